@@ -1,0 +1,18 @@
+//! The plan of one campaign, as data.
+//!
+//! The generator writes it as `campaign.plan.json` into the runner's crate, the runner reads it at start-up, and the
+//! results repository keeps a copy, so that reports speak in the names of the `.sesame` file. It is the only thing
+//! generator and runtime share, hence a crate of its own with no logic beyond look-ups.
+//!
+//! Guarantees of a plan written by the generator: every id is in range; every range has `low <= high`; times are in
+//! seconds of simulation time; every other quantity is in the unit its field, metric or topic declares (the unit on
+//! the wire), probabilities are in `0..=1`.
+
+mod model;
+mod test;
+
+pub use model::*;
+pub use test::*;
+
+/// The version of this schema. A runner refuses a plan of another version: both come from one release.
+pub const SCHEMA: u32 = 1;

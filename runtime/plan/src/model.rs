@@ -1,0 +1,538 @@
+//! What is fixed for a campaign: the space as far as this campaign sees it, and the campaign itself.
+
+use serde::{Deserialize, Serialize};
+
+use crate::KnownTest;
+
+macro_rules! id {
+    ($(#[$doc:meta])* $name:ident) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        #[serde(transparent)]
+        pub struct $name(pub u32);
+
+        impl $name {
+            /// The position in the plan's list of these.
+            pub fn index(self) -> usize {
+                self.0 as usize
+            }
+        }
+    };
+}
+
+id!(
+    /// A message type: position in [`CampaignPlan::messages`].
+    MessageId
+);
+id!(
+    /// A topic, or a group of topics: position in [`CampaignPlan::topics`].
+    TopicId
+);
+id!(
+    /// A metric: position in [`CampaignPlan::metrics`].
+    MetricId
+);
+id!(
+    /// A fuzzing operation: position in [`CampaignPlan::operations`].
+    OperationId
+);
+id!(
+    /// A known test: position in [`CampaignPlan::tests`].
+    KnownTestId
+);
+
+/// Everything a runner knows of its campaign.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CampaignPlan {
+    /// [`crate::SCHEMA`] of the generator that wrote the plan.
+    pub schema: u32,
+    /// Name and version of the generator, for example `sesamec 0.1.0`.
+    pub generator: String,
+    /// File name of the `.sesame` file, without its folder.
+    pub source: String,
+    /// The space's name.
+    pub space: String,
+    /// The space's doc comment, lines joined by `\n`; empty when there is none.
+    pub doc: String,
+    /// The simulator under test.
+    pub simulator: Simulator,
+    /// Message types, each after the types it contains.
+    pub messages: Vec<MessageType>,
+    /// All topics of the space, in declaration order.
+    pub topics: Vec<Topic>,
+    /// Nodes of the system.
+    pub nodes: Vec<Node>,
+    /// The metrics this campaign measures, in declaration order.
+    pub metrics: Vec<Metric>,
+    /// All requirements of the space.
+    pub requirements: Vec<Requirement>,
+    /// The operations this campaign (or a known test of it) may use, in declaration order.
+    pub operations: Vec<Operation>,
+    /// The known tests of the space whose operations and metrics are all in this plan.
+    pub tests: Vec<KnownTest>,
+    /// The campaign.
+    pub campaign: Campaign,
+}
+
+impl CampaignPlan {
+    /// The message type of an id.
+    pub fn message(&self, id: MessageId) -> &MessageType {
+        &self.messages[id.index()]
+    }
+    /// The topic of an id.
+    pub fn topic(&self, id: TopicId) -> &Topic {
+        &self.topics[id.index()]
+    }
+    /// The metric of an id.
+    pub fn metric(&self, id: MetricId) -> &Metric {
+        &self.metrics[id.index()]
+    }
+    /// The operation of an id.
+    pub fn operation(&self, id: OperationId) -> &Operation {
+        &self.operations[id.index()]
+    }
+    /// The known test of an id.
+    pub fn test(&self, id: KnownTestId) -> &KnownTest {
+        &self.tests[id.index()]
+    }
+}
+
+/// The simulator, and how the runner reaches it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Simulator {
+    /// Its name in the space.
+    pub name: String,
+    /// The transport and its settings.
+    pub transport: Transport,
+}
+
+/// How a runner exchanges messages with a simulator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Transport {
+    /// A Rust type linked into the runner, stepped in lock-step with the relay.
+    InProcess {
+        /// Path of the type, for example `kuka_cell_sim::Cell`.
+        path: String,
+        /// Simulation time of one step, in nanoseconds; positive.
+        step_ns: u64,
+    },
+}
+
+/// A named message type.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MessageType {
+    /// Its name in the space.
+    pub name: String,
+    /// Its doc comment.
+    pub doc: String,
+    /// Its fields, in declaration order.
+    pub fields: Vec<Field>,
+}
+
+/// One field of a message type.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Field {
+    /// Its name, as on the wire.
+    pub name: String,
+    /// Its doc comment.
+    pub doc: String,
+    /// Its type.
+    #[serde(rename = "type")]
+    pub ty: Type,
+}
+
+/// The type of a field or topic.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Type {
+    /// True or false.
+    Bool,
+    /// A whole number, in a unit if one is declared.
+    Int {
+        /// The unit on the wire.
+        unit: Option<String>,
+    },
+    /// A real number, in a unit if one is declared.
+    Real {
+        /// The unit on the wire.
+        unit: Option<String>,
+    },
+    /// Text.
+    Text,
+    /// A point in space: x, y, z, in a unit if one is declared.
+    Point {
+        /// The unit on the wire.
+        unit: Option<String>,
+    },
+    /// Any number of values of one type.
+    List {
+        /// The type of each element.
+        of: Box<Type>,
+    },
+    /// A message type.
+    Message {
+        /// Which.
+        id: MessageId,
+    },
+}
+
+/// A topic, or a group of topics of one type.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Topic {
+    /// Its name in the space.
+    pub name: String,
+    /// Its doc comment.
+    pub doc: String,
+    /// Names on the wire, matched exactly: one, or the written-out members of a group.
+    pub paths: Vec<String>,
+    /// What it carries.
+    #[serde(rename = "type")]
+    pub ty: Type,
+}
+
+/// A node: a program that publishes and subscribes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Node {
+    /// Its name in the space.
+    pub name: String,
+    /// Its doc comment.
+    pub doc: String,
+    /// Topics it publishes.
+    pub publishes: Vec<TopicId>,
+    /// Topics it subscribes to.
+    pub subscribes: Vec<TopicId>,
+}
+
+/// Which end of a metric is of interest to a tester.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Direction {
+    /// Larger is more dangerous.
+    Maximise,
+    /// Smaller is more dangerous (or cheaper).
+    Minimise,
+}
+
+/// A number computed from the messages of a test.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Metric {
+    /// Its name in the space.
+    pub name: String,
+    /// Its doc comment.
+    pub doc: String,
+    /// The unit of its value; `None` for a plain number.
+    pub unit: Option<String>,
+    /// Which way an objective on it goes; objectives always have one.
+    pub direction: Option<Direction>,
+    /// The value of a test in which it was never set.
+    pub default: Option<f64>,
+    /// Where its value comes from.
+    pub source: MetricSource,
+    /// Line of its declaration, from 1.
+    pub line: u32,
+}
+
+/// Where a metric's value comes from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum MetricSource {
+    /// The user's Rust code, called with each message of these topics.
+    Hook {
+        /// Its inputs, in declaration order.
+        topics: Vec<TopicId>,
+    },
+    /// The sum over operations of observed active time, clipped to the run, in seconds.
+    FuzzingTime,
+    /// The last value received.
+    Last {
+        /// Which value of which message.
+        input: FieldRef,
+    },
+}
+
+/// A value inside the messages of a topic.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FieldRef {
+    /// The topic.
+    pub topic: TopicId,
+    /// Field names from the message inwards; empty for a topic that carries the value itself.
+    pub path: Vec<String>,
+}
+
+/// What must hold of a metric's value. Bounds are in the metric's unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Bound {
+    /// `<= value`
+    AtMost {
+        /// The bound.
+        value: f64,
+    },
+    /// `< value`
+    Below {
+        /// The bound.
+        value: f64,
+    },
+    /// `>= value`
+    AtLeast {
+        /// The bound.
+        value: f64,
+    },
+    /// `> value`
+    Above {
+        /// The bound.
+        value: f64,
+    },
+    /// `== value`
+    Equal {
+        /// The bound.
+        value: f64,
+    },
+    /// `in [low, high]`, both ends included
+    Within {
+        /// Lower end.
+        low: f64,
+        /// Upper end.
+        high: f64,
+    },
+}
+
+impl Bound {
+    /// Whether a value keeps the bound. A NaN keeps none.
+    pub fn holds(self, x: f64) -> bool {
+        match self {
+            Bound::AtMost { value } => x <= value,
+            Bound::Below { value } => x < value,
+            Bound::AtLeast { value } => x >= value,
+            Bound::Above { value } => x > value,
+            Bound::Equal { value } => x == value,
+            Bound::Within { low, high } => (low..=high).contains(&x),
+        }
+    }
+}
+
+/// What must hold in every test.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Requirement {
+    /// Its name in the space, for example `R1`.
+    pub name: String,
+    /// Its sentence.
+    pub text: String,
+    /// The metric it bounds.
+    pub metric: MetricId,
+    /// The bound.
+    pub bound: Bound,
+}
+
+/// A fuzzing operation with its permitted ranges. A test holds instances of it, see [`crate::TestOperation`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Operation {
+    /// Its name in the space.
+    pub name: String,
+    /// Its doc comment.
+    pub doc: String,
+    /// The topic whose messages it disturbs.
+    pub topic: TopicId,
+    /// What it does to them.
+    pub kind: OperationKind,
+    /// The parameters a test chooses, in the order that [`OperationKind`] documents.
+    pub parameters: Vec<Parameter>,
+    /// The time outside of which it is never active (`within`); seconds, `start < end`.
+    pub within: Span,
+    /// Operations of a higher priority come first on a message; equal ones in declaration order. Default 0.
+    pub priority: i32,
+    /// Probability that a fresh test includes it. Default 1.
+    pub inclusion: f64,
+}
+
+/// A stretch of simulation time in seconds, `start <= end`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Span {
+    /// Where it starts, inclusive.
+    pub start: f64,
+    /// Where it ends, exclusive.
+    pub end: f64,
+}
+
+impl Span {
+    /// Its length in seconds.
+    pub fn length(self) -> f64 {
+        self.end - self.start
+    }
+}
+
+/// What an operation does to the messages of its topic.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum OperationKind {
+    /// Replaces or shifts a number by a fresh uniform draw per message. One parameter: a sub-range ([`Parameter`] of
+    /// shape [`Shape::Range`]) in the field's unit.
+    RandomValue {
+        /// Field names from the message inwards; empty for a topic that carries the number itself.
+        path: Vec<String>,
+        /// Whether the draw replaces the value or is added to it.
+        mode: ValueMode,
+        /// Whether the field is a whole number; the draw is then uniform over the whole numbers of the range.
+        integer: bool,
+    },
+    /// Drops each message independently. One parameter `loss`: the probability to drop, a value in `0..=1`.
+    PacketLoss,
+    /// Delays each message, order kept. One parameter `delay` in seconds: a value if fixed, else a sub-range.
+    Latency {
+        /// How each message's delay is drawn.
+        distribution: Distribution,
+        /// What becomes of held messages when the window ends.
+        drain: Drain,
+    },
+    /// Drops every message. No parameters.
+    Blackhole,
+}
+
+impl OperationKind {
+    /// The kind in words, as the `.sesame` file has it.
+    pub fn words(&self) -> &'static str {
+        match self {
+            OperationKind::RandomValue { mode: ValueMode::Absolute, .. } => "random absolute",
+            OperationKind::RandomValue { mode: ValueMode::Offset, .. } => "random offset",
+            OperationKind::PacketLoss => "packet loss",
+            OperationKind::Latency { .. } => "latency",
+            OperationKind::Blackhole => "blackhole",
+        }
+    }
+}
+
+/// Whether a random value replaces or shifts the original.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ValueMode {
+    /// The draw replaces the value.
+    Absolute,
+    /// The draw is added to the value.
+    Offset,
+}
+
+/// How the delay of each message is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Distribution {
+    /// The same for every message.
+    Fixed,
+    /// Uniform over the test's sub-range, drawn anew per message.
+    Uniform,
+}
+
+/// What becomes of held messages when an operation's window ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Drain {
+    /// Held ones go out on time, later ones queue behind them.
+    #[default]
+    Finish,
+    /// Held ones go out at once.
+    Flush,
+    /// Held ones are lost.
+    Drop,
+}
+
+/// A parameter of an operation: its permitted range in the space, and what a test makes of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Parameter {
+    /// Its name in a test, for example `offset`, `loss`, `delay`.
+    pub name: String,
+    /// Its unit; `None` for probabilities and plain numbers.
+    pub unit: Option<String>,
+    /// Lower end of what is permitted.
+    pub low: f64,
+    /// Upper end of what is permitted.
+    pub high: f64,
+    /// What a test chooses.
+    pub shape: Shape,
+    /// Whether only whole numbers are permitted.
+    pub integer: bool,
+}
+
+/// What a test chooses of a permitted range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// One value of it.
+    Value,
+    /// A sub-range of it.
+    Range,
+}
+
+/// A campaign.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Campaign {
+    /// Its name in the space.
+    pub name: String,
+    /// Its doc comment.
+    pub doc: String,
+    /// What the search optimises; each has a direction. Empty for a campaign that only repeats.
+    pub objectives: Vec<MetricId>,
+    /// The operations a test may hold.
+    pub operations: Vec<OperationId>,
+    /// How many operations a test holds.
+    pub count: Count,
+    /// How tests switch their operations on and off.
+    pub activation: ActivationMode,
+    /// How tests are found.
+    pub search: Search,
+    /// The one seed that decides everything; `run --seed` overrides it.
+    pub seed: u64,
+    /// Simulation time at which a test ends, in seconds.
+    pub end_after: f64,
+}
+
+/// Bounds of a count, both included.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Count {
+    /// At least.
+    pub min: u32,
+    /// At most.
+    pub max: u32,
+}
+
+/// How tests switch their operations on and off.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum ActivationMode {
+    /// In windows of simulation time.
+    Time,
+}
+
+/// How the tests of a campaign are found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Search {
+    /// NSGA-II (Deb 2002).
+    Nsga2 {
+        /// Tests per generation.
+        population: u32,
+        /// Tests in total.
+        evaluations: u32,
+    },
+    /// Independent random tests.
+    Random {
+        /// Tests in total.
+        evaluations: u32,
+    },
+    /// One known test again and again.
+    Repeat {
+        /// Which.
+        test: KnownTestId,
+        /// How often.
+        times: u32,
+    },
+}
+
+impl Search {
+    /// How many tests the campaign evaluates.
+    pub fn evaluations(&self) -> u32 {
+        match *self {
+            Search::Nsga2 { evaluations, .. } | Search::Random { evaluations } => evaluations,
+            Search::Repeat { times, .. } => times,
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! A test: the list of disturbances applied in one run of the simulator.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Bound, MetricId, OperationId};
+
+/// One test configuration: what a search evolves and a run applies. An empty list disturbs nothing.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Test {
+    /// Its operations. Order is no priority; an operation of the space may occur more than once.
+    pub operations: Vec<TestOperation>,
+}
+
+/// An operation of the space as one test applies it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TestOperation {
+    /// Which operation.
+    pub operation: OperationId,
+    /// When it is active.
+    pub activation: Activation,
+    /// A choice for each parameter of the operation, in the operation's order.
+    pub parameters: Vec<Choice>,
+    /// Seed of its draws, which are keyed by message index: repeating a test repeats its disturbance exactly.
+    pub draw_seed: u64,
+}
+
+/// When an operation of a test is active.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Activation {
+    /// For `start <= t < end`, in seconds of simulation time, inside the operation's `within`.
+    Time {
+        /// Where it starts.
+        start: f64,
+        /// Where it ends.
+        end: f64,
+    },
+}
+
+/// What a test chose for one parameter, in the parameter's unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Choice {
+    /// One value ([`crate::Shape::Value`]).
+    Value {
+        /// The value.
+        value: f64,
+    },
+    /// A sub-range, `low <= high` ([`crate::Shape::Range`]).
+    Range {
+        /// Lower end.
+        low: f64,
+        /// Upper end.
+        high: f64,
+    },
+}
+
+/// A test written by hand, with what is expected of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KnownTest {
+    /// Its name in the space.
+    pub name: String,
+    /// Its doc comment.
+    pub doc: String,
+    /// The test.
+    pub test: Test,
+    /// What must come out.
+    pub expectations: Vec<Expectation>,
+}
+
+/// What must come out of a known test.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Expectation {
+    /// The metric.
+    pub metric: MetricId,
+    /// The bound on its value.
+    pub bound: Bound,
+}

@@ -1,0 +1,32 @@
+//! What a generated SESAME test runner links.
+//!
+//! The core (relay, fuzzing operations, metrics, search) is sans-IO: messages and time in, messages and decisions out.
+//! Processes, sockets, files and clocks live in the rooms around it. Nothing here knows the `.sesame` language: a
+//! runner gets its campaign as a [`sesame_plan::CampaignPlan`].
+
+pub mod message;
+pub mod metric;
+pub mod observation;
+pub mod rng;
+mod runner;
+pub mod simulator;
+pub mod time;
+pub mod transport;
+pub mod value;
+
+pub use runner::{Runner, main};
+pub use sesame_plan as plan;
+
+/// The version of the interface between generated code and this crate.
+pub const GENERATOR_ABI: u32 = 1;
+
+/// Fails to compile when generated code was written for another version of the interface.
+#[macro_export]
+macro_rules! assert_generator_abi {
+    ($abi:literal) => {
+        const _: () = assert!(
+            $crate::GENERATOR_ABI == $abi,
+            "this runner was generated for another version of sesame-runtime: run `sesamec generate` again"
+        );
+    };
+}

@@ -1,0 +1,119 @@
+//! What was observed in one run of a test: what a worker reports and the results repository keeps.
+
+use serde::{Deserialize, Serialize};
+use sesame_plan::Span;
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Outcome {
+    /// It ran to its end, and what it disturbs was disturbed (or it disturbs nothing by design).
+    Completed,
+    /// It ran to its end, but no operation had any effect.
+    Void,
+    /// The simulator or a hook failed or panicked, or the worker process died.
+    Crash {
+        /// What is known of the cause.
+        message: String,
+    },
+    /// It took longer than its wall-clock limit and was stopped.
+    Timeout {
+        /// The limit, in seconds of wall time.
+        limit: f64,
+    },
+}
+
+impl Outcome {
+    /// One word for tables and the database.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Outcome::Completed => "completed",
+            Outcome::Void => "void",
+            Outcome::Crash { .. } => "crash",
+            Outcome::Timeout { .. } => "timeout",
+        }
+    }
+
+    /// What the word leaves out.
+    pub fn detail(&self) -> Option<String> {
+        match self {
+            Outcome::Completed | Outcome::Void => None,
+            Outcome::Crash { message } => Some(message.clone()),
+            Outcome::Timeout { limit } => Some(format!("stopped after {limit} s of wall time")),
+        }
+    }
+}
+
+/// What one run of a test showed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Observation {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Simulation time at which it ended, in seconds.
+    pub end: f64,
+    /// Per operation of the test, in its order; empty after a crash of the worker.
+    pub operations: Vec<OperationEffect>,
+    /// Per metric of the plan, in its order; empty after a crash of the worker.
+    pub metrics: Vec<MetricObservation>,
+    /// Messages the relay handled.
+    pub messages: u64,
+    /// What should be brought to the user's attention; ordered, bounded by whoever writes it.
+    pub warnings: Vec<String>,
+    /// Wall time in seconds spent in the run; never part of the digest.
+    pub wall: WallTime,
+}
+
+/// Where the wall time of a run went, in seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct WallTime {
+    /// The whole run as its worker saw it, simulator and relay together.
+    pub run: f64,
+}
+
+/// What one operation of a test did.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct OperationEffect {
+    /// Observed active intervals in seconds, clipped to the run, in order, none overlapping.
+    pub intervals: Vec<Span>,
+    /// What it counted.
+    pub counters: Counters,
+    /// Simulation time of its first effect, in seconds.
+    pub first_touch: Option<f64>,
+    /// Simulation time of its last effect, in seconds.
+    pub last_touch: Option<f64>,
+}
+
+/// What an operation counted. An operation had an effect when any but `seen` is above zero.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Counters {
+    /// Messages that reached it while it was active.
+    pub seen: u64,
+    /// Messages it changed.
+    pub changed: u64,
+    /// Messages it dropped.
+    pub dropped: u64,
+    /// Messages it held back.
+    pub delayed: u64,
+    /// Messages it made up.
+    pub injected: u64,
+    /// Side effects it had beside messages.
+    pub side_effects: u64,
+}
+
+impl Counters {
+    /// Whether the operation had any effect.
+    pub fn any_effect(&self) -> bool {
+        self.changed + self.dropped + self.delayed + self.injected + self.side_effects > 0
+    }
+}
+
+/// What a metric showed in one run.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct MetricObservation {
+    /// Its value: the last one at or before the end, or its default; `None` where there is neither.
+    pub value: Option<f64>,
+    /// Whether the value is one that was set, not the default.
+    pub set: bool,
+    /// Change points `(seconds, value)` in time order; the value holds until the next point. Always finite.
+    pub series: Vec<(f64, f64)>,
+}

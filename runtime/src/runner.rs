@@ -1,0 +1,25 @@
+//! What a generated crate hands to the runtime.
+
+use std::process::ExitCode;
+
+use crate::metric::HookEntry;
+use crate::transport::Connect;
+
+/// A campaign's runner: everything that generated code knows.
+#[derive(Debug, Clone, Copy)]
+pub struct Runner {
+    /// The plan, as `campaign.plan.json` holds it.
+    pub plan: &'static str,
+    /// Folder of the runner's crate; results go into `results/` inside it.
+    pub directory: &'static str,
+    /// The hooks this campaign uses.
+    pub hooks: &'static [HookEntry],
+    /// How the simulator is reached.
+    pub connect: Connect,
+}
+
+/// The runner's command line. A generated `main` is nothing but this call.
+pub fn main(runner: Runner) -> ExitCode {
+    let _ = runner;
+    ExitCode::FAILURE
+}

@@ -1,0 +1,218 @@
+//! The payload of a message: a small dynamic value.
+//!
+//! Topics are known only to the generated crate, the relay serves all of them; so the relay's payload is dynamic, and
+//! generated code turns it into typed messages for the user's hooks.
+
+use std::fmt;
+use std::ops::Deref;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+/// Text that is cheap to clone. Compares with and dereferences to `str`.
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Text(Arc<str>);
+
+impl Text {
+    /// The text itself.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl Deref for Text {
+    type Target = str;
+    fn deref(&self) -> &str {
+        &self.0
+    }
+}
+
+impl From<&str> for Text {
+    fn from(text: &str) -> Self {
+        Text(Arc::from(text))
+    }
+}
+
+impl From<String> for Text {
+    fn from(text: String) -> Self {
+        Text(Arc::from(text))
+    }
+}
+
+impl PartialEq<str> for Text {
+    fn eq(&self, other: &str) -> bool {
+        &*self.0 == other
+    }
+}
+
+impl PartialEq<&str> for Text {
+    fn eq(&self, other: &&str) -> bool {
+        &*self.0 == *other
+    }
+}
+
+impl fmt::Display for Text {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl fmt::Debug for Text {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Debug::fmt(&*self.0, f)
+    }
+}
+
+/// The field names shared by all records of one kind, so that a record carries only its values.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Fields(Box<[Text]>);
+
+impl Fields {
+    /// Names in order.
+    pub fn new<'a>(names: impl IntoIterator<Item = &'a str>) -> Arc<Fields> {
+        Arc::new(Fields(names.into_iter().map(Text::from).collect()))
+    }
+
+    /// The names, in order.
+    pub fn names(&self) -> &[Text] {
+        &self.0
+    }
+
+    /// The position of a name.
+    pub fn position(&self, name: &str) -> Option<usize> {
+        self.0.iter().position(|field| *field == *name)
+    }
+}
+
+/// A structured message: named values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    fields: Arc<Fields>,
+    values: Vec<Value>,
+}
+
+impl Record {
+    /// A record of these fields. There must be a value for each field.
+    pub fn new(fields: &Arc<Fields>, values: Vec<Value>) -> Self {
+        assert_eq!(fields.names().len(), values.len(), "a record has a value for each of its fields");
+        Record { fields: Arc::clone(fields), values }
+    }
+
+    /// The names of the fields.
+    pub fn fields(&self) -> &Arc<Fields> {
+        &self.fields
+    }
+
+    /// The value of a field.
+    pub fn get(&self, name: &str) -> Option<&Value> {
+        self.fields.position(name).map(|at| &self.values[at])
+    }
+
+    /// The value of a field, to be changed.
+    pub fn get_mut(&mut self, name: &str) -> Option<&mut Value> {
+        self.fields.position(name).map(|at| &mut self.values[at])
+    }
+
+    /// Names and values, in order.
+    pub fn iter(&self) -> impl Iterator<Item = (&Text, &Value)> {
+        self.fields.names().iter().zip(&self.values)
+    }
+}
+
+/// The payload of a message.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// True or false.
+    Bool(bool),
+    /// A whole number.
+    Int(i64),
+    /// A real number, in the unit the topic's type declares.
+    Real(f64),
+    /// Text.
+    Text(Text),
+    /// A point in space.
+    Point([f64; 3]),
+    /// Values in a row.
+    List(Vec<Value>),
+    /// Named values.
+    Record(Record),
+}
+
+impl Value {
+    /// The value at the end of a path of field names; `x`, `y`, `z` are fields of a point only for reading, see
+    /// [`Value::number_at`].
+    pub fn at<S: AsRef<str>>(&self, path: &[S]) -> Option<&Value> {
+        path.iter().try_fold(self, |value, name| match value {
+            Value::Record(record) => record.get(name.as_ref()),
+            _ => None,
+        })
+    }
+
+    /// As [`Value::at`], to be changed.
+    pub fn at_mut<S: AsRef<str>>(&mut self, path: &[S]) -> Option<&mut Value> {
+        path.iter().try_fold(self, |value, name| match value {
+            Value::Record(record) => record.get_mut(name.as_ref()),
+            _ => None,
+        })
+    }
+
+    /// The number at the end of a path: a real, a whole number, a truth value as 0 or 1.
+    pub fn number_at<S: AsRef<str>>(&self, path: &[S]) -> Option<f64> {
+        match self.at(path)? {
+            Value::Real(x) => Some(*x),
+            Value::Int(n) => Some(*n as f64),
+            Value::Bool(b) => Some(f64::from(u8::from(*b))),
+            _ => None,
+        }
+    }
+
+    /// What kind of value this is, in the words of the language.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Value::Bool(_) => "bool",
+            Value::Int(_) => "int",
+            Value::Real(_) => "real",
+            Value::Text(_) => "text",
+            Value::Point(_) => "point",
+            Value::List(_) => "list",
+            Value::Record(_) => "message",
+        }
+    }
+}
+
+impl From<f64> for Value {
+    fn from(x: f64) -> Self {
+        Value::Real(x)
+    }
+}
+impl From<i64> for Value {
+    fn from(n: i64) -> Self {
+        Value::Int(n)
+    }
+}
+impl From<bool> for Value {
+    fn from(b: bool) -> Self {
+        Value::Bool(b)
+    }
+}
+impl From<&str> for Value {
+    fn from(text: &str) -> Self {
+        Value::Text(text.into())
+    }
+}
+impl From<Text> for Value {
+    fn from(text: Text) -> Self {
+        Value::Text(text)
+    }
+}
+impl From<[f64; 3]> for Value {
+    fn from(point: [f64; 3]) -> Self {
+        Value::Point(point)
+    }
+}
+impl From<Record> for Value {
+    fn from(record: Record) -> Self {
+        Value::Record(record)
+    }
+}
