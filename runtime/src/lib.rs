@@ -4,15 +4,24 @@
 //! Processes, sockets, files and clocks live in the rooms around it. Nothing here knows the `.sesame` language: a
 //! runner gets its campaign as a [`sesame_plan::CampaignPlan`].
 
+pub mod activation;
+#[cfg(feature = "campaign")]
+pub mod campaign;
+pub mod evaluate;
+#[cfg(test)]
+mod fixture;
+pub mod fuzz;
 pub mod message;
 pub mod metric;
 pub mod observation;
+pub mod relay;
 pub mod rng;
 mod runner;
 pub mod simulator;
 pub mod time;
 pub mod transport;
 pub mod value;
+pub mod wire;
 
 pub use runner::{Runner, main};
 pub use sesame_plan as plan;

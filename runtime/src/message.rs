@@ -1,5 +1,7 @@
 //! From dynamic payloads to the typed messages of generated code.
 
+use sesame_plan::{CampaignPlan, Type};
+
 use crate::value::{Text, Value};
 
 /// A type that generated code and hooks see a payload as.
@@ -29,18 +31,45 @@ impl Mismatch {
     pub fn new(expected: &'static str, value: &Value) -> Self {
         Mismatch { path: Vec::new(), expected, found: value.kind() }
     }
+
+    fn missing(name: &str) -> Self {
+        Mismatch { path: vec![name.to_owned()], expected: "a value", found: "nothing" }
+    }
+
+    fn inside(mut self, name: &str) -> Self {
+        self.path.insert(0, name.to_owned());
+        self
+    }
+}
+
+/// Whether a payload is of a declared type. A message may have more fields than declared, never fewer.
+pub fn fits(plan: &CampaignPlan, ty: &Type, value: &Value) -> Result<(), Mismatch> {
+    match ty {
+        Type::Bool => bool::from_value(value).map(drop),
+        Type::Int { .. } => i64::from_value(value).map(drop),
+        Type::Real { .. } => f64::from_value(value).map(drop),
+        Type::Text => Text::from_value(value).map(drop),
+        Type::Point { .. } => <[f64; 3]>::from_value(value).map(drop),
+        Type::List { of } => {
+            let Value::List(items) = value else { return Err(Mismatch::new("list", value)) };
+            items.iter().enumerate().try_for_each(|(at, item)| fits(plan, of, item).map_err(|m| m.inside(&format!("[{at}]"))))
+        }
+        Type::Message { id } => {
+            let Value::Record(record) = value else { return Err(Mismatch::new("message", value)) };
+            plan.message(*id).fields.iter().try_for_each(|field| {
+                let value = record.get(&field.name).ok_or_else(|| Mismatch::missing(&field.name))?;
+                fits(plan, &field.ty, value).map_err(|mismatch| mismatch.inside(&field.name))
+            })
+        }
+    }
 }
 
 /// A field of a message, read as its declared type.
 pub fn field<T: FromValue>(message: &Value, name: &str) -> Result<T, Mismatch> {
     let Value::Record(record) = message else { return Err(Mismatch::new("message", message)) };
-    let within = |mut mismatch: Mismatch| {
-        mismatch.path.insert(0, name.to_owned());
-        mismatch
-    };
     match record.get(name) {
-        Some(value) => T::from_value(value).map_err(within),
-        None => Err(within(Mismatch { path: Vec::new(), expected: "a value", found: "nothing" })),
+        Some(value) => T::from_value(value).map_err(|mismatch| mismatch.inside(name)),
+        None => Err(Mismatch::missing(name)),
     }
 }
 
@@ -97,12 +126,7 @@ impl<T: FromValue> FromValue for Vec<T> {
         items
             .iter()
             .enumerate()
-            .map(|(at, item)| {
-                T::from_value(item).map_err(|mut mismatch| {
-                    mismatch.path.insert(0, format!("[{at}]"));
-                    mismatch
-                })
-            })
+            .map(|(at, item)| T::from_value(item).map_err(|mismatch| mismatch.inside(&format!("[{at}]"))))
             .collect()
     }
 }

@@ -2,9 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use crate::observation::MetricObservation;
 use crate::time::SimTime;
-use crate::value::Value;
+use crate::value::{Text, Value};
+
+mod engine;
+
+pub use engine::{MetricTable, Metrics, MissingHook};
 
 /// A user's metric hook as the runtime calls it. Generated code implements it around the typed hook trait.
 pub trait Hook {
@@ -29,7 +32,7 @@ pub struct HookEntry {
 #[derive(Debug, Default)]
 pub struct Context {
     now: SimTime,
-    topic: String,
+    topic: Text,
     value: Option<f64>,
     series: Vec<(f64, f64)>,
     last_times: BTreeMap<String, SimTime>,
@@ -56,7 +59,7 @@ impl Context {
     /// Sets the metric's value. What is not finite is refused and reported as a warning of the run.
     pub fn set(&mut self, value: f64) {
         if !value.is_finite() {
-            self.problem.get_or_insert_with(|| format!("refused the value {value} at {}", self.now));
+            self.note(format!("refused the value {value} at {}", self.now));
             return;
         }
         if self.value == Some(value) {
@@ -104,10 +107,11 @@ impl Context {
 
     /// Says that a message was not of its declared type; generated code does.
     pub fn mismatch(&mut self, mismatch: &crate::message::Mismatch) {
-        self.problem.get_or_insert_with(|| format!("a message on `{}` is not of its declared type: {mismatch}", self.topic));
+        self.note(format!("a message on `{}` is not of its declared type: {mismatch}", self.topic));
     }
 
-    pub(crate) fn observation(&self) -> MetricObservation {
-        MetricObservation { value: self.value, set: self.value.is_some(), series: self.series.clone() }
+    /// Keeps the first problem of a run for its warnings.
+    fn note(&mut self, problem: String) {
+        self.problem.get_or_insert(problem);
     }
 }

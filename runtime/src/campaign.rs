@@ -1,0 +1,12 @@
+//! A campaign: ask the search for tests, run them in worker processes, record what was observed, tell the search.
+//!
+//! The supervisor alone owns search and results. Tests run in workers, so that a simulator or hook that crashes or
+//! hangs takes nothing with it. Nothing here depends on how many workers there are: tests are numbered when they are
+//! asked for, and told in that order.
+
+mod frames;
+mod pool;
+mod worker;
+
+pub use pool::{Job, Pool, PoolError, PoolSettings};
+pub use worker::serve;

@@ -1,0 +1,285 @@
+//! The supervisor's side of its workers: starts them, hands out tests, and deals with those that die or hang.
+
+use std::fs::{self, File};
+use std::io::{self, Read, Seek, SeekFrom};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, mpsc};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use super::frames::{self, Hello, Reply};
+use super::worker::{crashed, empty};
+use crate::observation::{Observation, Outcome};
+
+pub use super::frames::Job;
+
+/// How long a fresh worker may take to report.
+const START_LIMIT: Duration = Duration::from_secs(30);
+
+/// How a pool runs its workers.
+#[derive(Debug, Clone)]
+pub struct PoolSettings {
+    /// How many workers; at least one.
+    pub workers: usize,
+    /// The program that is a worker when called with `worker ADDRESS`: the runner itself.
+    pub program: PathBuf,
+    /// Folder in which each worker gets a folder of its own.
+    pub directory: PathBuf,
+    /// Wall time after which a test is stopped and its worker replaced.
+    pub timeout: Duration,
+}
+
+/// A worker that cannot be started.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot start worker {worker}: {reason}")]
+pub struct PoolError {
+    /// Which one, from 1.
+    pub worker: usize,
+    /// Why.
+    pub reason: String,
+}
+
+/// Worker processes and the threads that talk to them.
+pub struct Pool {
+    jobs: Option<mpsc::Sender<Job>>,
+    results: mpsc::Receiver<Result<Reply, PoolError>>,
+    lanes: Vec<JoinHandle<()>>,
+    stop: Arc<AtomicBool>,
+    in_flight: usize,
+}
+
+impl Pool {
+    /// Starts the workers.
+    pub fn start(settings: &PoolSettings) -> Result<Self, PoolError> {
+        let (jobs, queue) = mpsc::channel();
+        let queue = Arc::new(Mutex::new(queue));
+        let (sender, results) = mpsc::channel();
+        let stop = Arc::new(AtomicBool::new(false));
+        let mut lanes = Vec::with_capacity(settings.workers);
+        for number in 1..=settings.workers.max(1) {
+            let mut lane = Lane { number, settings: settings.clone(), worker: None, stop: Arc::clone(&stop) };
+            lane.worker = Some(Worker::start(&lane)?);
+            let (queue, sender) = (Arc::clone(&queue), sender.clone());
+            lanes.push(thread::spawn(move || lane.work(&queue, &sender)));
+        }
+        Ok(Pool { jobs: Some(jobs), results, lanes, stop, in_flight: 0 })
+    }
+
+    /// Hands out a test.
+    pub fn submit(&mut self, job: Job) {
+        let sent = self.jobs.as_ref().is_some_and(|jobs| jobs.send(job).is_ok());
+        assert!(sent, "lanes live as long as their pool");
+        self.in_flight += 1;
+    }
+
+    /// The next test that ended, with its number; `None` after `wait` without one.
+    pub fn next(&mut self, wait: Duration) -> Result<Option<(u32, Observation)>, PoolError> {
+        match self.results.recv_timeout(wait) {
+            Ok(result) => {
+                self.in_flight -= 1;
+                result.map(|reply| Some((reply.number, reply.observation)))
+            }
+            Err(_) => Ok(None),
+        }
+    }
+}
+
+impl Drop for Pool {
+    /// Stops the workers, whatever they do.
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        self.jobs = None;
+        for lane in self.lanes.drain(..) {
+            // A lane that panicked has nothing left to stop: its worker was ended when it unwound.
+            lane.join().ok();
+        }
+    }
+}
+
+/// One worker process after another, and the thread that feeds them.
+struct Lane {
+    number: usize,
+    settings: PoolSettings,
+    worker: Option<Worker>,
+    stop: Arc<AtomicBool>,
+}
+
+impl Lane {
+    fn work(mut self, queue: &Mutex<mpsc::Receiver<Job>>, results: &mpsc::Sender<Result<Reply, PoolError>>) {
+        loop {
+            let job = match queue.lock() {
+                Ok(queue) => queue.recv(),
+                Err(_) => return,
+            };
+            let Ok(job) = job else { return };
+            if self.stop.load(Ordering::Relaxed) {
+                return;
+            }
+            let reply = self.run(&job).map(|observation| Reply { number: job.number, observation });
+            if results.send(reply).is_err() {
+                return;
+            }
+        }
+    }
+
+    fn run(&mut self, job: &Job) -> Result<Observation, PoolError> {
+        let mut worker = match self.worker.take() {
+            Some(worker) => worker,
+            None => Worker::start(self)?,
+        };
+        let asked = Instant::now();
+        match worker.ask(job, self.settings.timeout, &self.stop) {
+            Ok(reply) => {
+                self.worker = Some(worker);
+                Ok(reply.observation)
+            }
+            Err(error) if error.kind() == io::ErrorKind::TimedOut => {
+                Ok(empty(Outcome::Timeout { limit: self.settings.timeout.as_secs_f64() }))
+            }
+            Err(error) => {
+                let how = worker.how_it_ended(&error);
+                let output = last_lines(&output_file(&self.directory()), 5);
+                let after = asked.elapsed().as_secs_f64();
+                Ok(crashed(format!("the worker process ended after {after:.1} s: {how}{output}")))
+            }
+        }
+    }
+
+    fn directory(&self) -> PathBuf {
+        self.settings.directory.join(self.number.to_string())
+    }
+
+    fn refuse(&self, reason: impl ToString) -> PoolError {
+        PoolError { worker: self.number, reason: reason.to_string() }
+    }
+}
+
+/// One worker process. Dropping it ends the process.
+struct Worker {
+    process: Child,
+    stream: Option<TcpStream>,
+}
+
+impl Worker {
+    fn start(lane: &Lane) -> Result<Self, PoolError> {
+        let directory = lane.directory();
+        let refuse = |reason: io::Error| lane.refuse(reason);
+        fs::create_dir_all(&directory).map_err(refuse)?;
+        let output = File::options().create(true).append(true).open(output_file(&directory)).map_err(refuse)?;
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(refuse)?;
+        let token = token().map_err(|error| lane.refuse(error))?;
+        let process = Command::new(&lane.settings.program)
+            .arg("worker")
+            .arg(listener.local_addr().map_err(refuse)?.to_string())
+            .env("SESAME_WORKER_TOKEN", &token)
+            .env("SESAME_WORKER", lane.number.to_string())
+            .current_dir(&directory)
+            .stdin(Stdio::null())
+            .stdout(output.try_clone().map_err(refuse)?)
+            .stderr(output)
+            .spawn()
+            .map_err(|error| lane.refuse(format!("{}: {error}", lane.settings.program.display())))?;
+        let mut worker = Worker { process, stream: None };
+        worker.stream = Some(worker.accept(&listener, &token, lane)?);
+        Ok(worker)
+    }
+
+    /// Waits for the worker's connection. Whoever else connects, without the token, is turned away.
+    fn accept(&mut self, listener: &TcpListener, token: &str, lane: &Lane) -> Result<TcpStream, PoolError> {
+        let refuse = |error: io::Error| lane.refuse(error);
+        listener.set_nonblocking(true).map_err(refuse)?;
+        let started = Instant::now();
+        while started.elapsed() < START_LIMIT {
+            if let Some(status) = self.process.try_wait().map_err(refuse)? {
+                let output = last_lines(&output_file(&lane.directory()), 10);
+                return Err(lane.refuse(format!("it ended at once, {status}{output}")));
+            }
+            match listener.accept() {
+                Ok((mut stream, _)) => {
+                    stream.set_nonblocking(false).map_err(refuse)?;
+                    stream.set_nodelay(true).map_err(refuse)?;
+                    stream.set_read_timeout(Some(Duration::from_secs(5))).map_err(refuse)?;
+                    if frames::receive::<Hello>(&mut stream).is_ok_and(|hello| hello.token == token) {
+                        return Ok(stream);
+                    }
+                }
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => thread::sleep(Duration::from_millis(2)),
+                Err(error) => return Err(lane.refuse(error)),
+            }
+        }
+        Err(lane.refuse(format!("it did not report within {} s", START_LIMIT.as_secs())))
+    }
+
+    /// Runs a test. The error is `TimedOut` when it took too long or the pool was told to stop.
+    fn ask(&mut self, job: &Job, timeout: Duration, stop: &AtomicBool) -> io::Result<Reply> {
+        let stream = self.stream.as_mut().ok_or(io::ErrorKind::NotConnected)?;
+        frames::send(stream, job)?;
+        let asked = Instant::now();
+        // Short waits for the first byte, so that a stop is noticed; then the frame is read in one go.
+        stream.set_read_timeout(Some(Duration::from_millis(100)))?;
+        loop {
+            match stream.peek(&mut [0]) {
+                Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+                Ok(_) => break,
+                Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
+                    if asked.elapsed() >= timeout || stop.load(Ordering::Relaxed) {
+                        return Err(io::ErrorKind::TimedOut.into());
+                    }
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        stream.set_read_timeout(Some(Duration::from_secs(60)))?;
+        frames::receive(stream)
+    }
+
+    fn how_it_ended(&mut self, error: &io::Error) -> String {
+        let patience = Instant::now();
+        while patience.elapsed() < Duration::from_secs(2) {
+            match self.process.try_wait() {
+                Ok(Some(status)) => return status.to_string(),
+                Ok(None) => thread::sleep(Duration::from_millis(5)),
+                Err(_) => break,
+            }
+        }
+        error.to_string()
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        // Closing the connection ends a healthy worker; killing ends one that hangs. Both may already be gone.
+        self.stream = None;
+        self.process.kill().ok();
+        self.process.wait().ok();
+    }
+}
+
+fn output_file(directory: &Path) -> PathBuf {
+    directory.join("output.log")
+}
+
+/// The end of what a worker printed, ready to be put behind a message.
+fn last_lines(path: &Path, count: usize) -> String {
+    let read = || -> io::Result<String> {
+        let mut file = File::open(path)?;
+        let length = file.metadata()?.len();
+        file.seek(SeekFrom::Start(length.saturating_sub(4096)))?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes)?;
+        Ok(String::from_utf8_lossy(&bytes).into_owned())
+    };
+    let text = read().unwrap_or_default();
+    let lines: Vec<&str> = text.lines().collect();
+    let tail = &lines[lines.len().saturating_sub(count)..];
+    if tail.is_empty() { String::new() } else { format!("; its last words:\n{}", tail.join("\n")) }
+}
+
+fn token() -> Result<String, getrandom::Error> {
+    let high = getrandom::u64()?;
+    let low = getrandom::u64()?;
+    Ok(format!("{high:016x}{low:016x}"))
+}

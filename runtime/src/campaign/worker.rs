@@ -1,0 +1,90 @@
+//! A worker process: runs the tests it is sent, one after another, until the supervisor is gone.
+
+use std::io;
+use std::net::{SocketAddr, TcpStream};
+use std::panic::{self, AssertUnwindSafe};
+use std::sync::Mutex;
+use std::sync::mpsc;
+use std::thread;
+
+use sesame_plan::CampaignPlan;
+
+use super::frames::{self, Hello, Job, Reply};
+use crate::evaluate::evaluate;
+use crate::metric::MetricTable;
+use crate::observation::{Observation, Outcome, WallTime};
+use crate::runner::Runner;
+use crate::wire::WireTable;
+
+/// The last panic's place and words, kept by the panic hook for the test's outcome.
+static LAST_PANIC: Mutex<Option<String>> = Mutex::new(None);
+
+/// Serves the supervisor at this address until it closes the connection.
+///
+/// A panic of the simulator or of a hook is the outcome of its test; the worker goes on with a fresh connection to the
+/// simulator.
+pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: SocketAddr, token: String) -> io::Result<()> {
+    let mut stream = TcpStream::connect(supervisor)?;
+    stream.set_nodelay(true)?;
+    frames::send(&mut stream, &Hello { token })?;
+    panic::set_hook(Box::new(|panic| {
+        eprintln!("{panic}");
+        if let Ok(mut last) = LAST_PANIC.lock() {
+            *last = Some(panic.to_string());
+        }
+    }));
+
+    let wires = WireTable::new(plan);
+    let metrics = MetricTable::new(plan, &wires, runner.hooks).map_err(io::Error::other)?;
+    let jobs = read_jobs(stream.try_clone()?);
+    let mut transport = None;
+    for Job { number, test, simulator_seed } in jobs {
+        let run = AssertUnwindSafe(|| {
+            let transport = transport.get_or_insert_with(|| (runner.connect.0)(plan));
+            evaluate(plan, &wires, &metrics, transport.as_mut(), &test, simulator_seed)
+        });
+        let observation = match panic::catch_unwind(run) {
+            Ok(Ok(observation)) => observation,
+            Ok(Err(misfit)) => crashed(misfit.to_string()),
+            Err(_) => {
+                transport = None;
+                let words = LAST_PANIC.lock().ok().and_then(|mut last| last.take());
+                crashed(words.unwrap_or_else(|| "a panic without words".to_owned()))
+            }
+        };
+        frames::send(&mut stream, &Reply { number, observation })?;
+    }
+    Ok(())
+}
+
+/// Reads jobs in a thread of its own. When the supervisor is gone the process ends at once, even in the middle of a
+/// test that hangs, so that no worker outlives its supervisor.
+fn read_jobs(mut stream: TcpStream) -> mpsc::Receiver<Job> {
+    let (sender, jobs) = mpsc::channel();
+    thread::spawn(move || {
+        while let Ok(job) = frames::receive(&mut stream) {
+            if sender.send(job).is_err() {
+                return;
+            }
+        }
+        std::process::exit(0);
+    });
+    jobs
+}
+
+/// The observation of a run that left nothing but its cause.
+pub(super) fn crashed(message: String) -> Observation {
+    empty(Outcome::Crash { message })
+}
+
+pub(super) fn empty(outcome: Outcome) -> Observation {
+    Observation {
+        outcome,
+        end: 0.0,
+        operations: Vec::new(),
+        metrics: Vec::new(),
+        messages: 0,
+        warnings: Vec::new(),
+        wall: WallTime::default(),
+    }
+}

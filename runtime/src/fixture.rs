@@ -1,0 +1,123 @@
+//! Small plans for the runtime's own tests.
+
+use sesame_plan::{
+    Activation, ActivationMode, Campaign, CampaignPlan, Choice, Count, Distribution, Drain, Field, FieldRef, MessageId,
+    MessageType, Metric, MetricSource, Operation, OperationId, OperationKind, Parameter, SCHEMA, Search, Shape,
+    Simulator, Span, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode,
+};
+
+/// Topic `command` of reals, topic `zones` with two members of `Zone { level: real, count: int }`.
+pub(crate) fn plan(operations: Vec<Operation>) -> CampaignPlan {
+    let ids = (0u32..).take(operations.len()).map(OperationId).collect();
+    let topic = |name: &str, paths: &[&str], ty| Topic {
+        name: name.to_owned(),
+        doc: String::new(),
+        paths: paths.iter().map(|&path| path.to_owned()).collect(),
+        ty,
+    };
+    let field = |name: &str, ty| Field { name: name.to_owned(), doc: String::new(), ty };
+    let metric = |name: &str, source| Metric {
+        name: name.to_owned(),
+        doc: String::new(),
+        unit: None,
+        direction: None,
+        default: None,
+        source,
+        line: 1,
+    };
+    CampaignPlan {
+        schema: SCHEMA,
+        generator: "test".to_owned(),
+        source: "test.sesame".to_owned(),
+        space: "test".to_owned(),
+        doc: String::new(),
+        simulator: Simulator {
+            name: "sim".to_owned(),
+            transport: Transport::InProcess { path: "sim::Sim".to_owned(), step_ns: 100_000_000 },
+        },
+        messages: vec![MessageType {
+            name: "Zone".to_owned(),
+            doc: String::new(),
+            fields: vec![field("level", Type::Real { unit: None }), field("count", Type::Int { unit: None })],
+        }],
+        topics: vec![
+            topic("command", &["arm/command"], Type::Real { unit: None }),
+            topic("zones", &["zones/Z1", "zones/Z2"], Type::Message { id: MessageId(0) }),
+        ],
+        nodes: Vec::new(),
+        metrics: vec![
+            metric("fuzzing_time", MetricSource::FuzzingTime),
+            metric(
+                "last_command",
+                MetricSource::Last { input: FieldRef { topic: TopicId(0), path: Vec::new() } },
+            ),
+        ],
+        requirements: Vec::new(),
+        operations,
+        tests: Vec::new(),
+        campaign: Campaign {
+            name: "campaign".to_owned(),
+            doc: String::new(),
+            objectives: Vec::new(),
+            operations: ids,
+            count: Count { min: 1, max: 5 },
+            activation: ActivationMode::Time,
+            search: Search::Random { evaluations: 1 },
+            seed: 1,
+            end_after: 10.0,
+        },
+    }
+}
+
+/// An operation on a topic, permitted in the first ten seconds.
+pub(crate) fn operation(topic: u32, kind: OperationKind) -> Operation {
+    let parameter = |name: &str, low, high, shape, integer| Parameter {
+        name: name.to_owned(),
+        unit: None,
+        low,
+        high,
+        shape,
+        integer,
+    };
+    let parameters = match &kind {
+        OperationKind::RandomValue { integer, .. } => vec![parameter("offset", -9.0, 9.0, Shape::Range, *integer)],
+        OperationKind::PacketLoss => vec![parameter("loss", 0.0, 1.0, Shape::Value, false)],
+        OperationKind::Latency { distribution: Distribution::Fixed, .. } => {
+            vec![parameter("delay", 0.0, 5.0, Shape::Value, false)]
+        }
+        OperationKind::Latency { .. } => vec![parameter("delay", 0.0, 5.0, Shape::Range, false)],
+        OperationKind::Blackhole => Vec::new(),
+    };
+    Operation {
+        name: kind.words().replace(' ', "_"),
+        doc: String::new(),
+        topic: TopicId(topic),
+        kind,
+        parameters,
+        within: Span { start: 0.0, end: 10.0 },
+        priority: 0,
+        inclusion: 1.0,
+    }
+}
+
+pub(crate) fn offset(path: &[&str], mode: ValueMode, integer: bool) -> OperationKind {
+    OperationKind::RandomValue { path: path.iter().map(|&name| name.to_owned()).collect(), mode, integer }
+}
+
+pub(crate) fn latency(distribution: Distribution, drain: Drain) -> OperationKind {
+    OperationKind::Latency { distribution, drain }
+}
+
+/// A use of an operation between two times.
+pub(crate) fn use_of(operation: u32, start: f64, end: f64, choice: Option<Choice>, draw_seed: u64) -> TestOperation {
+    TestOperation {
+        operation: OperationId(operation),
+        activation: Activation::Time { start, end },
+        parameters: choice.into_iter().collect(),
+        draw_seed,
+    }
+}
+
+pub(crate) fn test_of(operations: Vec<TestOperation>) -> Test {
+    Test { operations }
+}

@@ -1,0 +1,120 @@
+//! Fuzzing operations: what an active operation does to one message.
+//!
+//! Draws are keyed by the operation's draw seed and the message's index on its wire, so they do not depend on what
+//! happened before: repeating a test repeats its disturbance, and a shorter window disturbs its messages just the same.
+
+mod latency;
+mod packet_loss;
+mod random_value;
+
+use sesame_plan::{Choice, Operation, OperationKind, TestOperation};
+
+use crate::rng;
+use crate::time::SimTime;
+use crate::value::Value;
+
+pub use latency::Latency;
+pub use packet_loss::PacketLoss;
+pub use random_value::RandomValue;
+
+/// An operation with the choices of one test.
+#[derive(Debug, Clone)]
+pub enum Disturbance {
+    /// Replaces or shifts a number.
+    RandomValue(RandomValue),
+    /// Drops some messages.
+    PacketLoss(PacketLoss),
+    /// Delays messages.
+    Latency(Latency),
+    /// Drops all messages.
+    Blackhole,
+}
+
+/// What becomes of a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fate {
+    /// It goes on as it is.
+    Unchanged,
+    /// It goes on, changed.
+    Changed,
+    /// It is gone.
+    Dropped,
+    /// It goes on this much later, not before messages held earlier.
+    Delayed(SimTime),
+}
+
+/// The draws of one operation for one message.
+#[derive(Debug, Clone, Copy)]
+pub struct Draws {
+    seed: u64,
+    message: u64,
+}
+
+impl Draws {
+    /// The draws for the `index`th message on the `member`th wire of the operation's topic.
+    pub fn new(draw_seed: u64, member: u64, index: u64) -> Self {
+        let seed = if member == 0 { draw_seed } else { rng::derive_seed(draw_seed, "member", &[member]) };
+        Draws { seed, message: index }
+    }
+
+    /// The `n`th draw, uniform in `[0, 1)`.
+    pub fn unit(self, n: u64) -> f64 {
+        rng::keyed_unit(self.seed, self.message, n)
+    }
+}
+
+impl Disturbance {
+    /// Applies a test's choices to an operation of the space. A plan guarantees that they fit; choices read from
+    /// elsewhere are refused with a reason.
+    pub fn new(operation: &Operation, test: &TestOperation) -> Result<Self, ChoiceError> {
+        let refuse = |reason: String| Err(ChoiceError { operation: operation.name.clone(), reason });
+        if operation.parameters.len() != test.parameters.len() {
+            return refuse(format!("has {} parameters, not {}", operation.parameters.len(), test.parameters.len()));
+        }
+        for (parameter, choice) in operation.parameters.iter().zip(&test.parameters) {
+            let (low, high) = bounds(*choice);
+            if !(parameter.low <= low && low <= high && high <= parameter.high) {
+                return refuse(format!(
+                    "`{}` permits [{}, {}], not [{low}, {high}]",
+                    parameter.name, parameter.low, parameter.high
+                ));
+            }
+        }
+        let range = || test.parameters.first().copied().map_or((0.0, 0.0), bounds);
+        Ok(match &operation.kind {
+            OperationKind::RandomValue { path, mode, integer } => {
+                Disturbance::RandomValue(RandomValue { path: path.clone(), mode: *mode, integer: *integer, range: range() })
+            }
+            OperationKind::PacketLoss => Disturbance::PacketLoss(PacketLoss { loss: range().0 }),
+            OperationKind::Latency { drain, .. } => Disturbance::Latency(Latency { delay: range(), drain: *drain }),
+            OperationKind::Blackhole => Disturbance::Blackhole,
+        })
+    }
+
+    /// What becomes of a message while the operation is active; the message may be changed in place.
+    pub fn apply(&self, draws: Draws, value: &mut Value) -> Fate {
+        match self {
+            Disturbance::RandomValue(operation) => operation.apply(draws, value),
+            Disturbance::PacketLoss(operation) => operation.apply(draws),
+            Disturbance::Latency(operation) => operation.apply(draws),
+            Disturbance::Blackhole => Fate::Dropped,
+        }
+    }
+}
+
+fn bounds(choice: Choice) -> (f64, f64) {
+    match choice {
+        Choice::Value { value } => (value, value),
+        Choice::Range { low, high } => (low, high),
+    }
+}
+
+/// A test whose choices do not fit the operation.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("operation `{operation}` {reason}")]
+pub struct ChoiceError {
+    /// The operation.
+    pub operation: String,
+    /// What does not fit.
+    pub reason: String,
+}

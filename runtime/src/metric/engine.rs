@@ -1,0 +1,155 @@
+//! All metrics of one run: which message goes to which, and what comes out.
+
+use sesame_plan::{CampaignPlan, MetricSource};
+
+use super::{Context, Hook, HookEntry};
+use crate::observation::{MetricObservation, OperationEffect};
+use crate::time::SimTime;
+use crate::value::{Text, Value};
+use crate::wire::{Wire, WireTable};
+
+/// The metrics of a plan with their wiring; shared by all runs.
+pub struct MetricTable<'p> {
+    plan: &'p CampaignPlan,
+    hooks: Vec<Option<HookEntry>>,
+    /// Per wire: the metrics that want its messages, with the position of its topic among their inputs.
+    taps: Vec<Vec<(usize, usize)>>,
+    paths: Vec<Text>,
+}
+
+/// A hook that the plan wants and the runner does not have.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("metric `{0}` has no hook in this runner: run `sesamec generate` again")]
+pub struct MissingHook(pub String);
+
+impl<'p> MetricTable<'p> {
+    /// Wires the metrics of a plan to its topics and to the runner's hooks.
+    pub fn new(plan: &'p CampaignPlan, wires: &WireTable, hooks: &[HookEntry]) -> Result<Self, MissingHook> {
+        let mut found = Vec::with_capacity(plan.metrics.len());
+        let mut taps = vec![Vec::new(); wires.len()];
+        for (at, metric) in plan.metrics.iter().enumerate() {
+            let topics = match &metric.source {
+                MetricSource::Hook { topics } => topics.as_slice(),
+                MetricSource::FuzzingTime => &[],
+                MetricSource::Last { input } => std::slice::from_ref(&input.topic),
+            };
+            for wire in wires.iter() {
+                let input = topics.iter().position(|&topic| topic == wires.topic(wire));
+                taps[wire.index()].extend(input.map(|input| (at, input)));
+            }
+            found.push(match metric.source {
+                MetricSource::Hook { .. } => {
+                    let entry = hooks.iter().find(|hook| hook.metric == metric.name);
+                    Some(*entry.ok_or_else(|| MissingHook(metric.name.clone()))?)
+                }
+                _ => None,
+            });
+        }
+        let paths = wires.iter().map(|wire| Text::from(wires.path(wire))).collect();
+        Ok(MetricTable { plan, hooks: found, taps, paths })
+    }
+
+    /// Fresh metrics for one run.
+    pub fn start(&self) -> Metrics<'_> {
+        let states = self
+            .hooks
+            .iter()
+            .map(|hook| {
+                let mut state = State { hook: hook.map(|hook| (hook.build)()), context: Context::default() };
+                if let Some(hook) = &mut state.hook {
+                    hook.on_start(&mut state.context);
+                }
+                state
+            })
+            .collect();
+        Metrics { table: self, states }
+    }
+}
+
+/// The metrics of one run.
+pub struct Metrics<'p> {
+    table: &'p MetricTable<'p>,
+    states: Vec<State>,
+}
+
+struct State {
+    hook: Option<Box<dyn Hook>>,
+    context: Context,
+}
+
+impl Metrics<'_> {
+    /// A message, as the simulator sent it.
+    pub fn message(&mut self, now: SimTime, wire: Wire, value: &Value) {
+        for &(at, input) in &self.table.taps[wire.index()] {
+            let State { hook, context } = &mut self.states[at];
+            context.now = now;
+            context.topic.clone_from(&self.table.paths[wire.index()]);
+            match (&self.table.plan.metrics[at].source, hook) {
+                (MetricSource::Hook { .. }, Some(hook)) => hook.on_message(input, value, context),
+                (MetricSource::Last { input }, _) => match value.number_at(&input.path) {
+                    Some(number) => context.set(number),
+                    None => context.note(format!("a message on `{}` has no number `{}`", context.topic, input.path.join("."))),
+                },
+                _ => {}
+            }
+        }
+    }
+
+    /// Closes the run: a metric never set takes its default. Also what the user should know, one line per metric.
+    pub fn finish(mut self, end: SimTime, operations: &[OperationEffect]) -> (Vec<MetricObservation>, Vec<String>) {
+        let mut warnings = Vec::new();
+        let mut observations = Vec::with_capacity(self.states.len());
+        for (state, metric) in self.states.iter_mut().zip(&self.table.plan.metrics) {
+            let context = &mut state.context;
+            context.now = end;
+            if let Some(hook) = &mut state.hook {
+                hook.on_end(context);
+            }
+            if matches!(metric.source, MetricSource::FuzzingTime) {
+                for (time, total) in fuzzing_time(operations) {
+                    context.now = SimTime::from_seconds(time);
+                    context.set(total);
+                }
+            }
+            warnings.extend(context.problem.take().map(|problem| format!("metric `{}`: {problem}", metric.name)));
+            let set = context.value.is_some();
+            let value = context.value.or(metric.default);
+            observations.push(MetricObservation { value, set, series: std::mem::take(&mut context.series) });
+        }
+        (observations, warnings)
+    }
+
+    /// The metrics whose hook has said so far that it is not filled in, by position in the plan.
+    pub fn unimplemented(&self) -> impl Iterator<Item = usize> + '_ {
+        self.states.iter().enumerate().filter(|(_, state)| state.context.unimplemented).map(|(at, _)| at)
+    }
+}
+
+/// Total active time so far, at the end of each observed interval.
+fn fuzzing_time(operations: &[OperationEffect]) -> Vec<(f64, f64)> {
+    let mut intervals: Vec<_> = operations.iter().flat_map(|operation| &operation.intervals).copied().collect();
+    intervals.sort_by(|a, b| a.end.total_cmp(&b.end));
+    let mut total = 0.0;
+    std::iter::once((0.0, 0.0))
+        .chain(intervals.into_iter().map(|interval| {
+            total += interval.length();
+            (interval.end, total)
+        }))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sesame_plan::Span;
+
+    #[test]
+    fn fuzzing_time_adds_up_over_operations_even_where_they_overlap() {
+        let effect = |intervals: &[(f64, f64)]| OperationEffect {
+            intervals: intervals.iter().map(|&(start, end)| Span { start, end }).collect(),
+            ..OperationEffect::default()
+        };
+        let points = fuzzing_time(&[effect(&[(1.0, 5.0), (6.0, 7.0)]), effect(&[(2.0, 3.5)])]);
+        assert_eq!(points, [(0.0, 0.0), (3.5, 1.5), (5.0, 5.5), (7.0, 6.5)]);
+    }
+}

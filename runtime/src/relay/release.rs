@@ -1,0 +1,109 @@
+//! The release queue: messages that latency holds back, let go by time, then in the order they were held.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use crate::time::SimTime;
+use crate::value::Value;
+use crate::wire::Wire;
+
+/// A message on its way through its pipeline.
+#[derive(Debug)]
+pub(super) struct Held {
+    pub(super) wire: Wire,
+    /// Its index among the messages published on its wire.
+    pub(super) index: u64,
+    pub(super) value: Value,
+    /// The position in its wire's pipeline at which it goes on.
+    pub(super) next_stage: usize,
+}
+
+struct Entry {
+    release: SimTime,
+    sequence: u64,
+    operation: usize,
+    message: Held,
+}
+
+impl Entry {
+    fn key(&self) -> (SimTime, u64) {
+        (self.release, self.sequence)
+    }
+}
+
+impl PartialEq for Entry {
+    fn eq(&self, other: &Self) -> bool {
+        self.key() == other.key()
+    }
+}
+impl Eq for Entry {}
+impl PartialOrd for Entry {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Entry {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.key().cmp(&other.key())
+    }
+}
+
+#[derive(Default)]
+pub(super) struct ReleaseQueue {
+    heap: BinaryHeap<Reverse<Entry>>,
+    sequence: u64,
+    /// Per operation and wire: how many are held, and when the last of them goes.
+    tails: Vec<Vec<Tail>>,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Tail {
+    held: usize,
+    last: SimTime,
+}
+
+impl ReleaseQueue {
+    pub(super) fn new(operations: usize, wires: usize) -> Self {
+        ReleaseQueue { tails: vec![vec![Tail::default(); wires]; operations], ..ReleaseQueue::default() }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.heap.len()
+    }
+
+    /// When the last message that an operation holds on a wire goes; `None` when it holds none.
+    pub(super) fn last_release(&self, operation: usize, wire: Wire) -> Option<SimTime> {
+        let tail = self.tails[operation][wire.index()];
+        (tail.held > 0).then_some(tail.last)
+    }
+
+    pub(super) fn push(&mut self, release: SimTime, operation: usize, message: Held) {
+        let tail = &mut self.tails[operation][message.wire.index()];
+        tail.held += 1;
+        tail.last = release;
+        self.sequence += 1;
+        self.heap.push(Reverse(Entry { release, sequence: self.sequence, operation, message }));
+    }
+
+    /// When the next message is due.
+    pub(super) fn next_release(&self) -> Option<SimTime> {
+        self.heap.peek().map(|entry| entry.0.release)
+    }
+
+    /// The next message, due or not.
+    pub(super) fn pop(&mut self) -> Option<Held> {
+        let Reverse(entry) = self.heap.pop()?;
+        self.tails[entry.operation][entry.message.wire.index()].held -= 1;
+        Some(entry.message)
+    }
+
+    /// Everything an operation holds, in the order it would have gone.
+    pub(super) fn take_all(&mut self, operation: usize) -> Vec<Held> {
+        let (mut taken, kept): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.heap).into_vec().into_iter().partition(|entry| entry.0.operation == operation);
+        self.heap = kept.into();
+        self.tails[operation].fill(Tail::default());
+        taken.sort_unstable_by_key(|entry| entry.0.key());
+        taken.into_iter().map(|Reverse(entry)| entry.message).collect()
+    }
+}

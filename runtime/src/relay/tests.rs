@@ -1,0 +1,255 @@
+//! Behaviour of the relay on small message streams, and a naive model beside the release queue.
+
+use proptest::prelude::*;
+use sesame_plan::{Choice, Distribution, Drain, Operation, OperationKind, Test, TestOperation, ValueMode};
+
+use super::{Delivery, Exchange, Finished, Relay};
+use crate::fixture::{latency, offset, operation, plan, test_of, use_of};
+use crate::metric::MetricTable;
+use crate::time::SimTime;
+use crate::value::{Fields, Record, Value};
+use crate::wire::WireTable;
+
+const COMMAND: &str = "arm/command";
+
+fn one(value: f64) -> Option<Choice> {
+    Some(Choice::Value { value })
+}
+
+fn range(low: f64, high: f64) -> Option<Choice> {
+    Some(Choice::Range { low, high })
+}
+
+/// Publishes messages `(seconds, topic, value)` with a tick every tenth of a second in between, up to ten seconds.
+/// Gives what was delivered, with the time of delivery, and what the relay left behind.
+fn relayed(
+    operations: Vec<Operation>,
+    test: &[TestOperation],
+    messages: &[(f64, &str, Value)],
+) -> (Vec<(f64, String, Value)>, Finished) {
+    let plan = plan(operations);
+    let wires = WireTable::new(&plan);
+    let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+    let mut relay = Relay::new(&plan, &wires, &test_of(test.to_vec()), metrics.start()).unwrap();
+    let mut delivered = Vec::new();
+    let mut messages = messages.iter().peekable();
+    for tick in 0..=100 {
+        let now = SimTime::from_nanos(tick * 100_000_000);
+        let mut out = Vec::new();
+        relay.advance(now, &mut out);
+        while let Some((_, path, value)) = messages.next_if(|(time, ..)| SimTime::from_seconds(*time) <= now) {
+            relay.message(now, wires.find(path).unwrap(), value.clone(), &mut out);
+        }
+        delivered.extend(
+            out.into_iter().map(|Delivery { wire, value }| (now.seconds(), wires.path(wire).to_owned(), value)),
+        );
+    }
+    (delivered, relay.finish(SimTime::from_seconds(10.0)))
+}
+
+/// A command of 0, 1, 2, … each tenth of a second.
+fn commands(count: u32) -> Vec<(f64, &'static str, Value)> {
+    (0..count).map(|n| (f64::from(n) * 0.1, COMMAND, Value::Real(f64::from(n)))).collect()
+}
+
+fn numbers(delivered: &[(f64, String, Value)]) -> Vec<(f64, f64)> {
+    delivered.iter().map(|(time, _, value)| (*time, value.number_at::<&str>(&[]).unwrap())).collect()
+}
+
+#[test]
+fn without_operations_everything_passes_at_once_and_as_it_came() {
+    let (delivered, finished) = relayed(vec![], &[], &commands(50));
+    let sent: Vec<_> = commands(50).into_iter().map(|(t, _, v)| (SimTime::from_seconds(t).seconds(), v)).collect();
+    assert_eq!(delivered.into_iter().map(|(t, _, v)| (t, v)).collect::<Vec<_>>(), sent);
+    assert_eq!(finished.messages, 50);
+}
+
+#[test]
+fn a_blackhole_drops_everything_while_it_is_active_and_nothing_else() {
+    let hole = vec![operation(0, OperationKind::Blackhole)];
+    let (delivered, finished) = relayed(hole, &[use_of(0, 1.0, 2.0, None, 1)], &commands(50));
+    let kept: Vec<f64> = numbers(&delivered).into_iter().map(|(_, n)| n).collect();
+    assert_eq!(kept, (0..50).filter(|n| !(10..20).contains(n)).map(f64::from).collect::<Vec<_>>());
+    let effect = &finished.operations[0];
+    assert_eq!((effect.counters.seen, effect.counters.dropped), (10, 10));
+    assert_eq!((effect.first_touch, effect.last_touch), (Some(1.0), Some(1.9)));
+}
+
+#[test]
+fn loss_is_the_probability_to_drop() {
+    let loss = || vec![operation(0, OperationKind::PacketLoss)];
+    let dropped = |p| {
+        let (_, finished) = relayed(loss(), &[use_of(0, 0.0, 10.0, one(p), 3)], &commands(100));
+        finished.operations[0].counters.dropped
+    };
+    assert_eq!(dropped(0.0), 0);
+    assert_eq!(dropped(1.0), 100);
+    assert!((30..=50).contains(&dropped(0.4)), "{}", dropped(0.4));
+}
+
+#[test]
+fn a_shorter_window_disturbs_its_messages_just_the_same() {
+    let loss = || vec![operation(0, OperationKind::PacketLoss)];
+    let kept = |start| {
+        let (delivered, _) = relayed(loss(), &[use_of(0, start, 8.0, one(0.5), 3)], &commands(100));
+        numbers(&delivered).into_iter().filter(|(t, _)| (5.0..8.0).contains(t)).collect::<Vec<_>>()
+    };
+    assert_eq!(kept(0.0), kept(5.0));
+}
+
+#[test]
+fn a_fixed_delay_shifts_every_message_by_it() {
+    let lag = vec![operation(0, latency(Distribution::Fixed, Drain::Finish))];
+    let (delivered, finished) = relayed(lag, &[use_of(0, 0.0, 10.0, one(0.3), 1)], &commands(20));
+    let expected: Vec<_> = (0..20).map(|n| (f64::from(n + 3) / 10.0, f64::from(n))).collect();
+    assert_eq!(numbers(&delivered), expected);
+    assert_eq!(finished.operations[0].counters.delayed, 20);
+}
+
+/// Ten messages from 0 s, delayed by half a second until 0.5 s: what each drain policy makes of the tail.
+fn drained(drain: Drain) -> (Vec<(f64, f64)>, Finished) {
+    let lag = vec![operation(0, latency(Distribution::Fixed, drain))];
+    let (delivered, finished) = relayed(lag, &[use_of(0, 0.0, 0.5, one(0.5), 1)], &commands(10));
+    (numbers(&delivered), finished)
+}
+
+#[test]
+fn when_the_window_ends_held_messages_finish_and_later_ones_queue_behind_them() {
+    let (delivered, finished) = drained(Drain::Finish);
+    let times: Vec<f64> = delivered.iter().map(|(time, _)| *time).collect();
+    assert_eq!(delivered.iter().map(|(_, n)| *n).collect::<Vec<_>>(), (0..10).map(f64::from).collect::<Vec<_>>());
+    assert_eq!(times, [0.5, 0.6, 0.7, 0.8, 0.9, 0.9, 0.9, 0.9, 0.9, 0.9]);
+    assert_eq!(finished.operations[0].counters.delayed, 9, "the tail is counted; the last waited for nobody");
+}
+
+#[test]
+fn when_the_window_ends_flushed_messages_go_at_once() {
+    let (delivered, _) = drained(Drain::Flush);
+    let expected: Vec<_> = (0..10).map(|n| (f64::from(n.max(5)) / 10.0, f64::from(n))).collect();
+    assert_eq!(delivered, expected);
+}
+
+#[test]
+fn when_the_window_ends_dropped_messages_are_gone() {
+    let (delivered, finished) = drained(Drain::Drop);
+    // The first was due at 0.5 s, the moment at which the window ends: it is gone too.
+    assert_eq!(delivered.iter().map(|(_, n)| *n).collect::<Vec<_>>(), [5.0, 6.0, 7.0, 8.0, 9.0]);
+    let counters = finished.operations[0].counters;
+    assert_eq!((counters.delayed, counters.dropped), (0, 5));
+}
+
+#[test]
+fn an_offset_is_drawn_anew_for_each_message_from_the_sub_range() {
+    let jitter = vec![operation(0, offset(&[], ValueMode::Offset, false))];
+    let (delivered, finished) = relayed(jitter, &[use_of(0, 1.0, 9.0, range(2.0, 3.0), 7)], &commands(100));
+    let shifts: Vec<f64> = numbers(&delivered).iter().zip(0..).map(|((_, n), at)| n - f64::from(at)).collect();
+    assert!(shifts[..10].iter().chain(&shifts[90..]).all(|&shift| shift == 0.0));
+    assert!(shifts[10..90].iter().all(|shift| (1.999..3.001).contains(shift)), "{shifts:?}");
+    let mut distinct: Vec<i64> = shifts[10..90].iter().map(|shift| SimTime::from_seconds(*shift).nanos()).collect();
+    distinct.dedup();
+    assert_eq!(distinct.len(), 80);
+    assert_eq!(finished.operations[0].counters.changed, 80);
+}
+
+fn zone(level: f64, count: i64) -> Value {
+    Record::new(&Fields::new(["level", "count"]), vec![level.into(), count.into()]).into()
+}
+
+#[test]
+fn a_nested_whole_number_stays_whole_and_its_neighbours_untouched() {
+    let shift = vec![operation(1, offset(&["count"], ValueMode::Absolute, true))];
+    let messages: Vec<_> = (0..60).map(|n| (f64::from(n) * 0.1, "zones/Z1", zone(0.5, 100))).collect();
+    let (delivered, _) = relayed(shift, &[use_of(0, 0.0, 10.0, range(-1.0, 1.0), 7)], &messages);
+    let mut seen = std::collections::BTreeSet::new();
+    for (_, _, value) in &delivered {
+        let Some(&Value::Int(count)) = value.at(&["count"]) else { panic!("{value:?}") };
+        seen.insert(count);
+        assert_eq!(value.at(&["level"]), Some(&Value::Real(0.5)));
+    }
+    assert_eq!(seen.into_iter().collect::<Vec<_>>(), [-1, 0, 1]);
+}
+
+#[test]
+fn members_of_a_group_are_disturbed_independently() {
+    let jitter = vec![operation(1, offset(&["level"], ValueMode::Absolute, false))];
+    let messages = [(0.1, "zones/Z1", zone(0.0, 1)), (0.1, "zones/Z2", zone(0.0, 1))];
+    let (delivered, _) = relayed(jitter, &[use_of(0, 0.0, 10.0, range(0.0, 1.0), 7)], &messages);
+    assert_ne!(delivered[0].2, delivered[1].2);
+}
+
+#[test]
+fn operations_apply_in_priority_then_declaration_order() {
+    let mut replace = operation(0, offset(&[], ValueMode::Absolute, false));
+    let shift = operation(0, offset(&[], ValueMode::Offset, false));
+    let test = [use_of(1, 0.0, 10.0, range(1.0, 1.0), 1), use_of(0, 0.0, 10.0, range(5.0, 5.0), 1)];
+    let (declared, _) = relayed(vec![replace.clone(), shift.clone()], &test, &commands(1));
+    assert_eq!(numbers(&declared), [(0.0, 6.0)], "replaced by 5, then shifted by 1");
+    replace.priority = -1;
+    let (prioritised, _) = relayed(vec![replace, shift], &test, &commands(1));
+    assert_eq!(numbers(&prioritised), [(0.0, 5.0)], "shifted by 1, then replaced by 5");
+}
+
+#[test]
+fn a_delayed_message_goes_on_through_later_operations_when_it_is_released() {
+    let chain = vec![operation(0, latency(Distribution::Fixed, Drain::Finish)), operation(0, OperationKind::Blackhole)];
+    let test = [use_of(0, 0.0, 10.0, one(1.0), 1), use_of(1, 1.0, 1.5, None, 1)];
+    let (delivered, _) = relayed(chain, &test, &commands(10));
+    // Messages of 0.0 to 0.4 s come to the blackhole from 1.0 to 1.4 s, while it is active.
+    assert_eq!(numbers(&delivered), (5..10).map(|n| (f64::from(n + 10) / 10.0, f64::from(n))).collect::<Vec<_>>());
+}
+
+#[test]
+fn metrics_see_what_was_sent_not_what_was_made_of_it() {
+    let hole = vec![operation(0, OperationKind::Blackhole)];
+    let (_, finished) = relayed(hole, &[use_of(0, 0.0, 4.0, None, 1)], &commands(30));
+    assert_eq!(finished.metrics[1].value, Some(29.0));
+    assert_eq!(finished.metrics[0].value, Some(4.0), "fuzzing time");
+}
+
+#[test]
+fn choices_outside_what_is_permitted_are_refused() {
+    let plan = plan(vec![operation(0, OperationKind::PacketLoss)]);
+    let wires = WireTable::new(&plan);
+    let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+    let test: Test = test_of(vec![use_of(0, 0.0, 1.0, one(1.5), 1)]);
+    let refused = Relay::new(&plan, &wires, &test, metrics.start()).err().map(|error| error.to_string());
+    assert_eq!(refused.as_deref(), Some("operation `packet_loss` `loss` permits [0, 1], not [1.5, 1.5]"));
+}
+
+/// The release rule, written as it is said: a message goes at its own time or its predecessor's, whichever is later.
+fn naive_releases(sent: &[f64], delays: &[f64]) -> Vec<SimTime> {
+    let mut last = SimTime::ZERO;
+    sent.iter()
+        .zip(delays)
+        .map(|(&time, &delay)| {
+            last = last.max(SimTime::from_seconds(time) + SimTime::from_seconds(delay));
+            last
+        })
+        .collect()
+}
+
+proptest! {
+    #[test]
+    fn uniform_latency_keeps_order_and_follows_the_release_rule(seed: u64, low in 0.0..1.0f64, width in 0.0..3.0f64) {
+        let lag = vec![operation(0, latency(Distribution::Uniform, Drain::Finish))];
+        let (delivered, _) = relayed(lag, &[use_of(0, 0.0, 10.0, range(low, low + width), seed)], &commands(40));
+        let delays: Vec<f64> =
+            (0..40).map(|n| low + super::Draws::new(seed, 0, n).unit(0) * ((low + width) - low)).collect();
+        let sent: Vec<f64> = (0..40).map(|n| f64::from(n) * 0.1).collect();
+        let tick = 100_000_000;
+        let expected: Vec<(f64, f64)> = naive_releases(&sent, &delays)
+            .into_iter()
+            .zip(0..)
+            .map(|(release, n)| (SimTime::from_nanos((release.nanos() + tick - 1) / tick * tick).seconds(), f64::from(n)))
+            .collect();
+        prop_assert_eq!(numbers(&delivered), expected);
+    }
+
+    #[test]
+    fn repeating_a_test_repeats_its_disturbance(seed: u64) {
+        let jitter = || vec![operation(0, offset(&[], ValueMode::Offset, false))];
+        let run = |seed| relayed(jitter(), &[use_of(0, 1.0, 9.0, range(-1.0, 1.0), seed)], &commands(90)).0;
+        prop_assert_eq!(run(seed), run(seed));
+        prop_assert_ne!(run(seed), run(seed.wrapping_add(1)));
+    }
+}
