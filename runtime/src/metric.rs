@@ -6,8 +6,10 @@ use crate::time::SimTime;
 use crate::value::{Text, Value};
 
 mod engine;
+mod probe;
 
 pub use engine::{MetricTable, Metrics, MissingHook};
+pub use probe::unimplemented_hooks;
 
 /// A user's metric hook as the runtime calls it. Generated code implements it around the typed hook trait.
 pub trait Hook {

@@ -118,11 +118,6 @@ impl Metrics<'_> {
         }
         (observations, warnings)
     }
-
-    /// The metrics whose hook has said so far that it is not filled in, by position in the plan.
-    pub fn unimplemented(&self) -> impl Iterator<Item = usize> + '_ {
-        self.states.iter().enumerate().filter(|(_, state)| state.context.unimplemented).map(|(at, _)| at)
-    }
 }
 
 /// Total active time so far, at the end of each observed interval.
