@@ -9,6 +9,7 @@ pub mod metric;
 pub mod observation;
 pub mod rng;
 mod runner;
+pub mod search;
 pub mod simulator;
 pub mod time;
 pub mod transport;
