@@ -17,6 +17,7 @@ pub mod observation;
 pub mod relay;
 pub mod rng;
 mod runner;
+pub mod search;
 pub mod simulator;
 pub mod time;
 pub mod transport;

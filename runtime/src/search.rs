@@ -1,0 +1,125 @@
+//! How a campaign's tests are found: strategies that are asked for tests and told what came out.
+//!
+//! A [`Strategy`] has no clock, no files and no processes. What it asks depends on the plan, the seed and what it was
+//! told, so a campaign is resumed by telling a new strategy the stored results again. Randomness comes from a stream per
+//! child, derived from the seed, so nothing depends on the order in which the tests of a generation are run.
+//!
+//! Objectives are oriented once, in [`fitness`]: from there on smaller is better, in fronts and hypervolumes too.
+
+pub mod crowding;
+pub mod dominance;
+pub mod front;
+pub mod hypervolume;
+pub mod initial;
+pub mod nsga2;
+pub mod permitted;
+pub mod range;
+pub mod real;
+pub mod selection;
+pub mod sorting;
+pub mod vary;
+
+mod random;
+mod repeat;
+
+#[cfg(test)]
+mod landscape;
+
+use sesame_plan::{CampaignPlan, Direction, Search, Test};
+
+use crate::observation::{Observation, Outcome};
+
+pub use dominance::{Fitness, Unfit};
+pub use front::Front;
+pub use nsga2::Nsga2;
+pub use permitted::{Permitted, SearchError};
+pub use random::Random;
+pub use repeat::Repeat;
+pub use vary::TestVariation;
+
+/// How tests are found, by ask and tell.
+///
+/// The caller alternates: it asks for a generation, evaluates all of it in whatever order, and tells the results in the
+/// order asked. The tests of all generations together are exactly [`Search::evaluations`].
+pub trait Strategy: Send {
+    /// The next generation of tests; empty when the search is over.
+    fn ask(&mut self) -> Vec<Candidate>;
+
+    /// Takes the results of exactly the generation asked last, in its order.
+    fn tell(&mut self, results: &[Evaluated]);
+}
+
+/// A test to be evaluated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// The test.
+    pub test: Test,
+    /// Numbers of the tests it descends from: none, one or two.
+    pub parents: Vec<u32>,
+    /// The generation it belongs to, from 0.
+    pub generation: u32,
+}
+
+/// A test with its result.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evaluated {
+    /// The caller's number of the test, unique in the campaign.
+    pub number: u32,
+    /// The test, as asked.
+    pub test: Test,
+    /// Its fitness, from [`fitness`].
+    pub fitness: Fitness,
+}
+
+/// The strategy that a plan names. `seed` is the campaign's, or what `run --seed` put in its place.
+pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, SearchError> {
+    Ok(match plan.campaign.search {
+        Search::Nsga2 { population: 0, .. } => {
+            return Err(SearchError::NoPopulation { campaign: plan.campaign.name.clone() });
+        }
+        Search::Nsga2 { population, evaluations } => {
+            let variation = TestVariation::new(Permitted::of(plan)?, vary::Rates::default(), seed);
+            Box::new(Nsga2::new(nsga2::Settings { population, evaluations, seed }, variation))
+        }
+        Search::Random { evaluations } => Box::new(Random::new(Permitted::of(plan)?, evaluations, seed)),
+        Search::Repeat { test, times } => Box::new(Repeat::new(plan.test(test).test.clone(), times)),
+    })
+}
+
+/// The fitness of a run: its objective values in the campaign's order, negated where more is sought; or why it has none.
+pub fn fitness(plan: &CampaignPlan, observation: &Observation) -> Fitness {
+    match observation.outcome {
+        Outcome::Completed => {}
+        Outcome::Void => return Fitness::Unfit(Unfit::Void),
+        Outcome::Crash { .. } => return Fitness::Unfit(Unfit::Crash),
+        Outcome::Timeout { .. } => return Fitness::Unfit(Unfit::Timeout),
+    }
+    let oriented = plan.campaign.objectives.iter().map(|&id| {
+        let value = observation.metrics.get(id.index())?.value.filter(|value| !value.is_nan())?;
+        // Subtracted from zero and added to it, so that no negative zero comes out.
+        match plan.metric(id).direction.expect("the generator gives every objective a direction") {
+            Direction::Minimise => Some(0.0 + value),
+            Direction::Maximise => Some(0.0 - value),
+        }
+    });
+    oriented.collect::<Option<Vec<f64>>>().map_or(Fitness::Unfit(Unfit::Unmeasured), Fitness::Measured)
+}
+
+impl Strategy for Nsga2<TestVariation> {
+    fn ask(&mut self) -> Vec<Candidate> {
+        let generation = self.generation();
+        let asked = Nsga2::ask(self);
+        asked.into_iter().map(|a| Candidate { test: a.genome, parents: a.parents, generation }).collect()
+    }
+
+    fn tell(&mut self, results: &[Evaluated]) {
+        Nsga2::tell(
+            self,
+            results.iter().map(|result| nsga2::Told {
+                number: result.number,
+                genome: result.test.clone(),
+                fitness: result.fitness.clone(),
+            }),
+        );
+    }
+}

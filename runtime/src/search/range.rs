@@ -1,0 +1,122 @@
+//! Drawing and moving numbers and intervals inside what is permitted: windows, sub-ranges and single values alike.
+
+use sesame_plan::{Parameter, Shape};
+
+use crate::rng::Stream;
+
+/// The share of a permitted window that a test's window has at least: shorter ones rarely meet a message, so trying
+/// them would only make void tests.
+pub(crate) const SHORTEST_WINDOW: f64 = 1e-3;
+
+/// A permitted range of numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// The least number, itself permitted.
+    pub low: f64,
+    /// The greatest number, at least `low`, itself permitted.
+    pub high: f64,
+    /// How long an interval inside is at least; at most `high - low`, and 0 for whole numbers.
+    pub shortest: f64,
+    /// Whether only whole numbers are permitted; then both ends are whole.
+    pub integer: bool,
+}
+
+/// How far a local step goes: its standard deviation as a share of the permitted range is log-uniform between these
+/// two, so that both careful and bold steps are always tried and no scale has to be right.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepSizes {
+    /// The smallest standard deviation.
+    pub finest: f64,
+    /// The largest.
+    pub boldest: f64,
+}
+
+impl Range {
+    /// The permitted window of an operation, in seconds.
+    pub fn window(start: f64, end: f64) -> Self {
+        Range { low: start, high: end, shortest: (end - start) * SHORTEST_WINDOW, integer: false }
+    }
+
+    /// The permitted range of a parameter; `None` where it must be whole and no whole number is in it.
+    pub fn parameter(parameter: &Parameter) -> Option<Self> {
+        let (low, high) = match parameter.integer {
+            true => (libm::ceil(parameter.low), libm::floor(parameter.high)),
+            false => (parameter.low, parameter.high),
+        };
+        (low <= high).then_some(Range { low, high, shortest: 0.0, integer: parameter.integer })
+    }
+
+    /// Whether a test has anything to choose.
+    pub fn is_fixed(self) -> bool {
+        self.low == self.high
+    }
+
+    /// A number, uniform over the range.
+    pub fn number(self, stream: &mut Stream) -> f64 {
+        if self.integer {
+            // The count of whole numbers may exceed what an integer type holds, hence the detour by floor.
+            (self.low + libm::floor(stream.uniform(0.0, self.high - self.low + 1.0))).min(self.high)
+        } else {
+            let share = stream.unit();
+            (self.low * (1.0 - share) + self.high * share).clamp(self.low, self.high)
+        }
+    }
+
+    /// An interval `low <= high`, uniform over all that fit (the triangle of feasible pairs).
+    pub fn interval(self, stream: &mut Stream) -> (f64, f64) {
+        if self.integer {
+            // Of n whole numbers there are n (n + 1) / 2 pairs. An n by n + 1 rectangle holds each twice: once on or
+            // below its diagonal, once above.
+            let n = self.high - self.low + 1.0;
+            let row = libm::floor(stream.uniform(0.0, n)).min(n - 1.0);
+            let column = libm::floor(stream.uniform(0.0, n + 1.0)).min(n);
+            let (low, high) = if column <= row { (column, row) } else { (row, column - 1.0) };
+            return ((self.low + low).min(self.high), (self.low + high).min(self.high));
+        }
+        let starts = Range { high: (self.high - self.shortest).max(self.low), ..self };
+        let (a, b) = (starts.number(stream), starts.number(stream));
+        (a.min(b), (a.max(b) + self.shortest).min(self.high))
+    }
+
+    /// A number near another. It differs unless the step ends where it began, at an end of the range.
+    pub fn number_near(self, number: f64, steps: StepSizes, stream: &mut Stream) -> f64 {
+        (number + self.step(steps, stream)).clamp(self.low, self.high)
+    }
+
+    /// An interval near another: moved as a whole, or one end moved.
+    pub fn interval_near(self, (low, high): (f64, f64), steps: StepSizes, stream: &mut Stream) -> (f64, f64) {
+        let way = stream.below(3);
+        let step = self.step(steps, stream);
+        match way {
+            0 => {
+                let step = step.clamp(self.low - low, self.high - high);
+                ((low + step).max(self.low), (high + step).min(self.high))
+            }
+            1 => ((low + step).min(high - self.shortest).max(self.low), high),
+            _ => (low, (high + step).max(low + self.shortest).min(self.high)),
+        }
+    }
+
+    fn step(self, steps: StepSizes, stream: &mut Stream) -> f64 {
+        let ratio = steps.boldest / steps.finest;
+        let deviation = (self.high - self.low) * steps.finest * libm::pow(ratio, stream.unit());
+        let step = deviation * stream.normal();
+        match self.integer {
+            // Away from zero, as a step of no length is none.
+            true if step < 0.0 => libm::floor(step),
+            true => libm::ceil(step),
+            false => step,
+        }
+    }
+}
+
+/// How a parameter of this shape is chosen anew.
+pub(crate) fn fresh_choice(range: Range, shape: Shape, stream: &mut Stream) -> sesame_plan::Choice {
+    match shape {
+        Shape::Value => sesame_plan::Choice::Value { value: range.number(stream) },
+        Shape::Range => {
+            let (low, high) = range.interval(stream);
+            sesame_plan::Choice::Range { low, high }
+        }
+    }
+}

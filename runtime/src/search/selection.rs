@@ -1,0 +1,127 @@
+//! Who mates and who survives: crowded comparison, binary tournament, environmental selection (Deb et al. 2002).
+
+use std::cmp::Ordering;
+
+use crate::rng::Stream;
+use crate::search::crowding::distances;
+use crate::search::dominance::Fitness;
+use crate::search::sorting::fronts;
+
+/// Where a solution stands in its population.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Standing {
+    /// Its front, from 0 for the best.
+    pub front: usize,
+    /// Its crowding distance on that front.
+    pub crowding: f64,
+}
+
+impl Standing {
+    /// The crowded comparison: `Less` is better. An earlier front wins, then the larger crowding distance.
+    pub fn compare(self, other: Standing) -> Ordering {
+        self.front.cmp(&other.front).then_with(|| other.crowding.total_cmp(&self.crowding))
+    }
+}
+
+/// The standing of each solution, in their order.
+pub fn standings(fitness: &[&Fitness]) -> Vec<Standing> {
+    let mut standings = vec![Standing { front: 0, crowding: 0.0 }; fitness.len()];
+    for (rank, front) in fronts(fitness).iter().enumerate() {
+        for (&position, crowding) in front.iter().zip(distances(fitness, front)) {
+            standings[position] = Standing { front: rank, crowding };
+        }
+    }
+    standings
+}
+
+/// `n` parents, by binary tournaments. Contestants come from shuffled copies of the population, so that within
+/// `population / 2` tournaments each solution competes once, and neighbours in the result are different solutions
+/// (save where one copy ends and the next begins). Equal contestants: the first drawn wins, which is either at random.
+pub fn parents(standings: &[Standing], n: usize, stream: &mut Stream) -> Vec<usize> {
+    assert!(!standings.is_empty(), "parents come from a population");
+    let mut contestants = Vec::with_capacity(2 * n + standings.len());
+    while contestants.len() < 2 * n {
+        contestants.extend(stream.permutation(standings.len()));
+    }
+    let winner = |pair: &[usize]| {
+        if standings[pair[1]].compare(standings[pair[0]]).is_lt() { pair[1] } else { pair[0] }
+    };
+    contestants.chunks_exact(2).take(n).map(winner).collect()
+}
+
+/// The positions of the `n` best solutions in ascending order (all when there are no more): whole fronts while they
+/// fit, of the next one those with the largest crowding distances, of equal ones the earlier.
+pub fn survivors(fitness: &[&Fitness], n: usize) -> Vec<usize> {
+    let mut chosen: Vec<usize> = Vec::with_capacity(n.min(fitness.len()));
+    for mut front in fronts(fitness) {
+        let room = n - chosen.len();
+        if front.len() > room {
+            let crowding = distances(fitness, &front);
+            let mut order: Vec<usize> = (0..front.len()).collect();
+            order.sort_by(|&a, &b| crowding[b].total_cmp(&crowding[a]));
+            front = order[..room].iter().map(|&k| front[k]).collect();
+        }
+        chosen.extend(front);
+        if chosen.len() == n {
+            break;
+        }
+    }
+    chosen.sort_unstable();
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::search::dominance::{Unfit, dominates, tests::any_population};
+
+    proptest! {
+        #[test]
+        fn survivors_are_the_best_by_the_crowded_comparison(population in any_population(), n in 0usize..40) {
+            let all: Vec<&Fitness> = population.iter().collect();
+            let standings = standings(&all);
+            let mut order: Vec<usize> = (0..all.len()).collect();
+            order.sort_by(|&a, &b| standings[a].compare(standings[b]).then(a.cmp(&b)));
+            order.truncate(n);
+            order.sort_unstable();
+            prop_assert_eq!(survivors(&all, n), order);
+        }
+
+        #[test]
+        fn a_tournament_is_never_won_by_the_dominated(population in any_population(), n in 0usize..50, seed: u64) {
+            prop_assume!(!population.is_empty());
+            let all: Vec<&Fitness> = population.iter().collect();
+            let standings = standings(&all);
+            let parents = parents(&standings, n, &mut Stream::derive(seed, "test", &[]));
+            prop_assert_eq!(parents.len(), n);
+            // Replays the contests: the same stream shuffles the same contestants.
+            let mut stream = Stream::derive(seed, "test", &[]);
+            let mut contestants = Vec::new();
+            while contestants.len() < 2 * n {
+                contestants.extend(stream.permutation(all.len()));
+            }
+            for (contest, &winner) in parents.iter().enumerate() {
+                let pair = [contestants[2 * contest], contestants[2 * contest + 1]];
+                let loser = if pair[0] == winner { pair[1] } else { pair[0] };
+                prop_assert!(pair.contains(&winner));
+                prop_assert!(!dominates(all[loser], all[winner]));
+                prop_assert!(standings[winner].compare(standings[loser]).is_le());
+            }
+        }
+    }
+
+    #[test]
+    fn everyone_competes_equally_often_and_the_worst_never_wins() {
+        let population: Vec<Fitness> = (0..9).map(|i| Fitness::Measured(vec![f64::from(i)])).collect();
+        let population = [population, vec![Fitness::Unfit(Unfit::Crash)]].concat();
+        let standings = standings(&population.iter().collect::<Vec<_>>());
+        let parents = parents(&standings, 5_000, &mut Stream::derive(3, "test", &[]));
+        let mut wins = [0u32; 10];
+        parents.iter().for_each(|&winner| wins[winner] += 1);
+        assert_eq!(wins[0], 1_000, "the best wins each of its contests");
+        assert_eq!(wins[9], 0, "the unfit loses each of its contests");
+        assert!(wins.windows(2).all(|pair| pair[0] > pair[1]), "{wins:?}");
+    }
+}
