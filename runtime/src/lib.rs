@@ -7,6 +7,8 @@
 pub mod message;
 pub mod metric;
 pub mod observation;
+pub mod record;
+pub mod report;
 pub mod rng;
 mod runner;
 pub mod simulator;
