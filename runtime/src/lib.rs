@@ -14,8 +14,13 @@ pub mod fuzz;
 pub mod message;
 pub mod metric;
 pub mod observation;
+#[cfg(feature = "record")]
+pub mod record;
 pub mod relay;
+#[cfg(feature = "report")]
+pub mod report;
 pub mod rng;
+#[cfg(feature = "campaign")]
 mod runner;
 pub mod search;
 pub mod simulator;
@@ -24,6 +29,7 @@ pub mod transport;
 pub mod value;
 pub mod wire;
 
+#[cfg(feature = "campaign")]
 pub use runner::{Runner, main};
 pub use sesame_plan as plan;
 

@@ -79,7 +79,14 @@ fn hint(near: &Option<String>, known: &[String]) -> String {
 
 /// Makes a connection to the simulator; generated code names the one its space declares.
 #[derive(Clone, Copy)]
-pub struct Connect(pub(crate) fn(&CampaignPlan) -> Box<dyn Transport>);
+pub struct Connect(fn(&CampaignPlan) -> Box<dyn Transport>);
+
+impl Connect {
+    /// A transport as the plan describes it.
+    pub fn transport(self, plan: &CampaignPlan) -> Box<dyn Transport> {
+        (self.0)(plan)
+    }
+}
 
 impl std::fmt::Debug for Connect {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

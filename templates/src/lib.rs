@@ -1,1 +1,3 @@
-//! To be written.
+//! Texts that SESAME writes for people, as templates.
+
+pub mod report;

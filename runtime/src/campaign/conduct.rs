@@ -1,19 +1,21 @@
 //! Conducting a campaign: reference run, search, reference run again.
 
-use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use sesame_plan::{CampaignPlan, MetricSource, Search, Test};
+use sesame_plan::{CampaignPlan, Search, Test};
 
 use super::pool::{Job, Pool, PoolError, PoolSettings};
 use crate::observation::{Observation, Outcome};
 use crate::record::{
-    Event, EventKind, Origin, RecordError, Recorder, Repository, ResultSet, Status, TestRecord, Verdict, verdict,
+    Event, EventKind, MetricValue, Origin, RecordError, Recorder, Repository, ResultSet, Status, TestRecord, Verdict,
+    verdict,
 };
 use crate::rng::derive_seed;
-use crate::search::{self, Candidate, Evaluated, Fitness, Front, SearchError};
+use crate::search::{self, Candidate, Evaluated, Front, SearchError};
 
 /// A test that runs this many times as long as the undisturbed run is taken to hang.
 const PATIENCE: f64 = 20.0;
@@ -83,7 +85,7 @@ pub fn conduct(
     plan: &CampaignPlan,
     mut recorder: Recorder,
     settings: &Settings,
-    directory: PathBuf,
+    directory: &Path,
     interrupted: &AtomicBool,
     progress: &mut dyn FnMut(Progress<'_>),
 ) -> Result<Conducted, CampaignError> {
@@ -92,84 +94,61 @@ pub fn conduct(
     let pool = Pool::start(&PoolSettings {
         workers: settings.workers,
         program: settings.program.clone(),
-        directory,
+        directory: directory.to_path_buf(),
         timeout: settings.timeout.unwrap_or(FIRST_TIMEOUT),
     })?;
-    let mut desk = Desk { plan, recorder: &mut recorder, recorded, pool, interrupted };
+    let mut desk = Desk { recorder: &mut recorder, recorded, pool, interrupted };
 
-    let undisturbed = |number, seed| Planned {
-        number,
-        origin: Origin::Reference,
-        generation: None,
-        parents: Vec::new(),
-        test: Test::default(),
-        simulator_seed: simulator_seed(seed, 0),
-        duplicate_of: None,
-    };
-    let Some(reference) = desk.evaluate(vec![undisturbed(0, settings.seed)], &mut |_| {})?.pop() else {
-        return interrupt(desk, recorder);
-    };
-    if let Outcome::Crash { .. } | Outcome::Timeout { .. } = reference.observation.outcome {
-        let detail = reference.observation.outcome.detail().unwrap_or_default();
-        return Err(CampaignError::Reference(detail));
+    let mut reference = None;
+    if !desk.evaluate(vec![undisturbed(0, settings.seed)], &mut |record| reference = Some(record.clone()))? {
+        return interrupt(recorder);
     }
-    for warning in reference_warnings(plan, &reference.observation) {
-        desk.recorder.put_event(&Event { kind: EventKind::Warning, test: Some(0), text: warning })?;
+    let reference = reference.map(|record| record.observation).unwrap_or_else(|| unreachable!("one test was evaluated"));
+    if let Outcome::Crash { .. } | Outcome::Timeout { .. } = reference.outcome {
+        return Err(CampaignError::Reference(reference.outcome.detail().unwrap_or_default()));
+    }
+    for text in reference_warnings(plan, &reference) {
+        desk.recorder.put_event(&Event { kind: EventKind::Warning, test: Some(0), text })?;
     }
     if settings.timeout.is_none() {
-        let usual = Duration::from_secs_f64(reference.observation.wall.run * PATIENCE);
-        desk.pool.set_timeout(usual.max(LEAST_TIMEOUT));
+        desk.pool.set_timeout(Duration::from_secs_f64(reference.wall.run * PATIENCE).max(LEAST_TIMEOUT));
     }
 
     let total = plan.campaign.search.evaluations();
     let repeats = matches!(plan.campaign.search, Search::Repeat { .. });
     let mut front = Front::default();
     let mut earlier = Earlier::default();
-    let mut next = 1;
-    progress(Progress { done: 0, total, latest: None, front: &front });
+    let mut numbered = 0;
+    let mut done = 0;
+    progress(Progress { done, total, latest: None, front: &front });
     loop {
         let candidates = strategy.ask();
         let Some(generation) = candidates.first().map(|candidate| candidate.generation) else { break };
-        let planned = candidates
-            .into_iter()
-            .map(|Candidate { test, parents, generation }| {
-                let number = next;
-                next += 1;
-                Planned {
-                    number,
-                    origin: Origin::Search,
-                    generation: Some(generation),
-                    parents,
-                    duplicate_of: if repeats { None } else { earlier.same(&test, number) },
-                    test,
-                    simulator_seed: simulator_seed(settings.seed, if repeats { number } else { 0 }),
-                }
-            })
-            .collect();
-        let first = next;
-        let mut done = 0;
-        let mut evaluated: Vec<TestRecord> = desk.evaluate(planned, &mut |record| {
-            done += 1;
-            front.add(record.number, &search::fitness(plan, &record.observation));
-            progress(Progress { done: record_count(first, done, next), total, latest: Some(record), front: &front });
-        })?;
-        if interrupted.load(Ordering::Relaxed) {
-            return interrupt(desk, recorder);
+        let mut planned = Vec::with_capacity(candidates.len());
+        for Candidate { test, parents, generation } in candidates {
+            numbered += 1;
+            planned.push(Planned {
+                number: numbered,
+                origin: Origin::Search,
+                generation: Some(generation),
+                parents,
+                duplicate_of: if repeats { None } else { earlier.same(&test, numbered) },
+                test,
+                simulator_seed: simulator_seed(settings.seed, if repeats { numbered } else { 0 }),
+            });
         }
-        evaluated.sort_by_key(|record| record.number);
-        let told: Vec<Evaluated> = evaluated
-            .iter()
-            .map(|record| Evaluated {
-                number: record.number,
-                test: record.test.clone(),
-                fitness: search::fitness(plan, &record.observation),
-            })
-            .collect();
-        // Built anew in the order of numbers, since equal members are kept by number, not by who came first.
-        front = told.iter().fold(before_generation(&front, &told), |mut front, told| {
-            front.add(told.number, &told.fitness);
-            front
-        });
+        let mut told = Vec::with_capacity(planned.len());
+        let complete = desk.evaluate(planned, &mut |record| {
+            let fitness = search::fitness(plan, &record.observation);
+            done += 1;
+            front.add(record.number, &fitness);
+            told.push(Evaluated { number: record.number, test: record.test.clone(), fitness });
+            progress(Progress { done, total, latest: Some(record), front: &front });
+        })?;
+        if !complete {
+            return interrupt(recorder);
+        }
+        told.sort_by_key(|evaluated| evaluated.number);
         strategy.tell(&told);
         if !plan.campaign.objectives.is_empty() {
             desk.recorder.put_result_set(&ResultSet {
@@ -180,5 +159,174 @@ pub fn conduct(
             })?;
         }
     }
-    todo_end(desk, next, front, reference)
+
+    let mut again = None;
+    let last = undisturbed(numbered + 1, settings.seed);
+    if !desk.evaluate(vec![last], &mut |record| again = Some(record.observation.clone()))? {
+        return interrupt(recorder);
+    }
+    if let Some(difference) = again.and_then(|again| difference(plan, &reference, &again)) {
+        let text = format!("an undisturbed run after the campaign differs from the one before it: {difference}; \
+            the simulator does not start afresh for each test");
+        desk.recorder.put_event(&Event { kind: EventKind::Warning, test: Some(numbered + 1), text })?;
+    }
+    drop(desk);
+    if !plan.campaign.objectives.is_empty() {
+        recorder.put_result_set(&ResultSet {
+            name: "final".to_owned(),
+            generation: None,
+            status: Status::Final,
+            members: front.numbers(),
+        })?;
+    }
+    Ok(Conducted::Finished(recorder.finish("all tests were evaluated")?))
+}
+
+fn interrupt(recorder: Recorder) -> Result<Conducted, CampaignError> {
+    recorder.interrupt()?;
+    Ok(Conducted::Interrupted)
+}
+
+/// The simulator's seed: one for the whole campaign, and one for each run where a test is repeated.
+fn simulator_seed(seed: u64, repetition: u32) -> u64 {
+    derive_seed(seed, "simulator", &[u64::from(repetition)])
+}
+
+/// A test that has its number and waits for its run.
+struct Planned {
+    number: u32,
+    origin: Origin,
+    generation: Option<u32>,
+    parents: Vec<u32>,
+    test: Test,
+    simulator_seed: u64,
+    duplicate_of: Option<u32>,
+}
+
+fn undisturbed(number: u32, seed: u64) -> Planned {
+    Planned {
+        number,
+        origin: Origin::Reference,
+        generation: None,
+        parents: Vec::new(),
+        test: Test::default(),
+        simulator_seed: simulator_seed(seed, 0),
+        duplicate_of: None,
+    }
+}
+
+impl Planned {
+    fn with(self, observation: Observation) -> TestRecord {
+        TestRecord {
+            number: self.number,
+            origin: self.origin,
+            generation: self.generation,
+            parents: self.parents,
+            test: self.test,
+            simulator_seed: self.simulator_seed,
+            duplicate_of: self.duplicate_of,
+            observation,
+        }
+    }
+}
+
+/// The tests of this campaign by their content, so that an equal one is not simulated again.
+#[derive(Default)]
+struct Earlier(BTreeMap<String, u32>);
+
+impl Earlier {
+    /// The number of the first test equal to this one; this one is remembered if it is the first.
+    fn same(&mut self, test: &Test, number: u32) -> Option<u32> {
+        let content = serde_json::to_string(test).unwrap_or_else(|error| unreachable!("a test is plain data: {error}"));
+        match self.0.entry(content) {
+            Entry::Occupied(first) => Some(*first.get()),
+            Entry::Vacant(place) => {
+                place.insert(number);
+                None
+            }
+        }
+    }
+}
+
+/// Where tests are handed out and their results recorded.
+struct Desk<'a> {
+    recorder: &'a mut Recorder,
+    /// Numbers of the tests already recorded when the campaign was taken up again.
+    recorded: BTreeSet<u32>,
+    pool: Pool,
+    interrupted: &'a AtomicBool,
+}
+
+impl Desk<'_> {
+    /// Runs tests and records each as it ends; `each` sees every one, in the order they ended. False if the user
+    /// stopped it; what had ended by then is recorded.
+    fn evaluate(
+        &mut self,
+        planned: Vec<Planned>,
+        each: &mut dyn FnMut(&TestRecord),
+    ) -> Result<bool, CampaignError> {
+        let mut waiting = BTreeMap::new();
+        let mut duplicates = Vec::new();
+        for test in planned {
+            if self.recorded.contains(&test.number) {
+                let record = self.recorder.repository().test(test.number)?;
+                if record.test != test.test || record.simulator_seed != test.simulator_seed {
+                    return Err(CampaignError::OtherCampaign(test.number));
+                }
+                each(&record);
+            } else if let Some(original) = test.duplicate_of {
+                duplicates.push((original, test));
+            } else {
+                let job = Job { number: test.number, test: test.test.clone(), simulator_seed: test.simulator_seed };
+                self.pool.submit(job);
+                waiting.insert(test.number, test);
+            }
+        }
+        while !waiting.is_empty() {
+            if self.interrupted.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
+            let Some((number, observation)) = self.pool.next(Duration::from_millis(100))? else { continue };
+            let Some(test) = waiting.remove(&number) else { continue };
+            self.record(test.with(observation), each)?;
+        }
+        for (original, test) in duplicates {
+            let observation = self.recorder.repository().test(original)?.observation;
+            self.record(test.with(observation), each)?;
+        }
+        Ok(true)
+    }
+
+    fn record(&mut self, record: TestRecord, each: &mut dyn FnMut(&TestRecord)) -> Result<(), CampaignError> {
+        self.recorder.commit(&record)?;
+        for warning in &record.observation.warnings {
+            let event = Event { kind: EventKind::Warning, test: Some(record.number), text: warning.clone() };
+            self.recorder.put_event(&event)?;
+        }
+        each(&record);
+        Ok(())
+    }
+}
+
+/// What is wrong with a system before anything is fuzzed.
+fn reference_warnings(plan: &CampaignPlan, reference: &Observation) -> Vec<String> {
+    let broken = plan.requirements.iter().filter_map(|requirement| {
+        let metric = reference.metrics.get(requirement.metric.index())?;
+        let value = MetricValue { value: metric.value, set: metric.set };
+        (verdict(requirement.bound, &reference.outcome, value) == Verdict::Violated).then(|| {
+            let name = &plan.metric(requirement.metric).name;
+            let value = value.value.map_or_else(|| "no value".to_owned(), |value| value.to_string());
+            format!("requirement {} is broken before anything is fuzzed: `{name}` is {value}", requirement.name)
+        })
+    });
+    broken.collect()
+}
+
+/// The first metric in which two undisturbed runs differ, in words.
+fn difference(plan: &CampaignPlan, before: &Observation, after: &Observation) -> Option<String> {
+    if before.outcome != after.outcome {
+        return Some(format!("it ended as {}, not as {}", after.outcome.word(), before.outcome.word()));
+    }
+    let pairs = plan.metrics.iter().zip(before.metrics.iter().zip(&after.metrics));
+    pairs.filter(|(_, (before, after))| before != after).map(|(metric, _)| format!("metric `{}`", metric.name)).next()
 }

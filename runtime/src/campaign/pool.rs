@@ -5,7 +5,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
@@ -48,7 +48,8 @@ pub struct Pool {
     results: mpsc::Receiver<Result<Reply, PoolError>>,
     lanes: Vec<JoinHandle<()>>,
     stop: Arc<AtomicBool>,
-    in_flight: usize,
+    /// Wall time after which a test is stopped, in milliseconds.
+    timeout: Arc<AtomicU64>,
 }
 
 impl Pool {
@@ -58,30 +59,33 @@ impl Pool {
         let queue = Arc::new(Mutex::new(queue));
         let (sender, results) = mpsc::channel();
         let stop = Arc::new(AtomicBool::new(false));
+        let timeout = Arc::new(AtomicU64::new(millis(settings.timeout)));
         let mut lanes = Vec::with_capacity(settings.workers);
         for number in 1..=settings.workers.max(1) {
-            let mut lane = Lane { number, settings: settings.clone(), worker: None, stop: Arc::clone(&stop) };
+            let (stop, timeout) = (Arc::clone(&stop), Arc::clone(&timeout));
+            let mut lane = Lane { number, settings: settings.clone(), worker: None, stop, timeout };
             lane.worker = Some(Worker::start(&lane)?);
             let (queue, sender) = (Arc::clone(&queue), sender.clone());
             lanes.push(thread::spawn(move || lane.work(&queue, &sender)));
         }
-        Ok(Pool { jobs: Some(jobs), results, lanes, stop, in_flight: 0 })
+        Ok(Pool { jobs: Some(jobs), results, lanes, stop, timeout })
+    }
+
+    /// Changes the wall time after which a test is stopped, for tests not begun yet.
+    pub fn set_timeout(&self, timeout: Duration) {
+        self.timeout.store(millis(timeout), Ordering::Relaxed);
     }
 
     /// Hands out a test.
-    pub fn submit(&mut self, job: Job) {
+    pub fn submit(&self, job: Job) {
         let sent = self.jobs.as_ref().is_some_and(|jobs| jobs.send(job).is_ok());
         assert!(sent, "lanes live as long as their pool");
-        self.in_flight += 1;
     }
 
     /// The next test that ended, with its number; `None` after `wait` without one.
-    pub fn next(&mut self, wait: Duration) -> Result<Option<(u32, Observation)>, PoolError> {
+    pub fn next(&self, wait: Duration) -> Result<Option<(u32, Observation)>, PoolError> {
         match self.results.recv_timeout(wait) {
-            Ok(result) => {
-                self.in_flight -= 1;
-                result.map(|reply| Some((reply.number, reply.observation)))
-            }
+            Ok(result) => result.map(|reply| Some((reply.number, reply.observation))),
             Err(_) => Ok(None),
         }
     }
@@ -105,6 +109,7 @@ struct Lane {
     settings: PoolSettings,
     worker: Option<Worker>,
     stop: Arc<AtomicBool>,
+    timeout: Arc<AtomicU64>,
 }
 
 impl Lane {
@@ -131,13 +136,14 @@ impl Lane {
             None => Worker::start(self)?,
         };
         let asked = Instant::now();
-        match worker.ask(job, self.settings.timeout, &self.stop) {
+        let timeout = Duration::from_millis(self.timeout.load(Ordering::Relaxed));
+        match worker.ask(job, timeout, &self.stop) {
             Ok(reply) => {
                 self.worker = Some(worker);
                 Ok(reply.observation)
             }
             Err(error) if error.kind() == io::ErrorKind::TimedOut => {
-                Ok(empty(Outcome::Timeout { limit: self.settings.timeout.as_secs_f64() }))
+                Ok(empty(Outcome::Timeout { limit: timeout.as_secs_f64() }))
             }
             Err(error) => {
                 let how = worker.how_it_ended(&error);
@@ -256,6 +262,10 @@ impl Drop for Worker {
         self.process.kill().ok();
         self.process.wait().ok();
     }
+}
+
+fn millis(duration: Duration) -> u64 {
+    u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)
 }
 
 fn output_file(directory: &Path) -> PathBuf {

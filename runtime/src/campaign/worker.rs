@@ -40,7 +40,7 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: SocketAddr, token
     let mut transport = None;
     for Job { number, test, simulator_seed } in jobs {
         let run = AssertUnwindSafe(|| {
-            let transport = transport.get_or_insert_with(|| (runner.connect.0)(plan));
+            let transport = transport.get_or_insert_with(|| runner.connect.transport(plan));
             evaluate(plan, &wires, &metrics, transport.as_mut(), &test, simulator_seed)
         });
         let observation = match panic::catch_unwind(run) {

@@ -1,0 +1,190 @@
+//! The results repository: what a campaign run leaves behind, in one SQLite file.
+//!
+//! It guarantees: a test is there whole or not at all, whatever kills the process; one process writes at a time; what
+//! is read equals what was written, bit for bit; equal campaigns have equal digests, whatever the number of workers
+//! and however often a run was interrupted. The file is meant to be read by others too: its schema is documented in
+//! the file itself, and its views answer the common questions.
+//!
+//! A [`Recorder`] writes while a campaign runs; a [`Repository`] reads, during a run or after it.
+
+mod digest;
+mod error;
+mod folder;
+mod recorder;
+mod repository;
+#[cfg(test)]
+pub(crate) mod sample;
+mod schema;
+#[cfg(test)]
+mod tests;
+mod verdict;
+
+use serde::Serialize;
+use sesame_plan::{KnownTestId, Test};
+
+use crate::observation::{Observation, Outcome};
+
+pub use digest::digest;
+pub use error::RecordError;
+pub use folder::{Claim, DATABASE, LOCK, claim_folder};
+pub use recorder::Recorder;
+pub use repository::{CampaignFacts, Repository};
+pub use schema::SCHEMA;
+pub use verdict::{Verdict, verdict, violation_spans};
+
+/// One test with everything that is known of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TestRecord {
+    /// Its number in the campaign; its name is `T` and the number.
+    pub number: u32,
+    /// Where it comes from.
+    pub origin: Origin,
+    /// The generation of the search it belongs to.
+    pub generation: Option<u32>,
+    /// Numbers of the tests it was made of.
+    pub parents: Vec<u32>,
+    /// What it disturbs.
+    pub test: Test,
+    /// The simulator's seed in its run.
+    pub simulator_seed: u64,
+    /// The equal test whose result stands for this one, which was not simulated again. The observation must be that
+    /// test's own: its series are kept once, and read from there.
+    pub duplicate_of: Option<u32>,
+    /// What its run showed.
+    pub observation: Observation,
+}
+
+/// Where a test comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Origin {
+    /// The undisturbed run for comparison.
+    Reference,
+    /// A known test of the space.
+    Known(KnownTestId),
+    /// The campaign's search.
+    Search,
+}
+
+impl Origin {
+    /// One word for tables and the database.
+    pub fn word(self) -> &'static str {
+        match self {
+            Origin::Reference => "reference",
+            Origin::Known(_) => "known",
+            Origin::Search => "search",
+        }
+    }
+}
+
+/// The value of a metric in one run.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct MetricValue {
+    /// The last value set, or the default; `None` where there is neither.
+    pub value: Option<f64>,
+    /// Whether the value is one that was set, not the default.
+    pub set: bool,
+}
+
+/// One test without its time series and effects: what tables over all tests need.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TestRow {
+    /// Its number in the campaign.
+    pub number: u32,
+    /// Where it comes from.
+    pub origin: Origin,
+    /// The generation of the search it belongs to.
+    pub generation: Option<u32>,
+    /// What it disturbs.
+    pub test: Test,
+    /// How its run ended.
+    pub outcome: Outcome,
+    /// Simulation time at which it ended, in seconds.
+    pub end: f64,
+    /// The equal test whose result stands for this one.
+    pub duplicate_of: Option<u32>,
+    /// Per metric of the plan, in its order; empty after a crash of the worker.
+    pub values: Vec<MetricValue>,
+}
+
+impl TestRow {
+    /// The value of the plan's metric at this position; unmeasured when the run reported none.
+    pub fn value(&self, metric: sesame_plan::MetricId) -> MetricValue {
+        self.values.get(metric.index()).copied().unwrap_or_default()
+    }
+}
+
+/// Whether a set of results is on the way or the result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// On the way, after some generation.
+    Intermediate,
+    /// The campaign's result.
+    Final,
+}
+
+impl Status {
+    /// One word for tables and the database.
+    pub fn word(self) -> &'static str {
+        match self {
+            Status::Intermediate => "intermediate",
+            Status::Final => "final",
+        }
+    }
+}
+
+/// A named set of tests: the front after a generation, or at the end.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ResultSet {
+    /// Its name, unique in the campaign.
+    pub name: String,
+    /// The generation after which it was taken.
+    pub generation: Option<u32>,
+    /// Whether it is the result.
+    pub status: Status,
+    /// Numbers of its tests, in its order.
+    pub members: Vec<u32>,
+}
+
+/// Whether an event belongs to what the campaign found or to one way of getting there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EventKind {
+    /// Part of the content: an equal campaign has the same warnings.
+    Warning,
+    /// Of one session (interrupted, resumed, a worker restarted); no part of the digest.
+    Session,
+}
+
+impl EventKind {
+    fn word(self) -> &'static str {
+        match self {
+            EventKind::Warning => "warning",
+            EventKind::Session => "session",
+        }
+    }
+}
+
+/// Something that happened in the campaign that a user should know.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Event {
+    /// What it belongs to.
+    pub kind: EventKind,
+    /// The test it is about, if about one.
+    pub test: Option<u32>,
+    /// What happened.
+    pub text: String,
+}
+
+/// A stretch of wall time in which a process worked on the campaign.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Session {
+    /// When it began, in seconds since 1970 UTC.
+    pub started_at: f64,
+    /// When it ended; `None` while it runs, or when it was killed.
+    pub ended_at: Option<f64>,
+    /// The machine's name, where it is known.
+    pub host: Option<String>,
+    /// The process.
+    pub pid: u32,
+    /// How many workers it ran.
+    pub workers: u32,
+}

@@ -1,0 +1,135 @@
+//! What can go wrong with results on disk, each with the path and what to do.
+
+use std::path::{Path, PathBuf};
+
+/// Why results could not be written or read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordError {
+    /// The folder already holds results.
+    #[error("there are results already; choose another folder, or `resume` them if they are unfinished: {}", path.display())]
+    Exists {
+        /// The database.
+        path: PathBuf,
+    },
+    /// There is no database where one was looked for.
+    #[error("no results here; name the folder of a run, for example `results/42`: {}", path.display())]
+    Missing {
+        /// The database looked for.
+        path: PathBuf,
+    },
+    /// Another process is writing these results.
+    #[error("{} is writing these results; wait for it or stop it: {}", holder(*pid), path.display())]
+    Locked {
+        /// The holder, where the lock file tells it.
+        pid: Option<u32>,
+        /// The lock file.
+        path: PathBuf,
+    },
+    /// The run has ended, there is nothing to go on with.
+    #[error("this run is finished; start a new one with `run`: {}", path.display())]
+    Finished {
+        /// The database.
+        path: PathBuf,
+    },
+    /// The file is not a results repository.
+    #[error("not the results of a campaign ({found}); nothing was changed: {}", path.display())]
+    Foreign {
+        /// What it seems to be.
+        found: String,
+        /// The file.
+        path: PathBuf,
+    },
+    /// A later release wrote the file.
+    #[error(
+        "these results have schema {found}, this release reads up to {known}; read them with the release that wrote \
+         them, or a later one: {}", path.display()
+    )]
+    Newer {
+        /// Schema of the file.
+        found: i64,
+        /// Schema of this release.
+        known: i64,
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is cut off or its content contradicts itself.
+    #[error("these results are damaged ({problem}); restore the file from a copy, or run the campaign again: {}", path.display())]
+    Damaged {
+        /// What was found.
+        problem: String,
+        /// The file.
+        path: PathBuf,
+    },
+    /// A test of this number is there already.
+    #[error("test T{number} is recorded already; a number is used once: {}", path.display())]
+    TestExists {
+        /// The number.
+        number: u32,
+        /// The database.
+        path: PathBuf,
+    },
+    /// There is no such test.
+    #[error("no test `{name}` in these results; `list` shows what there is: {}", path.display())]
+    NoSuchTest {
+        /// What was asked for.
+        name: String,
+        /// The database.
+        path: PathBuf,
+    },
+    /// A number that is to be recorded does not fit: the runtime promises finite numbers and small counts.
+    #[error("test T{test}: {what} cannot be recorded: {}", path.display())]
+    Unrecordable {
+        /// The test.
+        test: u32,
+        /// What does not fit.
+        what: String,
+        /// The database.
+        path: PathBuf,
+    },
+    /// The file system refused.
+    #[error("cannot {doing}: {source}: {}", path.display())]
+    Io {
+        /// What was being done.
+        doing: &'static str,
+        /// Why it failed.
+        source: std::io::Error,
+        /// Where.
+        path: PathBuf,
+    },
+    /// The database refused.
+    #[error("cannot {doing}: {source}: {}", path.display())]
+    Database {
+        /// What was being done.
+        doing: &'static str,
+        /// Why it failed.
+        source: rusqlite::Error,
+        /// The database.
+        path: PathBuf,
+    },
+}
+
+impl RecordError {
+    pub(crate) fn io(doing: &'static str, path: &Path, source: std::io::Error) -> Self {
+        RecordError::Io { doing, source, path: path.to_owned() }
+    }
+
+    /// Sorts a failure of the database into what a user can do about it.
+    pub(crate) fn database(doing: &'static str, path: &Path, source: rusqlite::Error) -> Self {
+        use rusqlite::ErrorCode::{DatabaseCorrupt, NotADatabase};
+        let path = path.to_owned();
+        match source.sqlite_error_code() {
+            Some(NotADatabase) => RecordError::Foreign { found: "not an SQLite file".to_owned(), path },
+            Some(DatabaseCorrupt) => RecordError::Damaged { problem: source.to_string(), path },
+            _ => RecordError::Database { doing, source, path },
+        }
+    }
+
+    pub(crate) fn damaged(path: &Path, problem: impl Into<String>) -> Self {
+        RecordError::Damaged { problem: problem.into(), path: path.to_owned() }
+    }
+}
+
+fn holder(pid: Option<u32>) -> String {
+    pid.map_or_else(|| "another process".to_owned(), |pid| format!("process {pid}"))
+}

@@ -1,0 +1,363 @@
+//! Writing results while a campaign runs.
+
+use std::path::Path;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use rusqlite::{Connection, ErrorCode, Transaction, params};
+use sesame_plan::{Activation, CampaignPlan, Choice};
+
+use crate::observation::{Observation, Outcome};
+use crate::record::folder::{DATABASE, Lock};
+use crate::record::schema::{self, index};
+use crate::record::{Event, EventKind, Origin, RecordError, Repository, ResultSet, TestRecord};
+
+/// Writes the results of one campaign run. There is one per folder: it holds the folder's lock.
+///
+/// Dropping it without [`Recorder::finish`] leaves the run unfinished, with all that was committed.
+#[derive(Debug)]
+pub struct Recorder {
+    // Before the lock: the database is closed when the lock is let go.
+    repository: Repository,
+    session: i64,
+    _lock: Lock,
+}
+
+impl Recorder {
+    /// Begins the results of a run in a folder, which is made if absent and must not hold results.
+    pub fn create(folder: &Path, plan: &CampaignPlan, seed: u64, workers: u32) -> Result<Recorder, RecordError> {
+        std::fs::create_dir_all(folder).map_err(|e| RecordError::io("make the folder for results", folder, e))?;
+        let lock = Lock::acquire(folder)?;
+        let path = folder.join(DATABASE);
+        if path.exists() {
+            return Err(RecordError::Exists { path });
+        }
+        let made = Connection::open(&path).and_then(|mut connection| {
+            tune(&connection)?;
+            schema::install(&mut connection, plan, seed)?;
+            Ok(connection)
+        });
+        let connection = made.map_err(|e| RecordError::database("begin the results", &path, e))?;
+        Recorder::begin_session(Repository::from_connection(connection, path)?, lock, workers)
+    }
+
+    /// Goes on with the results of a run that was interrupted.
+    pub fn resume(folder: &Path, workers: u32) -> Result<Recorder, RecordError> {
+        let path = folder.join(DATABASE);
+        if !path.exists() {
+            return Err(RecordError::Missing { path });
+        }
+        let lock = Lock::acquire(folder)?;
+        let connection = schema::open(&path, true)?;
+        let repository = Repository::from_connection(connection, path)?;
+        if repository.campaign().stop.is_some() {
+            return Err(RecordError::Finished { path: repository.path });
+        }
+        tune(&repository.connection).map_err(|e| RecordError::database("open the results", &repository.path, e))?;
+        Recorder::begin_session(repository, lock, workers)
+    }
+
+    fn begin_session(repository: Repository, lock: Lock, workers: u32) -> Result<Recorder, RecordError> {
+        repository
+            .connection
+            .execute(
+                "INSERT INTO sessions (started_at, host, pid, workers) VALUES (?1, ?2, ?3, ?4)",
+                params![wall_clock(), host(), std::process::id(), workers],
+            )
+            .map_err(|e| RecordError::database("begin a session", &repository.path, e))?;
+        let session = repository.connection.last_insert_rowid();
+        Ok(Recorder { repository, session, _lock: lock })
+    }
+
+    /// What was recorded so far.
+    pub fn repository(&self) -> &Repository {
+        &self.repository
+    }
+
+    /// Records a test that has ended: all of it in one transaction, or nothing.
+    pub fn commit(&mut self, record: &TestRecord) -> Result<(), RecordError> {
+        let plan = &self.repository.facts.plan;
+        let path = self.repository.path.clone();
+        if let Some(what) = unrecordable(record) {
+            return Err(RecordError::Unrecordable { test: record.number, what, path });
+        }
+        let written = self.repository.connection.transaction().and_then(|transaction| {
+            write_test(&transaction, plan, record)?;
+            transaction.commit()
+        });
+        written.map_err(|source| match source.sqlite_error() {
+            Some(error) if error.extended_code == rusqlite::ffi::SQLITE_CONSTRAINT_PRIMARYKEY => {
+                RecordError::TestExists { number: record.number, path }
+            }
+            _ => RecordError::database("record a test", &path, source),
+        })
+    }
+
+    /// Records a set of results; one of the same name is replaced.
+    pub fn put_result_set(&mut self, set: &ResultSet) -> Result<(), RecordError> {
+        let written = self.repository.connection.transaction().and_then(|transaction| {
+            transaction.execute("DELETE FROM result_set_members WHERE result_set = ?1", [&set.name])?;
+            transaction.execute(
+                "INSERT OR REPLACE INTO result_sets (name, generation, status) VALUES (?1, ?2, ?3)",
+                params![set.name, set.generation, set.status.word()],
+            )?;
+            for (position, test) in set.members.iter().enumerate() {
+                transaction
+                    .prepare_cached("INSERT INTO result_set_members (result_set, position, test) VALUES (?1, ?2, ?3)")?
+                    .execute(params![set.name, index(position), test])?;
+            }
+            transaction.commit()
+        });
+        written.map_err(|e| RecordError::database("record a set of results", &self.repository.path, e))
+    }
+
+    /// Records an event. A warning said before is kept once, so that a resumed run may say it again.
+    pub fn put_event(&mut self, event: &Event) -> Result<(), RecordError> {
+        let written = self.repository.connection.transaction().and_then(|transaction| {
+            let known: bool = transaction
+                .prepare_cached(
+                    "SELECT EXISTS (SELECT 1 FROM events WHERE kind = 'warning' AND test IS ?1 AND text = ?2)",
+                )?
+                .query_row(params![event.test, event.text], |row| row.get(0))?;
+            if event.kind == EventKind::Session || !known {
+                write_event(&transaction, event)?;
+            }
+            transaction.commit()
+        });
+        written.map_err(|e| RecordError::database("record an event", &self.repository.path, e))
+    }
+
+    /// Ends this session but not the run: `resume` can go on with it. Dropping does the same without the time of day.
+    pub fn interrupt(self) -> Result<(), RecordError> {
+        self.end_session()
+    }
+
+    /// Ends the run, with why it ended in a few words, and leaves one plain file that needs nothing beside it.
+    pub fn finish(mut self, stop: &str) -> Result<Repository, RecordError> {
+        let failed = |source, path: &Path| RecordError::database("finish the results", path, source);
+        self.repository
+            .connection
+            .execute("UPDATE campaign SET stop = ?1", [stop])
+            .map_err(|e| failed(e, &self.repository.path))?;
+        self.repository.facts.stop = Some(stop.to_owned());
+        self.end_session()?;
+        self.repository.connection.flush_prepared_statement_cache();
+        // Leaving the write-ahead log needs the file for ourselves. With a reader at work the log stays, which loses
+        // nothing: whoever closes the file last folds it in.
+        let left: rusqlite::Result<String> =
+            self.repository.connection.query_row("PRAGMA journal_mode = DELETE", [], |row| row.get(0));
+        match left {
+            Err(error)
+                if !matches!(error.sqlite_error_code(), Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked)) =>
+            {
+                Err(failed(error, &self.repository.path))
+            }
+            _ => Ok(self.repository),
+        }
+    }
+
+    fn end_session(&self) -> Result<(), RecordError> {
+        self.repository
+            .connection
+            .execute("UPDATE sessions SET ended_at = ?1 WHERE id = ?2", params![wall_clock(), self.session])
+            .map(drop)
+            .map_err(|e| RecordError::database("end a session", &self.repository.path, e))
+    }
+}
+
+/// Commits append to a log that the system writes out when it likes: a killed process loses nothing that was
+/// committed, a power cut may lose the last tests but damages nothing.
+fn tune(connection: &Connection) -> rusqlite::Result<()> {
+    connection.query_row("PRAGMA journal_mode = WAL", [], |_| Ok(()))?;
+    connection.pragma_update(None, "synchronous", "NORMAL")?;
+    connection.set_prepared_statement_cache_capacity(32);
+    Ok(())
+}
+
+fn wall_clock() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |elapsed| elapsed.as_secs_f64())
+}
+
+fn host() -> Option<String> {
+    let name =
+        std::fs::read_to_string("/proc/sys/kernel/hostname").ok().or_else(|| std::env::var("COMPUTERNAME").ok())?;
+    Some(name.trim().to_owned()).filter(|name| !name.is_empty())
+}
+
+/// What of a test SQLite could not give back as it is: numbers that are none, counts beyond 63 bits.
+fn unrecordable(record: &TestRecord) -> Option<String> {
+    let Observation { outcome, end, operations, metrics, messages, wall, warnings: _ } = &record.observation;
+    let mut numbers = vec![("the end of the run", *end), ("the wall time", wall.run)];
+    if let Outcome::Timeout { limit } = outcome {
+        numbers.push(("the time limit", *limit));
+    }
+    for operation in &record.test.operations {
+        let Activation::Time { start, end } = operation.activation;
+        numbers.extend([("the start of an operation", start), ("the end of an operation", end)]);
+        for choice in &operation.parameters {
+            match *choice {
+                Choice::Value { value } => numbers.push(("a parameter", value)),
+                Choice::Range { low, high } => numbers.extend([("a parameter", low), ("a parameter", high)]),
+            }
+        }
+    }
+    for effect in operations {
+        numbers
+            .extend(effect.intervals.iter().flat_map(|span| [("an interval", span.start), ("an interval", span.end)]));
+        numbers.extend([effect.first_touch, effect.last_touch].into_iter().flatten().map(|time| ("a touch", time)));
+    }
+    for metric in metrics {
+        numbers.extend(metric.value.map(|value| ("the value of a metric", value)));
+        numbers.extend(
+            metric
+                .series
+                .iter()
+                .flat_map(|point| [("the time of a change", point.0), ("a value in a series", point.1)]),
+        );
+    }
+    if let Some((what, number)) = numbers.into_iter().find(|(_, number)| !number.is_finite()) {
+        return Some(format!("{what} is {number}"));
+    }
+    let counts = operations.iter().flat_map(|effect| {
+        let c = &effect.counters;
+        [c.seen, c.changed, c.dropped, c.delayed, c.injected, c.side_effects]
+    });
+    let count = counts.chain([*messages]).find(|&count| i64::try_from(count).is_err())?;
+    Some(format!("the count {count}, which is beyond 63 bits,"))
+}
+
+fn count(count: u64) -> i64 {
+    i64::try_from(count).expect("`unrecordable` refused larger counts")
+}
+
+fn write_test(transaction: &Transaction<'_>, plan: &CampaignPlan, record: &TestRecord) -> rusqlite::Result<()> {
+    let TestRecord { number, origin, generation, parents, simulator_seed, duplicate_of, observation, test: _ } = record;
+    let known_test = match origin {
+        Origin::Known(id) => Some(plan.test(*id).name.as_str()),
+        Origin::Reference | Origin::Search => None,
+    };
+    let (detail, limit) = match &observation.outcome {
+        Outcome::Completed | Outcome::Void => (None, None),
+        Outcome::Crash { message } => (Some(message.as_str()), None),
+        Outcome::Timeout { limit } => (None, Some(*limit)),
+    };
+    transaction
+        .prepare_cached(
+            "INSERT INTO tests (number, name, origin, known_test, generation, simulator_seed, outcome, \
+             outcome_detail, time_limit_s, end_s, messages, duplicate_of) \
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
+        )?
+        .execute(params![
+            number,
+            format!("T{number}"),
+            origin.word(),
+            known_test,
+            generation,
+            simulator_seed.to_string(),
+            observation.outcome.word(),
+            detail,
+            limit,
+            observation.end,
+            count(observation.messages),
+            duplicate_of
+        ])?;
+    for (position, parent) in parents.iter().enumerate() {
+        transaction
+            .prepare_cached("INSERT INTO parents (test, position, parent) VALUES (?1, ?2, ?3)")?
+            .execute(params![number, index(position), parent])?;
+    }
+    write_operations(transaction, plan, record)?;
+    for (metric, shown) in observation.metrics.iter().enumerate() {
+        transaction
+            .prepare_cached("INSERT INTO metric_values (test, metric, value, is_set) VALUES (?1, ?2, ?3, ?4)")?
+            .execute(params![number, index(metric), shown.value, shown.set])?;
+        if duplicate_of.is_some() {
+            continue;
+        }
+        let mut insert = transaction.prepare_cached(
+            "INSERT INTO change_points (test, metric, position, time_s, value) VALUES (?1, ?2, ?3, ?4, ?5)",
+        )?;
+        for (position, (time, value)) in shown.series.iter().enumerate() {
+            insert.execute(params![number, index(metric), index(position), time, value])?;
+        }
+    }
+    for (position, text) in observation.warnings.iter().enumerate() {
+        transaction
+            .prepare_cached("INSERT INTO events (kind, test, position, text) VALUES ('warning', ?1, ?2, ?3)")?
+            .execute(params![number, index(position), text])?;
+    }
+    transaction
+        .prepare_cached("INSERT INTO wall_times (test, run_s) VALUES (?1, ?2)")?
+        .execute(params![number, observation.wall.run])
+        .map(drop)
+}
+
+fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: &TestRecord) -> rusqlite::Result<()> {
+    let number = record.number;
+    for (position, operation) in record.test.operations.iter().enumerate() {
+        let kind = plan.operation(operation.operation);
+        let Activation::Time { start, end } = operation.activation;
+        let effect = record.observation.operations.get(position);
+        let counters = effect.map(|effect| effect.counters);
+        transaction
+            .prepare_cached(
+                "INSERT INTO operations (test, position, operation, start_s, end_s, draw_seed, seen, changed, \
+                 dropped, delayed, injected, side_effects, first_touch_s, last_touch_s) \
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14)",
+            )?
+            .execute(params![
+                number,
+                index(position),
+                kind.name,
+                start,
+                end,
+                operation.draw_seed.to_string(),
+                counters.map(|c| count(c.seen)),
+                counters.map(|c| count(c.changed)),
+                counters.map(|c| count(c.dropped)),
+                counters.map(|c| count(c.delayed)),
+                counters.map(|c| count(c.injected)),
+                counters.map(|c| count(c.side_effects)),
+                effect.and_then(|effect| effect.first_touch),
+                effect.and_then(|effect| effect.last_touch),
+            ])?;
+        for (at, (choice, parameter)) in operation.parameters.iter().zip(&kind.parameters).enumerate() {
+            let (value, low, high) = match *choice {
+                Choice::Value { value } => (Some(value), None, None),
+                Choice::Range { low, high } => (None, Some(low), Some(high)),
+            };
+            transaction
+                .prepare_cached(
+                    "INSERT INTO choices (test, operation, position, parameter, unit, value, low, high) \
+                     VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+                )?
+                .execute(params![
+                    number,
+                    index(position),
+                    index(at),
+                    parameter.name,
+                    parameter.unit,
+                    value,
+                    low,
+                    high
+                ])?;
+        }
+        for (at, span) in effect.into_iter().flat_map(|effect| &effect.intervals).enumerate() {
+            transaction
+                .prepare_cached(
+                    "INSERT INTO intervals (test, operation, position, start_s, end_s) VALUES (?1, ?2, ?3, ?4, ?5)",
+                )?
+                .execute(params![number, index(position), index(at), span.start, span.end])?;
+        }
+    }
+    Ok(())
+}
+
+fn write_event(transaction: &Transaction<'_>, event: &Event) -> rusqlite::Result<()> {
+    transaction
+        .prepare_cached(
+            "INSERT INTO events (kind, test, position, text) \
+             VALUES (?1, ?2, (SELECT coalesce(max(position) + 1, 0) FROM events WHERE test IS ?2), ?3)",
+        )?
+        .execute(params![event.kind.word(), event.test, event.text])
+        .map(drop)
+}

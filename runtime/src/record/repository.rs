@@ -1,0 +1,385 @@
+//! Reading results.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use rusqlite::types::FromSql;
+use rusqlite::{Connection, Row, params};
+use sesame_plan::{Activation, CampaignPlan, Choice, KnownTestId, OperationId, Span, Test, TestOperation};
+
+use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
+use crate::record::folder::DATABASE;
+use crate::record::{
+    Event, EventKind, MetricValue, Origin, RecordError, ResultSet, Session, Status, TestRecord, TestRow, digest, schema,
+};
+
+/// The results of one campaign run, to be read.
+#[derive(Debug)]
+pub struct Repository {
+    pub(super) connection: Connection,
+    pub(super) path: PathBuf,
+    pub(super) facts: CampaignFacts,
+}
+
+/// What is fixed for a campaign run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CampaignFacts {
+    /// Everything the runner knew of the campaign.
+    pub plan: CampaignPlan,
+    /// The one seed that decided everything.
+    pub seed: u64,
+    /// Version of the runtime that ran it.
+    pub runtime: String,
+    /// Why the run ended; `None` while it is unfinished.
+    pub stop: Option<String>,
+}
+
+/// One observed number: test, position of its operation or metric, and the value.
+type At = (i64, i64);
+
+impl Repository {
+    /// Opens the results in a run's folder, or a results file itself, for reading only. A run may be writing them.
+    pub fn open(path: &Path) -> Result<Repository, RecordError> {
+        let path = if path.is_dir() { path.join(DATABASE) } else { path.to_owned() };
+        let connection = schema::open(&path, false)?;
+        Repository::from_connection(connection, path)
+    }
+
+    pub(super) fn from_connection(connection: Connection, path: PathBuf) -> Result<Repository, RecordError> {
+        let row: Result<(String, String, String, Option<String>), _> =
+            connection.query_row("SELECT plan, seed, runtime, stop FROM campaign", [], |row| {
+                Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))
+            });
+        let (plan, seed, runtime, stop) = row.map_err(|source| match source {
+            rusqlite::Error::QueryReturnedNoRows => RecordError::damaged(&path, "there is no campaign in it"),
+            _ => RecordError::database("read the campaign", &path, source),
+        })?;
+        let plan = serde_json::from_str(&plan)
+            .map_err(|e| RecordError::damaged(&path, format!("its plan cannot be read: {e}")))?;
+        let seed = seed.parse().map_err(|_| RecordError::damaged(&path, format!("`{seed}` is no seed")))?;
+        Ok(Repository { connection, path, facts: CampaignFacts { plan, seed, runtime, stop } })
+    }
+
+    /// The database's file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What is fixed for the run.
+    pub fn campaign(&self) -> &CampaignFacts {
+        &self.facts
+    }
+
+    /// Everything the runner knew of the campaign.
+    pub fn plan(&self) -> &CampaignPlan {
+        &self.facts.plan
+    }
+
+    /// Hash of the canonical content, see [`digest()`].
+    pub fn digest(&self) -> Result<String, RecordError> {
+        digest::of_connection(&self.connection).map_err(|e| RecordError::database("read the results", &self.path, e))
+    }
+
+    /// All tests, by number.
+    pub fn tests(&self) -> Result<Vec<TestRow>, RecordError> {
+        self.rows(None)
+    }
+
+    /// The number of the test that a user calls `T158`, `158`, by the name of a known test, or `reference` (the first
+    /// undisturbed run).
+    pub fn find(&self, name: &str) -> Result<u32, RecordError> {
+        let found = self.read(
+            "SELECT min(number) FROM tests WHERE name = ?1 OR name = 'T' || ?1 OR known_test = ?1 \
+             OR (origin = 'reference' AND ?1 = 'reference')",
+            params![name],
+            |row| row.get::<_, Option<u32>>(0),
+        )?;
+        found
+            .into_iter()
+            .flatten()
+            .next()
+            .ok_or_else(|| RecordError::NoSuchTest { name: name.to_owned(), path: self.path.clone() })
+    }
+
+    /// One test, whole.
+    pub fn test(&self, number: u32) -> Result<TestRecord, RecordError> {
+        let missing = || RecordError::NoSuchTest { name: format!("T{number}"), path: self.path.clone() };
+        let row = self.rows(Some(number))?.pop().ok_or_else(missing)?;
+        let (simulator_seed, messages, run): (String, u64, f64) = self
+            .read(
+                "SELECT simulator_seed, messages, run_s FROM tests JOIN wall_times ON test = number WHERE number = ?1",
+                params![number],
+                |row| Ok((row.get(0)?, unsigned(row, 1)?, row.get(2)?)),
+            )?
+            .pop()
+            .ok_or_else(missing)?;
+        let parents =
+            self.read("SELECT parent FROM parents WHERE test = ?1 ORDER BY position", params![number], |row| {
+                row.get(0)
+            })?;
+        let warnings = self.read(
+            "SELECT text FROM events WHERE test = ?1 AND kind = 'warning' ORDER BY position",
+            params![number],
+            |row| row.get(0),
+        )?;
+        let mut metrics: Vec<MetricObservation> = row
+            .values
+            .iter()
+            .map(|shown| MetricObservation { value: shown.value, set: shown.set, series: Vec::new() })
+            .collect();
+        let points = self.read(
+            "SELECT metric, time_s, value FROM change_points WHERE test = ?1 ORDER BY metric, position",
+            params![row.duplicate_of.unwrap_or(number)],
+            |row| Ok((position(row, 0)?, row.get(1)?, row.get(2)?)),
+        )?;
+        for (metric, time, value) in points {
+            let metric = metrics
+                .get_mut(metric)
+                .ok_or_else(|| RecordError::damaged(&self.path, format!("T{number} has a series without a metric")))?;
+            metric.series.push((time, value));
+        }
+        Ok(TestRecord {
+            number,
+            origin: row.origin,
+            generation: row.generation,
+            parents,
+            test: row.test,
+            simulator_seed: self.seed(&simulator_seed)?,
+            duplicate_of: row.duplicate_of,
+            observation: Observation {
+                outcome: row.outcome,
+                end: row.end,
+                operations: self.effects(number)?,
+                metrics,
+                messages,
+                warnings,
+                wall: WallTime { run },
+            },
+        })
+    }
+
+    /// The sets of results, by generation, the final one last.
+    pub fn result_sets(&self) -> Result<Vec<ResultSet>, RecordError> {
+        let mut sets = self.read(
+            "SELECT name, generation, status FROM result_sets ORDER BY status = 'final', generation, name",
+            [],
+            |row| {
+                let last = row.get::<_, String>(2)? == Status::Final.word();
+                let status = if last { Status::Final } else { Status::Intermediate };
+                Ok(ResultSet { name: row.get(0)?, generation: row.get(1)?, status, members: Vec::new() })
+            },
+        )?;
+        for set in &mut sets {
+            set.members = self.read(
+                "SELECT test FROM result_set_members WHERE result_set = ?1 ORDER BY position",
+                params![set.name],
+                |row| row.get(0),
+            )?;
+        }
+        Ok(sets)
+    }
+
+    /// The final set of results, or the latest one while there is no final one.
+    pub fn latest_result_set(&self) -> Result<Option<ResultSet>, RecordError> {
+        Ok(self.result_sets()?.pop())
+    }
+
+    /// Everything that happened that a user should know, warnings of tests included: first those of the campaign, then
+    /// by test.
+    pub fn events(&self) -> Result<Vec<Event>, RecordError> {
+        self.read("SELECT kind, test, text FROM events ORDER BY test, position, id", [], |row| {
+            let warning = row.get::<_, String>(0)? == EventKind::Warning.word();
+            let kind = if warning { EventKind::Warning } else { EventKind::Session };
+            Ok(Event { kind, test: row.get(1)?, text: row.get(2)? })
+        })
+    }
+
+    /// When and where the campaign was worked on.
+    pub fn sessions(&self) -> Result<Vec<Session>, RecordError> {
+        self.read("SELECT started_at, ended_at, host, pid, workers FROM sessions ORDER BY id", [], |row| {
+            Ok(Session {
+                started_at: row.get(0)?,
+                ended_at: row.get(1)?,
+                host: row.get(2)?,
+                pid: row.get(3)?,
+                workers: row.get(4)?,
+            })
+        })
+    }
+
+    fn rows(&self, only: Option<u32>) -> Result<Vec<TestRow>, RecordError> {
+        let mut operations = self.operations(only)?;
+        let mut values: BTreeMap<i64, Vec<MetricValue>> = BTreeMap::new();
+        let read = self.read(
+            "SELECT test, value, is_set FROM metric_values WHERE ?1 IS NULL OR test = ?1 ORDER BY test, metric",
+            params![only],
+            |row| Ok((row.get(0)?, MetricValue { value: row.get(1)?, set: row.get(2)? })),
+        )?;
+        for (test, value) in read {
+            values.entry(test).or_default().push(value);
+        }
+        let rows = self.read(
+            "SELECT number, origin, known_test, generation, outcome, outcome_detail, time_limit_s, end_s, duplicate_of \
+             FROM tests WHERE ?1 IS NULL OR number = ?1 ORDER BY number",
+            params![only],
+            |row| {
+                let number: u32 = row.get(0)?;
+                let origin: (String, Option<String>) = (row.get(1)?, row.get(2)?);
+                let outcome: (String, Option<String>, Option<f64>) = (row.get(4)?, row.get(5)?, row.get(6)?);
+                Ok((number, origin, row.get(3)?, outcome, row.get(7)?, row.get(8)?))
+            },
+        )?;
+        rows.into_iter()
+            .map(|(number, (origin, known), generation, (outcome, detail, limit), end, duplicate_of)| {
+                Ok(TestRow {
+                    number,
+                    origin: self.origin(&origin, known.as_deref())?,
+                    generation,
+                    test: Test { operations: operations.remove(&i64::from(number)).unwrap_or_default() },
+                    outcome: self.outcome(&outcome, detail, limit)?,
+                    end,
+                    duplicate_of,
+                    values: values.remove(&i64::from(number)).unwrap_or_default(),
+                })
+            })
+            .collect()
+    }
+
+    fn operations(&self, only: Option<u32>) -> Result<BTreeMap<i64, Vec<TestOperation>>, RecordError> {
+        let choices = self.read(
+            "SELECT test, operation, value, low, high FROM choices WHERE ?1 IS NULL OR test = ?1 \
+             ORDER BY test, operation, position",
+            params![only],
+            |row| {
+                let choice = match (row.get(2)?, row.get(3)?, row.get(4)?) {
+                    (Some(value), None, None) => Some(Choice::Value { value }),
+                    (None, Some(low), Some(high)) => Some(Choice::Range { low, high }),
+                    _ => None,
+                };
+                Ok(((row.get(0)?, row.get(1)?), choice))
+            },
+        )?;
+        let mut parameters: BTreeMap<At, Vec<Choice>> = BTreeMap::new();
+        for (at, choice) in choices {
+            let choice = choice.ok_or_else(|| {
+                RecordError::damaged(&self.path, format!("T{} has a choice that is neither value nor range", at.0))
+            })?;
+            parameters.entry(at).or_default().push(choice);
+        }
+        let rows = self.read(
+            "SELECT test, position, operation, start_s, end_s, draw_seed FROM operations \
+             WHERE ?1 IS NULL OR test = ?1 ORDER BY test, position",
+            params![only],
+            |row| {
+                let at: At = (row.get(0)?, row.get(1)?);
+                Ok((at, row.get::<_, String>(2)?, row.get(3)?, row.get(4)?, row.get::<_, String>(5)?))
+            },
+        )?;
+        let ids: BTreeMap<&str, OperationId> = (0u32..)
+            .zip(&self.plan().operations)
+            .map(|(id, operation)| (operation.name.as_str(), OperationId(id)))
+            .collect();
+        let mut tests: BTreeMap<i64, Vec<TestOperation>> = BTreeMap::new();
+        for (at, name, start, end, draw_seed) in rows {
+            let operation = *ids.get(name.as_str()).ok_or_else(|| {
+                RecordError::damaged(&self.path, format!("T{} has an operation `{name}` that the plan lacks", at.0))
+            })?;
+            tests.entry(at.0).or_default().push(TestOperation {
+                operation,
+                activation: Activation::Time { start, end },
+                parameters: parameters.remove(&at).unwrap_or_default(),
+                draw_seed: self.seed(&draw_seed)?,
+            });
+        }
+        Ok(tests)
+    }
+
+    fn effects(&self, number: u32) -> Result<Vec<OperationEffect>, RecordError> {
+        let mut effects: Vec<OperationEffect> = self.read(
+            "SELECT seen, changed, dropped, delayed, injected, side_effects, first_touch_s, last_touch_s \
+             FROM operations WHERE test = ?1 AND seen IS NOT NULL ORDER BY position",
+            params![number],
+            |row| {
+                Ok(OperationEffect {
+                    intervals: Vec::new(),
+                    counters: Counters {
+                        seen: unsigned(row, 0)?,
+                        changed: unsigned(row, 1)?,
+                        dropped: unsigned(row, 2)?,
+                        delayed: unsigned(row, 3)?,
+                        injected: unsigned(row, 4)?,
+                        side_effects: unsigned(row, 5)?,
+                    },
+                    first_touch: row.get(6)?,
+                    last_touch: row.get(7)?,
+                })
+            },
+        )?;
+        let spans = self.read(
+            "SELECT operation, start_s, end_s FROM intervals WHERE test = ?1 ORDER BY operation, position",
+            params![number],
+            |row| Ok((position(row, 0)?, Span { start: row.get(1)?, end: row.get(2)? })),
+        )?;
+        for (operation, span) in spans {
+            let effect = effects.get_mut(operation).ok_or_else(|| {
+                RecordError::damaged(&self.path, format!("T{number} has an interval without an operation"))
+            })?;
+            effect.intervals.push(span);
+        }
+        Ok(effects)
+    }
+
+    fn origin(&self, origin: &str, known: Option<&str>) -> Result<Origin, RecordError> {
+        match (origin, known) {
+            ("reference", None) => Ok(Origin::Reference),
+            ("search", None) => Ok(Origin::Search),
+            ("known", Some(name)) => (0u32..)
+                .zip(&self.plan().tests)
+                .find(|(_, test)| test.name == name)
+                .map(|(id, _)| Origin::Known(KnownTestId(id)))
+                .ok_or_else(|| RecordError::damaged(&self.path, format!("the plan has no known test `{name}`"))),
+            _ => Err(RecordError::damaged(&self.path, format!("a test cannot come from `{origin}`"))),
+        }
+    }
+
+    fn outcome(&self, word: &str, detail: Option<String>, limit: Option<f64>) -> Result<Outcome, RecordError> {
+        match (word, detail, limit) {
+            ("completed", None, None) => Ok(Outcome::Completed),
+            ("void", None, None) => Ok(Outcome::Void),
+            ("crash", Some(message), None) => Ok(Outcome::Crash { message }),
+            ("timeout", None, Some(limit)) => Ok(Outcome::Timeout { limit }),
+            _ => Err(RecordError::damaged(&self.path, format!("a test cannot have ended as `{word}`"))),
+        }
+    }
+
+    fn seed(&self, text: &str) -> Result<u64, RecordError> {
+        text.parse().map_err(|_| RecordError::damaged(&self.path, format!("`{text}` is no seed")))
+    }
+
+    fn read<T>(
+        &self,
+        sql: &str,
+        parameters: impl rusqlite::Params,
+        row: impl FnMut(&Row<'_>) -> rusqlite::Result<T>,
+    ) -> Result<Vec<T>, RecordError> {
+        let rows = self
+            .connection
+            .prepare_cached(sql)
+            .and_then(|mut statement| statement.query_map(parameters, row)?.collect::<rusqlite::Result<Vec<T>>>());
+        rows.map_err(|e| RecordError::database("read the results", &self.path, e))
+    }
+}
+
+/// A count; a negative one is an error of conversion, not a huge number.
+fn unsigned(row: &Row<'_>, column: usize) -> rusqlite::Result<u64> {
+    let value = row.get_ref(column)?;
+    let count = i64::column_result(value)
+        .map_err(|e| rusqlite::Error::FromSqlConversionFailure(column, value.data_type(), Box::new(e)))?;
+    u64::try_from(count).map_err(|_| rusqlite::Error::IntegralValueOutOfRange(column, count))
+}
+
+/// A position in a list.
+fn position(row: &Row<'_>, column: usize) -> rusqlite::Result<usize> {
+    let count = unsigned(row, column)?;
+    usize::try_from(count).map_err(|_| rusqlite::Error::IntegralValueOutOfRange(column, i64::MAX))
+}

@@ -1,0 +1,142 @@
+//! The database's schema: made new, and recognised.
+
+use std::path::Path;
+
+use rusqlite::{Connection, OpenFlags};
+use sesame_plan::{CampaignPlan, Direction};
+
+use crate::record::RecordError;
+use crate::record::verdict::ends;
+
+/// The schema's version, in the file's `user_version`.
+pub const SCHEMA: i64 = 1;
+
+/// Marks an SQLite file as ours, in its `application_id`: "SESM".
+pub(crate) const APPLICATION_ID: i64 = 0x5345_534D;
+
+const DDL: &str = include_str!("schema.sql");
+
+/// Makes all tables and views, and fills in what is fixed for a campaign; all or nothing.
+pub(crate) fn install(connection: &mut Connection, plan: &CampaignPlan, seed: u64) -> rusqlite::Result<()> {
+    let transaction = connection.transaction()?;
+    transaction.execute_batch(DDL)?;
+    transaction.execute_batch(&wide_views(plan))?;
+    transaction.execute(
+        "INSERT INTO campaign (id, space, name, source, generator, runtime, seed, evaluations, end_after_s, plan) \
+         VALUES (1, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+        rusqlite::params![
+            plan.space,
+            plan.campaign.name,
+            plan.source,
+            plan.generator,
+            env!("CARGO_PKG_VERSION"),
+            seed.to_string(),
+            plan.campaign.search.evaluations(),
+            plan.campaign.end_after,
+            serde_json::to_string(plan).expect("a plan is plain data with text keys"),
+        ],
+    )?;
+    for (id, metric) in plan.metrics.iter().enumerate() {
+        let objective = plan.campaign.objectives.iter().position(|objective| objective.index() == id);
+        transaction.execute(
+            "INSERT INTO metrics (id, name, unit, direction, objective, default_value) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+            rusqlite::params![
+                index(id),
+                metric.name,
+                metric.unit,
+                metric.direction.map(|direction| match direction {
+                    Direction::Maximise => "maximise",
+                    Direction::Minimise => "minimise",
+                }),
+                objective.map(index),
+                metric.default,
+            ],
+        )?;
+    }
+    for (id, requirement) in plan.requirements.iter().enumerate() {
+        let (low, low_excluded, high, high_excluded) = ends(requirement.bound);
+        transaction.execute(
+            "INSERT INTO requirements (id, name, text, metric, low, low_excluded, high, high_excluded) \
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+            rusqlite::params![
+                index(id),
+                requirement.name,
+                requirement.text,
+                requirement.metric.0,
+                low,
+                low_excluded,
+                high,
+                high_excluded
+            ],
+        )?;
+    }
+    transaction.pragma_update(None, "application_id", APPLICATION_ID)?;
+    transaction.pragma_update(None, "user_version", SCHEMA)?;
+    transaction.commit()
+}
+
+/// A position in a list as SQLite's integer.
+pub(crate) fn index(position: usize) -> i64 {
+    i64::try_from(position).expect("no list has 2^63 members")
+}
+
+/// The views with a column per metric, which only a plan can name: `results` has a row per test, `front` those of the
+/// final front, or of the latest one while the campaign is unfinished.
+fn wide_views(plan: &CampaignPlan) -> String {
+    let columns: String = plan
+        .metrics
+        .iter()
+        .enumerate()
+        .map(|(id, metric)| {
+            let name = metric.name.replace('"', "\"\"");
+            format!(
+                ",\n           (SELECT value FROM metric_values WHERE test = t.number AND metric = {id}) AS \"{name}\""
+            )
+        })
+        .collect();
+    format!(
+        "-- One row per test with a column per metric.\n\
+         CREATE VIEW results AS\n    SELECT t.number AS number, t.name AS name, t.origin AS origin, \
+         t.known_test AS known_test, t.generation AS generation, t.outcome AS outcome{columns}\n      \
+         FROM tests t ORDER BY t.number;\n\
+         -- The tests no other test is better than.\n\
+         CREATE VIEW front AS\n    SELECT r.* FROM results r JOIN result_set_members m ON m.test = r.number\n     \
+         WHERE m.result_set = (SELECT name FROM result_sets ORDER BY status = 'final' DESC, generation DESC LIMIT 1)\n     \
+         ORDER BY r.number;\n"
+    )
+}
+
+/// Opens an existing database, after making sure that it is ours, readable by this release, and whole.
+pub(crate) fn open(path: &Path, writable: bool) -> Result<Connection, RecordError> {
+    let length = match std::fs::metadata(path) {
+        Ok(metadata) if metadata.is_file() => metadata.len(),
+        Ok(_) => return Err(RecordError::Foreign { found: "not a file".to_owned(), path: path.to_owned() }),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            return Err(RecordError::Missing { path: path.to_owned() });
+        }
+        Err(error) => return Err(RecordError::io("read the results", path, error)),
+    };
+    if length == 0 {
+        return Err(RecordError::damaged(path, "the file is empty"));
+    }
+    let doing = "open the results";
+    let flags = OpenFlags::SQLITE_OPEN_NO_MUTEX
+        | if writable { OpenFlags::SQLITE_OPEN_READ_WRITE } else { OpenFlags::SQLITE_OPEN_READ_ONLY };
+    let connection = Connection::open_with_flags(path, flags).map_err(|e| RecordError::database(doing, path, e))?;
+    connection.busy_timeout(std::time::Duration::from_secs(5)).map_err(|e| RecordError::database(doing, path, e))?;
+    let pragma = |name: &str| -> Result<i64, RecordError> {
+        connection.pragma_query_value(None, name, |row| row.get(0)).map_err(|e| RecordError::database(doing, path, e))
+    };
+    if pragma("application_id")? != APPLICATION_ID {
+        return Err(RecordError::Foreign {
+            found: "an SQLite file of another program".to_owned(),
+            path: path.to_owned(),
+        });
+    }
+    match pragma("user_version")? {
+        SCHEMA => {}
+        found if found > SCHEMA => return Err(RecordError::Newer { found, known: SCHEMA, path: path.to_owned() }),
+        found => return Err(RecordError::damaged(path, format!("there is no schema {found}"))),
+    }
+    Ok(connection)
+}

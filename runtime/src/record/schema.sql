@@ -1,0 +1,192 @@
+-- Results of one SESAME campaign run.
+--
+-- Times are seconds of simulation time since the start of a run (columns ending in _s), unless the table says wall time.
+-- Values of metrics and parameters are in the unit that stands beside their name. Numbers that need 64 unsigned bits
+-- (seeds) are decimal text, since SQLite's integers are signed.
+-- Questions most people have are answered by the views: results, front, findings, verdicts, series.
+
+-- The campaign: one row.
+CREATE TABLE campaign (
+    id              INTEGER PRIMARY KEY CHECK (id = 1),
+    space           TEXT NOT NULL,
+    name            TEXT NOT NULL,
+    source          TEXT NOT NULL,  -- file name of the .sesame file
+    generator       TEXT NOT NULL,  -- program and version that generated the runner
+    runtime         TEXT NOT NULL,  -- version of the runtime that ran it
+    seed            TEXT NOT NULL,  -- the one seed that decided everything
+    evaluations     INTEGER NOT NULL, -- tests the search was to evaluate
+    end_after_s     REAL NOT NULL,  -- simulation time at which a test ends
+    plan            TEXT NOT NULL,  -- everything the runner knew of the campaign, JSON
+    stop            TEXT            -- why the run ended; NULL while it is unfinished
+) STRICT;
+
+CREATE TABLE metrics (
+    id              INTEGER PRIMARY KEY,
+    name            TEXT NOT NULL,
+    unit            TEXT,           -- NULL for a plain number
+    direction       TEXT CHECK (direction IN ('maximise', 'minimise')), -- which way is of interest to a tester
+    objective       INTEGER,        -- position among the campaign's objectives, from 0; NULL for none
+    default_value   REAL            -- value of a run in which it was never set
+) STRICT;
+
+-- A requirement is violated by a value below low or above high (or equal to it, where that end is excluded).
+CREATE TABLE requirements (
+    id              INTEGER PRIMARY KEY,
+    name            TEXT NOT NULL,
+    text            TEXT NOT NULL,
+    metric          INTEGER NOT NULL REFERENCES metrics,
+    low             REAL,
+    low_excluded    INTEGER NOT NULL,
+    high            REAL,
+    high_excluded   INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE tests (
+    number          INTEGER PRIMARY KEY,
+    name            TEXT NOT NULL UNIQUE, -- T and the number
+    origin          TEXT NOT NULL CHECK (origin IN ('reference', 'known', 'search')), -- reference: undisturbed
+    known_test      TEXT,           -- name of the known test in the .sesame file
+    generation      INTEGER,
+    simulator_seed  TEXT NOT NULL,
+    outcome         TEXT NOT NULL CHECK (outcome IN ('completed', 'void', 'crash', 'timeout')), -- void: no effect
+    outcome_detail  TEXT,           -- what is known of a crash
+    time_limit_s    REAL,           -- of a timeout, in seconds of wall time
+    end_s           REAL NOT NULL,  -- when the run ended
+    messages        INTEGER NOT NULL, -- handled by the relay
+    duplicate_of    INTEGER REFERENCES tests -- the equal test whose result stands for this one, which was not simulated
+) STRICT;
+
+CREATE TABLE parents (
+    test            INTEGER NOT NULL REFERENCES tests,
+    position        INTEGER NOT NULL,
+    parent          INTEGER NOT NULL, -- number of the parent test
+    PRIMARY KEY (test, position)
+) STRICT, WITHOUT ROWID;
+
+-- The operations of a test: what was planned, and what it did. Counts are NULL where the run could not report them.
+CREATE TABLE operations (
+    test            INTEGER NOT NULL REFERENCES tests,
+    position        INTEGER NOT NULL, -- in the test, from 0
+    operation       TEXT NOT NULL,
+    start_s         REAL NOT NULL,  -- planned
+    end_s           REAL NOT NULL,  -- planned, excluded
+    draw_seed       TEXT NOT NULL,
+    seen            INTEGER,        -- messages that reached it while it was active
+    changed         INTEGER,
+    dropped         INTEGER,
+    delayed         INTEGER,
+    injected        INTEGER,
+    side_effects    INTEGER,
+    first_touch_s   REAL,           -- its first effect
+    last_touch_s    REAL,           -- its last effect
+    PRIMARY KEY (test, position)
+) STRICT, WITHOUT ROWID;
+
+-- What a test chose for the parameters of an operation: value, or low and high of a sub-range.
+CREATE TABLE choices (
+    test            INTEGER NOT NULL REFERENCES tests,
+    operation       INTEGER NOT NULL, -- position of the operation in the test
+    position        INTEGER NOT NULL,
+    parameter       TEXT NOT NULL,
+    unit            TEXT,           -- NULL for probabilities and plain numbers
+    value           REAL,
+    low             REAL,
+    high            REAL,
+    PRIMARY KEY (test, operation, position)
+) STRICT, WITHOUT ROWID;
+
+-- When an operation was seen to be active, clipped to the run.
+CREATE TABLE intervals (
+    test            INTEGER NOT NULL REFERENCES tests,
+    operation       INTEGER NOT NULL, -- position of the operation in the test
+    position        INTEGER NOT NULL,
+    start_s         REAL NOT NULL,
+    end_s           REAL NOT NULL,  -- excluded
+    PRIMARY KEY (test, operation, position)
+) STRICT, WITHOUT ROWID;
+
+CREATE TABLE metric_values (
+    test            INTEGER NOT NULL REFERENCES tests,
+    metric          INTEGER NOT NULL REFERENCES metrics,
+    value           REAL,           -- NULL: neither set nor defaulted
+    is_set          INTEGER NOT NULL, -- 0: the value is the default
+    PRIMARY KEY (test, metric)
+) STRICT, WITHOUT ROWID;
+
+-- Time series as change points: a value holds until the next one. A duplicate's series are those of its original.
+CREATE TABLE change_points (
+    test            INTEGER NOT NULL REFERENCES tests,
+    metric          INTEGER NOT NULL REFERENCES metrics,
+    position        INTEGER NOT NULL,
+    time_s          REAL NOT NULL,
+    value           REAL NOT NULL,
+    PRIMARY KEY (test, metric, position)
+) STRICT, WITHOUT ROWID;
+
+CREATE TABLE result_sets (
+    name            TEXT PRIMARY KEY,
+    generation      INTEGER,
+    status          TEXT NOT NULL CHECK (status IN ('intermediate', 'final'))
+) STRICT;
+
+CREATE TABLE result_set_members (
+    result_set      TEXT NOT NULL REFERENCES result_sets,
+    position        INTEGER NOT NULL,
+    test            INTEGER NOT NULL, -- number of the test
+    PRIMARY KEY (result_set, position)
+) STRICT, WITHOUT ROWID;
+
+-- What happened that a user should know. A warning belongs to the content; a session note (interrupted, resumed, a
+-- worker restarted) to one way of getting there.
+CREATE TABLE events (
+    id              INTEGER PRIMARY KEY,
+    kind            TEXT NOT NULL CHECK (kind IN ('warning', 'session')),
+    test            INTEGER,        -- NULL: of the campaign
+    position        INTEGER NOT NULL, -- among the events of its test
+    text            TEXT NOT NULL
+) STRICT;
+
+-- Wall time, processes and hosts: nothing below is part of the digest.
+CREATE TABLE sessions (
+    id              INTEGER PRIMARY KEY,
+    started_at      REAL NOT NULL,  -- wall time, seconds since 1970 UTC
+    ended_at        REAL,           -- the same; NULL: still running, or killed
+    host            TEXT,
+    pid             INTEGER NOT NULL,
+    workers         INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE wall_times (
+    test            INTEGER PRIMARY KEY REFERENCES tests,
+    run_s           REAL NOT NULL   -- wall time of the run as its worker saw it
+) STRICT;
+
+-- Per test and requirement: kept, violated, or unsaid. After a crash or timeout only a violation that was seen stands.
+CREATE VIEW verdicts AS
+    SELECT t.number AS test, t.name AS test_name, r.name AS requirement, r.text AS requirement_text, v.value AS value,
+           CASE
+               WHEN v.value IS NULL THEN 'unsaid'
+               WHEN v.value < r.low OR v.value > r.high OR (r.low_excluded AND v.value = r.low)
+                    OR (r.high_excluded AND v.value = r.high)
+                    THEN CASE WHEN t.outcome IN ('completed', 'void') OR v.is_set THEN 'violated' ELSE 'unsaid' END
+               WHEN t.outcome IN ('completed', 'void') THEN 'kept'
+               ELSE 'unsaid'
+           END AS verdict
+      FROM tests t CROSS JOIN requirements r LEFT JOIN metric_values v ON v.test = t.number AND v.metric = r.metric
+     ORDER BY t.number, r.id;
+
+-- What a tester looks for: violated requirements, crashes, timeouts. Duplicates are left out.
+CREATE VIEW findings AS
+    SELECT v.test, v.test_name, 'violation' AS finding, v.requirement, v.value, v.requirement_text AS detail
+      FROM verdicts v JOIN tests t ON t.number = v.test
+     WHERE v.verdict = 'violated' AND t.duplicate_of IS NULL
+    UNION ALL
+    SELECT number, name, outcome, NULL, NULL, outcome_detail
+      FROM tests WHERE outcome IN ('crash', 'timeout') AND duplicate_of IS NULL
+     ORDER BY 1, 3, 4;
+
+-- Time series with the names of their metrics.
+CREATE VIEW series AS
+    SELECT t.number AS test, t.name AS test_name, m.name AS metric, m.unit AS unit, c.position AS position,
+           c.time_s AS time_s, c.value AS value
+      FROM tests t JOIN change_points c ON c.test = coalesce(t.duplicate_of, t.number) JOIN metrics m ON m.id = c.metric;

@@ -1,0 +1,436 @@
+//! The repository as its users see it: what is written is read, what is committed stays, what is foreign is refused.
+
+use std::path::Path;
+
+use proptest::prelude::*;
+use rusqlite::Connection;
+use sesame_plan::{Bound, KnownTestId, MetricId, Test};
+use tempfile::TempDir;
+
+use super::*;
+use crate::observation::{MetricObservation, WallTime};
+
+fn folder() -> TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+fn commit_all(folder: &Path, records: &[TestRecord]) -> Recorder {
+    let plan = sample::plan();
+    let mut recorder = Recorder::create(folder, &plan, 42, 2).unwrap();
+    for record in records {
+        recorder.commit(record).unwrap();
+    }
+    recorder
+}
+
+/// The digest of a finished run with these tests.
+fn digest_of(records: &[TestRecord]) -> String {
+    let folder = folder();
+    let repository = commit_all(folder.path(), records).finish("all evaluations done").unwrap();
+    repository.digest().unwrap()
+}
+
+#[test]
+fn everything_that_is_recorded_is_read_back() {
+    let folder = folder();
+    let plan = sample::plan();
+    let records = sample::records(&plan, 60);
+    let repository = sample::campaign(folder.path(), &plan, 60);
+    for repository in [repository, Repository::open(folder.path()).unwrap()] {
+        assert_eq!(repository.plan(), &plan);
+        assert_eq!(repository.campaign().seed, 42);
+        assert_eq!(repository.campaign().stop.as_deref(), Some("all evaluations done"));
+        for record in &records {
+            assert_eq!(&repository.test(record.number).unwrap(), record);
+        }
+        let rows = repository.tests().unwrap();
+        assert_eq!(rows.len(), records.len());
+        for (row, record) in rows.iter().zip(&records) {
+            assert_eq!((row.number, row.origin, &row.test), (record.number, record.origin, &record.test));
+            assert_eq!((&row.outcome, row.end), (&record.observation.outcome, record.observation.end));
+            let values: Vec<_> =
+                record.observation.metrics.iter().map(|m| MetricValue { value: m.value, set: m.set }).collect();
+            assert_eq!(row.values, values);
+        }
+        let sets = repository.result_sets().unwrap();
+        assert_eq!(sets.iter().map(|set| set.name.as_str()).collect::<Vec<_>>(), ["generation-0", "front"]);
+        assert_eq!(repository.latest_result_set().unwrap().unwrap().members, sample::front(&plan, &records));
+        let events = repository.events().unwrap();
+        assert_eq!(events.iter().map(|event| event.test).collect::<Vec<_>>(), [None, Some(17)]);
+        let sessions = repository.sessions().unwrap();
+        assert_eq!((sessions.len(), sessions[0].workers, sessions[0].pid), (1, 2, std::process::id()));
+        assert!(sessions[0].ended_at >= Some(sessions[0].started_at));
+    }
+}
+
+#[test]
+fn a_test_is_found_by_the_names_people_use() {
+    let folder = folder();
+    let repository = sample::campaign(folder.path(), &sample::plan(), 20);
+    assert_eq!(repository.find("T7").unwrap(), 7);
+    assert_eq!(repository.find("7").unwrap(), 7);
+    assert_eq!(repository.find("known_jitter").unwrap(), 1);
+    assert_eq!(repository.find("reference").unwrap(), 0);
+    let error = repository.find("T700").unwrap_err();
+    assert!(matches!(error, RecordError::NoSuchTest { ref name, .. } if name == "T700"), "{error}");
+}
+
+#[test]
+fn a_finished_run_is_one_plain_file_beside_its_lock() {
+    let folder = folder();
+    drop(sample::campaign(folder.path(), &sample::plan(), 20));
+    let mut names: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    names.sort();
+    assert_eq!(names, [LOCK, DATABASE]);
+}
+
+#[test]
+fn a_run_that_was_killed_keeps_every_committed_test_and_can_be_resumed() {
+    let folder = folder();
+    let records = sample::records(&sample::plan(), 30);
+    let (before, after) = records.split_at(20);
+    let whole = digest_of(&records);
+    // What a kill leaves behind: the files as they are in the middle of a run, log included.
+    let killed = tempfile::tempdir().unwrap();
+    let recorder = commit_all(folder.path(), before);
+    for entry in std::fs::read_dir(folder.path()).unwrap() {
+        let entry = entry.unwrap();
+        std::fs::copy(entry.path(), killed.path().join(entry.file_name())).unwrap();
+    }
+    drop(recorder);
+    let repository = Repository::open(killed.path()).unwrap();
+    assert_eq!(repository.campaign().stop, None);
+    assert_eq!(repository.tests().unwrap().len(), before.len());
+    drop(repository);
+    let mut resumed = Recorder::resume(killed.path(), 1).unwrap();
+    for record in after {
+        resumed.commit(record).unwrap();
+    }
+    let repository = resumed.finish("all evaluations done").unwrap();
+    assert_eq!(repository.sessions().unwrap().len(), 2);
+    assert_eq!(repository.digest().unwrap(), whole, "going on gives what an unbroken run gives");
+}
+
+#[test]
+fn a_test_that_cannot_be_recorded_leaves_nothing_behind() {
+    let folder = folder();
+    let records = sample::records(&sample::plan(), 5);
+    let mut recorder = commit_all(folder.path(), &records[..3]);
+    let mut bad = records[3].clone();
+    bad.observation.metrics[2].series[0].1 = f64::NAN;
+    let error = recorder.commit(&bad).unwrap_err();
+    assert!(error.to_string().starts_with("test T3: a value in a series is NaN cannot be recorded"), "{error}");
+    let error = recorder.commit(&records[2]).unwrap_err();
+    assert!(matches!(error, RecordError::TestExists { number: 2, .. }), "{error}");
+    assert_eq!(recorder.repository().tests().unwrap().len(), 3);
+    recorder.commit(&records[3]).unwrap();
+    assert_eq!(recorder.repository().test(3).unwrap(), records[3]);
+}
+
+#[test]
+fn one_process_writes_and_others_may_read() {
+    let folder = folder();
+    let recorder = commit_all(folder.path(), &sample::records(&sample::plan(), 3));
+    let error = Recorder::resume(folder.path(), 1).unwrap_err();
+    assert!(matches!(error, RecordError::Locked { pid: Some(pid), .. } if pid == std::process::id()), "{error}");
+    assert!(error.to_string().contains(&format!("process {} is writing", std::process::id())), "{error}");
+    assert_eq!(Repository::open(folder.path()).unwrap().tests().unwrap().len(), 5);
+    recorder.interrupt().unwrap();
+    Recorder::resume(folder.path(), 1).unwrap().finish("stopped").unwrap();
+    assert!(matches!(Recorder::resume(folder.path(), 1).unwrap_err(), RecordError::Finished { .. }));
+    let error = Recorder::create(folder.path(), &sample::plan(), 42, 1).unwrap_err();
+    assert!(matches!(error, RecordError::Exists { .. }), "{error}");
+}
+
+#[test]
+fn a_run_can_be_finished_while_somebody_reads_it() {
+    let folder = folder();
+    let recorder = commit_all(folder.path(), &sample::records(&sample::plan(), 3));
+    let reader = Connection::open(folder.path().join(DATABASE)).unwrap();
+    let mut statement = reader.prepare("SELECT number FROM tests").unwrap();
+    let mut rows = statement.query([]).unwrap();
+    assert!(rows.next().unwrap().is_some());
+    recorder.repository().connection.busy_timeout(std::time::Duration::ZERO).unwrap();
+    let repository = recorder.finish("all evaluations done").unwrap();
+    assert_eq!(repository.tests().unwrap().len(), 5);
+}
+
+#[test]
+fn what_is_no_repository_of_this_release_is_refused_with_what_to_do() {
+    let folder = folder();
+    let path = folder.path().join(DATABASE);
+    let refused = |expected: &str| {
+        let error = Repository::open(&path).unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains(expected), "{text}");
+        assert!(text.ends_with(&path.display().to_string()), "the path comes last: {text}");
+        assert!(Recorder::resume(folder.path(), 1).is_err(), "nor is it written to");
+        error
+    };
+    assert!(matches!(refused("no results here"), RecordError::Missing { .. }));
+    std::fs::write(&path, "").unwrap();
+    assert!(matches!(refused("the file is empty"), RecordError::Damaged { .. }));
+    std::fs::write(&path, "time,value\n1,2\n".repeat(100)).unwrap();
+    assert!(matches!(refused("not an SQLite file"), RecordError::Foreign { .. }));
+    std::fs::remove_file(&path).unwrap();
+    Connection::open(&path).unwrap().execute_batch("CREATE TABLE notes (text TEXT)").unwrap();
+    assert!(matches!(refused("of another program"), RecordError::Foreign { .. }));
+    std::fs::remove_file(&path).unwrap();
+
+    drop(sample::campaign(folder.path(), &sample::plan(), 30));
+    let whole = std::fs::read(&path).unwrap();
+    let open = Connection::open(&path).unwrap();
+    open.pragma_update(None, "user_version", SCHEMA + 1).unwrap();
+    drop(open);
+    assert!(matches!(refused("schema 2, this release reads up to 1"), RecordError::Newer { found: 2, known: 1, .. }));
+    for length in [whole.len() / 2, 4096, 700] {
+        std::fs::write(&path, &whole[..length]).unwrap();
+        assert!(matches!(refused("restore the file"), RecordError::Damaged { .. }), "cut to {length} bytes");
+    }
+    std::fs::write(&path, &whole).unwrap();
+    assert_eq!(Repository::open(&path).unwrap().tests().unwrap().len(), 32, "the file itself may be named");
+}
+
+#[test]
+fn a_taken_folder_gets_the_next_number_and_an_unfinished_one_is_named() {
+    let results = folder();
+    let first = claim_folder(results.path(), 42).unwrap();
+    assert_eq!(first, Claim { folder: results.path().join("42"), unfinished: None });
+    let running = commit_all(&first.folder, &[]);
+    let second = claim_folder(results.path(), 42).unwrap();
+    assert_eq!(second, Claim { folder: results.path().join("42-2"), unfinished: None }, "the first still runs");
+    running.interrupt().unwrap();
+    let third = claim_folder(results.path(), 42).unwrap();
+    assert_eq!(third, Claim { folder: results.path().join("42-3"), unfinished: Some(first.folder.clone()) });
+    Recorder::resume(&first.folder, 1).unwrap().finish("done").unwrap();
+    assert_eq!(claim_folder(results.path(), 42).unwrap().unfinished, None);
+    assert_eq!(claim_folder(results.path(), 7).unwrap().folder, results.path().join("7"));
+}
+
+#[test]
+fn the_views_answer_in_the_names_of_the_space() {
+    let folder = folder();
+    let plan = sample::plan();
+    let repository = sample::campaign(folder.path(), &plan, 60);
+    let open = Connection::open(folder.path().join(DATABASE)).unwrap();
+    let (number, collisions): (u32, f64) = open
+        .query_row(
+            "SELECT number, collision_occurrence FROM front ORDER BY collision_occurrence DESC LIMIT 1",
+            [],
+            |row| Ok((row.get(0)?, row.get(1)?)),
+        )
+        .unwrap();
+    assert_eq!(repository.test(number).unwrap().observation.metrics[0].value, Some(collisions));
+    let crashes: i64 =
+        open.query_row("SELECT count(*) FROM findings WHERE finding = 'crash'", [], |row| row.get(0)).unwrap();
+    assert_eq!(crashes, 2);
+    let series = |test: u32| -> i64 {
+        open.query_row("SELECT count(*) FROM series WHERE test = ?1", [test], |row| row.get(0)).unwrap()
+    };
+    assert!(series(40) > 0 && series(44) == series(40), "a duplicate shows the series of its original");
+}
+
+#[test]
+fn the_verdicts_of_the_view_are_those_of_the_function() {
+    let folder = folder();
+    let plan = sample::plan();
+    let repository = sample::campaign(folder.path(), &plan, 60);
+    let mut expected = Vec::new();
+    for row in repository.tests().unwrap() {
+        for requirement in &plan.requirements {
+            let word = verdict(requirement.bound, &row.outcome, row.value(requirement.metric)).word();
+            expected.push((row.number, requirement.name.clone(), word.to_owned()));
+        }
+    }
+    let open = Connection::open(folder.path().join(DATABASE)).unwrap();
+    let mut statement = open.prepare("SELECT test, requirement, verdict FROM verdicts").unwrap();
+    let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).unwrap();
+    let view: Vec<(u32, String, String)> = rows.collect::<Result<_, _>>().unwrap();
+    assert_eq!(view, expected);
+    for word in ["kept", "violated", "unsaid"] {
+        assert!(view.iter().any(|row| row.2 == word), "the sample has every verdict");
+    }
+}
+
+#[test]
+fn the_digest_does_not_depend_on_wall_times_sessions_and_the_order_of_writing() {
+    let plan = sample::plan();
+    let mut records = sample::records(&plan, 30);
+    let digest = digest_of(&records);
+    assert_eq!(digest.len(), 64);
+    for record in &mut records {
+        record.observation.wall = WallTime { run: record.observation.wall.run + 1.0 };
+    }
+    records.reverse();
+    let folder = folder();
+    let mut recorder = Recorder::create(folder.path(), &plan, 42, 8).unwrap();
+    for record in &records {
+        recorder.commit(record).unwrap();
+    }
+    recorder.put_event(&Event { kind: EventKind::Session, test: None, text: "resumed".to_owned() }).unwrap();
+    let repository = recorder.finish("all evaluations done").unwrap();
+    assert_eq!(repository.digest().unwrap(), digest);
+    drop(repository);
+    assert_eq!(super::digest(&folder.path().join(DATABASE)).unwrap(), digest);
+}
+
+#[test]
+fn the_digest_tells_campaigns_sets_and_warnings_apart() {
+    let plan = sample::plan();
+    let records = sample::records(&plan, 3);
+    let with = |change: &dyn Fn(&mut Recorder), seed, stop: &str| {
+        let folder = folder();
+        let mut recorder = Recorder::create(folder.path(), &plan, seed, 1).unwrap();
+        for record in &records {
+            recorder.commit(record).unwrap();
+        }
+        change(&mut recorder);
+        recorder.finish(stop).unwrap().digest().unwrap()
+    };
+    let set = |members: &[u32], status| ResultSet {
+        name: "front".to_owned(),
+        generation: None,
+        status,
+        members: members.to_vec(),
+    };
+    let warning = |text: &str| Event { kind: EventKind::Warning, test: None, text: text.to_owned() };
+    let digests = [
+        with(&|_| {}, 42, "done"),
+        with(&|_| {}, 43, "done"),
+        with(&|_| {}, 42, "stopped"),
+        with(&|r| r.put_result_set(&set(&[1, 2], Status::Final)).unwrap(), 42, "done"),
+        with(&|r| r.put_result_set(&set(&[2, 1], Status::Final)).unwrap(), 42, "done"),
+        with(&|r| r.put_result_set(&set(&[1, 2], Status::Intermediate)).unwrap(), 42, "done"),
+        with(&|r| r.put_event(&warning("a")).unwrap(), 42, "done"),
+        with(&|r| r.put_event(&warning("b")).unwrap(), 42, "done"),
+    ];
+    for (at, digest) in digests.iter().enumerate() {
+        assert!(!digests[..at].contains(digest), "case {at} equals an earlier one");
+    }
+    let twice = with(
+        &|r| {
+            r.put_event(&warning("a")).unwrap();
+            r.put_event(&warning("a")).unwrap()
+        },
+        42,
+        "done",
+    );
+    assert_eq!(twice, digests[6], "a warning said again when a run is resumed is one warning");
+    let replaced = with(
+        &|r| {
+            r.put_result_set(&set(&[1], Status::Intermediate)).unwrap();
+            r.put_result_set(&set(&[1, 2], Status::Final)).unwrap()
+        },
+        42,
+        "done",
+    );
+    assert_eq!(replaced, digests[3], "a set of the same name is replaced");
+}
+
+/// One kind of change to one test's record.
+fn change(record: &mut TestRecord, kind: usize) {
+    let next_up = |x: &mut f64| *x = x.next_up();
+    let observation = &mut record.observation;
+    match kind {
+        0 => record.simulator_seed ^= 1 << 63,
+        1 => record.parents.push(1),
+        2 => record.generation = record.generation.map_or(Some(0), |_| None),
+        3 => next_up(&mut observation.end),
+        4 => observation.messages += 1,
+        5 => observation.outcome = Outcome::Timeout { limit: 31.0 },
+        6 => observation.outcome = Outcome::Crash { message: "other".to_owned() },
+        7 => observation.warnings.push("a warning".to_owned()),
+        8 => next_up(&mut observation.metrics[2].series[0].0),
+        9 => next_up(&mut observation.metrics[2].series[0].1),
+        10 => observation.metrics[0].set = !observation.metrics[0].set,
+        11 => observation.metrics[4].value = None,
+        12 => drop(observation.metrics[2].series.pop()),
+        13 => record.test.operations[0].draw_seed ^= 1,
+        14 => observation.operations[0].counters.seen += 1,
+        15 => observation.operations[0].counters.side_effects += 1,
+        16 => next_up(&mut observation.operations[0].intervals[0].end),
+        17 => observation.operations[0].first_touch = Some(0.5),
+        18 => {
+            let sesame_plan::Activation::Time { start, .. } = &mut record.test.operations[0].activation;
+            *start = start.next_down();
+        }
+        19 => record.origin = Origin::Known(KnownTestId(0)),
+        20 => match &mut record.test.operations[0].parameters[0] {
+            sesame_plan::Choice::Range { high, .. } => next_up(high),
+            sesame_plan::Choice::Value { value } => next_up(value),
+        },
+        _ => observation.operations.clear(),
+    }
+}
+
+fn finite() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        any::<f64>().prop_filter("finite", |x| x.is_finite()),
+        Just(0.0),
+        Just(f64::MIN_POSITIVE),
+        (-10i32..10).prop_map(f64::from)
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn any_change_of_content_changes_the_digest(kind in 0usize..22, seed in any::<u64>()) {
+        let plan = sample::plan();
+        let mut record = sample::record(&plan, 3, Origin::Search, plan.tests[0].test.clone());
+        record.simulator_seed = seed;
+        let before = digest_of(std::slice::from_ref(&record));
+        prop_assert_eq!(&digest_of(std::slice::from_ref(&record)), &before);
+        change(&mut record, kind);
+        prop_assert_ne!(digest_of(&[record]), before);
+    }
+
+    #[test]
+    fn any_finite_numbers_come_back_bit_for_bit(
+        value in prop::option::of(finite()),
+        series in prop::collection::vec((finite(), finite()), 0..20),
+        end in finite(),
+    ) {
+        let folder = folder();
+        let plan = sample::plan();
+        let mut record = sample::record(&plan, 3, Origin::Search, Test::default());
+        record.observation.end = end;
+        record.observation.metrics[0] = MetricObservation { value, set: true, series };
+        let recorder = commit_all(folder.path(), std::slice::from_ref(&record));
+        let read = recorder.repository().test(3).unwrap();
+        prop_assert_eq!(&read, &record);
+        let bits = |record: &TestRecord| -> Vec<u64> {
+            let points = record.observation.metrics[0].series.iter().flat_map(|point| [point.0, point.1]);
+            points.chain([record.observation.end]).map(|x| (x + 0.0).to_bits()).collect()
+        };
+        prop_assert_eq!(bits(&read), bits(&record));
+    }
+
+    #[test]
+    fn bounds_of_every_kind_mean_the_same_in_the_view(
+        kind in 0usize..6, a in -3i32..4, width in 0i32..3, x in prop::option::of(-3i32..4), set in any::<bool>(), outcome in 0usize..4,
+    ) {
+        let value = f64::from(a);
+        let bound = [
+            Bound::AtMost { value }, Bound::Below { value }, Bound::AtLeast { value }, Bound::Above { value },
+            Bound::Equal { value }, Bound::Within { low: value, high: f64::from(a + width) },
+        ][kind];
+        let mut plan = sample::plan();
+        plan.requirements.truncate(1);
+        plan.requirements[0].bound = bound;
+        let mut record = sample::record(&plan, 3, Origin::Search, Test::default());
+        record.observation.outcome = [
+            Outcome::Completed, Outcome::Void, Outcome::Timeout { limit: 1.0 }, Outcome::Crash { message: String::new() },
+        ][outcome].clone();
+        let shown = MetricValue { value: x.map(f64::from), set };
+        record.observation.metrics[0] = MetricObservation { value: shown.value, set, series: vec![] };
+        let folder = folder();
+        let mut recorder = Recorder::create(folder.path(), &plan, 1, 1).unwrap();
+        recorder.commit(&record).unwrap();
+        let view: String = recorder.repository().connection.query_row("SELECT verdict FROM verdicts", [], |row| row.get(0)).unwrap();
+        prop_assert_eq!(view, verdict(bound, &record.observation.outcome, shown).word());
+        let row = &recorder.repository().tests().unwrap()[0];
+        prop_assert_eq!(row.value(MetricId(0)), shown);
+    }
+}
