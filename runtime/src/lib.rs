@@ -7,6 +7,8 @@
 pub mod activation;
 #[cfg(feature = "campaign")]
 pub mod campaign;
+#[cfg(feature = "campaign")]
+mod cli;
 pub mod evaluate;
 #[cfg(test)]
 mod fixture;

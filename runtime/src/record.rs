@@ -26,7 +26,7 @@ use crate::observation::{Observation, Outcome};
 
 pub use digest::digest;
 pub use error::RecordError;
-pub use folder::{Claim, DATABASE, LOCK, claim_folder};
+pub use folder::{Claim, DATABASE, LOCK, claim_folder, latest_folder};
 pub use recorder::Recorder;
 pub use repository::{CampaignFacts, Repository};
 pub use schema::SCHEMA;

@@ -20,6 +20,5 @@ pub struct Runner {
 
 /// The runner's command line. A generated `main` is nothing but this call.
 pub fn main(runner: Runner) -> ExitCode {
-    let _ = runner;
-    ExitCode::FAILURE
+    crate::cli::main(&runner)
 }

@@ -43,6 +43,24 @@ pub fn claim_folder(results: &Path, seed: u64) -> Result<Claim, RecordError> {
     }
 }
 
+/// The folder of the run whose results were written last, if there is any.
+pub fn latest_folder(results: &Path) -> Result<Option<PathBuf>, RecordError> {
+    let failed = |error| RecordError::io("look for results", results, error);
+    let entries = match std::fs::read_dir(results) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(failed(error)),
+    };
+    let mut latest = None;
+    for entry in entries {
+        let folder = entry.map_err(failed)?.path();
+        let Ok(written) = std::fs::metadata(folder.join(DATABASE)).and_then(|file| file.modified()) else { continue };
+        // Equal times are told apart by name, so that the answer does not depend on the order of the listing.
+        latest = latest.max(Some((written, folder)));
+    }
+    Ok(latest.map(|(_, folder)| folder))
+}
+
 fn can_be_resumed(folder: &Path) -> bool {
     let open = Repository::open(folder).is_ok_and(|repository| repository.campaign().stop.is_none());
     // The lock is let go at once: asking must not keep anybody from writing.

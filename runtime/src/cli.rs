@@ -1,0 +1,178 @@
+//! The runner's command line.
+//!
+//! Results go to standard output, progress and problems to standard error. Exit codes: 0 done, 1 failed, 2 wrong usage,
+//! 130 stopped by the user.
+
+mod progress;
+mod run;
+
+use std::io::Write as _;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
+use sesame_plan::{CampaignPlan, SCHEMA};
+
+use crate::campaign;
+use crate::record::{self, Repository};
+use crate::report;
+use crate::runner::Runner;
+
+/// Exit code of a run that the user stopped, as shells have it for an interrupted program.
+const STOPPED: u8 = 130;
+
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    args_conflicts_with_subcommands = true,
+    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 130 stopped by the user."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    run: run::Options,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run the campaign (what the runner does when no command is given)
+    Run(run::Options),
+    /// Go on with a run that was stopped, to the same results
+    Resume(run::ResumeOptions),
+    /// List all tests of a run
+    List(Which),
+    /// Show one test whole: operations, effects, metrics, requirements
+    Show {
+        /// The test, for example `T158`
+        test: String,
+        #[command(flatten)]
+        which: Which,
+    },
+    /// Print the hash of a run's content: equal runs have equal digests
+    Digest(Which),
+    /// Serve a supervisor; started by `run`
+    #[command(hide = true)]
+    Worker {
+        supervisor: SocketAddr,
+    },
+}
+
+/// Which run, and how it is shown.
+#[derive(Debug, Args)]
+struct Which {
+    /// Folder of the run, for example `results/42`; by default the latest
+    #[arg(long, value_name = "DIR")]
+    results: Option<PathBuf>,
+    /// How to show it
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+enum Format {
+    /// For people
+    #[default]
+    Text,
+    /// For programs
+    Json,
+}
+
+/// What went wrong, in words for the user; causes are in the words.
+#[derive(Debug)]
+struct Failure(String);
+
+impl<E: std::error::Error> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Failure(error.to_string())
+    }
+}
+
+pub(crate) fn main(runner: &Runner) -> ExitCode {
+    match dispatch(runner) {
+        Ok(code) => code,
+        Err(Failure(words)) => {
+            eprintln!("error: {words}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
+    let plan: CampaignPlan = serde_json::from_str(runner.plan)
+        .map_err(|error| Failure(format!("the plan in this runner is damaged ({error}): run `sesamec generate` again")))?;
+    if plan.schema != SCHEMA {
+        let (found, known) = (plan.schema, SCHEMA);
+        return Err(Failure(format!("the plan has schema {found}, this runtime knows {known}: run `sesamec generate` again")));
+    }
+    let about = format!("Campaign `{}` of the space `{}`.\n\n{}", plan.campaign.name, plan.space, plan.campaign.doc);
+    let command = Cli::command().name(plan.campaign.name.clone()).bin_name(plan.campaign.name.clone()).about(about);
+    let cli = match command.try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches)) {
+        Ok(cli) => cli,
+        Err(error) => error.exit(),
+    };
+    let results = Path::new(runner.directory).join("results");
+    match cli.command {
+        None => run::run(runner, &plan, &results, &cli.run),
+        Some(Command::Run(options)) => run::run(runner, &plan, &results, &options),
+        Some(Command::Resume(options)) => run::resume(runner, &plan, &results, &options),
+        Some(Command::List(which)) => list(&results, &which),
+        Some(Command::Show { test, which }) => show(&results, &which, &test),
+        Some(Command::Digest(which)) => digest(&results, &which),
+        Some(Command::Worker { supervisor }) => {
+            let token = std::env::var("SESAME_WORKER_TOKEN")
+                .map_err(|_| Failure("`worker` is started by `run`, not by hand".to_owned()))?;
+            campaign::serve(runner, &plan, supervisor, token)?;
+            Ok(ExitCode::SUCCESS)
+        }
+    }
+}
+
+fn open(results: &Path, which: &Which) -> Result<Repository, Failure> {
+    let folder = match &which.results {
+        Some(folder) => folder.clone(),
+        None => record::latest_folder(results)?
+            .ok_or_else(|| Failure(format!("there are no results yet in {}: `run` makes some", results.display())))?,
+    };
+    Ok(Repository::open(&folder)?)
+}
+
+fn list(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
+    let list = report::list(&open(results, which)?)?;
+    match which.format {
+        Format::Text => print(&list.to_text(text_style())),
+        Format::Json => print_json(&list),
+    }
+}
+
+fn show(results: &Path, which: &Which, test: &str) -> Result<ExitCode, Failure> {
+    let repository = open(results, which)?;
+    let shown = report::show(&repository, repository.find(test)?)?;
+    match which.format {
+        Format::Text => print(&shown.to_text(text_style())),
+        Format::Json => print_json(&shown),
+    }
+}
+
+fn digest(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
+    let repository = open(results, which)?;
+    let digest = repository.digest()?;
+    match which.format {
+        Format::Text => print(&format!("{digest}\n")),
+        Format::Json => print_json(&serde_json::json!({ "digest": digest })),
+    }
+}
+
+/// Prints for people or programs. A reader that has gone away, as `| head` does, is no failure.
+fn print(text: &str) -> Result<ExitCode, Failure> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(ExitCode::SUCCESS),
+    }
+}
+
+fn print_json(value: &impl serde::Serialize) -> Result<ExitCode, Failure> {
+    let text = serde_json::to_string_pretty(value)?;
+    print(&format!("{text}\n"))
+}

@@ -1,0 +1,102 @@
+//! Progress while a campaign runs: a bar on a terminal, a line now and then elsewhere.
+
+use std::io::IsTerminal as _;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use sesame_plan::{CampaignPlan, Direction, MetricSource};
+
+use crate::campaign::Progress;
+
+/// How often a line is printed where there is no terminal.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// Shows how far a campaign is, on standard error.
+pub(super) struct Display<'a> {
+    plan: &'a CampaignPlan,
+    bar: Option<ProgressBar>,
+    started: Instant,
+    last_line: Instant,
+    worst: Vec<Option<f64>>,
+}
+
+impl<'a> Display<'a> {
+    pub(super) fn new(plan: &'a CampaignPlan, seed: u64) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10));
+            let template = "{prefix} {bar:20} {pos}/{len}  {wide_msg}";
+            let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+            bar.set_style(style.progress_chars("██░"));
+            bar.set_prefix(format!(" {}  seed {seed} ", plan.campaign.name));
+            bar
+        });
+        let now = Instant::now();
+        Display { plan, bar, started: now, last_line: now, worst: vec![None; plan.campaign.objectives.len()] }
+    }
+
+    pub(super) fn update(&mut self, progress: Progress<'_>) {
+        self.remember(progress);
+        let rest = self.rest(progress);
+        match &self.bar {
+            Some(bar) => {
+                bar.set_length(u64::from(progress.total));
+                bar.set_position(u64::from(progress.done));
+                bar.set_message(rest);
+            }
+            None if self.last_line.elapsed() >= LINE_EVERY => {
+                self.last_line = Instant::now();
+                eprintln!("{} {}/{}  {rest}", self.plan.campaign.name, progress.done, progress.total);
+            }
+            None => {}
+        }
+    }
+
+    pub(super) fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+
+    /// The worst value of each objective so far.
+    fn remember(&mut self, progress: Progress<'_>) {
+        let Some(latest) = progress.latest else { return };
+        for (worst, &id) in self.worst.iter_mut().zip(&self.plan.campaign.objectives) {
+            let value = latest.observation.metrics.get(id.index()).and_then(|metric| metric.value);
+            *worst = match (*worst, value, self.plan.metric(id).direction) {
+                (Some(old), Some(new), Some(Direction::Maximise)) => Some(old.max(new)),
+                (Some(old), Some(new), _) => Some(old.min(new)),
+                (old, new, _) => old.or(new),
+            };
+        }
+    }
+
+    fn rest(&self, progress: Progress<'_>) -> String {
+        let mut parts = vec![format!("front of {}", progress.front.numbers().len())];
+        for (worst, &id) in self.worst.iter().zip(&self.plan.campaign.objectives) {
+            let metric = self.plan.metric(id);
+            // The least fuzzing time is no news.
+            if matches!(metric.source, MetricSource::FuzzingTime) {
+                continue;
+            }
+            let Some(worst) = worst else { continue };
+            let word = if metric.direction == Some(Direction::Maximise) { "most" } else { "least" };
+            parts.push(format!("{word} {} {worst:.4}", metric.name).trim_end_matches('0').trim_end_matches('.').to_owned());
+        }
+        if progress.done > 0 && progress.done < progress.total {
+            let each = self.started.elapsed().as_secs_f64() / f64::from(progress.done);
+            parts.push(format!("{} left", wait(each * f64::from(progress.total - progress.done))));
+        }
+        parts.join("  ")
+    }
+}
+
+/// A length of wall time in words.
+pub(super) fn wait(seconds: f64) -> String {
+    if seconds < 90.0 {
+        format!("{seconds:.0} s")
+    } else if seconds < 5400.0 {
+        format!("{:.0} min", seconds / 60.0)
+    } else {
+        format!("{:.1} h", seconds / 3600.0)
+    }
+}
