@@ -1,0 +1,131 @@
+//! The cell as a simulator: PLC, arms, conveyors and the watch over zones, talking over the bus.
+
+use sesame_runtime::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError};
+use sesame_runtime::time::SimTime;
+
+use crate::arm::{Arm, R3200, R270072, R270073};
+use crate::conveyor::{Conveyor, INFEED, OUTFEED};
+use crate::noise::TorqueNoise;
+use crate::plc::Plc;
+use crate::program::programs;
+use crate::zones::ZoneMonitor;
+
+/// The topic of the fastest gripper's speed, in m/s.
+pub const GRIPPER_SPEED_TOPIC: &str = "cell/gripper_speed";
+
+/// The longest step that still moves smoothly.
+const LONGEST_STEP: SimTime = SimTime::from_nanos(50_000_000);
+
+/// The servos are integrated in parts of a step no longer than this.
+const LONGEST_PART: SimTime = SimTime::from_nanos(4_000_000);
+
+/// The gearbox cell, free of randomness: the same messages give the same run, whatever the seed.
+#[derive(Debug, Clone)]
+pub struct Cell(World);
+
+/// The gearbox cell with torque noise drawn from the run's seed.
+#[derive(Debug, Clone)]
+pub struct NoisyCell {
+    world: World,
+    noise: [TorqueNoise; 3],
+}
+
+impl Simulator for Cell {
+    fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
+        World::start(setup, bus).map(Cell)
+    }
+
+    fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError> {
+        self.0.step(bus, &[[0.0; 6]; 3]);
+        Ok(Progress::Running)
+    }
+}
+
+impl Simulator for NoisyCell {
+    fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
+        let world = World::start(setup, bus)?;
+        let noise = |arm: usize| TorqueNoise::new(setup.seed, arm, world.arms[arm].model(), setup.step.seconds());
+        let noise = std::array::from_fn(noise);
+        Ok(NoisyCell { world, noise })
+    }
+
+    fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError> {
+        let disturbances = self.noise.each_mut().map(TorqueNoise::draw);
+        self.world.step(bus, &disturbances);
+        Ok(Progress::Running)
+    }
+}
+
+impl Cell {
+    /// The arms: R3200, R270073, R270072.
+    pub fn arms(&self) -> &[Arm; 3] {
+        &self.0.arms
+    }
+}
+
+impl NoisyCell {
+    /// The arms: R3200, R270073, R270072.
+    pub fn arms(&self) -> &[Arm; 3] {
+        &self.world.arms
+    }
+}
+
+/// All that is in the cell.
+#[derive(Debug, Clone)]
+struct World {
+    plc: Plc,
+    arms: [Arm; 3],
+    conveyors: [Conveyor; 2],
+    monitor: ZoneMonitor,
+    gripper_speed: Port,
+    n_parts: u32,
+    part_seconds: f64,
+}
+
+impl World {
+    fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
+        let step = setup.step;
+        if step <= SimTime::ZERO || step > LONGEST_STEP {
+            return Err(SimulatorError(format!(
+                "a step of {step} does not suit the gearbox cell: give it more than 0 ms and at most 50 ms (its PLC runs \
+                 at 20 ms)"
+            )));
+        }
+        let n_parts = u32::try_from((step.nanos() + LONGEST_PART.nanos() - 1) / LONGEST_PART.nanos())
+            .expect("a step of at most 50 ms has few parts");
+        let programs = programs()?;
+        let [product_home, housing_home, shaft_home] = programs.homes;
+        let arms = [
+            Arm::open(&R3200, &product_home, bus),
+            Arm::open(&R270073, &housing_home, bus),
+            Arm::open(&R270072, &shaft_home, bus),
+        ];
+        let conveyors = [Conveyor::open(&INFEED, bus), Conveyor::open(&OUTFEED, bus)];
+        Ok(World {
+            plc: Plc::open(programs, bus),
+            monitor: ZoneMonitor::open(&arms, bus),
+            arms,
+            conveyors,
+            gripper_speed: bus.open(GRIPPER_SPEED_TOPIC),
+            n_parts,
+            part_seconds: step.seconds() / f64::from(n_parts),
+        })
+    }
+
+    fn step(&mut self, bus: &mut Bus<'_>, disturbances: &[[f64; 6]; 3]) {
+        self.plc.scan(bus);
+        for (arm, disturbance) in self.arms.iter_mut().zip(disturbances) {
+            arm.receive(bus);
+            arm.advance(self.n_parts, self.part_seconds, disturbance);
+            arm.publish_state(bus);
+        }
+        for conveyor in &mut self.conveyors {
+            conveyor.receive(bus);
+            conveyor.advance(self.n_parts, self.part_seconds);
+            conveyor.publish_measured(bus);
+        }
+        self.monitor.publish(&self.arms, bus);
+        let fastest = self.arms.iter().map(Arm::gripper_speed).fold(0.0, f64::max);
+        bus.publish(self.gripper_speed, fastest);
+    }
+}
