@@ -38,11 +38,11 @@ const fn joint(degrees: (f64, f64), degrees_per_second: f64, acceleration: f64) 
 
 /// The joints of an arm of 3.2 m reach and about 120 kg payload. Ranges and rated speeds are typical of the class, in
 /// our zero positions (see [`crate::kinematics`]); `Link0` is kept to half a turn either way, as the cell's cabling
-/// asks. A joint reaches its rated speed in about half a second, the wrist sooner.
+/// asks. A joint reaches its rated speed in a little less than half a second, the wrist sooner.
 const LONG_ARM_JOINTS: [AxisLimits; 6] = [
-    joint((-180.0, 180.0), 105.0, 3.5),
-    joint((-50.0, 85.0), 101.0, 3.0),
-    joint((-210.0, 65.0), 107.0, 3.5),
+    joint((-180.0, 180.0), 105.0, 4.2),
+    joint((-50.0, 85.0), 101.0, 3.6),
+    joint((-210.0, 65.0), 107.0, 4.2),
     joint((-350.0, 350.0), 170.0, 9.0),
     joint((-125.0, 125.0), 129.0, 9.0),
     joint((-350.0, 350.0), 206.0, 12.0),

@@ -32,7 +32,7 @@ const HOUSING_READY: [f64; 3] = [-3.5, 2.2, 1.30];
 /// Where the R270073 takes housings from.
 const HOUSING_RACK: [f64; 3] = [-4.3, 5.3, 0.75];
 
-/// The drawn-in posture in which the R3200 carries gearboxes: leaning back, forearm a little down, gripper hanging.
+/// The drawn-in posture in which the R3200 carries gearboxes: leaning back, the forearm dipping a little.
 fn carrying(turn: f64) -> Joints {
     let (shoulder, dip) = (-0.45, 0.2);
     [turn, shoulder, dip - shoulder, 0.0, std::f64::consts::FRAC_PI_2 - dip, -turn]
@@ -40,12 +40,12 @@ fn carrying(turn: f64) -> Joints {
 
 /// The stretched-out posture in which the R3200 holds gearboxes over the right-hand surface for inspection.
 fn inspecting(turn: f64) -> Joints {
-    let (shoulder, dip) = (0.85, 0.03);
+    let (shoulder, dip) = (0.85, -0.45);
     [turn, shoulder, dip - shoulder, 0.0, std::f64::consts::FRAC_PI_2 - dip, -turn]
 }
 
 /// The direction of the right-hand surface's inspection place, in rad.
-const INSPECTION_TURN: f64 = -1.45;
+const INSPECTION_TURN: f64 = -1.25;
 
 /// All sequences of the cell, not yet begun.
 #[derive(Debug, Clone)]
@@ -82,35 +82,35 @@ fn product_move() -> Result<(Joints, Vec<Step<6>>), SimulatorError> {
     let pick_turn = at(PICK)?[0];
     let place_turn = at(PLACE)?[0];
     let steps = vec![
-        // To the infeed, over the picked place, down, grip, up and drawn in.
-        Move { to: at(above(PICK, 0.75))?, seconds: 6.5 },
+        // To the infeed, out over the gearbox, down, grip, up and drawn in.
+        Move { to: with_turn(home, pick_turn), seconds: 5.6 },
+        Move { to: at(above(PICK, 0.75))?, seconds: 2.6 },
         Arrive,
         Await(Signal::GearboxAtPick),
         Move { to: at(PICK)?, seconds: 2.5 },
         Arrive,
-        Hold { seconds: 1.0 },
-        Move { to: at(above(PICK, 0.45))?, seconds: 1.6 },
+        Hold { seconds: 1.4 },
+        Move { to: at(above(PICK, 0.45))?, seconds: 1.8 },
         Raise(Signal::GearboxLifted),
         Move { to: carrying(pick_turn), seconds: 2.8 },
         // Past the right-hand surface, and out over it for the inspection.
-        Move { to: carrying(INSPECTION_TURN), seconds: 9.5 },
+        Move { to: carrying(INSPECTION_TURN), seconds: 10.0 },
         Arrive,
         Move { to: inspecting(INSPECTION_TURN), seconds: 4.0 },
         Arrive,
-        Hold { seconds: 1.6 },
+        Hold { seconds: 0.8 },
         Move { to: carrying(INSPECTION_TURN), seconds: 4.0 },
         // On to the workers' station, down, let go.
-        Move { to: carrying(place_turn), seconds: 4.0 },
+        Move { to: carrying(place_turn), seconds: 5.4 },
         Move { to: at(above(PLACE, 0.75))?, seconds: 3.2 },
-        Arrive,
         Move { to: at(PLACE)?, seconds: 2.5 },
         Arrive,
         Hold { seconds: 2.4 },
         Move { to: at(above(PLACE, 0.75))?, seconds: 2.2 },
         Raise(Signal::GearboxPlaced),
         // Home, high over the right-hand surface.
-        Move { to: with_turn(home, place_turn), seconds: 3.5 },
-        Move { to: home, seconds: 8.0 },
+        Move { to: with_turn(home, place_turn), seconds: 4.6 },
+        Move { to: home, seconds: 10.0 },
         Arrive,
     ];
     Ok((home, steps))
@@ -168,28 +168,28 @@ fn shaft() -> Result<(Joints, Vec<Step<6>>), SimulatorError> {
 
 /// The infeed takes the finished gearbox to the R3200 and the empty carrier back.
 fn infeed() -> Vec<Step<1>> {
-    use Step::{Arrive, Await, Move, Raise};
+    use Step::{Await, AwaitSwitch, Move, Raise};
     vec![
         Move { to: ASSEMBLY_TO_PICK, seconds: 5.0 },
-        Arrive,
+        AwaitSwitch,
         Raise(Signal::GearboxAtPick),
         Await(Signal::GearboxLifted),
         Move { to: [0.0], seconds: 5.0 },
-        Arrive,
+        AwaitSwitch,
         Raise(Signal::CarrierAtAssembly),
     ]
 }
 
 /// The outfeed takes the gearbox to the workers, who take it off, and comes back.
 fn outfeed() -> Vec<Step<1>> {
-    use Step::{Arrive, Await, Hold, Move};
+    use Step::{Await, AwaitSwitch, Hold, Move};
     vec![
         Await(Signal::GearboxPlaced),
         Move { to: [0.8], seconds: 3.0 },
-        Arrive,
+        AwaitSwitch,
         Hold { seconds: 3.0 },
         Move { to: [0.0], seconds: 3.0 },
-        Arrive,
+        AwaitSwitch,
     ]
 }
 

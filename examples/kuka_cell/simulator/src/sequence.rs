@@ -14,6 +14,9 @@ pub enum Step<const N: usize> {
     },
     /// Waits until every measured axis is within the tolerance of its set point; at most [`IN_POSITION_MONITORING`].
     Arrive,
+    /// Waits until every measured axis is within the tolerance, however long it takes: the end switch that must be made
+    /// before anyone else may go on.
+    AwaitSwitch,
     /// Waits for this time.
     Hold {
         /// How long.
@@ -107,6 +110,7 @@ impl<const N: usize> Sequence<N> {
                     elapsed.seconds() >= seconds
                 }
                 Step::Arrive => self.has_arrived(measured) || elapsed >= IN_POSITION_MONITORING,
+                Step::AwaitSwitch => self.has_arrived(measured),
                 Step::Hold { seconds } => elapsed.seconds() >= seconds,
                 Step::Raise(signal) => {
                     signals.raise(signal);
@@ -180,6 +184,15 @@ mod tests {
             sequence.advance(at(1.50), &[off], &mut signals);
             assert!(sequence.is_done());
         }
+    }
+
+    #[test]
+    fn an_end_switch_is_waited_for_without_limit() {
+        let (mut sequence, mut signals) = sequence(vec![Step::AwaitSwitch]);
+        sequence.advance(at(1000.0), &[0.28], &mut signals);
+        assert!(!sequence.is_done());
+        sequence.advance(at(1000.02), &[0.02], &mut signals);
+        assert!(sequence.is_done());
     }
 
     #[test]

@@ -26,9 +26,9 @@ pub const ZONES: [Zone; 9] = [
     // Behind the pick station: people who refill the infeed.
     Zone { name: "Z1", lowest: [-3.5, -0.2, 0.0], highest: [-2.50, 1.3, 2.0] },
     // Beyond the inspection surface on the right-hand side.
-    Zone { name: "Z2", lowest: [-0.7, -4.3, 0.0], highest: [1.6, -3.27, 2.0] },
+    Zone { name: "Z2", lowest: [-0.9, -4.3, 0.0], highest: [1.9, -3.06, 2.2] },
     // The workers' station, where gearboxes are handed over for manual operations.
-    Zone { name: "Z3", lowest: [-3.6, -2.3, 0.0], highest: [-2.55, -0.5, 2.0] },
+    Zone { name: "Z3", lowest: [-3.6, -2.3, 0.0], highest: [-2.60, -0.5, 2.0] },
     // The aisle behind the R270073.
     Zone { name: "Z4", lowest: [-6.5, 2.0, 0.0], highest: [-5.7, 5.5, 2.0] },
     // The aisle behind the R270072.
@@ -36,7 +36,7 @@ pub const ZONES: [Zone; 9] = [
     // The fence with the maintenance door across the cell's left-hand side.
     Zone { name: "Z6", lowest: [-6.0, 6.3, 0.0], highest: [2.6, 6.8, 2.0] },
     // Over the front of the right-hand surface, where gearboxes are carried past.
-    Zone { name: "ZTRIG1", lowest: [1.05, -0.90, 0.80], highest: [1.35, -0.60, 1.10] },
+    Zone { name: "ZTRIG1", lowest: [1.10, -0.85, 0.80], highest: [1.40, -0.55, 1.10] },
     // At the infeed's pick station.
     Zone { name: "ZTRIG2", lowest: [-2.15, 1.0, 0.40], highest: [-1.85, 1.3, 0.70] },
     // Where gearboxes are put down near the workers.

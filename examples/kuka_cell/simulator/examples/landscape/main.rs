@@ -51,7 +51,10 @@ fn undisturbed() {
         (1, "Link1 below -0.4", |q| q < -0.4),
     ] {
         let targets = bench.published(&target_topic("R3200ProductMove", link));
-        println!("| {name} | {} |", spans(targets.iter().map(|message| (message.time.seconds(), beyond(real(message))))));
+        println!(
+            "| {name} | {} |",
+            spans(targets.iter().map(|message| (message.time.seconds(), beyond(real(message)))))
+        );
     }
     if std::env::args().any(|argument| argument == "--trace") {
         println!("\n| s | Link0 | Link1 | gripper speed, m/s | Z1 | Z2 | Z3 | ZTRIG1 | ZR270073 | ZR270072 |\n|---|");
