@@ -104,7 +104,8 @@ impl Context {
 
     /// Says that a message was not of its declared type; generated code does.
     pub fn mismatch(&mut self, mismatch: &crate::message::Mismatch) {
-        self.problem.get_or_insert_with(|| format!("a message on `{}` is not of its declared type: {mismatch}", self.topic));
+        self.problem
+            .get_or_insert_with(|| format!("a message on `{}` is not of its declared type: {mismatch}", self.topic));
     }
 
     pub(crate) fn observation(&self) -> MetricObservation {
