@@ -67,9 +67,9 @@ impl Stream {
 /// The seed of a purpose under a seed.
 pub fn derive_seed(seed: u64, purpose: &str, path: &[u64]) -> u64 {
     // FNV-1a over the purpose separates the names; `mix` after each step spreads every bit.
-    let name = purpose.bytes().fold(0xCBF2_9CE4_8422_2325, |hash: u64, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3)
-    });
+    let name = purpose
+        .bytes()
+        .fold(0xCBF2_9CE4_8422_2325, |hash: u64, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3));
     path.iter().fold(mix(seed ^ mix(name)), |state, &part| mix(state ^ mix(part.wrapping_add(0x9E37_79B9_7F4A_7C15))))
 }
 

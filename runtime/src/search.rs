@@ -123,3 +123,54 @@ impl Strategy for Nsga2<TestVariation> {
         );
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::MetricId;
+
+    use super::*;
+    use crate::observation::{MetricObservation, WallTime};
+
+    fn observed(outcome: Outcome, values: &[Option<f64>]) -> Observation {
+        let metric = |&value: &Option<f64>| MetricObservation { value, set: value.is_some(), series: Vec::new() };
+        Observation {
+            outcome,
+            end: 70.0,
+            operations: Vec::new(),
+            metrics: values.iter().map(metric).collect(),
+            messages: 0,
+            warnings: Vec::new(),
+            wall: WallTime::default(),
+        }
+    }
+
+    #[test]
+    fn fitness_orients_objectives_in_the_order_of_the_campaign() {
+        let mut plan = landscape::LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+        let completed = observed(Outcome::Completed, &[Some(12.5), Some(3.0)]);
+        assert_eq!(fitness(&plan, &completed), Fitness::Measured(vec![12.5, -3.0]));
+        plan.campaign.objectives.reverse();
+        assert_eq!(fitness(&plan, &completed), Fitness::Measured(vec![-3.0, 12.5]));
+        plan.campaign.objectives = vec![MetricId(1)];
+        let Fitness::Measured(zero) = fitness(&plan, &observed(Outcome::Completed, &[None, Some(0.0)])) else {
+            panic!("only objectives need a value")
+        };
+        assert!(zero[0].is_sign_positive());
+    }
+
+    #[test]
+    fn only_completed_runs_with_all_objectives_have_a_fitness() {
+        let plan = landscape::LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+        let values = [Some(12.5), Some(3.0)];
+        let unfit = |outcome, values: &[Option<f64>]| match fitness(&plan, &observed(outcome, values)) {
+            Fitness::Unfit(why) => why,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(unfit(Outcome::Void, &values), Unfit::Void);
+        assert_eq!(unfit(Outcome::Crash { message: "x".to_owned() }, &[]), Unfit::Crash);
+        assert_eq!(unfit(Outcome::Timeout { limit: 9.0 }, &values), Unfit::Timeout);
+        assert_eq!(unfit(Outcome::Completed, &[Some(12.5), None]), Unfit::Unmeasured);
+        assert_eq!(unfit(Outcome::Completed, &[Some(12.5), Some(f64::NAN)]), Unfit::Unmeasured);
+        assert_eq!(unfit(Outcome::Completed, &[]), Unfit::Unmeasured);
+    }
+}

@@ -129,7 +129,9 @@ pub(crate) mod tests {
                 assert_eq!(dominates(a, b), i < j, "{a:?} over {b:?}");
             }
         }
-        assert!(!dominates(&void, &Fitness::Unfit(Unfit::Timeout)) && !dominates(&Fitness::Unfit(Unfit::Timeout), &void));
+        assert!(
+            !dominates(&void, &Fitness::Unfit(Unfit::Timeout)) && !dominates(&Fitness::Unfit(Unfit::Timeout), &void)
+        );
     }
 
     proptest! {

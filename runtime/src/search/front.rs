@@ -39,9 +39,8 @@ impl Front {
         if self.members.iter().any(beaten_by) {
             return false;
         }
-        self.members.retain(|member| {
-            !dominates_in_all(objectives, &member.objectives) && member.objectives != *objectives
-        });
+        self.members
+            .retain(|member| !dominates_in_all(objectives, &member.objectives) && member.objectives != *objectives);
         let place = self.members.partition_point(|member| member.number < number);
         self.members.insert(place, FrontMember { number, objectives: objectives.clone() });
         true

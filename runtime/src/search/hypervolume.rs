@@ -73,7 +73,12 @@ mod tests {
         (1u32..1 << points.len())
             .map(|subset| {
                 let corner = |k: usize| {
-                    points.iter().enumerate().filter(|(i, _)| subset >> i & 1 == 1).map(|(_, p)| p[k]).fold(f64::MIN, f64::max)
+                    points
+                        .iter()
+                        .enumerate()
+                        .filter(|(i, _)| subset >> i & 1 == 1)
+                        .map(|(_, p)| p[k])
+                        .fold(f64::MIN, f64::max)
                 };
                 let common: f64 = (0..reference.len()).map(|k| (reference[k] - corner(k)).max(0.0)).product();
                 if subset.count_ones() % 2 == 1 { common } else { -common }

@@ -43,3 +43,62 @@ pub fn fresh_operation(kind: &PermittedOperation, stream: &mut Stream) -> TestOp
         draw_seed: stream.bits(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use sesame_plan::{Count, OperationId, Search};
+
+    use super::*;
+    use crate::search::landscape::LANDSCAPES;
+    use crate::search::permitted::tests::{any_plan, broken_rule};
+
+    fn fresh_tests(inclusion: &[f64], count: Count) -> Vec<Vec<u32>> {
+        let mut plan = LANDSCAPES[2].plan(Search::Random { evaluations: 1 });
+        plan.campaign.count = count;
+        plan.campaign.operations = (0u32..).map(OperationId).take(inclusion.len()).collect();
+        plan.operations.iter_mut().zip(inclusion).for_each(|(op, &p)| op.inclusion = p);
+        let permitted = Permitted::of(&plan).unwrap();
+        let kinds = |i| fresh_test(&permitted, &mut Stream::derive(1, "test", &[i])).operations;
+        (0..6_000).map(|i| kinds(i).iter().map(|op| op.operation.0).collect()).collect()
+    }
+
+    fn share(tests: &[Vec<u32>], holds: impl Fn(&[u32]) -> bool) -> f64 {
+        tests.iter().filter(|kinds| holds(kinds)).count() as f64 / tests.len() as f64
+    }
+
+    #[test]
+    fn lengths_are_uniform_over_what_is_permitted() {
+        let tests = fresh_tests(&[1.0, 1.0], Count { min: 1, max: 5 });
+        for length in 1..=5 {
+            assert!((share(&tests, |kinds| kinds.len() == length) - 0.2).abs() < 0.02, "length {length}");
+        }
+        assert!((share(&tests, |kinds| kinds[0] == 0) - 0.5).abs() < 0.02, "the order is random");
+        assert!(tests.iter().all(|kinds| kinds.len() == 1 || (kinds.contains(&0) && kinds.contains(&1))));
+    }
+
+    #[test]
+    fn an_operation_is_included_with_its_probability() {
+        let tests = fresh_tests(&[0.8, 0.3, 0.0, 1.0], Count { min: 4, max: 6 });
+        for (kind, probability) in [(0, 0.8), (1, 0.3), (2, 0.0), (3, 1.0)] {
+            assert!((share(&tests, |kinds| kinds.contains(&kind)) - probability).abs() < 0.02, "kind {kind}");
+        }
+    }
+
+    #[test]
+    fn at_least_one_is_included_even_when_all_are_unlikely() {
+        let tests = fresh_tests(&[0.0, 0.0], Count { min: 1, max: 1 });
+        assert!((share(&tests, |kinds| kinds == [0]) - 0.5).abs() < 0.02);
+        let tests = fresh_tests(&[0.001, 0.0], Count { min: 1, max: 2 });
+        assert!(tests.iter().all(|kinds| kinds.iter().all(|&kind| kind == 0)), "never what has probability 0");
+    }
+
+    proptest! {
+        #[test]
+        fn fresh_tests_are_permitted(plan in any_plan(), seed: u64) {
+            let permitted = Permitted::of(&plan).unwrap();
+            let test = fresh_test(&permitted, &mut Stream::derive(seed, "test", &[]));
+            prop_assert_eq!(broken_rule(&plan, &test), None);
+        }
+    }
+}

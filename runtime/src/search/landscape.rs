@@ -10,7 +10,8 @@ use sesame_plan::{
     ValueMode,
 };
 
-use crate::search::{Evaluated, Fitness, Front, Strategy, Unfit, hypervolume::hypervolume};
+use crate::search::hypervolume::hypervolume;
+use crate::search::{Evaluated, Fitness, Front, Strategy, Unfit};
 
 /// Where and to what the robot is vulnerable.
 pub(crate) struct Phase {
@@ -188,54 +189,133 @@ pub(crate) struct Run {
     pub(crate) volume: f64,
 }
 
-mod tune {
+#[cfg(test)]
+mod tests {
     use super::*;
-    use crate::search::range::StepSizes;
-    use crate::search::vary::Rates;
-    use crate::search::{Nsga2, Permitted, Random, TestVariation, nsga2::Settings};
+    use crate::search::{Candidate, strategy};
 
-    fn score(rates: Option<Rates>, seeds: u64) -> Vec<f64> {
-        LANDSCAPES
-            .iter()
-            .map(|l| {
-                let mut v: Vec<f64> = (0..seeds)
-                    .map(|seed| {
-                        let plan = l.plan(Search::Nsga2 { population: 10, evaluations: 210 });
-                        let p = Permitted::of(&plan).unwrap();
-                        match rates {
-                            None => l.campaign(&mut Random::new(p, 210, seed)).volume,
-                            Some(r) => {
-                                let s = Settings { population: 10, evaluations: 210, seed };
-                                l.campaign(&mut Nsga2::new(s, TestVariation::new(p, r, seed))).volume
-                            }
-                        }
-                    })
-                    .collect();
-                v.sort_by(f64::total_cmp);
-                v.iter().sum::<f64>() / v.len() as f64
-            })
-            .collect()
+    const NSGA2: Search = Search::Nsga2 { population: 10, evaluations: 210 };
+
+    fn median_volume(landscape: &Landscape, search: &Search) -> f64 {
+        let plan = landscape.plan(search.clone());
+        let run = |seed| landscape.campaign(strategy(&plan, seed).unwrap().as_mut()).volume;
+        let mut volumes: Vec<f64> = (1..=10).map(run).collect();
+        volumes.sort_by(f64::total_cmp);
+        f64::midpoint(volumes[4], volumes[5])
     }
 
     #[test]
-    fn tune() {
-        let show = |name: &str, r: Option<Rates>| {
-            let s = score(r, 100);
-            println!("{name:<28} {:.3}  {:?}", s.iter().sum::<f64>() / 4.0, s.iter().map(|x| format!("{x:.3}")).collect::<Vec<_>>());
-        };
-        show("random", None);
-        let d = Rates::default();
-        show("default", Some(d));
-        for x in [0.0, 0.5, 1.0] { show(&format!("crossover {x}"), Some(Rates { crossover: x, ..d })); }
-        for x in [0.1, 0.2, 0.45, 0.666, 0.9] { show(&format!("window {x}"), Some(Rates { window: x, ..d })); }
-        for x in [0.1, 0.2, 0.45, 0.666, 0.9] { show(&format!("parameter {x}"), Some(Rates { parameter: x, ..d })); }
-        for x in [0.0, 0.1, 0.35, 0.5, 1.0] { show(&format!("fresh {x}"), Some(Rates { fresh: x, ..d })); }
-        for x in [0.0, 0.02, 0.1, 0.2] { show(&format!("retarget {x}"), Some(Rates { retarget: x, ..d })); }
-        for x in [0.0, 0.05, 0.2, 0.3] { show(&format!("add {x}"), Some(Rates { add: x, ..d })); }
-        for x in [0.0, 0.1, 0.2, 0.3] { show(&format!("duplicate {x}"), Some(Rates { duplicate: x, ..d })); }
-        for x in [0.0, 0.05, 0.25, 0.4] { show(&format!("drop {x}"), Some(Rates { drop: x, ..d })); }
-        for (a, b) in [(0.001, 0.1), (0.01, 0.1), (0.03, 0.3), (0.1, 0.1001), (0.1, 0.5), (0.01, 1.0)] {
-            show(&format!("steps {a} {b}"), Some(Rates { steps: StepSizes { finest: a, boldest: b }, ..d }));
+    fn evolution_beats_chance_on_every_landscape() {
+        let ratios = LANDSCAPES.map(|landscape| {
+            let random = median_volume(&landscape, &Search::Random { evaluations: 210 });
+            (landscape.name, median_volume(&landscape, &NSGA2) / random)
+        });
+        println!("{ratios:?}");
+        assert!(ratios.iter().all(|(_, ratio)| *ratio > 1.1), "{ratios:?}");
+    }
+
+    #[test]
+    fn no_test_is_asked_twice() {
+        for landscape in LANDSCAPES {
+            let plan = landscape.plan(NSGA2);
+            let run = landscape.campaign(strategy(&plan, 5).unwrap().as_mut());
+            for (i, result) in run.tests.iter().enumerate() {
+                assert!(!run.tests[..i].iter().any(|earlier| earlier.test == result.test), "{}", landscape.name);
+            }
         }
+    }
+
+    #[test]
+    fn the_seed_decides_everything() {
+        let plan = LANDSCAPES[1].plan(NSGA2);
+        let run = |seed| LANDSCAPES[1].campaign(strategy(&plan, seed).unwrap().as_mut()).tests;
+        assert_eq!(run(3), run(3));
+        assert_ne!(run(3), run(4));
+    }
+
+    #[test]
+    fn a_resumed_search_goes_on_as_if_never_stopped() {
+        let landscape = &LANDSCAPES[0];
+        let plan = landscape.plan(NSGA2);
+        let whole = landscape.campaign(strategy(&plan, 8).unwrap().as_mut()).tests;
+        let mut resumed = strategy(&plan, 8).unwrap();
+        for stored in whole.chunks(10).take(7) {
+            let asked: Vec<Test> = resumed.ask().into_iter().map(|candidate| candidate.test).collect();
+            assert_eq!(asked, stored.iter().map(|result| result.test.clone()).collect::<Vec<_>>());
+            resumed.tell(stored);
+        }
+        let next: Vec<Test> = resumed.ask().into_iter().map(|candidate| candidate.test).collect();
+        assert_eq!(next, whole[70..80].iter().map(|result| result.test.clone()).collect::<Vec<_>>());
+    }
+
+    /// All generations of a search in which nothing can be measured.
+    fn generations(search: Search) -> Vec<Vec<Candidate>> {
+        let mut plan = LANDSCAPES[0].plan(search);
+        plan.tests = vec![sesame_plan::KnownTest {
+            name: "known".to_owned(),
+            doc: String::new(),
+            test: Test::default(),
+            expectations: Vec::new(),
+        }];
+        let mut strategy = strategy(&plan, 1).unwrap();
+        let mut generations: Vec<Vec<Candidate>> = Vec::new();
+        loop {
+            let batch = strategy.ask();
+            if batch.is_empty() {
+                return generations;
+            }
+            let first = generations.iter().map(Vec::len).sum::<usize>();
+            let results: Vec<Evaluated> = (0u32..)
+                .skip(first)
+                .zip(&batch)
+                .map(|(number, candidate)| Evaluated {
+                    number,
+                    test: candidate.test.clone(),
+                    fitness: Fitness::Unfit(Unfit::Unmeasured),
+                })
+                .collect();
+            strategy.tell(&results);
+            generations.push(batch);
+        }
+    }
+
+    #[test]
+    fn exactly_the_evaluations_asked_for_are_made() {
+        let sizes = |search| generations(search).iter().map(Vec::len).collect::<Vec<_>>();
+        assert_eq!(sizes(Search::Nsga2 { population: 7, evaluations: 24 }), [7, 7, 7, 3]);
+        assert_eq!(sizes(Search::Nsga2 { population: 1, evaluations: 3 }), [1, 1, 1]);
+        assert_eq!(sizes(Search::Nsga2 { population: 10, evaluations: 4 }), [4]);
+        assert_eq!(sizes(Search::Nsga2 { population: 10, evaluations: 0 }), [0; 0]);
+        assert_eq!(sizes(Search::Random { evaluations: 120 }), [50, 50, 20]);
+        assert_eq!(sizes(Search::Repeat { test: sesame_plan::KnownTestId(0), times: 30 }), [30]);
+        assert_eq!(sizes(Search::Repeat { test: sesame_plan::KnownTestId(0), times: 0 }), [0; 0]);
+    }
+
+    #[test]
+    fn parents_are_earlier_tests_and_generations_are_counted() {
+        let generations = generations(Search::Nsga2 { population: 6, evaluations: 30 });
+        let mut earlier = 0;
+        for (n, generation) in (0u32..).zip(&generations) {
+            for candidate in generation {
+                assert_eq!(candidate.generation, n);
+                assert_eq!(candidate.parents.is_empty(), n == 0);
+                assert!(candidate.parents.len() <= 2 && candidate.parents.iter().all(|&parent| parent < earlier));
+            }
+            earlier += u32::try_from(generation.len()).unwrap();
+        }
+    }
+
+    #[test]
+    fn the_random_tests_are_those_an_evolution_begins_with() {
+        let random = &generations(Search::Random { evaluations: 10 })[0];
+        let first = &generations(Search::Nsga2 { population: 10, evaluations: 20 })[0];
+        assert_eq!(random, first);
+    }
+
+    #[test]
+    fn a_population_of_nobody_is_refused() {
+        let plan = LANDSCAPES[0].plan(Search::Nsga2 { population: 0, evaluations: 10 });
+        let Err(refusal) = strategy(&plan, 1) else { panic!("a population of 0 was accepted") };
+        assert_eq!(refusal.to_string(), "campaign `three phases` has a population of 0; give it at least 1");
     }
 }

@@ -91,7 +91,15 @@ impl<V: Variation> Nsga2<V> {
     /// A run before its first generation.
     pub fn new(settings: Settings, variation: V) -> Self {
         assert!(settings.population > 0, "a population has at least one member");
-        Nsga2 { settings, variation, generation: 0, asked: 0, awaited: 0, population: Vec::new(), standings: Vec::new() }
+        Nsga2 {
+            settings,
+            variation,
+            generation: 0,
+            asked: 0,
+            awaited: 0,
+            population: Vec::new(),
+            standings: Vec::new(),
+        }
     }
 
     /// The generation that [`Nsga2::ask`] gives next, from 0.

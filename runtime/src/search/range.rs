@@ -120,3 +120,78 @@ pub(crate) fn fresh_choice(range: Range, shape: Shape, stream: &mut Stream) -> s
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEPS: StepSizes = StepSizes { finest: 0.01, boldest: 0.3 };
+
+    #[test]
+    fn intervals_are_uniform_over_the_triangle_of_feasible_pairs() {
+        let range = Range { low: 10.0, high: 20.0, shortest: 0.0, integer: false };
+        let mut stream = Stream::derive(1, "test", &[]);
+        let n = 40_000;
+        let pairs: Vec<(f64, f64)> = (0..n).map(|_| range.interval(&mut stream)).collect();
+        let share = |holds: fn(f64, f64) -> bool| {
+            pairs.iter().filter(|(low, high)| holds(*low, *high)).count() as f64 / f64::from(n)
+        };
+        // Areas of the triangle with both legs 10 and area 50.
+        assert!((share(|low, _| low < 15.0) - 0.75).abs() < 0.01);
+        assert!((share(|_, high| high > 15.0) - 0.75).abs() < 0.01);
+        assert!((share(|low, high| high - low > 5.0) - 0.25).abs() < 0.01);
+        assert!((share(|low, high| low + high > 30.0) - 0.5).abs() < 0.01);
+    }
+
+    #[test]
+    fn whole_intervals_are_uniform_over_the_feasible_pairs() {
+        let range = Range { low: -1.0, high: 2.0, shortest: 0.0, integer: true };
+        let mut stream = Stream::derive(1, "test", &[]);
+        let mut counts = std::collections::BTreeMap::new();
+        for _ in 0..20_000 {
+            let (low, high) = range.interval(&mut stream);
+            assert!(low <= high);
+            *counts.entry((low.to_string(), high.to_string())).or_insert(0u32) += 1;
+        }
+        assert_eq!(counts.len(), 10, "{counts:?}");
+        assert!(counts.values().all(|n| (1_800..2_200).contains(n)), "{counts:?}");
+    }
+
+    #[test]
+    fn whole_numbers_are_uniform_with_both_ends() {
+        let range = Range { low: 3.0, high: 6.0, shortest: 0.0, integer: true };
+        let mut stream = Stream::derive(1, "test", &[]);
+        let mut counts = [0u32; 4];
+        for _ in 0..20_000 {
+            let number = range.number(&mut stream);
+            let place = [3.0, 4.0, 5.0, 6.0].iter().position(|&n| n == number).expect("one of the whole numbers");
+            counts[place] += 1;
+        }
+        assert!(counts.iter().all(|n| (4_700..5_300).contains(n)), "{counts:?}");
+    }
+
+    #[test]
+    fn a_whole_number_in_the_middle_always_moves() {
+        let range = Range { low: 0.0, high: 10.0, shortest: 0.0, integer: true };
+        let mut stream = Stream::derive(1, "test", &[]);
+        for _ in 0..1_000 {
+            let near = range.number_near(5.0, STEPS, &mut stream);
+            assert!(near != 5.0 && libm::trunc(near) == near && (0.0..=10.0).contains(&near), "{near}");
+        }
+    }
+
+    #[test]
+    fn moved_windows_reach_the_ends_and_stay_inside() {
+        let range = Range::window(0.0, 65.0);
+        let mut stream = Stream::derive(1, "test", &[]);
+        let mut window = (30.0, 40.0);
+        let (mut at_start, mut at_end) = (false, false);
+        for _ in 0..3_000 {
+            window = range.interval_near(window, STEPS, &mut stream);
+            assert!(0.0 <= window.0 && window.1 <= 65.0 && window.1 - window.0 > 0.999 * range.shortest, "{window:?}");
+            at_start |= window.0 == 0.0;
+            at_end |= window.1 == 65.0;
+        }
+        assert!(at_start && at_end);
+    }
+}

@@ -2,6 +2,29 @@
 //!
 //! A mutated operation draws with a new seed; a copied one with that of its parent. A child is never one of the tests
 //! asked before in the same campaign (draw seeds aside), unless [`Rates::tries`] attempts to change it all fail.
+//!
+//! # Rates
+//!
+//! Chosen on four synthetic robots with hidden phases of vulnerability, hits to be maximised and active time minimised.
+//! What counts is the hypervolume of the final front, as a multiple of random search's with the same budget (geometric
+//! mean over the robots; 200 seeds with population 10 and 210 evaluations, 60 seeds with 20 and 1000). The default
+//! reaches 1.5 and 1.7. Of each rate, the default and what other values do to that:
+//!
+//! | rate        | default    | population 10, 210 evaluations   | population 20, 1000 evaluations  |
+//! |-------------|------------|----------------------------------|----------------------------------|
+//! | `crossover` | 0.9        | 0: 1.31, 0.5: 1.42               | 0: 1.57, 0.5: 1.62               |
+//! | `window`    | 0.4        | 0.1: 1.39, 0.2: 1.41, 0.8: 1.50  | 0.1: 1.59, 0.2: 1.64, 0.8: 1.69  |
+//! | `parameter` | 0.3        | 0: 1.46, 0.2: 1.47, 0.8: 1.49    | 0: 1.66, 0.2: 1.71, 0.8: 1.62    |
+//! | `fresh`     | 0.2        | 0: 1.42, 1: 1.44                 | 0: 1.59, 1: 1.55                 |
+//! | `retarget`  | 0.05       | 0: 1.49, 0.2: 1.48               | 0: 1.69, 0.2: 1.62               |
+//! | `add`       | 0.8        | 0.1: 1.17, 0.4: 1.39             | 0.1: 1.42, 0.4: 1.58             |
+//! | `duplicate` | 0.5        | 0: 1.32, 0.25: 1.45, 0.8: 1.50   | 0: 1.48, 0.25: 1.59, 0.8: 1.70   |
+//! | `drop`      | 0.2        | 0: 1.49, 0.5: 1.46               | 0: 1.68, 0.5: 1.67               |
+//! | `steps`     | 0.01, 0.2  | 0.01, 0.05: 1.44; 0.1, 0.5: 1.51 | 0.01, 0.05: 1.66; 0.1, 0.5: 1.67 |
+//!
+//! Growth has to be much likelier than loss: selection for little active time empties lists and shortens windows by
+//! itself, and without a steady supply of operations a small population ends among short tests that hit nothing. With
+//! `add` 0.1, `duplicate` 0.05 and `drop` 0.15 NSGA-II at 210 evaluations is worse than random search.
 
 use std::collections::BTreeSet;
 
@@ -43,14 +66,14 @@ impl Default for Rates {
     fn default() -> Self {
         Rates {
             crossover: 0.9,
-            window: 0.3,
+            window: 0.4,
             parameter: 0.3,
             fresh: 0.2,
             retarget: 0.05,
-            add: 0.1,
-            duplicate: 0.05,
-            drop: 0.15,
-            steps: StepSizes { finest: 0.01, boldest: 0.3 },
+            add: 0.8,
+            duplicate: 0.5,
+            drop: 0.2,
+            steps: StepSizes { finest: 0.01, boldest: 0.2 },
             tries: 20,
         }
     }
@@ -231,4 +254,112 @@ fn changed_choice(choice: Choice, range: Range, shape: Shape, rates: &Rates, str
 
 fn kind_of<'a>(operation: &TestOperation, permitted: &'a Permitted) -> &'a PermittedOperation {
     permitted.find(operation.operation).expect("a test of a campaign holds operations of that campaign")
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use sesame_plan::Search;
+
+    use super::*;
+    use crate::search::landscape::LANDSCAPES;
+    use crate::search::permitted::tests::{any_plan, broken_rule};
+
+    fn seeds(test: &Test) -> BTreeSet<u64> {
+        test.operations.iter().map(|operation| operation.draw_seed).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn offspring_are_permitted_over_many_generations(plan in any_plan(), seed: u64) {
+            let mut variation = TestVariation::new(Permitted::of(&plan).unwrap(), Rates::default(), seed);
+            let mut tests = [variation.initial(0), variation.initial(1)];
+            for generation in 1..30 {
+                let [a, b] = &tests;
+                tests = variation.offspring([a, b], generation, 0).map(|child| child.genome);
+                for test in &tests {
+                    prop_assert_eq!(broken_rule(&plan, test), None);
+                }
+            }
+        }
+
+        #[test]
+        fn crossover_exchanges_tails_and_loses_nothing(plan in any_plan(), seed: u64) {
+            let permitted = Permitted::of(&plan).unwrap();
+            let mut stream = Stream::derive(seed, "test", &[]);
+            let [a, b] = [(); 2].map(|()| fresh_test(&permitted, &mut stream));
+            if let Some([c, d]) = crossover([&a, &b], &permitted, &mut stream) {
+                prop_assert_eq!(broken_rule(&plan, &c), None);
+                prop_assert_eq!(broken_rule(&plan, &d), None);
+                prop_assert!(identity(&c) != identity(&a) && identity(&c) != identity(&b));
+                let both = |x: &Test, y: &Test| identity(&Test { operations: [&x.operations[..], &y.operations].concat() });
+                prop_assert_eq!(both(&c, &d), both(&a, &b));
+                prop_assert_eq!(&seeds(&c) | &seeds(&d), &seeds(&a) | &seeds(&b));
+            } else {
+                // Only lists of one operation, or of the one permitted length 1, have no cut in between.
+                prop_assert!(a.operations.len() == 1 || b.operations.len() == 1, "{} {}", a.operations.len(), b.operations.len());
+            }
+        }
+
+        #[test]
+        fn an_operation_has_a_new_draw_seed_exactly_when_it_is_new_or_changed(plan in any_plan(), seed: u64) {
+            let permitted = Permitted::of(&plan).unwrap();
+            let mut stream = Stream::derive(seed, "test", &[]);
+            let before = fresh_test(&permitted, &mut stream);
+            let mut after = before.clone();
+            let rates = Rates { steps: StepSizes { finest: 0.01, boldest: 0.02 }, ..Rates::default() };
+            mutate(&mut after, &permitted, &rates, &mut stream);
+            for operation in &after.operations {
+                match before.operations.iter().find(|old| old.draw_seed == operation.draw_seed) {
+                    Some(old) => prop_assert_eq!(old, operation),
+                    // A step may end where it began, at an end of the range; a new seed alone is then what changed.
+                    None => prop_assert!(!before.operations.contains(operation)),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn each_way_of_mutation_does_what_its_name_says() {
+        let plan = LANDSCAPES[2].plan(Search::Random { evaluations: 1 });
+        let permitted = Permitted::of(&plan).unwrap();
+        let idle = Rates {
+            crossover: 0.0,
+            window: 0.0,
+            parameter: 0.0,
+            fresh: 0.0,
+            retarget: 0.0,
+            add: 0.0,
+            duplicate: 0.0,
+            drop: 0.0,
+            ..Rates::default()
+        };
+        let before = (0..)
+            .map(|i| fresh_test(&permitted, &mut Stream::derive(1, "test", &[i])))
+            .find(|test| test.operations.len() == 3)
+            .expect("lists of three are common");
+        let mutated = |rates: Rates| {
+            let mut test = before.clone();
+            mutate(&mut test, &permitted, &rates, &mut Stream::derive(9, "mutation", &[]));
+            test.operations
+        };
+        let old = &before.operations;
+        let kept = |new: &[TestOperation]| new.iter().filter(|operation| old.contains(operation)).count();
+
+        assert_eq!(mutated(idle), *old);
+        let moved = mutated(Rates { window: 1.0, ..idle });
+        assert!(moved.iter().zip(old).all(|(n, o)| n.activation != o.activation && n.parameters == o.parameters));
+        let tuned = mutated(Rates { parameter: 1.0, ..idle });
+        assert!(tuned.iter().zip(old).all(|(n, o)| n.activation == o.activation && n.parameters != o.parameters));
+        let retargeted = mutated(Rates { retarget: 1.0, ..idle });
+        assert!(retargeted.iter().zip(old).all(|(n, o)| n.operation != o.operation && n.activation == o.activation));
+        let longer = mutated(Rates { add: 1.0, ..idle });
+        assert_eq!((longer.len(), kept(&longer)), (4, 3));
+        let copied = mutated(Rates { duplicate: 1.0, ..idle });
+        assert_eq!((copied.len(), kept(&copied)), (4, 3));
+        let copy = copied.iter().find(|operation| !old.contains(operation)).expect("the copy differs in its window");
+        assert!(old.iter().any(|o| o.operation == copy.operation && o.parameters == copy.parameters));
+        let shorter = mutated(Rates { drop: 1.0, ..idle });
+        assert_eq!((shorter.len(), kept(&shorter)), (2, 2));
+    }
 }
