@@ -1,1 +1,29 @@
+//! What a campaign found, for people: tables for a terminal, the same as data, and one page with pictures.
+//!
+//! All of it is read from the results repository, so that it can be made again at any time, and each form says the
+//! same: [`summary`], [`list`] and [`show`] gather the facts (they serialise to JSON as they are), [`summary_text`] and its like
+//! lay them out, [`page()`] draws them.
 
+mod axis;
+mod markup;
+mod number;
+mod page;
+mod scatter;
+mod show;
+mod summary;
+mod table;
+mod text;
+mod timeline;
+
+pub use page::{page, write_page};
+pub use show::{
+    ChoiceReport, ListedTest, MetricReport, OperationReport, TestList, TestReport, VerdictReport, list, show,
+};
+pub use summary::{
+    Counts, ExpectationSummary, Failure, FrontTest, Objective, RequirementSummary, Spread, Summary, Worst, summary,
+};
+pub use table::TextOptions;
+pub use text::{headline, list_text, summary_text, test_text};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,158 @@
+//! A writer of HTML and SVG that escapes by construction.
+//!
+//! Names of elements and attributes are the program's own (`'static`), everything else goes through one escape. What
+//! comes out is well-formed as XML too, so that any XML parser can check it.
+
+/// Markup in the making.
+#[derive(Debug, Default)]
+pub(crate) struct Markup {
+    text: String,
+    open: Vec<&'static str>,
+}
+
+/// Attributes of an element.
+pub(crate) type Attributes<'a> = &'a [(&'static str, &'a str)];
+
+impl Markup {
+    /// Opens an element; [`Markup::close`] closes it.
+    pub(crate) fn open(&mut self, tag: &'static str, attributes: Attributes<'_>) {
+        self.tag(tag, attributes);
+        self.text.push('>');
+        self.open.push(tag);
+    }
+
+    /// Closes the innermost open element.
+    pub(crate) fn close(&mut self) {
+        let tag = self.open.pop().expect("every `close` has its `open`");
+        self.text.push_str("</");
+        self.text.push_str(tag);
+        self.text.push('>');
+        if matches!(tag, "tr" | "div" | "section" | "figure" | "table" | "svg" | "p" | "h1" | "h2" | "h3" | "details") {
+            self.text.push('\n');
+        }
+    }
+
+    /// An element without content.
+    pub(crate) fn leaf(&mut self, tag: &'static str, attributes: Attributes<'_>) {
+        self.tag(tag, attributes);
+        self.text.push_str("/>");
+    }
+
+    /// An element with nothing but text in it.
+    pub(crate) fn element(&mut self, tag: &'static str, attributes: Attributes<'_>, text: &str) {
+        self.open(tag, attributes);
+        self.text(text);
+        self.close();
+    }
+
+    /// Text.
+    pub(crate) fn text(&mut self, text: &str) {
+        escape(text, &mut self.text);
+    }
+
+    /// The whole; every element must be closed.
+    pub(crate) fn finish(self) -> String {
+        assert!(self.open.is_empty(), "elements left open: {:?}", self.open);
+        self.text
+    }
+
+    fn tag(&mut self, tag: &'static str, attributes: Attributes<'_>) {
+        self.text.push('<');
+        self.text.push_str(tag);
+        for (name, value) in attributes {
+            self.text.push(' ');
+            self.text.push_str(name);
+            self.text.push_str("=\"");
+            escape(value, &mut self.text);
+            self.text.push('"');
+        }
+    }
+}
+
+/// Appends text so that it is nothing but text, inside and outside of attributes. Characters that no document may hold
+/// are replaced.
+fn escape(text: &str, into: &mut String) {
+    for c in text.chars() {
+        match c {
+            '&' => into.push_str("&amp;"),
+            '<' => into.push_str("&lt;"),
+            '>' => into.push_str("&gt;"),
+            '"' => into.push_str("&quot;"),
+            '\'' => into.push_str("&#39;"),
+            '\n' | '\t' => into.push(c),
+            c if c.is_control() || matches!(c, '\u{FFFE}' | '\u{FFFF}') => into.push('\u{FFFD}'),
+            c => into.push(c),
+        }
+    }
+}
+
+/// Fills a template's placeholders `{{name}}` with finished markup, in one pass: what is filled in is not looked at
+/// again. The template is ours, so a placeholder without a value is a bug.
+pub(crate) fn fill(template: &str, values: &[(&str, &str)]) -> String {
+    let mut filled = String::with_capacity(template.len() + values.iter().map(|(_, value)| value.len()).sum::<usize>());
+    let mut rest = template;
+    while let Some((before, after)) = rest.split_once("{{") {
+        let (name, after) = after.split_once("}}").expect("every placeholder of a template ends");
+        let (_, value) =
+            values.iter().find(|(key, _)| *key == name).expect("every placeholder of a template has a value");
+        filled.push_str(before);
+        filled.push_str(value);
+        rest = after;
+    }
+    filled.push_str(rest);
+    filled
+}
+
+/// A coordinate with at most two decimals.
+pub(crate) fn coordinate(x: f64) -> String {
+    let text = format!("{x:.2}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// A share of the whole width or height, in per cent.
+pub(crate) fn percent(share: f64) -> String {
+    format!("{}%", coordinate(share * 100.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn any_text_comes_back_as_it_was_and_nothing_else(text in any::<String>(), title in "[<>\"'&{}/a-z]{0,20}") {
+            let mut markup = Markup::default();
+            markup.open("p", &[("title", &title)]);
+            markup.element("b", &[], &text);
+            markup.close();
+            let html = markup.finish();
+            let document = roxmltree::Document::parse(&html).unwrap();
+            let p = document.root_element();
+            prop_assert_eq!(p.attribute("title"), Some(title.as_str()));
+            let expected: String = text
+                .chars()
+                .map(|c| if (c.is_control() && c != '\n' && c != '\t') || matches!(c, '\u{FFFE}' | '\u{FFFF}') { '\u{FFFD}' } else { c })
+                .collect();
+            let b = p.first_element_child().unwrap();
+            prop_assert_eq!(b.text().unwrap_or_default(), expected);
+            prop_assert_eq!(p.children().count(), 1);
+        }
+    }
+
+    #[test]
+    fn placeholders_in_values_stay_what_they_are() {
+        assert_eq!(fill("<{{a}}|{{b}}>", &[("a", "{{b}}"), ("b", "2")]), "<{{b}}|2>");
+    }
+
+    #[test]
+    fn coordinates_are_short() {
+        assert_eq!(
+            ["0", "12.5", "0.33", "0"],
+            [0.0, 12.5, 1.0 / 3.0, -0.001].map(coordinate).each_ref().map(String::as_str)
+        );
+        assert_eq!(percent(0.125), "12.5%");
+    }
+}

@@ -1,0 +1,515 @@
+//! The page with pictures: one file that needs nothing but itself.
+
+use std::path::Path;
+
+use sesame_plan::Search;
+
+use crate::observation::Outcome;
+use crate::record::MetricValue;
+use crate::record::{Origin, RecordError, Repository, TestRow, Verdict};
+use crate::report::markup::{Markup, coordinate, fill};
+use crate::report::number::{self, plural, with_unit};
+use crate::report::scatter::{Detail, Dimension, Kind, Point, scatter};
+use crate::report::show::{TestReport, report_on};
+use crate::report::summary::{Objective, RequirementSummary, Summary, summarise, value_text};
+use crate::report::text::{
+    choices_text, counts_sentence, effect_text, headline, objective_columns, outcome_sentence, spans_text,
+};
+use crate::report::timeline::timeline;
+
+/// Timelines drawn at most; of a larger front evenly chosen ones.
+const TIMELINES: usize = 24;
+
+/// Writes the page beside the results, or wherever it is wanted.
+pub fn write_page(repository: &Repository, path: &Path) -> Result<(), RecordError> {
+    let html = page(repository)?;
+    // Written aside and renamed, so that a browser never sees half of it.
+    let aside = path.with_extension("html.tmp");
+    std::fs::write(&aside, html)
+        .and_then(|()| std::fs::rename(&aside, path))
+        .map_err(|e| RecordError::io("write the page", path, e))
+}
+
+/// The page, from a campaign's results; a run may still be going on.
+pub fn page(repository: &Repository) -> Result<String, RecordError> {
+    let rows = repository.tests()?;
+    let members = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
+    let summary = summarise(repository, &rows, members)?;
+    let groups = chosen(&summary, &rows);
+    let drawn: Vec<u32> = groups.iter().flat_map(|group| group.tests.iter().copied()).collect();
+
+    let mut body = Markup::default();
+    header(&mut body, repository, &summary)?;
+    body.open("main", &[]);
+    requirements(&mut body, &summary, &drawn);
+    front(&mut body, repository, &summary, &rows, &drawn);
+    failures(&mut body, &summary);
+    for group in groups.iter().filter(|group| !group.tests.is_empty()) {
+        body.open("section", &[]);
+        body.element("h2", &[], group.title);
+        body.element("p", &[("class", "quiet")], &group.caption);
+        for &number in &group.tests {
+            let record = repository.test(number)?;
+            let on_front = summary.front.iter().any(|test| test.number == number);
+            let report = report_on(repository.plan(), &record, on_front);
+            body.open("article", &[("class", "test"), ("id", &report.test)]);
+            test_heading(&mut body, &summary, &report);
+            timeline(&mut body, repository.plan(), &record, &report);
+            figures(&mut body, &report);
+            body.close();
+        }
+        body.close();
+    }
+    body.close();
+    let title = format!("{} of {}, seed {}", summary.campaign, summary.space, summary.seed);
+    let mut escaped = Markup::default();
+    escaped.text(&title);
+    Ok(fill(sesame_templates::report::PAGE, &[("title", &escaped.finish()), ("body", &body.finish())]))
+}
+
+/// Tests that get a timeline, under a heading.
+struct Group {
+    title: &'static str,
+    caption: String,
+    tests: Vec<u32>,
+}
+
+fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
+    let reference: Vec<u32> =
+        rows.iter().filter(|row| row.origin == Origin::Reference).map(|row| row.number).take(1).collect();
+    let all: Vec<u32> = summary.front.iter().map(|test| test.number).collect();
+    let front = evenly(&all, TIMELINES);
+    let worst = summary.requirements.iter().filter_map(|requirement| requirement.worst.as_ref());
+    let worst = worst.filter_map(|worst| rows.iter().find(|row| format!("T{}", row.number) == worst.test));
+    let failed =
+        rows.iter().filter(|row| matches!(row.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. })).take(4);
+    let known = rows.iter().filter(|row| matches!(row.origin, Origin::Known(_))).take(8);
+    let mut more: Vec<u32> = Vec::new();
+    for row in worst.chain(failed).chain(known) {
+        if !front.contains(&row.number) && !more.contains(&row.number) {
+            more.push(row.number);
+        }
+    }
+    let front_caption = if front.len() < all.len() {
+        format!("{} of the {} tests on the front, evenly chosen; `show` tells the others.", front.len(), all.len())
+    } else {
+        "Outlined: planned; filled: active. Red: outside the bound of a requirement.".to_owned()
+    };
+    vec![
+        Group { title: "Undisturbed", caption: "The reference run, for comparison.".to_owned(), tests: reference },
+        Group { title: "Tests on the front", caption: front_caption, tests: front },
+        Group {
+            title: "More tests to look at",
+            caption: "The worst violation of each requirement, crashes and timeouts, and known tests.".to_owned(),
+            tests: more,
+        },
+    ]
+}
+
+/// At most so many, evenly chosen, first and last among them.
+fn evenly(all: &[u32], limit: usize) -> Vec<u32> {
+    if all.len() <= limit {
+        return all.to_vec();
+    }
+    (0..limit).map(|at| all[at * (all.len() - 1) / (limit - 1)]).collect()
+}
+
+fn header(body: &mut Markup, repository: &Repository, summary: &Summary) -> Result<(), RecordError> {
+    let facts = repository.campaign();
+    let plan = &facts.plan;
+    let sessions = repository.sessions()?;
+    body.open("header", &[]);
+    body.element("p", &[("class", "kicker")], &plan.space);
+    body.element("h1", &[], &plan.campaign.name);
+    for doc in [&plan.campaign.doc, &plan.doc] {
+        if !doc.is_empty() {
+            body.element("p", &[("class", "doc")], doc);
+        }
+    }
+    body.element("p", &[("class", "headline")], &format!("{}.", headline(summary)));
+    body.element("p", &[], &format!("{}.", counts_sentence(summary)));
+    let search = match plan.campaign.search {
+        Search::Nsga2 { population, evaluations } => {
+            format!("NSGA-II, population {population}, {evaluations} evaluations")
+        }
+        Search::Random { evaluations } => format!("random, {evaluations} evaluations"),
+        Search::Repeat { test, times } => format!("{} repeated {times} times", plan.test(test).name),
+    };
+    let wall: f64 = sessions.iter().filter_map(|session| Some(session.ended_at? - session.started_at)).sum();
+    let workers = sessions.last().map_or(0, |session| session.workers);
+    let workers = plural(usize::try_from(workers).unwrap_or(usize::MAX), "worker", "workers");
+    let rows = [
+        ("Search", search),
+        ("Seed", facts.seed.to_string()),
+        ("One test", format!("{} of simulation", number::quantity(plan.campaign.end_after, Some("s")))),
+        ("Took", format!("{} on {workers}", number::quantity(wall, Some("s")))),
+        ("Made by", format!("{}, sesame-runtime {}", plan.generator, facts.runtime)),
+        ("Source", plan.source.clone()),
+        ("Ended", facts.stop.clone().unwrap_or_else(|| "unfinished".to_owned())),
+        ("Digest", repository.digest()?),
+    ];
+    body.open("dl", &[]);
+    for (name, value) in &rows {
+        body.open("div", &[("class", if *name == "Digest" { "digest" } else { "fact" })]);
+        body.element("dt", &[], name);
+        body.element("dd", &[], value);
+        body.close();
+    }
+    body.close();
+    for warning in &summary.warnings {
+        body.element("p", &[("class", "warning")], &format!("Warning: {warning}"));
+    }
+    body.close();
+    Ok(())
+}
+
+fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
+    if summary.requirements.is_empty() {
+        return;
+    }
+    body.open("section", &[]);
+    body.element("h2", &[], "Requirements");
+    body.open("div", &[("class", "scroll")]);
+    body.open("table", &[]);
+    heading_row(body, &["", "Requirement", "Bound", "Tests", "Violated", "Kept", "Unsaid", "Undisturbed", "Worst"]);
+    body.open("tbody", &[]);
+    for requirement in &summary.requirements {
+        body.open("tr", &[]);
+        body.element("th", &[("scope", "row")], &requirement.requirement);
+        body.element("td", &[], &requirement.text);
+        body.element("td", &[("class", "keep")], &format!("{} {}", requirement.metric, requirement.bound));
+        body.open("td", &[]);
+        verdict_bar(body, requirement);
+        body.close();
+        let broken = if requirement.violated > 0 { "number bad" } else { "number" };
+        body.element("td", &[("class", broken)], &requirement.violated.to_string());
+        body.element("td", &[("class", "number")], &requirement.kept.to_string());
+        body.element("td", &[("class", "number")], &requirement.unsaid.to_string());
+        let undisturbed = if requirement.reference == Some(Verdict::Violated) { "bad" } else { "quiet" };
+        body.element("td", &[("class", undisturbed)], requirement.reference.map_or("–", Verdict::word));
+        body.open("td", &[("class", "keep")]);
+        match &requirement.worst {
+            Some(worst) => {
+                test_link(body, &worst.test, drawn);
+                body.text(&format!(" {}", worst.text));
+            }
+            None => body.text("–"),
+        }
+        body.close();
+        body.close();
+    }
+    body.close();
+    body.close();
+    body.close();
+    body.close();
+}
+
+/// The shares of tests that violate, keep, and leave unsaid.
+fn verdict_bar(body: &mut Markup, requirement: &RequirementSummary) {
+    let total = (requirement.violated + requirement.kept + requirement.unsaid).max(1) as f64;
+    let label = format!("{} violated, {} kept, {} unsaid", requirement.violated, requirement.kept, requirement.unsaid);
+    body.open("svg", &[("class", "bar"), ("viewBox", "0 0 100 10"), ("role", "img"), ("aria-label", &label)]);
+    let mut left = 0.0;
+    for (count, class) in
+        [(requirement.violated, "violated"), (requirement.kept, "kept"), (requirement.unsaid, "unsaid")]
+    {
+        let width = 100.0 * count as f64 / total;
+        let (x, width_text) = (coordinate(left), coordinate(width));
+        body.leaf("rect", &[("class", class), ("x", &x), ("y", "0"), ("width", &width_text), ("height", "10")]);
+        left += width;
+    }
+    body.close();
+}
+
+fn front(body: &mut Markup, repository: &Repository, summary: &Summary, rows: &[TestRow], drawn: &[u32]) {
+    body.open("section", &[("id", "front")]);
+    if summary.objectives.is_empty() {
+        body.element("h2", &[], "Values");
+        spreads(body, summary);
+        body.close();
+        return;
+    }
+    body.element("h2", &[], "Front");
+    let objectives = &summary.objectives;
+    let pairs: Vec<(usize, usize)> = (0..objectives.len()).flat_map(|y| (0..y).map(move |x| (x, y))).take(10).collect();
+    if objectives.len() == 1 {
+        let x = Dimension { title: "test".to_owned(), direction: None };
+        let points =
+            points(summary, rows, drawn, |row| Some((f64::from(row.number), row.value(objectives[0].id).value?)));
+        scatter(body, &x, &dimension(&objectives[0]), &points, Detail { named: true, points: 2500 });
+    }
+    let detail = Detail { named: pairs.len() == 1, points: 2500 / pairs.len().max(1) };
+    body.open("div", &[("class", if pairs.len() > 1 { "charts" } else { "charts one" })]);
+    for (x, y) in pairs {
+        let value = |row: &TestRow, at: usize| row.value(objectives[at].id).value;
+        let points = points(summary, rows, drawn, |row| Some((value(row, x)?, value(row, y)?)));
+        scatter(body, &dimension(&objectives[x]), &dimension(&objectives[y]), &points, detail);
+    }
+    body.close();
+    body.element("p", &[("class", "quiet")], &caption(summary, repository));
+    front_table(body, summary, drawn);
+    body.close();
+}
+
+fn dimension(objective: &Objective) -> Dimension {
+    let title = match &objective.unit {
+        Some(unit) => format!("{} [{unit}]", objective.metric),
+        None => objective.metric.clone(),
+    };
+    Dimension { title, direction: objective.direction }
+}
+
+fn points(
+    summary: &Summary,
+    rows: &[TestRow],
+    drawn: &[u32],
+    place: impl Fn(&TestRow) -> Option<(f64, f64)>,
+) -> Vec<Point> {
+    let measured = |row: &&TestRow| row.outcome == Outcome::Completed && row.duplicate_of.is_none();
+    rows.iter()
+        .filter(measured)
+        .filter_map(|row| {
+            let (x, y) = place(row)?;
+            let kind = if summary.front.iter().any(|test| test.number == row.number) {
+                Kind::Front
+            } else if row.origin == Origin::Reference {
+                Kind::Reference
+            } else {
+                Kind::Plain
+            };
+            let values: Vec<String> = summary
+                .objectives
+                .iter()
+                .map(|objective| {
+                    let value = row.value(objective.id).value.map_or("–".to_owned(), number::number);
+                    format!("{} {}", objective.metric, with_unit(value, objective.unit.as_deref()))
+                })
+                .collect();
+            let name = if kind == Kind::Reference { "undisturbed".to_owned() } else { format!("T{}", row.number) };
+            Some(Point {
+                x,
+                y,
+                kind,
+                test: format!("T{}", row.number),
+                title: format!("{name}: {}", values.join(", ")),
+                linked: drawn.contains(&row.number),
+            })
+        })
+        .collect()
+}
+
+fn caption(summary: &Summary, repository: &Repository) -> String {
+    let counts = &summary.counts;
+    let mut hidden = Vec::new();
+    for (count, word) in [
+        (counts.void, "void"),
+        (counts.unmeasured, "unmeasured"),
+        (counts.crashes, "crashed"),
+        (counts.timeouts, "timed out"),
+        (counts.duplicates, "duplicates"),
+    ] {
+        if count > 0 {
+            hidden.push(format!("{count} {word}"));
+        }
+    }
+    let mut caption =
+        "Each dot is a test; filled and named: no other test is better in every objective. The ring is the \
+                       undisturbed run. Point at a dot to see its values, click it to see it over time."
+            .to_owned();
+    if !hidden.is_empty() {
+        caption.push_str(&format!(" Not shown: {}.", number::join_words(&hidden)));
+    }
+    if repository.campaign().stop.is_none() {
+        caption.push_str(" The run is unfinished: this is the front so far.");
+    }
+    caption
+}
+
+fn front_table(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
+    body.open("div", &[("class", "scroll")]);
+    body.open("table", &[]);
+    let mut titles = vec!["Test"];
+    titles.extend(summary.objectives.iter().map(|objective| objective.metric.as_str()));
+    titles.extend(["Violates", "Operations"]);
+    heading_row(body, &titles);
+    body.open("tbody", &[]);
+    let columns = objective_columns(summary);
+    for (at, test) in summary.front.iter().enumerate() {
+        body.open("tr", &[]);
+        body.open("th", &[("scope", "row")]);
+        test_link(body, &test.test, drawn);
+        body.close();
+        for column in &columns {
+            body.element("td", &[("class", "number")], &column[at]);
+        }
+        body.element("td", &[("class", "bad keep")], &test.violates.join(" "));
+        body.element("td", &[], &test.operations);
+        body.close();
+    }
+    body.close();
+    body.close();
+    body.close();
+}
+
+fn spreads(body: &mut Markup, summary: &Summary) {
+    body.open("div", &[("class", "scroll")]);
+    body.open("table", &[]);
+    heading_row(body, &["Metric", "Unit", "Tests", "Least", "Median", "Most"]);
+    body.open("tbody", &[]);
+    for spread in &summary.spreads {
+        let decimals = number::decimals([spread.min, spread.median, spread.max]);
+        body.open("tr", &[]);
+        body.element("th", &[("scope", "row")], &spread.metric);
+        body.element("td", &[], spread.unit.as_deref().unwrap_or_default());
+        body.element("td", &[("class", "number")], &spread.count.to_string());
+        for value in [spread.min, spread.median, spread.max] {
+            body.element("td", &[("class", "number")], &number::fixed(value, decimals));
+        }
+        body.close();
+    }
+    body.close();
+    body.close();
+    body.close();
+}
+
+fn failures(body: &mut Markup, summary: &Summary) {
+    if summary.failures.is_empty() {
+        return;
+    }
+    body.open("section", &[]);
+    body.element("h2", &[], "Crashes and timeouts");
+    body.open("div", &[("class", "scroll")]);
+    body.open("table", &[]);
+    heading_row(body, &["Test", "Outcome", "At", "Cause"]);
+    body.open("tbody", &[]);
+    for failure in summary.failures.iter().take(50) {
+        body.open("tr", &[]);
+        body.element("th", &[("scope", "row")], &failure.test);
+        body.element("td", &[("class", "bad")], &failure.outcome);
+        body.element("td", &[("class", "number")], &number::quantity(failure.at, Some("s")));
+        body.element("td", &[], &failure.detail);
+        body.close();
+    }
+    body.close();
+    body.close();
+    body.close();
+    if summary.failures.len() > 50 {
+        body.element(
+            "p",
+            &[("class", "quiet")],
+            &format!("And {} more; `list` tells all.", summary.failures.len() - 50),
+        );
+    }
+    body.close();
+}
+
+fn test_heading(body: &mut Markup, summary: &Summary, report: &TestReport) {
+    body.open("h3", &[]);
+    body.text(&report.test);
+    if !matches!(report.origin.as_str(), "search" | "reference") {
+        body.element("span", &[("class", "quiet")], &format!(" {}", report.origin));
+    }
+    for requirement in report.requirements.iter().filter(|requirement| requirement.verdict == Verdict::Violated) {
+        body.element("span", &[("class", "chip"), ("title", &requirement.text)], &requirement.requirement);
+    }
+    body.close();
+    let values: Vec<String> = summary
+        .objectives
+        .iter()
+        .filter_map(|objective| {
+            let metric = report.metrics.iter().find(|metric| metric.metric == objective.metric)?;
+            let shown = MetricValue { value: metric.value, set: metric.set };
+            Some(format!("{} {}", metric.metric, value_text(shown, metric.unit.as_deref())))
+        })
+        .collect();
+    body.element("p", &[("class", "values")], &values.join(" · "));
+}
+
+/// Everything on a test as tables, folded away.
+fn figures(body: &mut Markup, report: &TestReport) {
+    body.open("details", &[]);
+    body.element("summary", &[], "Figures");
+    body.element(
+        "p",
+        &[("class", "quiet")],
+        &format!("{}. Simulator seed {}.", outcome_sentence(report), report.simulator_seed),
+    );
+    if !report.operations.is_empty() {
+        table(body, &["Operation", "Kind", "Topic", "Choices", "Planned", "Observed", "Effect"], |body| {
+            for operation in &report.operations {
+                let observed = operation.observed.as_deref().map_or("unknown".to_owned(), spans_text);
+                let cells = [
+                    operation.kind.clone(),
+                    operation.topic.clone(),
+                    choices_text(operation),
+                    spans_text(&[operation.planned]),
+                    observed,
+                    effect_text(operation),
+                ];
+                row(body, &operation.operation, &cells);
+            }
+        });
+    }
+    table(body, &["Metric", "Value", "Changes"], |body| {
+        for metric in &report.metrics {
+            let shown = MetricValue { value: metric.value, set: metric.set };
+            row(body, &metric.metric, &[value_text(shown, metric.unit.as_deref()), metric.changes.to_string()]);
+        }
+    });
+    if !report.requirements.is_empty() {
+        table(body, &["Requirement", "Verdict", "Bound", "Value", "Outside"], |body| {
+            for requirement in &report.requirements {
+                let cells = [
+                    requirement.verdict.word().to_owned(),
+                    format!("{} {}", requirement.metric, requirement.bound),
+                    requirement.value.clone(),
+                    spans_text(&requirement.outside),
+                ];
+                row(body, &requirement.requirement, &cells);
+            }
+        });
+    }
+    for warning in &report.warnings {
+        body.element("p", &[("class", "warning")], &format!("Warning: {warning}"));
+    }
+    body.close();
+}
+
+fn table(body: &mut Markup, titles: &[&str], rows: impl FnOnce(&mut Markup)) {
+    body.open("div", &[("class", "scroll")]);
+    body.open("table", &[]);
+    heading_row(body, titles);
+    body.open("tbody", &[]);
+    rows(body);
+    body.close();
+    body.close();
+    body.close();
+}
+
+fn row(body: &mut Markup, name: &str, cells: &[String]) {
+    body.open("tr", &[]);
+    body.element("th", &[("scope", "row")], name);
+    for cell in cells {
+        body.element("td", &[], cell);
+    }
+    body.close();
+}
+
+fn heading_row(body: &mut Markup, titles: &[&str]) {
+    body.open("thead", &[]);
+    body.open("tr", &[]);
+    for title in titles {
+        body.element("th", &[("scope", "col")], title);
+    }
+    body.close();
+    body.close();
+}
+
+fn test_link(body: &mut Markup, test: &str, drawn: &[u32]) {
+    if drawn.iter().any(|number| format!("T{number}") == test) {
+        let link = format!("#{test}");
+        body.element("a", &[("href", &link)], test);
+    } else {
+        body.text(test);
+    }
+}

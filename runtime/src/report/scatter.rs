@@ -1,0 +1,274 @@
+//! Tests as points in the plane of two objectives, with the front among them.
+//!
+//! Charts are fluid: places are shares of the width and height, sizes of dots and letters are pixels, so that a chart
+//! fills its column on any screen and stays readable on a small one.
+
+use sesame_plan::Direction;
+
+use crate::report::axis::Axis;
+use crate::report::markup::{Markup, coordinate, percent};
+
+/// One axis of a chart.
+#[derive(Debug, Clone)]
+pub(crate) struct Dimension {
+    /// What is along it, with its unit, as in `fuzzing_time [s]`.
+    pub(crate) title: String,
+    /// Which way is of interest to a tester.
+    pub(crate) direction: Option<Direction>,
+}
+
+/// What a point stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Some test.
+    Plain,
+    /// A test on the front.
+    Front,
+    /// The undisturbed run.
+    Reference,
+}
+
+/// A test as a point.
+#[derive(Debug, Clone)]
+pub(crate) struct Point {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    pub(crate) kind: Kind,
+    /// The test's name.
+    pub(crate) test: String,
+    /// What is said of it when it is pointed at.
+    pub(crate) title: String,
+    /// Whether the page has a timeline of it to jump to.
+    pub(crate) linked: bool,
+}
+
+/// How much a chart shows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Detail {
+    /// Whether points of the front carry their names and are joined by a line.
+    pub(crate) named: bool,
+    /// Plain points drawn at most; beyond that, of points close together one stands for all.
+    pub(crate) points: usize,
+}
+
+/// Draws a chart.
+pub(crate) fn scatter(markup: &mut Markup, x: &Dimension, y: &Dimension, points: &[Point], detail: Detail) {
+    let horizontal = Axis::round(points.iter().map(|point| point.x), 7);
+    let vertical = Axis::round(points.iter().map(|point| point.y), 5);
+    let place = |point: &Point| (horizontal.share(point.x), 1.0 - vertical.share(point.y));
+    markup.open("div", &[("class", if detail.named { "chart" } else { "chart small" })]);
+    markup.element("p", &[("class", "axis-title")], &axis_title(y));
+    let label = format!("{} against {}, {} tests", y.title, x.title, points.len());
+    markup.open("svg", &[("class", "scatter"), ("role", "img"), ("aria-label", &label)]);
+    for (tick, text) in vertical.ticks.iter().zip(vertical.labels()) {
+        let y = percent(1.0 - vertical.share(*tick));
+        markup.leaf("line", &[("class", "grid"), ("x1", "0"), ("x2", "100%"), ("y1", &y), ("y2", &y)]);
+        markup.element("text", &[("class", "tick end"), ("x", "-8"), ("y", &y), ("dy", "4")], &text);
+    }
+    for (tick, text) in horizontal.ticks.iter().zip(horizontal.labels()) {
+        let x = percent(horizontal.share(*tick));
+        markup.leaf("line", &[("class", "grid"), ("x1", &x), ("x2", &x), ("y1", "0"), ("y2", "100%")]);
+        markup.element("text", &[("class", "tick middle"), ("x", &x), ("y", "100%"), ("dy", "18")], &text);
+    }
+    let plain: Vec<&Point> = points.iter().filter(|point| point.kind == Kind::Plain).collect();
+    for point in thin(&plain, detail.points, place) {
+        dot(markup, point, place(point), "3", "dot");
+    }
+    let front: Vec<&Point> = points.iter().filter(|point| point.kind == Kind::Front).collect();
+    if detail.named {
+        step_line(markup, &front, x.direction, place);
+    }
+    for point in points.iter().filter(|point| point.kind == Kind::Reference) {
+        dot(markup, point, place(point), "5", "dot reference");
+    }
+    for point in &front {
+        dot(markup, point, place(point), if detail.named { "6" } else { "4" }, "dot front");
+    }
+    if detail.named {
+        let occupied: Vec<(f64, f64)> = front.iter().map(|point| place(point)).collect();
+        names(markup, &front, &occupied, Screen { width: 980.0, height: 400.0, class: "name wide" });
+        names(markup, &front, &occupied, Screen { width: 300.0, height: 280.0, class: "name narrow" });
+    }
+    markup.close();
+    markup.element("p", &[("class", "axis-title below")], &axis_title(x));
+    markup.close();
+}
+
+fn axis_title(dimension: &Dimension) -> String {
+    match dimension.direction {
+        Some(Direction::Maximise) => format!("{}, maximised", dimension.title),
+        Some(Direction::Minimise) => format!("{}, minimised", dimension.title),
+        None => dimension.title.clone(),
+    }
+}
+
+fn dot(markup: &mut Markup, point: &Point, (x, y): (f64, f64), radius: &str, class: &str) {
+    let (x, y) = (percent(x), percent(y));
+    let link = format!("#{}", point.test);
+    if point.linked {
+        markup.open("a", &[("href", &link)]);
+    }
+    markup.open("circle", &[("class", class), ("cx", &x), ("cy", &y), ("r", radius)]);
+    markup.element("title", &[], &point.title);
+    markup.close();
+    if point.linked {
+        markup.close();
+    }
+}
+
+/// The edge of what the front dominates: from the best point along the horizontal axis, each step goes to what is
+/// worse in both.
+fn step_line(markup: &mut Markup, front: &[&Point], x: Option<Direction>, place: impl Fn(&Point) -> (f64, f64)) {
+    let mut places: Vec<(f64, f64)> = front.iter().map(|point| place(point)).collect();
+    places.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if x == Some(Direction::Maximise) {
+        places.reverse();
+    }
+    let Some(first) = places.first() else { return };
+    let mut path = format!("M{} {}", coordinate(first.0 * 1000.0), coordinate(first.1 * 1000.0));
+    for (x, y) in &places[1..] {
+        path.push_str(&format!("H{}V{}", coordinate(x * 1000.0), coordinate(y * 1000.0)));
+    }
+    markup.open("svg", &[("viewBox", "0 0 1000 1000"), ("preserveAspectRatio", "none"), ("aria-hidden", "true")]);
+    markup.leaf("path", &[("class", "front-line"), ("d", &path)]);
+    markup.close();
+}
+
+/// At most so many points: where there are more, the first of each cell of the finest grid that makes few enough.
+fn thin<'a>(points: &[&'a Point], limit: usize, place: impl Fn(&Point) -> (f64, f64)) -> Vec<&'a Point> {
+    let mut kept = points.to_vec();
+    let mut cells = 256.0;
+    while kept.len() > limit.max(1) {
+        let mut taken = std::collections::BTreeSet::new();
+        kept = points
+            .iter()
+            .copied()
+            .filter(|point| {
+                let (x, y) = place(point);
+                taken.insert((libm::floor(x * cells).to_bits(), libm::floor(y * cells).to_bits()))
+            })
+            .collect();
+        if cells < 1.0 {
+            break;
+        }
+        cells *= 0.8;
+    }
+    kept
+}
+
+/// The size for which names are placed.
+#[derive(Debug, Clone, Copy)]
+struct Screen {
+    width: f64,
+    height: f64,
+    class: &'static str,
+}
+
+/// Writes the names of points where they cover no other name and no point of the front; a name without such a place
+/// is left out (the dot still tells it when pointed at).
+fn names(markup: &mut Markup, points: &[&Point], occupied: &[(f64, f64)], screen: Screen) {
+    let dots = occupied.iter().map(|(x, y)| Frame::around(x * screen.width, y * screen.height, 7.0));
+    let mut frames: Vec<Frame> = dots.collect();
+    for (point, (x, y)) in points.iter().zip(occupied) {
+        let length = point.test.len() as f64 * 7.5;
+        // To the right, to the left, above, below.
+        let places = [
+            (10.0, 4.0, 0.0, ""),
+            (-10.0, 4.0, -1.0, " end"),
+            (0.0, -11.0, -0.5, " middle"),
+            (0.0, 20.0, -0.5, " middle"),
+        ];
+        for (dx, dy, shift, anchor) in places {
+            let left = x * screen.width + dx + shift * length;
+            let base = y * screen.height + dy;
+            let frame = Frame { left, right: left + length, top: base - 11.0, bottom: base + 3.0 };
+            let inside = frame.left >= 2.0
+                && frame.right <= screen.width + 10.0
+                && frame.top >= -8.0
+                && frame.bottom <= screen.height;
+            if inside && frames.iter().all(|other| !frame.overlaps(*other)) {
+                frames.push(frame);
+                let class = format!("{}{anchor}", screen.class);
+                let (x, y, dx, dy) = (percent(*x), percent(*y), coordinate(dx), coordinate(dy));
+                markup.element(
+                    "text",
+                    &[("class", &class), ("x", &x), ("y", &y), ("dx", &dx), ("dy", &dy)],
+                    &point.test,
+                );
+                break;
+            }
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Frame {
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
+}
+
+impl Frame {
+    fn around(x: f64, y: f64, radius: f64) -> Frame {
+        Frame { left: x - radius, right: x + radius, top: y - radius, bottom: y + radius }
+    }
+
+    fn overlaps(self, other: Frame) -> bool {
+        self.left < other.right && other.left < self.right && self.top < other.bottom && other.top < self.bottom
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(x: f64, y: f64, kind: Kind, test: &str) -> Point {
+        Point { x, y, kind, test: test.to_owned(), title: format!("{test}: {x}, {y}"), linked: kind == Kind::Front }
+    }
+
+    fn dimension(title: &str, direction: Direction) -> Dimension {
+        Dimension { title: title.to_owned(), direction: Some(direction) }
+    }
+
+    #[test]
+    fn a_small_chart_reads_as_it_should() {
+        let points = [
+            point(1.0, 0.0, Kind::Front, "T1"),
+            point(4.0, 3.0, Kind::Front, "T2"),
+            point(9.0, 8.0, Kind::Front, "T3"),
+            point(8.0, 2.0, Kind::Plain, "T4"),
+            point(0.0, 0.0, Kind::Reference, "T0"),
+        ];
+        let mut markup = Markup::default();
+        let detail = Detail { named: true, points: 100 };
+        let (x, y) = (dimension("fuzzing_time [s]", Direction::Minimise), dimension("hits", Direction::Maximise));
+        scatter(&mut markup, &x, &y, &points, detail);
+        insta::assert_snapshot!("scatter", markup.finish().replace("><", ">\n<"));
+    }
+
+    #[test]
+    fn many_points_are_thinned_and_the_front_is_not() {
+        let mut points: Vec<Point> =
+            (0..10_000u32).map(|n| point(f64::from(n % 100), f64::from(n / 100), Kind::Plain, "T9")).collect();
+        points.extend((0..50).map(|n| point(f64::from(n), f64::from(n), Kind::Front, "T1")));
+        let mut markup = Markup::default();
+        let (x, y) = (dimension("x", Direction::Minimise), dimension("y", Direction::Maximise));
+        scatter(&mut markup, &x, &y, &points, Detail { named: true, points: 800 });
+        let text = markup.finish();
+        assert_eq!(text.matches("\"dot front\"").count(), 50);
+        assert!((300..=800).contains(&text.matches("\"dot\"").count()));
+    }
+
+    #[test]
+    fn names_never_cover_each_other() {
+        let points: Vec<Point> =
+            (0..40).map(|n| point(f64::from(n % 7), f64::from(n % 5), Kind::Front, "T1234")).collect();
+        let mut markup = Markup::default();
+        let (x, y) = (dimension("x", Direction::Minimise), dimension("y", Direction::Maximise));
+        scatter(&mut markup, &x, &y, &points, Detail { named: true, points: 800 });
+        let text = markup.finish();
+        let placed = |class: &str| text.matches(class).count();
+        assert!(placed("name narrow") < placed("name wide") && placed("name wide") < 40, "a small screen names fewer");
+    }
+}

@@ -1,0 +1,280 @@
+//! The tests of a campaign: a line for each, or everything on one.
+
+use serde::Serialize;
+use sesame_plan::{Activation, CampaignPlan, Choice, Span};
+
+use crate::observation::Counters;
+use crate::record::{
+    MetricValue, Origin, RecordError, Repository, TestRecord, TestRow, Verdict, verdict, violation_spans,
+};
+use crate::report::{number, summary};
+
+/// A line in the list of all tests.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ListedTest {
+    /// Its name.
+    pub test: String,
+    /// `reference`, `search`, or the name of a known test.
+    pub origin: String,
+    /// The generation it belongs to.
+    pub generation: Option<u32>,
+    /// `completed`, `void`, `crash` or `timeout`.
+    pub outcome: String,
+    /// The equal test whose result stands for this one.
+    pub duplicate_of: Option<String>,
+    /// Whether it is on the front.
+    pub front: bool,
+    /// A value per metric of the plan, in its order.
+    pub values: Vec<MetricValue>,
+    /// Names of the requirements it violates.
+    pub violates: Vec<String>,
+    /// Its operations, as in `jitter_link0 ×2, lose_link0`.
+    pub operations: String,
+}
+
+/// All tests of a campaign.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TestList {
+    /// Names of the plan's metrics.
+    pub metrics: Vec<String>,
+    /// Their units.
+    pub units: Vec<Option<String>>,
+    /// The tests, by number.
+    pub tests: Vec<ListedTest>,
+}
+
+/// Everything on one test.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TestReport {
+    /// Its name.
+    pub test: String,
+    /// Its number.
+    pub number: u32,
+    /// `reference`, `search`, or the name of a known test.
+    pub origin: String,
+    /// The generation it belongs to.
+    pub generation: Option<u32>,
+    /// The tests it was made of.
+    pub parents: Vec<String>,
+    /// The simulator's seed in its run.
+    pub simulator_seed: u64,
+    /// The equal test whose result stands for this one.
+    pub duplicate_of: Option<String>,
+    /// `completed`, `void`, `crash` or `timeout`.
+    pub outcome: String,
+    /// What is known of a crash or timeout.
+    pub detail: Option<String>,
+    /// Simulation time at which it ended, in seconds.
+    pub end: f64,
+    /// Messages the relay handled.
+    pub messages: u64,
+    /// Whether it is on the front.
+    pub front: bool,
+    /// Its operations.
+    pub operations: Vec<OperationReport>,
+    /// All metrics of the plan.
+    pub metrics: Vec<MetricReport>,
+    /// All requirements of the space.
+    pub requirements: Vec<VerdictReport>,
+    /// What should be brought to the user's attention.
+    pub warnings: Vec<String>,
+}
+
+/// One operation of a test.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OperationReport {
+    /// The operation's name in the space.
+    pub operation: String,
+    /// Its kind in words.
+    pub kind: String,
+    /// The topic it disturbs.
+    pub topic: String,
+    /// When it was to be active, in seconds.
+    pub planned: Span,
+    /// When it was seen to be active, in seconds; `None` where the run could not report it.
+    pub observed: Option<Vec<Span>>,
+    /// What the test chose.
+    pub choices: Vec<ChoiceReport>,
+    /// The seed of its draws.
+    pub draw_seed: u64,
+    /// What it counted; `None` where the run could not report it.
+    pub counters: Option<Counters>,
+    /// Simulation time of its first effect, in seconds.
+    pub first_touch: Option<f64>,
+    /// Simulation time of its last effect, in seconds.
+    pub last_touch: Option<f64>,
+}
+
+/// What a test chose for a parameter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChoiceReport {
+    /// The parameter.
+    pub parameter: String,
+    /// Its unit; `None` for probabilities and plain numbers.
+    pub unit: Option<String>,
+    /// The value or sub-range.
+    pub choice: Choice,
+    /// Both in words, as in `offset 0.27…0.29 rad`.
+    pub text: String,
+}
+
+/// A metric in one test.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MetricReport {
+    /// Its name.
+    pub metric: String,
+    /// Its unit; `None` for a plain number.
+    pub unit: Option<String>,
+    /// Its value.
+    pub value: Option<f64>,
+    /// Whether the value is one that was set, not the default.
+    pub set: bool,
+    /// How often it changed.
+    pub changes: usize,
+}
+
+/// A requirement in one test.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerdictReport {
+    /// Its name.
+    pub requirement: String,
+    /// Its sentence.
+    pub text: String,
+    /// The metric it bounds.
+    pub metric: String,
+    /// The bound in words.
+    pub bound: String,
+    /// What the run says.
+    pub verdict: Verdict,
+    /// The metric's value, in words.
+    pub value: String,
+    /// When the metric's series was outside the bound, in seconds.
+    pub outside: Vec<Span>,
+}
+
+/// All tests of a campaign.
+pub fn list(repository: &Repository) -> Result<TestList, RecordError> {
+    let plan = repository.plan();
+    let front = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
+    Ok(TestList {
+        metrics: plan.metrics.iter().map(|metric| metric.name.clone()).collect(),
+        units: plan.metrics.iter().map(|metric| metric.unit.clone()).collect(),
+        tests: repository.tests()?.iter().map(|row| listed(plan, row, front.contains(&row.number))).collect(),
+    })
+}
+
+fn listed(plan: &CampaignPlan, row: &TestRow, front: bool) -> ListedTest {
+    ListedTest {
+        test: format!("T{}", row.number),
+        origin: origin(plan, row.origin),
+        generation: row.generation,
+        outcome: row.outcome.word().to_owned(),
+        duplicate_of: row.duplicate_of.map(|number| format!("T{number}")),
+        front,
+        values: row.values.clone(),
+        violates: summary::violated(plan, row),
+        operations: summary::operations(plan, row),
+    }
+}
+
+fn origin(plan: &CampaignPlan, origin: Origin) -> String {
+    match origin {
+        Origin::Known(id) => plan.test(id).name.clone(),
+        Origin::Reference | Origin::Search => origin.word().to_owned(),
+    }
+}
+
+/// Everything on the test that a user calls `T158`, `158`, `reference`, or by the name of a known test.
+pub fn show(repository: &Repository, name: &str) -> Result<TestReport, RecordError> {
+    let record = repository.test(repository.find(name)?)?;
+    let front = repository.latest_result_set()?.is_some_and(|set| set.members.contains(&record.number));
+    Ok(report_on(repository.plan(), &record, front))
+}
+
+/// Everything on a test, from its record.
+pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, front: bool) -> TestReport {
+    let observation = &record.observation;
+    TestReport {
+        test: format!("T{}", record.number),
+        number: record.number,
+        origin: origin(plan, record.origin),
+        generation: record.generation,
+        parents: record.parents.iter().map(|number| format!("T{number}")).collect(),
+        simulator_seed: record.simulator_seed,
+        duplicate_of: record.duplicate_of.map(|number| format!("T{number}")),
+        outcome: observation.outcome.word().to_owned(),
+        detail: observation.outcome.detail(),
+        end: observation.end,
+        messages: observation.messages,
+        front,
+        operations: operations(plan, record),
+        metrics: plan
+            .metrics
+            .iter()
+            .enumerate()
+            .map(|(id, metric)| {
+                let shown = observation.metrics.get(id);
+                MetricReport {
+                    metric: metric.name.clone(),
+                    unit: metric.unit.clone(),
+                    value: shown.and_then(|shown| shown.value),
+                    set: shown.is_some_and(|shown| shown.set),
+                    changes: shown.map_or(0, |shown| shown.series.len()),
+                }
+            })
+            .collect(),
+        requirements: verdicts(plan, record),
+        warnings: observation.warnings.clone(),
+    }
+}
+
+fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> {
+    let reports = record.test.operations.iter().enumerate().map(|(position, used)| {
+        let operation = plan.operation(used.operation);
+        let effect = record.observation.operations.get(position);
+        let Activation::Time { start, end } = used.activation;
+        OperationReport {
+            operation: operation.name.clone(),
+            kind: operation.kind.words().to_owned(),
+            topic: plan.topic(operation.topic).name.clone(),
+            planned: Span { start, end },
+            observed: effect.map(|effect| effect.intervals.clone()),
+            choices: operation
+                .parameters
+                .iter()
+                .zip(&used.parameters)
+                .map(|(parameter, &choice)| ChoiceReport {
+                    parameter: parameter.name.clone(),
+                    unit: parameter.unit.clone(),
+                    choice,
+                    text: number::choice(&operation.kind, parameter, choice),
+                })
+                .collect(),
+            draw_seed: used.draw_seed,
+            counters: effect.map(|effect| effect.counters),
+            first_touch: effect.and_then(|effect| effect.first_touch),
+            last_touch: effect.and_then(|effect| effect.last_touch),
+        }
+    });
+    reports.collect()
+}
+
+fn verdicts(plan: &CampaignPlan, record: &TestRecord) -> Vec<VerdictReport> {
+    let observation = &record.observation;
+    let reports = plan.requirements.iter().map(|requirement| {
+        let metric = plan.metric(requirement.metric);
+        let shown = observation.metrics.get(requirement.metric.index());
+        let value = shown.map_or(MetricValue::default(), |shown| MetricValue { value: shown.value, set: shown.set });
+        VerdictReport {
+            requirement: requirement.name.clone(),
+            text: requirement.text.clone(),
+            metric: metric.name.clone(),
+            bound: number::bound(requirement.bound, metric.unit.as_deref()),
+            verdict: verdict(requirement.bound, &observation.outcome, value),
+            value: summary::value_text(value, metric.unit.as_deref()),
+            outside: shown
+                .map_or_else(Vec::new, |shown| violation_spans(&shown.series, requirement.bound, observation.end)),
+        }
+    });
+    reports.collect()
+}

@@ -1,0 +1,180 @@
+//! Reports on a made-up campaign, read as a user reads them.
+
+use super::*;
+use crate::record::{Repository, sample};
+
+const WIDE: TextOptions = TextOptions { width: None, colour: false };
+
+fn repository() -> (tempfile::TempDir, Repository) {
+    let folder = tempfile::tempdir().unwrap();
+    let repository = sample::campaign(folder.path(), &sample::plan(), 60);
+    (folder, repository)
+}
+
+#[test]
+fn the_summary_shows_the_front_the_requirements_and_what_failed() {
+    let (_folder, repository) = repository();
+    insta::assert_snapshot!("summary", summary_text(&summary(&repository).unwrap(), WIDE));
+}
+
+#[test]
+fn the_summary_fits_a_terminal() {
+    let (_folder, repository) = repository();
+    let text = summary_text(&summary(&repository).unwrap(), TextOptions { width: Some(100), colour: false });
+    insta::assert_snapshot!("summary_100_columns", text);
+}
+
+#[test]
+fn the_list_has_a_line_for_each_test() {
+    let (_folder, repository) = repository();
+    insta::assert_snapshot!("list", list_text(&list(&repository).unwrap(), WIDE));
+}
+
+#[test]
+fn everything_on_one_test_is_shown() {
+    let (_folder, repository) = repository();
+    for name in ["reference", "known_jitter", "T17", "T23", "T44"] {
+        insta::assert_snapshot!(format!("test_{name}"), test_text(&show(&repository, name).unwrap(), WIDE));
+    }
+}
+
+/// The page as any XML parser sees it.
+fn parsed(html: &str) -> roxmltree::Document<'_> {
+    let options = roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() };
+    roxmltree::Document::parse_with_options(html, options).unwrap()
+}
+
+#[test]
+fn the_page_is_well_formed_and_needs_nothing_but_itself() {
+    let (folder, repository) = repository();
+    let path = folder.path().join("report.html");
+    write_page(&repository, &path).unwrap();
+    let html = std::fs::read_to_string(&path).unwrap();
+    let document = parsed(&html);
+    let mut ids = std::collections::BTreeSet::new();
+    for node in document.descendants() {
+        assert!(!["link", "img", "iframe", "object"].contains(&node.tag_name().name()), "{:?}", node.tag_name());
+        assert!(node.attribute("src").is_none());
+        if let Some(id) = node.attribute("id") {
+            assert!(ids.insert(id.to_owned()), "`{id}` occurs twice");
+        }
+    }
+    assert!(!html.contains("http://") && !html.contains("https://") && !html.contains("url("));
+    for link in document.descendants().filter_map(|node| node.attribute("href")) {
+        assert!(ids.contains(link.strip_prefix('#').unwrap()), "`{link}` leads nowhere");
+    }
+    for svg in document.descendants().filter(|node| node.tag_name().name() == "svg") {
+        let spoken = svg.attribute("aria-label").is_some() || svg.attribute("aria-hidden") == Some("true");
+        assert!(spoken, "a picture without words");
+    }
+    let first = document.descendants().find(|node| node.attribute("class") == Some("test")).unwrap();
+    assert_eq!(first.attribute("id"), Some("T0"), "the undisturbed run comes first");
+}
+
+#[test]
+fn hostile_names_are_shown_and_nothing_more() {
+    let hostile = "<script>alert('1')</script>\" onload=\"x\" {{body}} & \u{1b}[31m";
+    let mut plan = sample::plan();
+    for text in [
+        &mut plan.space,
+        &mut plan.doc,
+        &mut plan.source,
+        &mut plan.generator,
+        &mut plan.campaign.doc,
+        &mut plan.campaign.name,
+    ] {
+        *text = hostile.to_owned();
+    }
+    plan.topics.iter_mut().for_each(|topic| topic.name = hostile.to_owned());
+    plan.tests.iter_mut().for_each(|test| test.name = hostile.to_owned());
+    for (at, operation) in plan.operations.iter_mut().enumerate() {
+        operation.name = format!("{at}{hostile}");
+        operation.parameters.iter_mut().for_each(|parameter| parameter.unit = Some(hostile.to_owned()));
+    }
+    for requirement in &mut plan.requirements {
+        requirement.name = hostile.to_owned();
+        requirement.text = hostile.to_owned();
+    }
+    for metric in &mut plan.metrics {
+        metric.name = hostile.to_owned();
+        metric.unit = Some(hostile.to_owned());
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let html = page(&sample::campaign(folder.path(), &plan, 40)).unwrap();
+    let document = parsed(&html);
+    assert_eq!(document.descendants().filter(|node| node.tag_name().name() == "script").count(), 1, "only our own");
+    assert!(document.descendants().all(|node| node.attribute("onload").is_none()));
+    assert!(html.contains("&lt;script&gt;alert") && !html.contains('\u{1b}'));
+    let tame = "<script>alert('1')</script>\" onload=\"x\" {{body}} & \u{FFFD}[31m";
+    assert!(document.descendants().any(|node| node.tag_name().name() == "h1" && node.text() == Some(tame)));
+}
+
+#[test]
+fn campaigns_with_any_number_of_objectives_have_a_page() {
+    for objectives in 0..=4u32 {
+        let mut plan = sample::plan();
+        plan.campaign.objectives = (0..objectives).map(sesame_plan::MetricId).collect();
+        let folder = tempfile::tempdir().unwrap();
+        let repository = sample::campaign(folder.path(), &plan, 30);
+        let html = page(&repository).unwrap();
+        let document = parsed(&html);
+        let charts = document.descendants().filter(|node| node.attribute("class") == Some("scatter")).count();
+        assert_eq!(charts, [0, 1, 1, 3, 6][objectives as usize]);
+        assert_eq!(summary_text(&summary(&repository).unwrap(), WIDE).contains("median"), objectives == 0);
+    }
+}
+
+#[test]
+fn an_unfinished_run_without_any_test_has_its_reports() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = sample::plan();
+    let recorder = crate::record::Recorder::create(folder.path(), &plan, 1, 1).unwrap();
+    let text = summary_text(&summary(recorder.repository()).unwrap(), WIDE);
+    assert!(text.starts_with("Front of 0 tests, no requirement broken\n"), "{text}");
+    assert!(text.contains("0 evaluations; the run is unfinished"), "{text}");
+    parsed(&page(recorder.repository()).unwrap());
+}
+
+#[test]
+fn a_large_campaign_stays_a_page_of_a_few_megabytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = sample::plan();
+    let mut recorder = crate::record::Recorder::create(folder.path(), &plan, 1, 1).unwrap();
+    let mut record = sample::record(&plan, 0, crate::record::Origin::Search, plan.tests[0].test.clone());
+    for metric in &mut record.observation.metrics {
+        metric.series = (0..2000u32).map(|n| (f64::from(n) * 0.035, f64::from(n * 7919 % 1000))).collect();
+    }
+    let many = 40;
+    for number in 0..2000 {
+        record.number = number;
+        record.observation.metrics[0].value = Some(f64::from(number % 97));
+        record.observation.metrics[1].value = Some(f64::from(number % 89));
+        if number == many {
+            record.observation.metrics.iter_mut().for_each(|metric| metric.series.clear());
+        }
+        recorder.commit(&record).unwrap();
+    }
+    let members = (0..many).collect();
+    let status = crate::record::Status::Final;
+    recorder
+        .put_result_set(&crate::record::ResultSet { name: "front".to_owned(), generation: None, status, members })
+        .unwrap();
+    let html = page(recorder.repository()).unwrap();
+    assert!(html.len() < 4_000_000, "{} bytes", html.len());
+    assert!(html.contains("24 of the 40 tests on the front"));
+}
+
+#[test]
+fn reports_serialise_with_names_and_units() {
+    let (_folder, repository) = repository();
+    let json = serde_json::to_value(show(&repository, "T1").unwrap()).unwrap();
+    assert_eq!(json["operations"][0]["choices"][0]["unit"], "rad");
+    assert_eq!(json["operations"][0]["choices"][0]["choice"]["low"], 0.27);
+    assert_eq!(json["requirements"][0]["verdict"], "violated");
+    let json = serde_json::to_value(summary(&repository).unwrap()).unwrap();
+    assert_eq!(json["objectives"][0]["metric"], "fuzzing_time");
+    assert_eq!(json["objectives"][0]["direction"], "minimise");
+    assert_eq!(json["requirements"][0]["worst"]["test"], "T1");
+    let json = serde_json::to_value(list(&repository).unwrap()).unwrap();
+    assert_eq!(json["tests"][5]["outcome"], "void");
+}
