@@ -15,11 +15,11 @@ pub struct ConveyorModel {
 
 /// Brings assembled gearboxes from the assembly arms to where the R3200 picks them up.
 pub const INFEED: ConveyorModel =
-    ConveyorModel { name: "Infeed", carriage: AxisLimits { lower: 0.0, upper: 1.9, speed: 0.8, acceleration: 1.0 } };
+    ConveyorModel { name: "Infeed", carriage: AxisLimits { lower: 0.0, upper: 1.9, speed: 1.0, acceleration: 1.0 } };
 
 /// Slides gearboxes from where the R3200 puts them down over to the workers, and the empty carrier back.
 pub const OUTFEED: ConveyorModel =
-    ConveyorModel { name: "Outfeed", carriage: AxisLimits { lower: 0.0, upper: 0.9, speed: 0.5, acceleration: 0.8 } };
+    ConveyorModel { name: "Outfeed", carriage: AxisLimits { lower: 0.0, upper: 0.9, speed: 0.7, acceleration: 1.0 } };
 
 /// A conveyor in motion.
 #[derive(Debug, Clone)]

@@ -218,3 +218,46 @@ fn station(arm: &ArmModel, place: [f64; 3]) -> Result<Joints, SimulatorError> {
     }
     Ok(joints)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::servo::AxisLimits;
+
+    /// Asserts that the axes can follow each move: within their ranges, below their speeds, with torque to spare.
+    fn assert_feasible<const N: usize>(name: &str, home: [f64; N], steps: &[Step<N>], limits: &[AxisLimits; N]) {
+        let mut from = home;
+        for step in steps {
+            let Step::Move { to, seconds } = *step else { continue };
+            for axis in 0..N {
+                let (limits, way) = (limits[axis], (to[axis] - from[axis]).abs());
+                assert!((limits.lower..=limits.upper).contains(&to[axis]), "{name} axis {axis}: {step:?}");
+                assert!(1.875 * way / seconds < 0.8 * limits.speed, "{name} axis {axis} too fast: {step:?}");
+                assert!(
+                    5.78 * way / (seconds * seconds) < 0.7 * limits.acceleration,
+                    "{name} axis {axis} speeds up too fast: {step:?}"
+                );
+            }
+            from = to;
+        }
+        assert_eq!(from, home, "{name} ends where it begins");
+    }
+
+    #[test]
+    fn the_axes_can_follow_all_moves() {
+        let (home, steps) = product_move().unwrap();
+        assert_feasible("R3200", home, &steps, &R3200.joints);
+        let (home, steps) = housing().unwrap();
+        assert_feasible("R270073", home, &steps, &R270073.joints);
+        let (home, steps) = shaft().unwrap();
+        assert_feasible("R270072", home, &steps, &R270072.joints);
+        assert_feasible("infeed", [0.0], &infeed(), &[crate::conveyor::INFEED.carriage]);
+        assert_feasible("outfeed", [0.0], &outfeed(), &[crate::conveyor::OUTFEED.carriage]);
+    }
+
+    #[test]
+    fn a_station_out_of_reach_is_refused_by_name() {
+        let message = station(&R270073, [3.0, 3.0, 1.0]).unwrap_err().to_string();
+        assert_eq!(message, "station (3, 3, 1) is out of reach of R270073");
+    }
+}

@@ -10,7 +10,7 @@ use kuka_cell_sim::{Cell, NoisyCell};
 use sesame_runtime::simulator::bench::{Bench, Published};
 use sesame_runtime::simulator::{Setup, Simulator};
 use sesame_runtime::time::SimTime;
-use sesame_runtime::value::Value;
+use sesame_runtime::value::{Text, Value};
 
 const PRODUCT: &str = "R3200ProductMove";
 const UP: (f64, f64) = (0.27, 0.29);
@@ -89,7 +89,7 @@ fn joint_topics_and_safety_zone_messages_are_those_of_the_original_platform() {
     let bench = run::<Cell>(0, &[]);
     // After 12 s, as the R3200 picks.
     let Value::Record(message) = &bench.published("safetyzones/Z1")[599].value else { panic!("a record") };
-    let names: Vec<&str> = message.fields().names().iter().map(|name| name.as_str()).collect();
+    let names: Vec<&str> = message.fields().names().iter().map(Text::as_str).collect();
     assert_eq!(names, ["zone", "level", "object1", "object2"]);
     assert_eq!(message.get("zone"), Some(&Value::from("Z1")));
     assert_eq!(message.get("object2"), Some(&Value::from("GripperR3200ProductMove")));

@@ -11,35 +11,35 @@ use sesame_runtime::value::Value;
 
 /// A random offset added to each target of a joint of the R3200 for a while.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Jitter {
+pub(crate) struct Jitter {
     /// Which joint.
-    pub link: usize,
+    pub(crate) link: usize,
     /// Offsets are uniform within these, in rad.
-    pub offset: (f64, f64),
+    pub(crate) offset: (f64, f64),
     /// From when until when, in s.
-    pub window: (f64, f64),
+    pub(crate) window: (f64, f64),
 }
 
 /// What a run came to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Outcome {
+pub(crate) struct Outcome {
     /// R1: intervals of 0.2 s with a gripper inside Z1, Z2 or Z3.
-    pub collisions: u32,
+    pub(crate) collisions: u32,
     /// R2: the highest speed of a gripper, in m/s.
-    pub top_speed: f64,
+    pub(crate) top_speed: f64,
     /// R3: the smallest distance of the R3200 to another arm, in mm.
-    pub approach: f64,
+    pub(crate) approach: f64,
     /// R4: the time of the first cycle in s, if it was completed.
-    pub cycle_time: Option<f64>,
+    pub(crate) cycle_time: Option<f64>,
 }
 
 /// How a simulator is set up everywhere here.
-pub fn setup(seed: u64) -> Setup {
+pub(crate) fn setup(seed: u64) -> Setup {
     Setup { seed, step: SimTime::from_seconds(0.02) }
 }
 
 /// 70 s of the cell, disturbed.
-pub fn run<S: Simulator>(seed: u64, jitters: &[Jitter]) -> Bench<S> {
+pub(crate) fn run<S: Simulator>(seed: u64, jitters: &[Jitter]) -> Bench<S> {
     let topics: Vec<String> = jitters.iter().map(|jitter| target_topic("R3200ProductMove", jitter.link)).collect();
     let jitters = jitters.to_vec();
     let tamper: Tamper = Box::new(move |now, topic, value| {
@@ -61,7 +61,7 @@ pub fn run<S: Simulator>(seed: u64, jitters: &[Jitter]) -> Bench<S> {
 }
 
 /// Reads the requirements off a run.
-pub fn outcome<S: Simulator>(bench: &Bench<S>) -> Outcome {
+pub(crate) fn outcome<S: Simulator>(bench: &Bench<S>) -> Outcome {
     let mut inside: Vec<SimTime> = ["Z1", "Z2", "Z3"]
         .iter()
         .flat_map(|zone| bench.published(&zone_topic(zone)))
@@ -87,11 +87,11 @@ pub fn outcome<S: Simulator>(bench: &Bench<S>) -> Outcome {
 }
 
 /// The level of a safety zone message, in mm.
-pub fn level(message: &Published) -> f64 {
+pub(crate) fn level(message: &Published) -> f64 {
     message.value.number_at(&["level"]).expect("safety zone messages have a level")
 }
 
 /// The number in a message that is nothing but a number.
-pub fn real(message: &Published) -> f64 {
+pub(crate) fn real(message: &Published) -> f64 {
     message.value.number_at::<&str>(&[]).expect("the message is a number")
 }
