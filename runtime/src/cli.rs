@@ -16,7 +16,7 @@ use sesame_plan::{CampaignPlan, SCHEMA};
 
 use crate::campaign;
 use crate::record::{self, Repository};
-use crate::report;
+use crate::report::{self, TextOptions};
 use crate::runner::Runner;
 
 /// Exit code of a run that the user stopped, as shells have it for an interrupted program.
@@ -54,9 +54,7 @@ enum Command {
     Digest(Which),
     /// Serve a supervisor; started by `run`
     #[command(hide = true)]
-    Worker {
-        supervisor: SocketAddr,
-    },
+    Worker { supervisor: SocketAddr },
 }
 
 /// Which run, and how it is shown.
@@ -100,11 +98,14 @@ pub(crate) fn main(runner: &Runner) -> ExitCode {
 }
 
 fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
-    let plan: CampaignPlan = serde_json::from_str(runner.plan)
-        .map_err(|error| Failure(format!("the plan in this runner is damaged ({error}): run `sesamec generate` again")))?;
+    let plan: CampaignPlan = serde_json::from_str(runner.plan).map_err(|error| {
+        Failure(format!("the plan in this runner is damaged ({error}): run `sesamec generate` again"))
+    })?;
     if plan.schema != SCHEMA {
         let (found, known) = (plan.schema, SCHEMA);
-        return Err(Failure(format!("the plan has schema {found}, this runtime knows {known}: run `sesamec generate` again")));
+        return Err(Failure(format!(
+            "the plan has schema {found}, this runtime knows {known}: run `sesamec generate` again"
+        )));
     }
     let about = format!("Campaign `{}` of the space `{}`.\n\n{}", plan.campaign.name, plan.space, plan.campaign.doc);
     let command = Cli::command().name(plan.campaign.name.clone()).bin_name(plan.campaign.name.clone()).about(about);
@@ -141,16 +142,15 @@ fn open(results: &Path, which: &Which) -> Result<Repository, Failure> {
 fn list(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
     let list = report::list(&open(results, which)?)?;
     match which.format {
-        Format::Text => print(&list.to_text(text_style())),
+        Format::Text => print(&report::list_text(&list, text_options())),
         Format::Json => print_json(&list),
     }
 }
 
 fn show(results: &Path, which: &Which, test: &str) -> Result<ExitCode, Failure> {
-    let repository = open(results, which)?;
-    let shown = report::show(&repository, repository.find(test)?)?;
+    let shown = report::show(&open(results, which)?, test)?;
     match which.format {
-        Format::Text => print(&shown.to_text(text_style())),
+        Format::Text => print(&report::test_text(&shown, text_options())),
         Format::Json => print_json(&shown),
     }
 }
@@ -170,6 +170,13 @@ fn print(text: &str) -> Result<ExitCode, Failure> {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
         _ => Ok(ExitCode::SUCCESS),
     }
+}
+
+/// On a terminal as wide as it is, with colour unless `NO_COLOR` says no; elsewhere plain and as wide as it comes.
+fn text_options() -> TextOptions {
+    let terminal = console::Term::stdout();
+    let width = terminal.size_checked().map(|(_, columns)| usize::from(columns));
+    TextOptions { width, colour: terminal.is_term() && console::colors_enabled() }
 }
 
 fn print_json(value: &impl serde::Serialize) -> Result<ExitCode, Failure> {

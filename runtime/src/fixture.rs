@@ -47,10 +47,7 @@ pub(crate) fn plan(operations: Vec<Operation>) -> CampaignPlan {
         nodes: Vec::new(),
         metrics: vec![
             metric("fuzzing_time", MetricSource::FuzzingTime),
-            metric(
-                "last_command",
-                MetricSource::Last { input: FieldRef { topic: TopicId(0), path: Vec::new() } },
-            ),
+            metric("last_command", MetricSource::Last { input: FieldRef { topic: TopicId(0), path: Vec::new() } }),
         ],
         requirements: Vec::new(),
         operations,

@@ -82,9 +82,12 @@ impl Disturbance {
         }
         let range = || test.parameters.first().copied().map_or((0.0, 0.0), bounds);
         Ok(match &operation.kind {
-            OperationKind::RandomValue { path, mode, integer } => {
-                Disturbance::RandomValue(RandomValue { path: path.clone(), mode: *mode, integer: *integer, range: range() })
-            }
+            OperationKind::RandomValue { path, mode, integer } => Disturbance::RandomValue(RandomValue {
+                path: path.clone(),
+                mode: *mode,
+                integer: *integer,
+                range: range(),
+            }),
             OperationKind::PacketLoss => Disturbance::PacketLoss(PacketLoss { loss: range().0 }),
             OperationKind::Latency { drain, .. } => Disturbance::Latency(Latency { delay: range(), drain: *drain }),
             OperationKind::Blackhole => Disturbance::Blackhole,

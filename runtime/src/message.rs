@@ -52,7 +52,10 @@ pub fn fits(plan: &CampaignPlan, ty: &Type, value: &Value) -> Result<(), Mismatc
         Type::Point { .. } => <[f64; 3]>::from_value(value).map(drop),
         Type::List { of } => {
             let Value::List(items) = value else { return Err(Mismatch::new("list", value)) };
-            items.iter().enumerate().try_for_each(|(at, item)| fits(plan, of, item).map_err(|m| m.inside(&format!("[{at}]"))))
+            items
+                .iter()
+                .enumerate()
+                .try_for_each(|(at, item)| fits(plan, of, item).map_err(|m| m.inside(&format!("[{at}]"))))
         }
         Type::Message { id } => {
             let Value::Record(record) = value else { return Err(Mismatch::new("message", value)) };

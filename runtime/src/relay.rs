@@ -140,7 +140,8 @@ impl<'a> Relay<'a> {
             .collect();
         let (metrics, mut warnings) = self.metrics.finish(end, &operations);
         if self.overflowed {
-            warnings.push(format!("more than {HELD_LIMIT} messages were held back at once; the oldest were let go early"));
+            warnings
+                .push(format!("more than {HELD_LIMIT} messages were held back at once; the oldest were let go early"));
         }
         Finished { operations, metrics, warnings, messages: self.messages }
     }

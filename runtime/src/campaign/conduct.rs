@@ -73,10 +73,14 @@ pub enum CampaignError {
     #[error(transparent)]
     Record(#[from] RecordError),
     /// The undisturbed run failed, so nothing that follows would mean anything.
-    #[error("the undisturbed reference run failed: {0}\nnothing was fuzzed: a campaign needs a system that works undisturbed")]
+    #[error(
+        "the undisturbed reference run failed: {0}\nnothing was fuzzed: a campaign needs a system that works undisturbed"
+    )]
     Reference(String),
     /// A resumed campaign asks for other tests than those recorded.
-    #[error("test T{0} of these results is not the one that this runner asks for: the results come from another model or version; start anew with `run`")]
+    #[error(
+        "test T{0} of these results is not the one that this runner asks for: the results come from another model or version; start anew with `run`"
+    )]
     OtherCampaign(u32),
 }
 
@@ -103,7 +107,8 @@ pub fn conduct(
     if !desk.evaluate(vec![undisturbed(0, settings.seed)], &mut |record| reference = Some(record.clone()))? {
         return interrupt(recorder);
     }
-    let reference = reference.map(|record| record.observation).unwrap_or_else(|| unreachable!("one test was evaluated"));
+    let reference =
+        reference.map(|record| record.observation).unwrap_or_else(|| unreachable!("one test was evaluated"));
     if let Outcome::Crash { .. } | Outcome::Timeout { .. } = reference.outcome {
         return Err(CampaignError::Reference(reference.outcome.detail().unwrap_or_default()));
     }
@@ -166,8 +171,10 @@ pub fn conduct(
         return interrupt(recorder);
     }
     if let Some(difference) = again.and_then(|again| difference(plan, &reference, &again)) {
-        let text = format!("an undisturbed run after the campaign differs from the one before it: {difference}; \
-            the simulator does not start afresh for each test");
+        let text = format!(
+            "an undisturbed run after the campaign differs from the one before it: {difference}; \
+            the simulator does not start afresh for each test"
+        );
         desk.recorder.put_event(&Event { kind: EventKind::Warning, test: Some(numbered + 1), text })?;
     }
     drop(desk);
@@ -260,11 +267,7 @@ struct Desk<'a> {
 impl Desk<'_> {
     /// Runs tests and records each as it ends; `each` sees every one, in the order they ended. False if the user
     /// stopped it; what had ended by then is recorded.
-    fn evaluate(
-        &mut self,
-        planned: Vec<Planned>,
-        each: &mut dyn FnMut(&TestRecord),
-    ) -> Result<bool, CampaignError> {
+    fn evaluate(&mut self, planned: Vec<Planned>, each: &mut dyn FnMut(&TestRecord)) -> Result<bool, CampaignError> {
         let mut waiting = BTreeMap::new();
         let mut duplicates = Vec::new();
         for test in planned {

@@ -80,7 +80,9 @@ impl<'a> Display<'a> {
             }
             let Some(worst) = worst else { continue };
             let word = if metric.direction == Some(Direction::Maximise) { "most" } else { "least" };
-            parts.push(format!("{word} {} {worst:.4}", metric.name).trim_end_matches('0').trim_end_matches('.').to_owned());
+            parts.push(
+                format!("{word} {} {worst:.4}", metric.name).trim_end_matches('0').trim_end_matches('.').to_owned(),
+            );
         }
         if progress.done > 0 && progress.done < progress.total {
             let each = self.started.elapsed().as_secs_f64() / f64::from(progress.done);

@@ -11,7 +11,7 @@ use clap::Args;
 use sesame_plan::{CampaignPlan, Search};
 
 use super::progress::{Display, wait};
-use super::{Failure, STOPPED, print, text_style};
+use super::{Failure, STOPPED, print, text_options};
 use crate::campaign::{Conducted, Settings, conduct};
 use crate::metric::unimplemented_hooks;
 use crate::record::{self, Claim, Recorder, Repository};
@@ -59,7 +59,10 @@ struct Work {
 
 fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text.parse().map_err(|_| "not a number of seconds".to_owned())?;
-    Duration::try_from_secs_f64(seconds).ok().filter(|limit| !limit.is_zero()).ok_or_else(|| "must be above 0".to_owned())
+    Duration::try_from_secs_f64(seconds)
+        .ok()
+        .filter(|limit| !limit.is_zero())
+        .ok_or_else(|| "must be above 0".to_owned())
 }
 
 pub(super) fn run(
@@ -155,8 +158,7 @@ fn carry_out(
     seed: u64,
     work: &Work,
 ) -> Result<ExitCode, Failure> {
-    let settings =
-        Settings { seed, workers: work.workers(), timeout: work.timeout, program: std::env::current_exe()? };
+    let settings = Settings { seed, workers: work.workers(), timeout: work.timeout, program: std::env::current_exe()? };
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
     ctrlc::set_handler(move || {
@@ -186,16 +188,15 @@ fn carry_out(
 /// Prints what was found and writes the page.
 fn conclude(repository: &Repository, folder: &Path, took: Duration) -> Result<(), Failure> {
     let page = folder.join("report.html");
-    std::fs::write(&page, report::page(repository)?)?;
-    print(&report::summary(repository)?.to_text(text_style()))?;
+    report::write_page(repository, &page)?;
+    print(&report::summary_text(&report::summary(repository)?, text_options()))?;
     let digest = repository.digest()?;
     print(&format!("\n    Report {}\n    Digest {digest}\n", shown(&page)))?;
     let tests = repository.tests()?.len();
-    eprintln!("      Took {} for {tests} runs", if took.as_secs() < 90 {
-        format!("{:.1} s", took.as_secs_f64())
-    } else {
-        wait(took.as_secs_f64())
-    });
+    eprintln!(
+        "      Took {} for {tests} runs",
+        if took.as_secs() < 90 { format!("{:.1} s", took.as_secs_f64()) } else { wait(took.as_secs_f64()) }
+    );
     Ok(())
 }
 

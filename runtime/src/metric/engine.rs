@@ -88,7 +88,11 @@ impl Metrics<'_> {
                 (MetricSource::Hook { .. }, Some(hook)) => hook.on_message(input, value, context),
                 (MetricSource::Last { input }, _) => match value.number_at(&input.path) {
                     Some(number) => context.set(number),
-                    None => context.note(format!("a message on `{}` has no number `{}`", context.topic, input.path.join("."))),
+                    None => context.note(format!(
+                        "a message on `{}` has no number `{}`",
+                        context.topic,
+                        input.path.join(".")
+                    )),
                 },
                 _ => {}
             }
