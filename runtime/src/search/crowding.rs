@@ -25,10 +25,10 @@ pub fn distances(fitness: &[&Fitness], front: &[usize]) -> Vec<f64> {
             points.sort_by(|a, b| ascending(a.0[objective], b.0[objective]).then_with(|| lexicographic(a.0, b.0)));
         }
         let (Some((least, first)), Some((most, last))) = (points.first(), points.last()) else { continue };
-        let span = most[objective] - least[objective];
-        if !(span > 0.0) {
+        if least[objective] == most[objective] {
             continue;
         }
+        let span = most[objective] - least[objective];
         distances[*first] = f64::INFINITY;
         distances[*last] = f64::INFINITY;
         for around in points.windows(3) {

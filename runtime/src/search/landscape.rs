@@ -136,7 +136,7 @@ impl Landscape {
             .map(|operation| {
                 let Activation::Time { start, end } = operation.activation;
                 let Choice::Range { low, high } = operation.parameters[0] else { panic!("offsets are sub-ranges") };
-                (operation.operation.index(), start, end, (low + high) / 2.0)
+                (operation.operation.index(), start, end, f64::midpoint(low, high))
             })
             .collect();
         let time = active.iter().map(|(_, start, end, _)| end - start).sum();
@@ -172,7 +172,9 @@ impl Landscape {
                     Evaluated { number, test: candidate.test, fitness }
                 })
                 .collect();
-            results.iter().for_each(|result| _ = front.add(result.number, &result.fitness));
+            for result in &results {
+                front.add(result.number, &result.fitness);
+            }
             strategy.tell(&results);
             tests.extend(results);
         }
@@ -210,7 +212,6 @@ mod tests {
             let random = median_volume(&landscape, &Search::Random { evaluations: 210 });
             (landscape.name, median_volume(&landscape, &NSGA2) / random)
         });
-        println!("{ratios:?}");
         assert!(ratios.iter().all(|(_, ratio)| *ratio > 1.1), "{ratios:?}");
     }
 

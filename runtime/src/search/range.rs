@@ -39,9 +39,10 @@ impl Range {
 
     /// The permitted range of a parameter; `None` where it must be whole and no whole number is in it.
     pub fn parameter(parameter: &Parameter) -> Option<Self> {
-        let (low, high) = match parameter.integer {
-            true => (libm::ceil(parameter.low), libm::floor(parameter.high)),
-            false => (parameter.low, parameter.high),
+        let (low, high) = if parameter.integer {
+            (libm::ceil(parameter.low), libm::floor(parameter.high))
+        } else {
+            (parameter.low, parameter.high)
         };
         (low <= high).then_some(Range { low, high, shortest: 0.0, integer: parameter.integer })
     }

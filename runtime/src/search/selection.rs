@@ -119,7 +119,9 @@ mod tests {
         let standings = standings(&population.iter().collect::<Vec<_>>());
         let parents = parents(&standings, 5_000, &mut Stream::derive(3, "test", &[]));
         let mut wins = [0u32; 10];
-        parents.iter().for_each(|&winner| wins[winner] += 1);
+        for winner in parents {
+            wins[winner] += 1;
+        }
         assert_eq!(wins[0], 1_000, "the best wins each of its contests");
         assert_eq!(wins[9], 0, "the unfit loses each of its contests");
         assert!(wins.windows(2).all(|pair| pair[0] > pair[1]), "{wins:?}");

@@ -24,7 +24,9 @@ pub fn fronts(fitness: &[&Fitness]) -> Vec<Vec<usize>> {
         Some((objectives, _)) if objectives.len() == 2 => fronts_of_pairs(&measured),
         _ => fronts_of_vectors(&mut measured),
     };
-    fronts.iter_mut().for_each(|front| front.sort_unstable());
+    for front in &mut fronts {
+        front.sort_unstable();
+    }
     infeasible.sort_by(|a, b| ascending(a.0, b.0));
     fronts.extend(infeasible.chunk_by(|a, b| a.0 == b.0).map(|tied| tied.iter().map(|&(_, i)| i).collect()));
     if !unfit.is_empty() {

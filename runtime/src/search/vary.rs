@@ -334,7 +334,7 @@ mod tests {
             drop: 0.0,
             ..Rates::default()
         };
-        let before = (0..)
+        let before = (0..100)
             .map(|i| fresh_test(&permitted, &mut Stream::derive(1, "test", &[i])))
             .find(|test| test.operations.len() == 3)
             .expect("lists of three are common");
