@@ -310,7 +310,7 @@ fn the_digest_tells_campaigns_sets_and_warnings_apart() {
     let twice = with(
         &|r| {
             r.put_event(&warning("a")).unwrap();
-            r.put_event(&warning("a")).unwrap()
+            r.put_event(&warning("a")).unwrap();
         },
         42,
         "done",
@@ -319,7 +319,7 @@ fn the_digest_tells_campaigns_sets_and_warnings_apart() {
     let replaced = with(
         &|r| {
             r.put_result_set(&set(&[1], Status::Intermediate)).unwrap();
-            r.put_result_set(&set(&[1, 2], Status::Final)).unwrap()
+            r.put_result_set(&set(&[1, 2], Status::Final)).unwrap();
         },
         42,
         "done",
