@@ -44,7 +44,7 @@ pub fn page(repository: &Repository) -> Result<String, RecordError> {
     body.open("main", &[]);
     requirements(&mut body, &summary, &drawn);
     front(&mut body, repository, &summary, &rows, &drawn);
-    failures(&mut body, &summary);
+    failures(&mut body, &summary, &drawn);
     for group in groups.iter().filter(|group| !group.tests.is_empty()) {
         body.open("section", &[]);
         body.element("h2", &[], group.title);
@@ -174,15 +174,14 @@ fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     body.open("table", &[]);
     heading_row(
         body,
-        &["", "Requirement", "Bound", "Tests", "Violated", "Kept", "Unsaid", "Undisturbed", "Worst"],
-        4..7,
+        &["", "Requirement", "Tests", "Violated", "Kept", "Unsaid", "Bound", "Undisturbed", "Worst"],
+        3..6,
     );
     body.open("tbody", &[]);
     for requirement in &summary.requirements {
         body.open("tr", &[]);
         body.element("th", &[("scope", "row")], &requirement.requirement);
         body.element("td", &[("class", "sentence")], &requirement.text);
-        body.element("td", &[("class", "keep")], &format!("{} {}", requirement.metric, requirement.bound));
         body.open("td", &[]);
         verdict_bar(body, requirement);
         body.close();
@@ -190,6 +189,7 @@ fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
         body.element("td", &[("class", broken)], &requirement.violated.to_string());
         body.element("td", &[("class", "number")], &requirement.kept.to_string());
         body.element("td", &[("class", "number")], &requirement.unsaid.to_string());
+        body.element("td", &[("class", "keep")], &format!("{} {}", requirement.metric, requirement.bound));
         let undisturbed = if requirement.reference == Some(Verdict::Violated) { "bad" } else { "quiet" };
         body.element("td", &[("class", undisturbed)], requirement.reference.map_or("–", Verdict::word));
         body.open("td", &[("class", "keep")]);
@@ -377,7 +377,7 @@ fn spreads(body: &mut Markup, summary: &Summary) {
     body.close();
 }
 
-fn failures(body: &mut Markup, summary: &Summary) {
+fn failures(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     if summary.failures.is_empty() {
         return;
     }
@@ -389,7 +389,9 @@ fn failures(body: &mut Markup, summary: &Summary) {
     body.open("tbody", &[]);
     for failure in summary.failures.iter().take(50) {
         body.open("tr", &[]);
-        body.element("th", &[("scope", "row")], &failure.test);
+        body.open("th", &[("scope", "row")]);
+        test_link(body, &failure.test, drawn);
+        body.close();
         body.element("td", &[("class", "bad")], &failure.outcome);
         body.element("td", &[("class", "number")], &number::quantity(failure.at, Some("s")));
         body.element("td", &[("class", "sentence")], &failure.detail);

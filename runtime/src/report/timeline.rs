@@ -174,13 +174,9 @@ fn series(
         let (x, width) = (percent(time.share(span.start)), percent(time.share(span.end) - time.share(span.start)));
         markup.leaf("rect", &[("class", "outside"), ("x", &x), ("y", "0"), ("width", &width), ("height", &tall)]);
     }
-    for &(name, bound, at) in &lines {
+    for &(_, _, at) in &lines {
         let y = coordinate(height(at));
         markup.leaf("line", &[("class", "bound"), ("x1", "0"), ("x2", "100%"), ("y1", &y), ("y2", &y)]);
-        // On the side where there is room, which is also where an unbroken line is not.
-        let dy = if height(at) < SERIES / 2.0 { "-4" } else { "12" };
-        let words = format!("{name} {}", number::bound(bound, unit));
-        markup.element("text", &[("class", "bound-name"), ("x", "100%"), ("dx", "-2"), ("y", &y), ("dy", dy)], &words);
     }
     let viewport = format!("0 0 {} {tall}", coordinate(time.high));
     let frame =
@@ -197,6 +193,14 @@ fn series(
         markup.leaf("path", &[("class", "line bad"), ("d", &bad)]);
     }
     markup.close();
+    // After the lines, so that none strikes a name out.
+    for &(name, bound, at) in &lines {
+        let y = coordinate(height(at));
+        // On the side where there is room, which is also where an unbroken line is not.
+        let dy = if height(at) < SERIES / 2.0 { "-4" } else { "12" };
+        let words = format!("{name} {}", number::bound(bound, unit));
+        markup.element("text", &[("class", "bound-name"), ("x", "100%"), ("dx", "-2"), ("y", &y), ("dy", dy)], &words);
+    }
     let decimals = number::decimals([extent.low, extent.high]);
     for value in [extent.high, extent.low] {
         let y = coordinate(height(value));
