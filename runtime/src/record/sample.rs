@@ -250,7 +250,7 @@ pub(crate) fn record(plan: &CampaignPlan, number: u32, origin: Origin, test: Tes
     TestRecord {
         number,
         origin,
-        generation: (origin == Origin::Search).then(|| number / 10),
+        generation: (origin == Origin::Search).then_some(number / 10),
         parents: vec![],
         test,
         simulator_seed: u64::MAX - u64::from(number),

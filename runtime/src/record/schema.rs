@@ -1,5 +1,6 @@
 //! The database's schema: made new, and recognised.
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use rusqlite::{Connection, OpenFlags};
@@ -83,17 +84,12 @@ pub(crate) fn index(position: usize) -> i64 {
 /// The views with a column per metric, which only a plan can name: `results` has a row per test, `front` those of the
 /// final front, or of the latest one while the campaign is unfinished.
 fn wide_views(plan: &CampaignPlan) -> String {
-    let columns: String = plan
-        .metrics
-        .iter()
-        .enumerate()
-        .map(|(id, metric)| {
-            let name = metric.name.replace('"', "\"\"");
-            format!(
-                ",\n           (SELECT value FROM metric_values WHERE test = t.number AND metric = {id}) AS \"{name}\""
-            )
-        })
-        .collect();
+    let mut columns = String::new();
+    for (id, metric) in plan.metrics.iter().enumerate() {
+        let name = metric.name.replace('"', "\"\"");
+        let value = format!("(SELECT value FROM metric_values WHERE test = t.number AND metric = {id})");
+        let _ = write!(columns, ",\n           {value} AS \"{name}\"");
+    }
     format!(
         "-- One row per test with a column per metric.\n\
          CREATE VIEW results AS\n    SELECT t.number AS number, t.name AS name, t.origin AS origin, \

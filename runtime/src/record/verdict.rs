@@ -37,10 +37,9 @@ impl Verdict {
 pub fn verdict(bound: Bound, outcome: &Outcome, value: MetricValue) -> Verdict {
     let ended = matches!(outcome, Outcome::Completed | Outcome::Void);
     match value.value {
-        None => Verdict::Unsaid,
         Some(x) if bound.holds(x) && ended => Verdict::Kept,
         Some(x) if !bound.holds(x) && (ended || value.set) => Verdict::Violated,
-        Some(_) => Verdict::Unsaid,
+        Some(_) | None => Verdict::Unsaid,
     }
 }
 

@@ -20,7 +20,7 @@ pub(crate) fn decimals(values: impl IntoIterator<Item = f64>) -> usize {
 /// A number with so many decimals. What is too large or small to be read that way gets an exponent; a zero has no sign.
 pub(crate) fn fixed(x: f64, decimals: usize) -> String {
     let magnitude = x.abs();
-    if x != 0.0 && x.is_finite() && (magnitude >= 1e9 || magnitude < 5e-4) {
+    if x != 0.0 && x.is_finite() && !(5e-4..1e9).contains(&magnitude) {
         return format!("{x:.2e}");
     }
     let text = format!("{x:.decimals$}");

@@ -1,5 +1,6 @@
 //! The page with pictures: one file that needs nothing but itself.
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use sesame_plan::Search;
@@ -34,7 +35,7 @@ pub fn write_page(repository: &Repository, path: &Path) -> Result<(), RecordErro
 pub fn page(repository: &Repository) -> Result<String, RecordError> {
     let rows = repository.tests()?;
     let members = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
-    let summary = summarise(repository, &rows, members)?;
+    let summary = summarise(repository, &rows, &members)?;
     let groups = chosen(&summary, &rows);
     let drawn: Vec<u32> = groups.iter().flat_map(|group| group.tests.iter().copied()).collect();
 
@@ -43,7 +44,7 @@ pub fn page(repository: &Repository) -> Result<String, RecordError> {
     body.open("main", &[]);
     requirements(&mut body, &summary, &drawn);
     front(&mut body, repository, &summary, &rows, &drawn);
-    failures(&mut body, &summary);
+    failures(&mut body, &summary, &drawn);
     for group in groups.iter().filter(|group| !group.tests.is_empty()) {
         body.open("section", &[]);
         body.element("h2", &[], group.title);
@@ -142,7 +143,7 @@ fn header(body: &mut Markup, repository: &Repository, summary: &Summary) -> Resu
         ("Search", search),
         ("Seed", facts.seed.to_string()),
         ("One test", format!("{} of simulation", number::quantity(plan.campaign.end_after, Some("s")))),
-        ("Took", format!("{} on {workers}", number::quantity(wall, Some("s")))),
+        ("Took", format!("{} s on {workers}", number::fixed(wall, 1))),
         ("Made by", format!("{}, sesame-runtime {}", plan.generator, facts.runtime)),
         ("Source", plan.source.clone()),
         ("Ended", facts.stop.clone().unwrap_or_else(|| "unfinished".to_owned())),
@@ -171,13 +172,16 @@ fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     body.element("h2", &[], "Requirements");
     body.open("div", &[("class", "scroll")]);
     body.open("table", &[]);
-    heading_row(body, &["", "Requirement", "Bound", "Tests", "Violated", "Kept", "Unsaid", "Undisturbed", "Worst"]);
+    heading_row(
+        body,
+        &["", "Requirement", "Tests", "Violated", "Kept", "Unsaid", "Bound", "Undisturbed", "Worst"],
+        3..6,
+    );
     body.open("tbody", &[]);
     for requirement in &summary.requirements {
         body.open("tr", &[]);
         body.element("th", &[("scope", "row")], &requirement.requirement);
-        body.element("td", &[], &requirement.text);
-        body.element("td", &[("class", "keep")], &format!("{} {}", requirement.metric, requirement.bound));
+        body.element("td", &[("class", "sentence")], &requirement.text);
         body.open("td", &[]);
         verdict_bar(body, requirement);
         body.close();
@@ -185,6 +189,7 @@ fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
         body.element("td", &[("class", broken)], &requirement.violated.to_string());
         body.element("td", &[("class", "number")], &requirement.kept.to_string());
         body.element("td", &[("class", "number")], &requirement.unsaid.to_string());
+        body.element("td", &[("class", "keep")], &format!("{} {}", requirement.metric, requirement.bound));
         let undisturbed = if requirement.reference == Some(Verdict::Violated) { "bad" } else { "quiet" };
         body.element("td", &[("class", undisturbed)], requirement.reference.map_or("–", Verdict::word));
         body.open("td", &[("class", "keep")]);
@@ -306,18 +311,18 @@ fn caption(summary: &Summary, repository: &Repository) -> String {
         (counts.unmeasured, "unmeasured"),
         (counts.crashes, "crashed"),
         (counts.timeouts, "timed out"),
-        (counts.duplicates, "duplicates"),
+        (counts.duplicates, if counts.duplicates == 1 { "duplicate" } else { "duplicates" }),
     ] {
         if count > 0 {
             hidden.push(format!("{count} {word}"));
         }
     }
     let mut caption =
-        "Each dot is a test; filled and named: no other test is better in every objective. The ring is the \
-                       undisturbed run. Point at a dot to see its values, click it to see it over time."
+        "Each dot is a test; emphasised: no other test is better in one objective without being worse in another. \
+         The ring is the undisturbed run. Point at a dot to see its values, click it to see it over time."
             .to_owned();
     if !hidden.is_empty() {
-        caption.push_str(&format!(" Not shown: {}.", number::join_words(&hidden)));
+        let _ = write!(caption, " Not shown: {}.", number::join_words(&hidden));
     }
     if repository.campaign().stop.is_none() {
         caption.push_str(" The run is unfinished: this is the front so far.");
@@ -328,12 +333,12 @@ fn caption(summary: &Summary, repository: &Repository) -> String {
 fn front_table(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     body.open("div", &[("class", "scroll")]);
     body.open("table", &[]);
+    let columns = objective_columns(summary);
     let mut titles = vec!["Test"];
     titles.extend(summary.objectives.iter().map(|objective| objective.metric.as_str()));
     titles.extend(["Violates", "Operations"]);
-    heading_row(body, &titles);
+    heading_row(body, &titles, 1..1 + columns.len());
     body.open("tbody", &[]);
-    let columns = objective_columns(summary);
     for (at, test) in summary.front.iter().enumerate() {
         body.open("tr", &[]);
         body.open("th", &[("scope", "row")]);
@@ -343,7 +348,7 @@ fn front_table(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
             body.element("td", &[("class", "number")], &column[at]);
         }
         body.element("td", &[("class", "bad keep")], &test.violates.join(" "));
-        body.element("td", &[], &test.operations);
+        body.element("td", &[("class", "sentence")], &test.operations);
         body.close();
     }
     body.close();
@@ -354,7 +359,7 @@ fn front_table(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
 fn spreads(body: &mut Markup, summary: &Summary) {
     body.open("div", &[("class", "scroll")]);
     body.open("table", &[]);
-    heading_row(body, &["Metric", "Unit", "Tests", "Least", "Median", "Most"]);
+    heading_row(body, &["Metric", "Unit", "Tests", "Least", "Median", "Most"], 2..6);
     body.open("tbody", &[]);
     for spread in &summary.spreads {
         let decimals = number::decimals([spread.min, spread.median, spread.max]);
@@ -372,7 +377,7 @@ fn spreads(body: &mut Markup, summary: &Summary) {
     body.close();
 }
 
-fn failures(body: &mut Markup, summary: &Summary) {
+fn failures(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     if summary.failures.is_empty() {
         return;
     }
@@ -380,14 +385,16 @@ fn failures(body: &mut Markup, summary: &Summary) {
     body.element("h2", &[], "Crashes and timeouts");
     body.open("div", &[("class", "scroll")]);
     body.open("table", &[]);
-    heading_row(body, &["Test", "Outcome", "At", "Cause"]);
+    heading_row(body, &["Test", "Outcome", "At", "Cause"], 2..3);
     body.open("tbody", &[]);
     for failure in summary.failures.iter().take(50) {
         body.open("tr", &[]);
-        body.element("th", &[("scope", "row")], &failure.test);
+        body.open("th", &[("scope", "row")]);
+        test_link(body, &failure.test, drawn);
+        body.close();
         body.element("td", &[("class", "bad")], &failure.outcome);
         body.element("td", &[("class", "number")], &number::quantity(failure.at, Some("s")));
-        body.element("td", &[], &failure.detail);
+        body.element("td", &[("class", "sentence")], &failure.detail);
         body.close();
     }
     body.close();
@@ -406,7 +413,7 @@ fn failures(body: &mut Markup, summary: &Summary) {
 fn test_heading(body: &mut Markup, summary: &Summary, report: &TestReport) {
     body.open("h3", &[]);
     body.text(&report.test);
-    if !matches!(report.origin.as_str(), "search" | "reference") {
+    if report.origin != "search" {
         body.element("span", &[("class", "quiet")], &format!(" {}", report.origin));
     }
     for requirement in report.requirements.iter().filter(|requirement| requirement.verdict == Verdict::Violated) {
@@ -478,7 +485,7 @@ fn figures(body: &mut Markup, report: &TestReport) {
 fn table(body: &mut Markup, titles: &[&str], rows: impl FnOnce(&mut Markup)) {
     body.open("div", &[("class", "scroll")]);
     body.open("table", &[]);
-    heading_row(body, titles);
+    heading_row(body, titles, 0..0);
     body.open("tbody", &[]);
     rows(body);
     body.close();
@@ -495,11 +502,13 @@ fn row(body: &mut Markup, name: &str, cells: &[String]) {
     body.close();
 }
 
-fn heading_row(body: &mut Markup, titles: &[&str]) {
+/// A heading per column; those of columns of numbers stand to the right, as the numbers do.
+fn heading_row(body: &mut Markup, titles: &[&str], numbers: std::ops::Range<usize>) {
     body.open("thead", &[]);
     body.open("tr", &[]);
-    for title in titles {
-        body.element("th", &[("scope", "col")], title);
+    for (column, title) in titles.iter().enumerate() {
+        let class = if numbers.contains(&column) { "number" } else { "words" };
+        body.element("th", &[("scope", "col"), ("class", class)], title);
     }
     body.close();
     body.close();

@@ -3,6 +3,8 @@
 //! Charts are fluid: places are shares of the width and height, sizes of dots and letters are pixels, so that a chart
 //! fills its column on any screen and stays readable on a small one.
 
+use std::fmt::Write as _;
+
 use sesame_plan::Direction;
 
 use crate::report::axis::Axis;
@@ -127,7 +129,7 @@ fn step_line(markup: &mut Markup, front: &[&Point], x: Option<Direction>, place:
     let Some(first) = places.first() else { return };
     let mut path = format!("M{} {}", coordinate(first.0 * 1000.0), coordinate(first.1 * 1000.0));
     for (x, y) in &places[1..] {
-        path.push_str(&format!("H{}V{}", coordinate(x * 1000.0), coordinate(y * 1000.0)));
+        let _ = write!(path, "H{}V{}", coordinate(x * 1000.0), coordinate(y * 1000.0));
     }
     markup.open("svg", &[("viewBox", "0 0 1000 1000"), ("preserveAspectRatio", "none"), ("aria-hidden", "true")]);
     markup.leaf("path", &[("class", "front-line"), ("d", &path)]);
@@ -166,39 +168,53 @@ struct Screen {
 
 /// Writes the names of points where they cover no other name and no point of the front; a name without such a place
 /// is left out (the dot still tells it when pointed at).
-fn names(markup: &mut Markup, points: &[&Point], occupied: &[(f64, f64)], screen: Screen) {
-    let dots = occupied.iter().map(|(x, y)| Frame::around(x * screen.width, y * screen.height, 7.0));
-    let mut frames: Vec<Frame> = dots.collect();
-    for (point, (x, y)) in points.iter().zip(occupied) {
-        let length = point.test.len() as f64 * 7.5;
-        // To the right, to the left, above, below.
-        let places = [
-            (10.0, 4.0, 0.0, ""),
-            (-10.0, 4.0, -1.0, " end"),
-            (0.0, -11.0, -0.5, " middle"),
-            (0.0, 20.0, -0.5, " middle"),
-        ];
-        for (dx, dy, shift, anchor) in places {
-            let left = x * screen.width + dx + shift * length;
-            let base = y * screen.height + dy;
-            let frame = Frame { left, right: left + length, top: base - 11.0, bottom: base + 3.0 };
-            let inside = frame.left >= 2.0
-                && frame.right <= screen.width + 10.0
-                && frame.top >= -8.0
-                && frame.bottom <= screen.height;
-            if inside && frames.iter().all(|other| !frame.overlaps(*other)) {
-                frames.push(frame);
-                let class = format!("{}{anchor}", screen.class);
-                let (x, y, dx, dy) = (percent(*x), percent(*y), coordinate(dx), coordinate(dy));
-                markup.element(
-                    "text",
-                    &[("class", &class), ("x", &x), ("y", &y), ("dx", &dx), ("dy", &dy)],
-                    &point.test,
-                );
-                break;
-            }
-        }
+fn names(markup: &mut Markup, points: &[&Point], places: &[(f64, f64)], screen: Screen) {
+    let lengths: Vec<f64> = points.iter().map(|point| point.test.len() as f64 * 7.5).collect();
+    for ((point, (x, y)), placed) in points.iter().zip(places).zip(place_names(places, &lengths, screen)) {
+        let Some(placed) = placed else { continue };
+        let class = format!("{}{}", screen.class, placed.anchor);
+        let (x, y, dx, dy) = (percent(*x), percent(*y), coordinate(placed.dx), coordinate(placed.dy));
+        let attributes = [("class", class.as_str()), ("x", &x), ("y", &y), ("dx", &dx), ("dy", &dy)];
+        markup.element("text", &attributes, &point.test);
     }
+}
+
+/// Where a name stands beside its dot.
+#[derive(Debug, Clone, Copy)]
+struct Placed {
+    dx: f64,
+    dy: f64,
+    anchor: &'static str,
+    frame: Frame,
+}
+
+/// A place for each name, in order of importance, earlier ones first; names have these lengths in pixels.
+fn place_names(places: &[(f64, f64)], lengths: &[f64], screen: Screen) -> Vec<Option<Placed>> {
+    let dots = places.iter().map(|(x, y)| Frame::around(x * screen.width, y * screen.height, 7.0));
+    let mut frames: Vec<Frame> = dots.collect();
+    // Above, to the left, to the right, below: a step line leaves its points to the sides. The share is that of the
+    // name's length which lies left of where it is anchored.
+    let sides =
+        [(0.0, -11.0, 0.5, " middle"), (-10.0, 4.0, 1.0, " end"), (10.0, 4.0, 0.0, ""), (0.0, 20.0, 0.5, " middle")];
+    places
+        .iter()
+        .zip(lengths)
+        .map(|((x, y), length)| {
+            let found = sides.iter().find_map(|&(dx, dy, share, anchor)| {
+                let left = x * screen.width + dx - share * length;
+                let base = y * screen.height + dy;
+                let frame = Frame { left, right: left + length, top: base - 11.0, bottom: base + 3.0 };
+                let inside = left >= -24.0
+                    && frame.right <= screen.width + 10.0
+                    && frame.top >= -16.0
+                    && frame.bottom <= screen.height + 8.0;
+                let free = inside && frames.iter().all(|other| !frame.overlaps(*other));
+                free.then_some(Placed { dx, dy, anchor, frame })
+            });
+            frames.extend(found.map(|placed| placed.frame));
+            found
+        })
+        .collect()
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -221,6 +237,8 @@ impl Frame {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     fn point(x: f64, y: f64, kind: Kind, test: &str) -> Point {
@@ -260,15 +278,25 @@ mod tests {
         assert!((300..=800).contains(&text.matches("\"dot\"").count()));
     }
 
-    #[test]
-    fn names_never_cover_each_other() {
-        let points: Vec<Point> =
-            (0..40).map(|n| point(f64::from(n % 7), f64::from(n % 5), Kind::Front, "T1234")).collect();
-        let mut markup = Markup::default();
-        let (x, y) = (dimension("x", Direction::Minimise), dimension("y", Direction::Maximise));
-        scatter(&mut markup, &x, &y, &points, Detail { named: true, points: 800 });
-        let text = markup.finish();
-        let placed = |class: &str| text.matches(class).count();
-        assert!(placed("name narrow") < placed("name wide") && placed("name wide") < 40, "a small screen names fewer");
+    proptest! {
+        #[test]
+        fn names_cover_neither_each_other_nor_a_point(
+            places in prop::collection::vec((0.0f64..=1.0, 0.0f64..=1.0), 1..40), length in 10.0f64..60.0,
+        ) {
+            let screen = Screen { width: 300.0, height: 280.0, class: "" };
+            let placed = place_names(&places, &vec![length; places.len()], screen);
+            prop_assert!(placed.iter().any(Option::is_some), "one name at least finds a place");
+            for (at, name) in placed.iter().enumerate() {
+                let Some(name) = name else { continue };
+                for other in placed[..at].iter().flatten() {
+                    prop_assert!(!name.frame.overlaps(other.frame));
+                }
+                for (x, y) in &places {
+                    let (x, y) = (x * screen.width, y * screen.height);
+                    let inside = (name.frame.left..name.frame.right).contains(&x) && (name.frame.top..name.frame.bottom).contains(&y);
+                    prop_assert!(!inside, "a dot lies under a name");
+                }
+            }
+        }
     }
 }

@@ -167,14 +167,11 @@ pub struct Spread {
 /// The front is the final result set, or the latest one of an unfinished run. It is sorted by the first objective that
 /// a requirement bounds (else the first objective), most dangerous first; equal tests by number.
 pub fn summary(repository: &Repository) -> Result<Summary, RecordError> {
-    summarise(
-        repository,
-        &repository.tests()?,
-        repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members),
-    )
+    let members = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
+    summarise(repository, &repository.tests()?, &members)
 }
 
-pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: Vec<u32>) -> Result<Summary, RecordError> {
+pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u32]) -> Result<Summary, RecordError> {
     let facts = repository.campaign();
     let plan = &facts.plan;
     let objectives: Vec<Objective> = plan
@@ -198,7 +195,7 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: Vec<
         seed: facts.seed,
         stop: facts.stop.clone(),
         counts: counts(plan, rows),
-        front: front(plan, &objectives, rows, &members),
+        front: front(plan, &objectives, rows, members),
         requirements: plan
             .requirements
             .iter()

@@ -145,7 +145,7 @@ fn a_large_campaign_stays_a_page_of_a_few_megabytes() {
         metric.series = (0..2000u32).map(|n| (f64::from(n) * 0.035, f64::from(n * 7919 % 1000))).collect();
     }
     let many = 40;
-    for number in 0..2000 {
+    for number in 0..500 {
         record.number = number;
         record.observation.metrics[0].value = Some(f64::from(number % 97));
         record.observation.metrics[1].value = Some(f64::from(number % 89));

@@ -60,10 +60,10 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
         text.push_str(&front(summary).render(options));
     }
     if summary.objectives.is_empty() && !summary.spreads.is_empty() {
-        section(&mut text, "Values", spreads(&summary.spreads), options);
+        section(&mut text, "Values", &spreads(&summary.spreads), options);
     }
     if !summary.requirements.is_empty() {
-        section(&mut text, "Requirements", requirements(summary), options);
+        section(&mut text, "Requirements", &requirements(summary), options);
     }
     if !summary.expectations.is_empty() {
         let mut table =
@@ -82,7 +82,7 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
                 came_out.to_owned(),
             ]);
         }
-        section(&mut text, "Known tests", table, options);
+        section(&mut text, "Known tests", &table, options);
     }
     if !summary.failures.is_empty() {
         let mut table = Table::new([left("test"), left("outcome"), right("at"), left("cause")]);
@@ -90,7 +90,7 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
             let at = with_unit(fixed(failure.at, 2), Some("s"));
             table.row([failure.test.clone(), failure.outcome.clone(), at, failure.detail.clone()]);
         }
-        section(&mut text, "Crashes and timeouts", table, options);
+        section(&mut text, "Crashes and timeouts", &table, options);
     }
     text.push('\n');
     paragraph(&mut text, &counts_sentence(summary), options);
@@ -131,7 +131,7 @@ fn paragraph(text: &mut String, sentence: &str, options: TextOptions) {
     }
 }
 
-fn section(text: &mut String, title: &str, table: Table, options: TextOptions) {
+fn section(text: &mut String, title: &str, table: &Table, options: TextOptions) {
     text.push('\n');
     text.push_str(&options.heading(title));
     text.push('\n');
@@ -266,14 +266,14 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
                 effect_text(operation),
             ]);
         }
-        section(&mut text, "Operations", table, options);
+        section(&mut text, "Operations", &table, options);
     }
     let mut table = Table::new([left("metric"), left("value"), right("changes")]);
     for metric in &test.metrics {
         let shown = MetricValue { value: metric.value, set: metric.set };
         table.row([metric.metric.clone(), value_text(shown, metric.unit.as_deref()), metric.changes.to_string()]);
     }
-    section(&mut text, "Metrics", table, options);
+    section(&mut text, "Metrics", &table, options);
     if !test.requirements.is_empty() {
         let mut table = Table::new([
             left("name"),
@@ -293,7 +293,7 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
                 requirement.text.clone(),
             ]);
         }
-        section(&mut text, "Requirements", table, options);
+        section(&mut text, "Requirements", &table, options);
     }
     for warning in &test.warnings {
         paragraph(&mut text, &format!("warning: {}", visible(warning)), options);

@@ -2,6 +2,8 @@
 //!
 //! Rows share one time axis. Like all charts they are fluid: horizontal places are shares of the width.
 
+use std::fmt::Write as _;
+
 use sesame_plan::{Bound, CampaignPlan, Metric, MetricSource, Span};
 
 use crate::observation::{MetricObservation, Outcome};
@@ -16,10 +18,10 @@ use crate::report::text::{choices_text, effect_text, spans_text};
 const LANE: f64 = 30.0;
 
 /// Height of a metric's row, in pixels.
-const SERIES: f64 = 66.0;
+const SERIES: f64 = 76.0;
 
 /// Space above and below a metric's line in its row, in pixels.
-const MARGIN: f64 = 8.0;
+const MARGIN: f64 = 15.0;
 
 /// Change points drawn per row: four for each of so many columns at most.
 const COLUMNS: f64 = 400.0;
@@ -163,7 +165,7 @@ fn series(
     let mut title =
         format!("{} from {} to {}", metric.name, number::number(extent.low), number::quantity(extent.high, unit));
     if !broken.is_empty() {
-        title.push_str(&format!("; outside its bound {}", spans_text(&broken)));
+        let _ = write!(title, "; outside its bound {}", spans_text(&broken));
     }
     let tall = coordinate(SERIES);
     markup.open("svg", &[("class", "plot"), ("height", &tall), ("role", "img"), ("aria-label", &title)]);
@@ -172,12 +174,9 @@ fn series(
         let (x, width) = (percent(time.share(span.start)), percent(time.share(span.end) - time.share(span.start)));
         markup.leaf("rect", &[("class", "outside"), ("x", &x), ("y", "0"), ("width", &width), ("height", &tall)]);
     }
-    for &(name, bound, at) in &lines {
+    for &(_, _, at) in &lines {
         let y = coordinate(height(at));
         markup.leaf("line", &[("class", "bound"), ("x1", "0"), ("x2", "100%"), ("y1", &y), ("y2", &y)]);
-        let dy = if height(at) < 20.0 { "12" } else { "-4" };
-        let words = format!("{name} {}", number::bound(bound, unit));
-        markup.element("text", &[("class", "bound-name"), ("x", "100%"), ("dx", "-2"), ("y", &y), ("dy", dy)], &words);
     }
     let viewport = format!("0 0 {} {tall}", coordinate(time.high));
     let frame =
@@ -194,6 +193,14 @@ fn series(
         markup.leaf("path", &[("class", "line bad"), ("d", &bad)]);
     }
     markup.close();
+    // After the lines, so that none strikes a name out.
+    for &(name, bound, at) in &lines {
+        let y = coordinate(height(at));
+        // On the side where there is room, which is also where an unbroken line is not.
+        let dy = if height(at) < SERIES / 2.0 { "-4" } else { "12" };
+        let words = format!("{name} {}", number::bound(bound, unit));
+        markup.element("text", &[("class", "bound-name"), ("x", "100%"), ("dx", "-2"), ("y", &y), ("dy", dy)], &words);
+    }
     let decimals = number::decimals([extent.low, extent.high]);
     for value in [extent.high, extent.low] {
         let y = coordinate(height(value));
@@ -232,9 +239,9 @@ fn step_path(points: &[(f64, f64)], end: f64, height: impl Fn(f64) -> f64, drawn
         }
         let (y, until) = (coordinate(height(value)), coordinate(until));
         if going {
-            path.push_str(&format!("V{y}H{until}"));
+            let _ = write!(path, "V{y}H{until}");
         } else {
-            path.push_str(&format!("M{} {y}H{until}", coordinate(time)));
+            let _ = write!(path, "M{} {y}H{until}", coordinate(time));
         }
         going = true;
     }
