@@ -1,1 +1,6 @@
-//! To be written.
+//! From a checked space to the runner crates of its campaigns.
+//!
+//! Model → plan ([`plan`]) → files in memory ([`emit`]) → disk ([`output`], the only module that writes). Each arrow
+//! but the last is a pure function: the same model and version give the same bytes.
+
+pub mod plan;
