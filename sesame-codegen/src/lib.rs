@@ -3,4 +3,7 @@
 //! Model → plan ([`plan`]) → files in memory ([`emit`]) → disk ([`output`], the only module that writes). Each arrow
 //! but the last is a pure function: the same model and version give the same bytes.
 
+pub mod emit;
+pub mod files;
+pub mod names;
 pub mod plan;
