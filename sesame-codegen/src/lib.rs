@@ -4,6 +4,8 @@
 //! but the last is a pure function: the same model and version give the same bytes.
 
 pub mod emit;
+pub mod environment;
 pub mod files;
 pub mod names;
+pub mod output;
 pub mod plan;

@@ -79,7 +79,11 @@ pub fn hook_type(metric: &str) -> String {
         "Box", "Context", "Default", "Drop", "Err", "Hook", "None", "Ok", "Option", "Result", "Some", "String", "Text",
         "Vec",
     ];
-    let name = camel(metric);
+    let name = metric.to_upper_camel_case();
+    if name == "Self" {
+        return "SelfMetric".to_owned();
+    }
+    let name = settled(name);
     if SPOKEN_OF.contains(&name.as_str()) { name + "Metric" } else { name }
 }
 

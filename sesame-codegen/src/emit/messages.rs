@@ -36,8 +36,7 @@ pub(super) struct Messages<'a> {
 impl<'a> Messages<'a> {
     pub(super) fn new(plan: &'a CampaignPlan) -> Self {
         // What stands beside the structs here, in a stub, or in code that a user is likely to write there.
-        let mut scope =
-            Scope::reserving(&["Box", "Context", "Default", "Option", "Result", "String", "Text", "Vec"]);
+        let mut scope = Scope::reserving(&["Box", "Context", "Default", "Option", "Result", "String", "Text", "Vec"]);
         let types = plan.messages.iter().map(|message| scope.take(names::camel(&message.name), "Message")).collect();
         let fields = plan.messages.iter().map(|message| field_names(&message.fields)).collect();
         Messages { plan, types, fields }

@@ -168,7 +168,7 @@ fn adapter(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -> TokenS
             }
         }
     });
-    let beyond = format!("metric `{}` has {} inputs", hook.metric, hook.inputs.len());
+    let beyond = format!("metric `{}` has no such input", hook.metric);
     quote! {
         struct #adapter<H>(H);
 

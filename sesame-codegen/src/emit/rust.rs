@@ -56,6 +56,13 @@ mod tests {
     fn no_doc_comment_ends_early() {
         let docs = docs(["a */ b", "c \r\n fn evil() {}", "d \u{2028} e", ""]);
         let text = file("// header", quote! { #docs pub struct A; });
-        insta::assert_snapshot!(text, @"");
+        insta::assert_snapshot!(text, @r"
+        // header
+        /// a */ b
+        /// c    fn evil() {}
+        /// d   e
+        ///
+        pub struct A;
+        ");
     }
 }

@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 use serde::Serialize;
-use sesame_plan::{CampaignPlan, Direction, Type};
+use sesame_plan::{Direction, Type};
 
 use super::handlers::{Handler, handlers, paths};
 use super::messages::{self, Messages, Place};
@@ -57,6 +57,7 @@ pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -
         [one] => imports.push(format!("crate::generated::messages::{one}")),
         several => imports.push(format!("crate::generated::messages::{{{}}}", several.join(", "))),
     }
+    imports.sort();
     imports.push("sesame_runtime::metric::Context".to_owned());
     if inputs.iter().any(|ty| messages::holds_text(ty)) {
         imports.push("sesame_runtime::value::Text".to_owned());
@@ -72,18 +73,12 @@ pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -
         imports,
         hook_type: names::written(&hook_type),
         hook_trait: names::written(&hook_trait),
-        handlers: handlers.iter().map(|handler| stub_handler(&runner.plan, types, hook, handler, place)).collect(),
+        handlers: handlers.iter().map(|handler| stub_handler(types, hook, handler, place)).collect(),
     };
     text::render(sesame_templates::runner::HOOK, &stub)
 }
 
-fn stub_handler(
-    plan: &CampaignPlan,
-    types: &Messages<'_>,
-    hook: &HookPlan,
-    handler: &Handler<'_>,
-    place: Place,
-) -> StubHandler {
+fn stub_handler(types: &Messages<'_>, hook: &HookPlan, handler: &Handler<'_>, place: Place) -> StubHandler {
     StubHandler {
         topic: handler.topic.name.clone(),
         paths: one_line(&paths(handler.topic)),
@@ -91,13 +86,13 @@ fn stub_handler(
         method: names::written(&handler.method),
         parameter: names::written(&handler.parameter),
         ty: types.borrowed(&handler.topic.ty, place),
-        example: example(plan, types, hook, handler),
+        example: example(types, hook, handler),
     }
 }
 
 /// A line that would make a metric of this input: something to start from, valid Rust on its own.
-fn example(plan: &CampaignPlan, types: &Messages<'_>, hook: &HookPlan, handler: &Handler<'_>) -> String {
-    let (value, ty) = number(plan, types, &handler.topic.ty, &handler.parameter);
+fn example(types: &Messages<'_>, hook: &HookPlan, handler: &Handler<'_>) -> String {
+    let (value, ty) = number(types, &handler.topic.ty, &handler.parameter);
     let same_unit = hook.unit.is_some() && messages::unit(ty) == hook.unit.as_deref();
     let real = match ty {
         Type::Int { .. } => format!("{value} as f64"),
@@ -128,12 +123,12 @@ fn counted(condition: &str) -> String {
 }
 
 /// The part of an input that an example speaks of: its first number, or else its first field.
-fn number<'a>(plan: &'a CampaignPlan, types: &Messages<'a>, ty: &'a Type, value: &str) -> (String, &'a Type) {
+fn number<'a>(types: &Messages<'a>, ty: &'a Type, value: &str) -> (String, &'a Type) {
     let Type::Message { id } = ty else { return (value.to_owned(), ty) };
     let fields = || types.fields(*id);
     let is_number = |ty: &Type| matches!(ty, Type::Real { .. } | Type::Int { .. });
     match fields().find(|(field, _)| is_number(&field.ty)).or_else(|| fields().next()) {
-        Some((field, rust_name)) => number(plan, types, &field.ty, &format!("{value}.{}", names::written(rust_name))),
+        Some((field, rust_name)) => number(types, &field.ty, &format!("{value}.{}", names::written(rust_name))),
         None => (value.to_owned(), ty),
     }
 }
