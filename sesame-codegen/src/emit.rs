@@ -50,17 +50,17 @@ pub enum Problem {
         /// The name.
         name: String,
     },
-    /// Two metrics, or two campaigns, that would share a file.
-    #[error("the {what}s `{first}` and `{second}` would share the file name `{file}`: rename one of them")]
-    SharedFile {
+    /// Two metrics, or two campaigns, that would share a file or a type.
+    #[error("the {what}s `{first}` and `{second}` would both be called `{generated}` in what is generated: rename one")]
+    SharedName {
         /// What they are.
         what: &'static str,
         /// The one declared first.
         first: String,
         /// The other.
         second: String,
-        /// The name they share.
-        file: String,
+        /// The name they would share.
+        generated: String,
     },
     /// A dependency whose name is not one of cargo.
     #[error("`{}` is not the name of a package, as [dependencies] has them", name.escape_debug())]
@@ -135,29 +135,34 @@ fn problems(plans: &[RunnerPlan], environment: &Environment) -> Vec<Problem> {
     for name in environment.dependencies.keys().filter(|name| !package::is_dependency(name)) {
         problems.push(Problem::Dependency { name: name.clone() });
     }
-    let hooks = plans.iter().take(1).flat_map(|runner| &runner.hooks).map(|hook| hook.metric.as_str());
-    problems.extend(shared_files("metric", hooks, names::snake));
+    let hooks = || plans.iter().take(1).flat_map(|runner| &runner.hooks).map(|hook| hook.metric.as_str());
+    let mut shared = shared_names("metric", hooks(), names::snake);
+    if shared.is_empty() {
+        shared = shared_names("metric", hooks(), names::hook_type);
+    }
+    problems.extend(shared);
     // Some file systems do not tell `Jitter` from `jitter`.
     let campaigns = plans.iter().map(|runner| runner.plan.campaign.name.as_str());
-    problems.extend(shared_files("campaign", campaigns, |name| names::campaign_folder(name).to_ascii_lowercase()));
+    problems.extend(shared_names("campaign", campaigns, |name| names::campaign_folder(name).to_ascii_lowercase()));
     problems
 }
 
-fn shared_files<'a>(
+fn shared_names<'a>(
     what: &'static str,
     names: impl Iterator<Item = &'a str>,
-    file: impl Fn(&str) -> String,
+    generated: impl Fn(&str) -> String,
 ) -> Vec<Problem> {
-    let mut first_by_file: BTreeMap<String, &str> = BTreeMap::new();
+    let mut firsts: BTreeMap<String, &str> = BTreeMap::new();
     let mut problems = Vec::new();
     for second in names {
-        let file = file(second);
-        match first_by_file.get(&file) {
-            Some(first) => {
-                problems.push(Problem::SharedFile { what, first: (*first).to_owned(), second: second.to_owned(), file })
+        let generated = generated(second);
+        match firsts.get(&generated) {
+            Some(&first) => {
+                let (first, second) = (first.to_owned(), second.to_owned());
+                problems.push(Problem::SharedName { what, first, second, generated });
             }
             None => {
-                first_by_file.insert(file, second);
+                firsts.insert(generated, second);
             }
         }
     }

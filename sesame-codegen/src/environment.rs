@@ -184,6 +184,11 @@ pub fn environment(
     Ok(Environment { dependencies, lock, options })
 }
 
+/// The runtime as a dependency of a crate in `folder`, which need not exist yet.
+pub fn runtime_for(folder: &Path, runtime: Option<&RuntimeChoice>) -> Result<Value, Error> {
+    runtime_dependency(&settled(folder)?, Path::new("."), runtime, None).map(|(value, _)| value)
+}
+
 fn settings(path: &Path) -> Result<Settings, Error> {
     match fs::read_to_string(path) {
         Ok(text) => toml::from_str(&text).map_err(|error| Error::Settings {

@@ -3,9 +3,12 @@
 //! Model → plan ([`plan`]) → files in memory ([`emit`]) → disk ([`output`], the only module that writes). Each arrow
 //! but the last is a pure function: the same model and version give the same bytes.
 
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod emit;
 pub mod environment;
 pub mod files;
 pub mod names;
 pub mod output;
 pub mod plan;
+pub mod project;

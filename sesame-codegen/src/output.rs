@@ -144,6 +144,12 @@ pub enum Error {
         /// File name of the `.sesame` file that was to be generated.
         source_file: String,
     },
+    /// A new project would be mixed with something else.
+    #[error("{} is there already and not empty: choose another name", folder.display())]
+    NotEmpty {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// A manifest that cannot be read.
     #[error(
         "the manifest {} cannot be used ({problem}): restore it, or delete it and generate with `--force`",
@@ -194,6 +200,24 @@ pub fn apply(out: &Path, trees: &[Tree], mode: Mode) -> Result<Report, Error> {
         steps.iter().try_for_each(Step::take)?;
     }
     Ok(report)
+}
+
+/// Writes a new project into a folder that must be empty or not there yet.
+pub fn create(folder: &Path, files: &std::collections::BTreeMap<String, String>) -> Result<(), Error> {
+    let failed = |cause| Error::Io { action: "look into", path: folder.to_owned(), cause };
+    match fs::read_dir(folder) {
+        Ok(mut entries) => {
+            if entries.next().transpose().map_err(failed)?.is_some() {
+                return Err(Error::NotEmpty { folder: folder.to_owned() });
+            }
+        }
+        Err(cause) if cause.kind() == io::ErrorKind::NotFound => {}
+        Err(cause) => return Err(failed(cause)),
+    }
+    files.iter().try_for_each(|(path, contents)| {
+        assert!(is_inside(path), "a project's path stays in its folder: {path}");
+        write(&folder.join(path), contents)
+    })
 }
 
 /// Something to be done on disk.

@@ -3,4 +3,5 @@
 //! Templates are in the language of tera and hold loops and plain conditions, nothing else: names, types and sentences
 //! are computed by whoever fills them in.
 
+pub mod project;
 pub mod runner;

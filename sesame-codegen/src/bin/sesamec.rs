@@ -1,1 +1,3 @@
+//! The `sesamec` command.
+
 fn main() {}

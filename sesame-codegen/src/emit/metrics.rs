@@ -107,16 +107,16 @@ pub(super) fn registry(runner: &RunnerPlan, types: &Messages<'_>, header: &str, 
         let module = module(hook);
         quote! { #[path = #file] mod #module; }
     });
-    let imports = used.iter().map(|hook| {
-        let (module, user, here) = (module(hook), names::ident(&names::hook_type(&hook.metric)), here(hook));
+    let imports = used.iter().enumerate().map(|(at, hook)| {
+        let (module, user, here) = (module(hook), names::ident(&names::hook_type(&hook.metric)), here(at));
         quote! { use self::#module::#user as #here; }
     });
     let notes: Vec<(String, String)> = used
         .iter()
         .map(|hook| (format!("use self::{}::", names::written(&names::snake(&hook.metric))), declared(runner, hook)))
         .collect();
-    let entries = used.iter().map(|hook| {
-        let (metric, build, here) = (&hook.metric, build(hook), here(hook));
+    let entries = used.iter().enumerate().map(|(at, hook)| {
+        let (metric, build, here) = (&hook.metric, build(hook), here(at));
         quote! { ::sesame_runtime::metric::HookEntry { metric: #metric, build: #build::<#here> } }
     });
     let adapters = used.iter().map(|hook| adapter(runner, types, hook));
@@ -139,9 +139,9 @@ fn module(hook: &HookPlan) -> proc_macro2::Ident {
     names::ident(&names::snake(&hook.metric))
 }
 
-/// The user's struct as the registry calls it; the ending keeps it apart from everything else there.
-fn here(hook: &HookPlan) -> proc_macro2::Ident {
-    format_ident!("{}UserHook", names::hook_type(&hook.metric))
+/// The user's struct as the registry calls it: short, so that rustc shows the note at the end of its line too.
+fn here(at: usize) -> proc_macro2::Ident {
+    format_ident!("Hook{at}")
 }
 
 fn build(hook: &HookPlan) -> proc_macro2::Ident {

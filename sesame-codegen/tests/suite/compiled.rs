@@ -15,8 +15,8 @@ use crate::plans::{awkward, small};
 fn generated(folder: &Path, plans: &[RunnerPlan]) {
     let runtime = sesame_codegen::environment::checkout_runtime().expect("tests run in a checkout");
     let manifest = format!(
-        "[package]\nname = \"kuka_cell_sim\"\nedition = \"2024\"\n[workspace]\n[dependencies]\nsesame-runtime.path = {:?}\n",
-        runtime.canonicalize().unwrap()
+        "[package]\nname = \"kuka_cell_sim\"\nedition = \"2024\"\n[workspace]\n[dependencies]\nsesame-runtime.path = {}\n",
+        toml::Value::from(runtime.canonicalize().unwrap().to_str().unwrap())
     );
     fs::create_dir_all(folder.join("simulator/src")).unwrap();
     fs::write(folder.join("simulator/Cargo.toml"), manifest).unwrap();
@@ -95,4 +95,22 @@ fn hooks_may_share_a_file_of_their_own() {
     fs::write(hook.with_file_name("shared.rs"), "pub const ONE: f64 = 1.0;\n").unwrap();
     let (compiles, said) = check(folder.path(), "coverage");
     assert!(compiles && !said.contains("hooks/"), "{said}");
+}
+
+#[test]
+fn the_simulator_of_a_new_project_passes_its_own_tests() {
+    let folder = tempfile::tempdir().unwrap();
+    let project = folder.path().join("demo");
+    sesame_codegen::output::create(&project, &sesame_codegen::project::files(&project, None).unwrap()).unwrap();
+    let workspace = sesame_codegen::environment::checkout_runtime().unwrap();
+    fs::copy(workspace.parent().unwrap().join("Cargo.lock"), project.join("simulator/Cargo.lock")).unwrap();
+    let output = Command::new(env!("CARGO"))
+        .args(["test", "--offline", "--quiet", "--color", "never"])
+        .current_dir(project.join("simulator"))
+        .env("CARGO_TARGET_DIR", Path::new(env!("CARGO_TARGET_TMPDIR")).join("emitted"))
+        .env_remove("RUSTFLAGS")
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("1 passed"));
 }

@@ -16,9 +16,9 @@ fn shown(trees: &[Tree]) -> String {
                 continue;
             }
             let folder = if tree.folder.is_empty() { "." } else { &tree.folder };
-            text += &format!("═══ {folder}/{path} ({:?})\n{}\n", file.owner, file.contents);
+            text = format!("{text}═══ {folder}/{path} ({:?})\n{}\n", file.owner, file.contents);
         }
-        text += &format!("═══ hooks: {:#?}\n", tree.hooks);
+        text = format!("{text}═══ hooks: {:#?}\n", tree.hooks);
     }
     text
 }
@@ -76,6 +76,14 @@ fn metrics_that_would_share_a_file_are_refused() {
     let mut runner = small("c");
     runner.hooks[1].metric = "CollisionOccurrence".into();
     insta::assert_snapshot!(problems(runner).join("\n"));
+}
+
+#[test]
+fn metrics_that_would_share_a_type_are_refused() {
+    let mut runner = small("c");
+    runner.hooks[0].metric = "level_1".into();
+    runner.hooks[1].metric = "level1".into();
+    assert!(problems(runner)[0].contains("`level_1` and `level1` would both be called `Level1`"));
 }
 
 #[test]
