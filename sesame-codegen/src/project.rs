@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Serialize;
-use toml::{Table, Value};
+use toml::Value;
 
 use crate::emit::text;
 use crate::environment::{self, RuntimeChoice};
@@ -50,25 +50,25 @@ pub fn files(folder: &Path, runtime: Option<&RuntimeChoice>) -> Result<BTreeMap<
         ("README.md".to_owned(), text::render(sesame_templates::project::README, &project)),
         ("sesame.toml".to_owned(), text::render(sesame_templates::project::SETTINGS, &project)),
         (".gitignore".to_owned(), "target/\n".to_owned()),
-        ("simulator/Cargo.toml".to_owned(), simulator_manifest(name, runtime)),
+        ("simulator/Cargo.toml".to_owned(), simulator_manifest(name, &runtime)),
         ("simulator/src/lib.rs".to_owned(), text::render(sesame_templates::project::SIMULATOR, &project)),
     ]
     .into())
 }
 
-fn simulator_manifest(name: &str, runtime: Value) -> String {
-    let package = Table::from_iter([
-        ("name".to_owned(), Value::from(format!("{name}_sim"))),
-        ("version".to_owned(), Value::from("0.1.0")),
-        ("edition".to_owned(), Value::from("2024")),
-        ("publish".to_owned(), Value::from(false)),
-    ]);
-    let dependencies = Table::from_iter([("sesame-runtime".to_owned(), runtime)]);
-    let manifest = Table::from_iter([
-        ("package".to_owned(), Value::Table(package)),
-        ("dependencies".to_owned(), Value::Table(dependencies)),
-        // A crate of its own, whatever workspace the project lies in.
-        ("workspace".to_owned(), Value::Table(Table::new())),
-    ]);
-    toml::to_string(&manifest).expect("tables of texts are TOML")
+/// The simulator's `Cargo.toml`. The name is an identifier, and toml prints the value.
+fn simulator_manifest(name: &str, runtime: &Value) -> String {
+    format!(
+        "[package]\n\
+         name = \"{name}_sim\"\n\
+         version = \"0.1.0\"\n\
+         edition = \"2024\"\n\
+         publish = false\n\
+         \n\
+         [dependencies]\n\
+         sesame-runtime = {runtime}\n\
+         \n\
+         # A crate of its own, whatever workspace the project lies in.\n\
+         [workspace]\n"
+    )
 }
