@@ -282,7 +282,8 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Tree {
     let note = generated_by(runner, environment);
     let header = format!("// {note}\n");
 
-    tree.add("Cargo.toml", Owner::Machine, package::cargo_toml(&note, &package, &environment.dependencies));
+    let dependencies = package::with_features(&environment.dependencies, &features(runner));
+    tree.add("Cargo.toml", Owner::Machine, package::cargo_toml(&note, &package, &dependencies));
     if let Some(lock) = &environment.lock {
         tree.add("Cargo.lock", Owner::Seed, lock.clone());
     }
@@ -331,6 +332,12 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Tree {
     let hooks = "../../../hooks";
     tree.add("src/generated/registry.rs", Owner::Machine, metrics::registry(runner, &types, &header, hooks));
     tree
+}
+
+/// The features of the runtime that a campaign uses, so that its runner compiles nothing else.
+fn features(runner: &RunnerPlan) -> Vec<&'static str> {
+    let Transport::InProcess { .. } = runner.plan.simulator.transport;
+    vec!["campaign", "in-process"]
 }
 
 /// `campaign.rs`: the campaign as the runtime takes it.

@@ -3,7 +3,29 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use toml::Value;
+use toml::{Table, Value};
+
+/// The dependencies, with these features of the runtime.
+pub(super) fn with_features(dependencies: &BTreeMap<String, Value>, features: &[&str]) -> BTreeMap<String, Value> {
+    let mut dependencies = dependencies.clone();
+    if let Some(runtime) = dependencies.get_mut("sesame-runtime") {
+        let mut table = match &*runtime {
+            Value::Table(table) => table.clone(),
+            version => Table::from_iter([("version".to_owned(), version.clone())]),
+        };
+        // What the user asks for in [runtime] comes first.
+        let wanted = table.entry("features").or_insert_with(|| Value::Array(Vec::new()));
+        if let Some(wanted) = wanted.as_array_mut() {
+            for &feature in features {
+                if !wanted.iter().any(|known| known.as_str() == Some(feature)) {
+                    wanted.push(feature.into());
+                }
+            }
+        }
+        *runtime = Value::Table(table);
+    }
+    dependencies
+}
 
 /// The manifest. Names of packages and dependencies are checked by those who made them; values are printed by toml.
 pub(super) fn cargo_toml(note: &str, package: &str, dependencies: &BTreeMap<String, Value>) -> String {
@@ -48,6 +70,17 @@ pub(super) fn is_dependency(name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn features_are_added_to_whatever_the_runtime_is() {
+        let with = |runtime: Value| {
+            let dependencies = BTreeMap::from([("sesame-runtime".to_owned(), runtime)]);
+            with_features(&dependencies, &["a", "b"])["sesame-runtime"].to_string()
+        };
+        assert_eq!(with("=1".into()), "{ version = \"=1\", features = [\"a\", \"b\"] }");
+        let table: Value = toml::from_str("path = \"p\"\nfeatures = [\"b\", \"c\"]").unwrap();
+        assert_eq!(with(table), "{ features = [\"b\", \"c\", \"a\"], path = \"p\" }");
+    }
 
     #[test]
     fn hostile_dependencies_stay_data() {
