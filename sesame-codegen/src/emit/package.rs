@@ -77,7 +77,7 @@ mod tests {
             let dependencies = BTreeMap::from([("sesame-runtime".to_owned(), runtime)]);
             with_features(&dependencies, &["a", "b"])["sesame-runtime"].to_string()
         };
-        assert_eq!(with("=1".into()), "{ version = \"=1\", features = [\"a\", \"b\"] }");
+        assert_eq!(with("=1".into()), "{ features = [\"a\", \"b\"], version = \"=1\" }");
         let table: Value = toml::from_str("path = \"p\"\nfeatures = [\"b\", \"c\"]").unwrap();
         assert_eq!(with(table), "{ features = [\"b\", \"c\", \"a\"], path = \"p\" }");
     }
