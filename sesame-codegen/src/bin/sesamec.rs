@@ -1,3 +1,5 @@
 //! The `sesamec` command.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    sesame_codegen::cli::main(&sesame_codegen::language::SESAME)
+}
