@@ -1,1 +1,17 @@
-//! To be written.
+//! From a checked space to the runner crates of its campaigns.
+//!
+//! Model → plan ([`lower`], [`plan`]) → files in memory ([`emit`]) → disk ([`output`], the only module that writes). Each
+//! arrow but the last is a pure function: the same model and version give the same bytes.
+
+#[cfg(feature = "cli")]
+pub mod cli;
+pub mod emit;
+pub mod environment;
+pub mod files;
+#[cfg(feature = "cli")]
+pub mod language;
+pub mod lower;
+pub mod names;
+pub mod output;
+pub mod plan;
+pub mod project;

@@ -1,1 +1,5 @@
-fn main() {}
+//! The `sesamec` command.
+
+fn main() -> std::process::ExitCode {
+    sesame_codegen::cli::main(&sesame_codegen::language::SESAME)
+}

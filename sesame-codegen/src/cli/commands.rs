@@ -1,0 +1,235 @@
+//! What each subcommand does.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use anyhow::{Context as _, anyhow, bail};
+
+use super::shell::{self, Shell};
+use super::{Checked, Generation, Language, build};
+use crate::environment::{RuntimeChoice, environment};
+use crate::files::{Owner, Tree};
+use crate::output::{self, Change, Mode, Orphan, Report};
+use crate::{emit, names, project};
+
+/// `sesamec new`
+pub(super) fn new(shell: Shell, folder: &Path, runtime: Option<&RuntimeChoice>) -> anyhow::Result<ExitCode> {
+    output::create(folder, &project::files(folder, runtime)?)?;
+    let name = folder.file_name().unwrap_or_default().display();
+    let space = folder.join(format!("{name}.sesame"));
+    let (space, hook) = (space.display(), folder.join(project::HOOK_FILE));
+    let (sesamec, hook, line) = (shell::command(), hook.display(), project::HOOK_LINE);
+    shell.did("Created", format!("{}: a space, a simulator of its own, and a README", folder.display()));
+    shell.text(&format!(
+        "\nTo a first front:\n\
+         \n  1. generate the runner and a stub for its metric\n\
+         \n         {sesamec} generate {space}\n\
+         \n  2. fill the stub in: in {hook}, let the body of `on_clearance` be\n\
+         \n         {line}\n\
+         \n  3. run the campaign\n\
+         \n         {sesamec} run {space}\n"
+    ));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `sesamec check`
+pub(super) fn check(shell: Shell, language: &Language, file: &Path) -> anyhow::Result<Checked> {
+    let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let checked = (language.check)(&file.display().to_string(), &text, shell.colour());
+    if !checked.diagnostics.is_empty() {
+        shell.text(&checked.diagnostics);
+    }
+    let shown = file.display();
+    match checked.errors {
+        0 => shell.did("Checked", format!("{shown}: {}", checked.summary)),
+        1 => bail!("{shown} has an error; `{} explain CODE` says more on its code", shell::command()),
+        n => bail!("{shown} has {n} errors; `{} explain CODE` says more on a code", shell::command()),
+    }
+    Ok(checked)
+}
+
+/// `sesamec generate`
+pub(super) fn generate(
+    shell: Shell,
+    language: &Language,
+    generation: &Generation,
+    only_check: bool,
+) -> anyhow::Result<ExitCode> {
+    let checked = check(shell, language, &generation.file)?;
+    let chosen = match &generation.campaign {
+        Some(name) => vec![choose(&checked, &generation.file, Some(name))?],
+        None if checked.plans.is_empty() => bail!("{} has no campaign to generate for", generation.file.display()),
+        None => (0..checked.plans.len()).collect(),
+    };
+    let mode = match (only_check, generation.force) {
+        (true, _) => Mode::Check,
+        (false, true) => Mode::Force,
+        (false, false) => Mode::Write,
+    };
+    let (out, report) = write(shell, generation, &checked, &chosen, mode)?;
+    if only_check && report.out_of_date() {
+        let files = report.files.iter().filter(|file| file.owner != Owner::Seed);
+        for file in files.filter(|file| !matches!(file.change, Change::Unchanged | Change::Kept)) {
+            let what = match file.change {
+                Change::Created => "is missing",
+                Change::Removed => "is generated no longer",
+                _ => "is out of date",
+            };
+            shell.text(&format!("{} {what}", out.join(&file.path).display()));
+        }
+        bail!("out of date: run `{} generate {}`", shell::command(), generation.file.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `sesamec run`
+pub(super) fn run(
+    shell: Shell,
+    language: &Language,
+    generation: &Generation,
+    arguments: &[OsString],
+) -> anyhow::Result<ExitCode> {
+    let checked = check(shell, language, &generation.file)?;
+    let chosen = choose(&checked, &generation.file, generation.campaign.as_deref())?;
+    let mode = if generation.force { Mode::Force } else { Mode::Write };
+    let (out, _) = write(shell, generation, &checked, &[chosen], mode)?;
+    let campaign = &checked.plans[chosen].plan.campaign.name;
+    let program = build::build(shell, &out.join(names::campaign_folder(campaign)), campaign)?;
+    let mut runner = Command::new(&program);
+    runner.arg("run").args(arguments);
+    start(runner).with_context(|| format!("cannot run {}", program.display()))
+}
+
+/// Becomes the runner: Ctrl-C and exit code are then its own.
+#[cfg(unix)]
+fn start(mut runner: Command) -> std::io::Result<ExitCode> {
+    use std::os::unix::process::CommandExt as _;
+    Err(runner.exec())
+}
+
+/// Waits for the runner, which gets Ctrl-C from the console as well.
+#[cfg(not(unix))]
+fn start(mut runner: Command) -> std::io::Result<ExitCode> {
+    let code = runner.status()?.code().unwrap_or(1);
+    Ok(u8::try_from(code).map_or(ExitCode::FAILURE, ExitCode::from))
+}
+
+/// `sesamec explain`
+pub(super) fn explain(language: &Language, code: &str) -> anyhow::Result<ExitCode> {
+    match (language.explain)(code) {
+        Some(page) => {
+            println!("{}", page.trim_end());
+            Ok(ExitCode::SUCCESS)
+        }
+        None => bail!("there is no diagnostic `{}`; codes look like E0203", code.escape_debug()),
+    }
+}
+
+/// The campaign of a name, or the only one.
+fn choose(checked: &Checked, file: &Path, name: Option<&str>) -> anyhow::Result<usize> {
+    let campaigns: Vec<&str> = checked.plans.iter().map(|runner| runner.plan.campaign.name.as_str()).collect();
+    let file = file.display();
+    let Some(name) = name else {
+        return match campaigns[..] {
+            [_] => Ok(0),
+            [] => bail!("{file} has no campaign to run"),
+            _ => bail!("{file} has several campaigns: choose one with `--campaign`: {}", campaigns.join(", ")),
+        };
+    };
+    if let Some(at) = campaigns.iter().position(|&campaign| campaign == name) {
+        return Ok(at);
+    }
+    let near = campaigns.iter().map(|&campaign| (strsim::damerau_levenshtein(campaign, name), campaign)).min();
+    match near {
+        Some((distance, campaign)) if distance <= name.len().max(3) / 3 => {
+            bail!("{file} has no campaign `{name}`; did you mean `{campaign}`?")
+        }
+        _ => bail!("{file} has no campaign `{name}`; it has {}", campaigns.join(", ")),
+    }
+}
+
+/// Generates some of a space's campaigns, and says so.
+fn write(
+    shell: Shell,
+    generation: &Generation,
+    checked: &Checked,
+    chosen: &[usize],
+    mode: Mode,
+) -> anyhow::Result<(PathBuf, Report)> {
+    let out = match &generation.out {
+        Some(out) => out.clone(),
+        None => generation.file.with_file_name("runners"),
+    };
+    let environment = environment(&generation.file, &out, &checked.plans, generation.runtime.as_ref())
+        .map_err(|errors| all(&errors))?;
+    let trees = emit::emit(&checked.plans, &environment).map_err(|problems| all(&problems))?;
+    let (shared, runners) = trees.split_first().expect("there is a tree for what runners share");
+    let trees: Vec<Tree> = std::iter::once(shared).chain(chosen.iter().map(|&at| &runners[at])).cloned().collect();
+    let report = output::apply(&out, &trees, mode)?;
+    tell(shell, &out, &trees, &report, mode);
+    Ok((out, report))
+}
+
+/// Several errors as one; the shell shows each on its own.
+fn all(errors: &[impl std::fmt::Display]) -> anyhow::Error {
+    anyhow!(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\u{1e}"))
+}
+
+/// What was generated.
+fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode) {
+    let written = |files: &[&output::FileReport]| {
+        files.iter().filter(|file| matches!(file.change, Change::Created | Change::Updated)).count()
+    };
+    let stubs: Vec<_> =
+        report.files.iter().filter(|file| file.owner == Owner::User && file.change == Change::Created).collect();
+    let kept = report.files.iter().filter(|file| file.owner == Owner::User && file.change == Change::Kept).count();
+    let verb = if mode == Mode::Check { "Compared" } else { "Generated" };
+    for tree in trees.iter().filter(|tree| !tree.folder.is_empty()) {
+        let prefix = format!("{}/", tree.folder);
+        let files: Vec<_> = report.files.iter().filter(|file| file.path.starts_with(&prefix)).collect();
+        let changed = match written(&files) {
+            0 => ", unchanged".to_owned(),
+            n if n == files.len() => String::new(),
+            n => format!(", {n} written"),
+        };
+        let hooks = match kept {
+            0 => String::new(),
+            1 => ", 1 hook kept".to_owned(),
+            n => format!(", {n} hooks kept"),
+        };
+        shell.did(verb, format!("{}: {} files{changed}{hooks}", out.join(&tree.folder).display(), files.len()));
+    }
+    if mode != Mode::Check {
+        for stub in stubs {
+            shell.did("Stub", format!("{}: yours to fill in", out.join(&stub.path).display()));
+        }
+    }
+    for hook in &report.changed_hooks {
+        let mut lines = format!(
+            "metric `{}` is given something else now; look into {}:",
+            hook.metric,
+            out.join(&hook.path).display()
+        );
+        let changes = hook.gone.iter().map(|line| ('-', line)).chain(hook.new.iter().map(|line| ('+', line)));
+        for (sign, line) in changes {
+            lines = format!("{lines}\n           {sign} {line}");
+        }
+        shell.warning(lines);
+    }
+    for orphan in &report.orphans {
+        shell.warning(match orphan {
+            Orphan::Hook { path, metric } => format!(
+                "there is no metric `{metric}` any more; its hook {} is kept but not compiled",
+                out.join(path).display()
+            ),
+            Orphan::Edited { path } => {
+                format!("{} is not generated any more; it is kept since it was edited", out.join(path).display())
+            }
+            Orphan::Runner { folder } => format!(
+                "there is no campaign for {} any more; it is kept, with its results",
+                out.join(folder).display()
+            ),
+        });
+    }
+}

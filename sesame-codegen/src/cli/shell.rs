@@ -1,0 +1,81 @@
+//! What the command says on the terminal: one line for each stage, the verb at the right edge of its column.
+
+use std::fmt::Display;
+use std::io::{self, IsTerminal as _, Write as _};
+
+/// Where messages go: standard error, so that standard output is free for what is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Shell {
+    colour: bool,
+    terminal: bool,
+}
+
+impl Shell {
+    /// The shell of this process: colours only on a terminal, and not when `NO_COLOR` is set.
+    pub fn of_the_process() -> Self {
+        let terminal = io::stderr().is_terminal();
+        let colour = terminal && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+        Shell { colour, terminal }
+    }
+
+    /// A shell without colours and without lines that change.
+    pub fn plain() -> Self {
+        Shell { colour: false, terminal: false }
+    }
+
+    /// Whether messages are coloured.
+    pub fn colour(self) -> bool {
+        self.colour
+    }
+
+    /// Something was done.
+    pub(super) fn did(self, verb: &str, what: impl Display) {
+        self.line(&format!("{} {what}", self.painted("1;32", &format!("{verb:>10}"))));
+    }
+
+    /// Something is being done; the next line replaces this one. Only on a terminal.
+    pub(super) fn doing(self, verb: &str, what: impl Display) {
+        if self.terminal {
+            let text = format!("\r\x1b[K{} {what}", self.painted("1;36", &format!("{verb:>10}")));
+            // A terminal that is gone is no reason to stop.
+            let _ = io::stderr().write_all(text.as_bytes());
+        }
+    }
+
+    /// Something the user should know.
+    pub(super) fn warning(self, what: impl Display) {
+        self.line(&format!("{} {what}", self.painted("1;33", "warning:")));
+    }
+
+    /// What went wrong, with its causes.
+    pub(super) fn failure(self, failure: &anyhow::Error) {
+        for error in format!("{failure:#}").split('\u{1e}') {
+            self.line(&format!("{} {error}", self.painted("1;31", "error:")));
+        }
+    }
+
+    /// Text as it is.
+    pub(super) fn text(self, text: &str) {
+        self.line(text.trim_end());
+    }
+
+    fn line(self, text: &str) {
+        let clear = if self.terminal { "\r\x1b[K" } else { "" };
+        let _ = writeln!(io::stderr(), "{clear}{text}");
+    }
+
+    fn painted(self, style: &str, text: &str) -> String {
+        if self.colour { format!("\x1b[{style}m{text}\x1b[0m") } else { text.to_owned() }
+    }
+}
+
+/// How the user called this command, for hints that can be copied.
+pub(super) fn command() -> &'static str {
+    let by_cargo = std::env::var_os("CARGO").is_some()
+        && std::env::var_os("CARGO_PKG_NAME").is_some_and(|name| name == env!("CARGO_PKG_NAME"));
+    match (by_cargo, cfg!(debug_assertions)) {
+        (false, _) => "sesamec",
+        (true, false) => "cargo run --release --",
+        (true, true) => "cargo run --",
+    }
+}

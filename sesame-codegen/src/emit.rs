@@ -1,0 +1,410 @@
+//! Plans → files in memory. Pure: nothing here reads or writes a file, a clock or the environment.
+//!
+//! No name or text of a space becomes code, a path or the structure of a file: names are checked first ([`Problem`]),
+//! Rust goes through quote, data through serialisers, and text through templates without logic.
+
+mod handlers;
+mod messages;
+mod metrics;
+mod package;
+mod rust;
+mod stub;
+pub(crate) mod text;
+
+use std::collections::BTreeMap;
+
+use quote::quote;
+use serde::Serialize;
+use sesame_plan::Transport;
+use sha2::{Digest as _, Sha256};
+
+use self::messages::Messages;
+use crate::files::{Hook, Owner, Tree};
+use crate::names;
+use crate::plan::RunnerPlan;
+
+/// The version of the interface between generated code and the runtime that this generator writes for.
+const ABI: u32 = 1;
+
+/// What the crates of a space need of the world around them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Environment {
+    /// `[dependencies]` of every runner, `sesame-runtime` and the simulator's crate included; paths as seen from a
+    /// runner's folder.
+    pub dependencies: BTreeMap<String, toml::Value>,
+    /// A `Cargo.lock` to start from, so that all runners build the same versions.
+    pub lock: Option<String>,
+    /// Options of the command line that had a say, by name.
+    pub options: BTreeMap<String, String>,
+}
+
+/// Why no crate can be generated from a plan. The language refuses all of this with a place in the `.sesame` file; it
+/// is checked here again because what is generated from is data.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Problem {
+    /// A name that could not safely become one of Rust or of a file.
+    #[error("the {what} name `{}` is not an identifier of ASCII letters, digits and `_`", name.escape_debug())]
+    Name {
+        /// What is so called.
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// Two metrics, or two campaigns, that would share a file or a type.
+    #[error("the {what}s `{first}` and `{second}` would both be called `{generated}` in what is generated: rename one")]
+    SharedName {
+        /// What they are.
+        what: &'static str,
+        /// The one declared first.
+        first: String,
+        /// The other.
+        second: String,
+        /// The name they would share.
+        generated: String,
+    },
+    /// A dependency whose name is not one of cargo.
+    #[error("`{}` is not the name of a package, as [dependencies] has them", name.escape_debug())]
+    Dependency {
+        /// The name.
+        name: String,
+    },
+    /// The path of the simulator's type is not one.
+    #[error("the simulator `{}` is not a path of Rust such as `my_simulator::World`", path.escape_debug())]
+    SimulatorPath {
+        /// The path.
+        path: String,
+    },
+}
+
+/// The files of a space and of its campaigns: first what all runners share, then one tree for each plan.
+///
+/// All plans are of one space, and there is at least one.
+pub fn emit(plans: &[RunnerPlan], environment: &Environment) -> Result<Vec<Tree>, Vec<Problem>> {
+    let problems = problems(plans, environment);
+    if !problems.is_empty() {
+        return Err(problems);
+    }
+    let mut trees = vec![shared(plans, environment)];
+    trees.extend(plans.iter().map(|runner| self::runner(runner, environment)));
+    Ok(trees)
+}
+
+/// The simulator's type, part by part.
+pub fn simulator_path(transport: &Transport) -> Vec<&str> {
+    let Transport::InProcess { path, .. } = transport;
+    path.split("::").collect()
+}
+
+fn problems(plans: &[RunnerPlan], environment: &Environment) -> Vec<Problem> {
+    let mut problems = Vec::new();
+    let mut check = |what: &'static str, name: &str| {
+        if !names::check(name) {
+            let problem = Problem::Name { what, name: name.to_owned() };
+            if !problems.contains(&problem) {
+                problems.push(problem);
+            }
+        }
+    };
+    for RunnerPlan { plan, hooks, .. } in plans {
+        check("space", &plan.space);
+        check("campaign", &plan.campaign.name);
+        for message in &plan.messages {
+            check("message", &message.name);
+            for field in &message.fields {
+                check("field", &field.name);
+            }
+        }
+        for topic in &plan.topics {
+            check("topic", &topic.name);
+        }
+        for metric in plan.metrics.iter().map(|metric| &metric.name).chain(hooks.iter().map(|hook| &hook.metric)) {
+            check("metric", metric);
+        }
+    }
+    for RunnerPlan { plan, .. } in plans {
+        let Transport::InProcess { path, .. } = &plan.simulator.transport;
+        let parts = simulator_path(&plan.simulator.transport);
+        let here = ["self", "Self", "super", "crate"];
+        if parts.len() < 2 || !parts.iter().all(|part| names::check(part) && !here.contains(part)) {
+            let problem = Problem::SimulatorPath { path: path.clone() };
+            if !problems.contains(&problem) {
+                problems.push(problem);
+            }
+        }
+    }
+    for name in environment.dependencies.keys().filter(|name| !package::is_dependency(name)) {
+        problems.push(Problem::Dependency { name: name.clone() });
+    }
+    let hooks = || plans.iter().take(1).flat_map(|runner| &runner.hooks).map(|hook| hook.metric.as_str());
+    let mut shared = shared_names("metric", hooks(), names::snake);
+    if shared.is_empty() {
+        shared = shared_names("metric", hooks(), names::hook_type);
+    }
+    problems.extend(shared);
+    // Some file systems do not tell `Jitter` from `jitter`.
+    let campaigns = plans.iter().map(|runner| runner.plan.campaign.name.as_str());
+    problems.extend(shared_names("campaign", campaigns, |name| names::campaign_folder(name).to_ascii_lowercase()));
+    problems
+}
+
+fn shared_names<'a>(
+    what: &'static str,
+    names: impl Iterator<Item = &'a str>,
+    generated: impl Fn(&str) -> String,
+) -> Vec<Problem> {
+    let mut firsts: BTreeMap<String, &str> = BTreeMap::new();
+    let mut problems = Vec::new();
+    for second in names {
+        let generated = generated(second);
+        match firsts.get(&generated) {
+            Some(&first) => {
+                let (first, second) = (first.to_owned(), second.to_owned());
+                problems.push(Problem::SharedName { what, first, second, generated });
+            }
+            None => {
+                firsts.insert(generated, second);
+            }
+        }
+    }
+    problems
+}
+
+#[derive(Serialize)]
+struct SharedReadme {
+    space: String,
+    source: String,
+    doc: Vec<String>,
+    hooks: Vec<ReadmeHook>,
+    campaigns: Vec<ReadmeCampaign>,
+}
+
+#[derive(Serialize)]
+struct ReadmeHook {
+    file: String,
+    metric: String,
+    line: u32,
+    doc: String,
+}
+
+#[derive(Serialize)]
+struct ReadmeCampaign {
+    name: String,
+    folder: String,
+    doc: String,
+}
+
+#[derive(Serialize)]
+struct RunnerReadme {
+    space: String,
+    source: String,
+    campaign: String,
+    doc: Vec<String>,
+    hooks: Vec<ReadmeHook>,
+    evaluations: u32,
+    seed: u64,
+}
+
+fn readme_hooks<'a>(hooks: impl Iterator<Item = &'a crate::plan::HookPlan>) -> Vec<ReadmeHook> {
+    hooks
+        .map(|hook| ReadmeHook {
+            file: format!("{}.rs", names::snake(&hook.metric)),
+            metric: hook.metric.clone(),
+            line: hook.line,
+            doc: rust::one_line(hook.doc.lines().next().unwrap_or_default()),
+        })
+        .collect()
+}
+
+fn doc_lines(doc: &str) -> Vec<String> {
+    doc.lines().map(rust::one_line).collect()
+}
+
+fn tree(folder: String, runner: &RunnerPlan, environment: &Environment, model: String) -> Tree {
+    Tree {
+        folder,
+        files: BTreeMap::new(),
+        generator: runner.plan.generator.clone(),
+        source: runner.plan.source.clone(),
+        options: environment.options.clone(),
+        model,
+        hooks: BTreeMap::new(),
+        runners: Vec::new(),
+    }
+}
+
+/// What all runners of a space share: the hooks, and what makes the folder pleasant.
+fn shared(plans: &[RunnerPlan], environment: &Environment) -> Tree {
+    let first = plans.first().expect("a space without campaigns has nothing to generate");
+    let model = sha256(plans.iter().map(plan_json));
+    let mut tree = tree(String::new(), first, environment, model);
+    tree.runners = plans.iter().map(|runner| names::campaign_folder(&runner.plan.campaign.name)).collect();
+
+    let note = format!("# {}\n", generated_by(first, environment));
+    tree.add(
+        ".cargo/config.toml",
+        Owner::Machine,
+        note.clone() + "# One target folder for all runners, so that what they share is compiled once.\n[build]\ntarget-dir = \"target\"\n",
+    );
+    tree.add(".gitignore", Owner::Machine, note + "/target/\n/*/results/\n");
+    let readme = SharedReadme {
+        space: first.plan.space.clone(),
+        source: rust::one_line(&first.plan.source),
+        doc: doc_lines(&first.plan.doc),
+        hooks: readme_hooks(first.hooks.iter()),
+        campaigns: plans
+            .iter()
+            .map(|runner| ReadmeCampaign {
+                name: runner.plan.campaign.name.clone(),
+                folder: names::campaign_folder(&runner.plan.campaign.name),
+                doc: rust::one_line(runner.plan.campaign.doc.lines().next().unwrap_or_default()),
+            })
+            .collect(),
+    };
+    tree.add("README.md", Owner::Machine, text::render(sesame_templates::runner::SHARED_README, &readme));
+
+    let types = Messages::new(&first.plan);
+    for hook in &first.hooks {
+        let path = format!("hooks/{}.rs", names::snake(&hook.metric));
+        tree.add(&path, Owner::User, stub::stub(first, &types, hook));
+        let inputs = handlers::inputs(&first.plan, &types, hook);
+        tree.hooks.insert(path, Hook { metric: hook.metric.clone(), inputs });
+    }
+    tree
+}
+
+/// The crate of one campaign.
+fn runner(runner: &RunnerPlan, environment: &Environment) -> Tree {
+    let plan = &runner.plan;
+    let json = plan_json(runner);
+    let mut tree =
+        tree(names::campaign_folder(&plan.campaign.name), runner, environment, sha256(std::iter::once(json.clone())));
+    let package = names::package(&plan.space, &plan.campaign.name);
+    let note = generated_by(runner, environment);
+    let header = format!("// {note}\n");
+
+    let dependencies = package::with_features(&environment.dependencies, &features(runner));
+    tree.add("Cargo.toml", Owner::Machine, package::cargo_toml(&note, &package, &dependencies));
+    if let Some(lock) = &environment.lock {
+        tree.add("Cargo.lock", Owner::Seed, lock.clone());
+    }
+    tree.add("campaign.plan.json", Owner::Machine, json);
+    let readme = RunnerReadme {
+        space: plan.space.clone(),
+        source: rust::one_line(&plan.source),
+        campaign: plan.campaign.name.clone(),
+        doc: doc_lines(&plan.campaign.doc),
+        hooks: readme_hooks(runner.hooks.iter().filter(|hook| runner.uses(hook))),
+        evaluations: plan.campaign.search.evaluations(),
+        seed: plan.campaign.seed,
+    };
+    tree.add("README.md", Owner::Machine, text::render(sesame_templates::runner::RUNNER_README, &readme));
+
+    let docs = rust::module_docs([format!("The test runner of campaign `{}`.", plan.campaign.name)]);
+    let main = rust::file(
+        &header,
+        quote! {
+            #docs
+            mod generated;
+
+            fn main() -> ::std::process::ExitCode {
+                ::sesame_runtime::main(generated::campaign::runner())
+            }
+        },
+    );
+    tree.add("src/main.rs", Owner::Machine, main);
+    let docs = rust::module_docs([format!("What `{}` says, as Rust.", plan.source)]);
+    let modules = rust::file(
+        &header,
+        quote! {
+            #docs
+            pub mod campaign;
+            pub mod messages;
+            pub mod metrics;
+            mod registry;
+        },
+    );
+    tree.add("src/generated/mod.rs", Owner::Machine, modules);
+    tree.add("src/generated/campaign.rs", Owner::Machine, campaign(runner, &header));
+    let types = Messages::new(plan);
+    tree.add("src/generated/messages.rs", Owner::Machine, types.file(&header));
+    tree.add("src/generated/metrics.rs", Owner::Machine, metrics::traits(runner, &types, &header));
+    // From src/generated/ of a runner to the folder beside it.
+    let hooks = "../../../hooks";
+    tree.add("src/generated/registry.rs", Owner::Machine, metrics::registry(runner, &types, &header, hooks));
+    tree
+}
+
+/// The features of the runtime that a campaign uses, so that its runner compiles nothing else.
+fn features(runner: &RunnerPlan) -> Vec<&'static str> {
+    let Transport::InProcess { .. } = runner.plan.simulator.transport;
+    vec!["campaign", "in-process"]
+}
+
+/// `campaign.rs`: the campaign as the runtime takes it.
+fn campaign(runner: &RunnerPlan, header: &str) -> String {
+    let plan = &runner.plan;
+    let path: Vec<_> = simulator_path(&plan.simulator.transport).into_iter().map(names::ident).collect();
+    let docs = rust::module_docs([format!("Campaign `{}`, for the runtime.", plan.campaign.name)]);
+    let abi = proc_macro2::Literal::u32_unsuffixed(ABI);
+    let source = rust::file(
+        header,
+        quote! {
+            #docs
+            ::sesame_runtime::assert_generator_abi!(#abi);
+
+            /// The simulator under test.
+            type Simulator = #(::#path)*;
+
+            /// Everything the runtime is told.
+            pub fn runner() -> ::sesame_runtime::Runner {
+                ::sesame_runtime::Runner {
+                    plan: ::core::include_str!("../../campaign.plan.json"),
+                    directory: ::core::env!("CARGO_MANIFEST_DIR"),
+                    hooks: super::registry::HOOKS,
+                    connect: ::sesame_runtime::transport::in_process::<Simulator>(),
+                }
+            }
+        },
+    );
+    let place = format!("simulator `{}` in {}", plan.simulator.name, plan.source);
+    rust::note_lines(&source, &[("type Simulator =".to_owned(), place)])
+}
+
+/// What every machine file says at its top.
+fn generated_by(runner: &RunnerPlan, environment: &Environment) -> String {
+    let mut command = format!("sesamec generate {}", runner.plan.source);
+    for (name, value) in &environment.options {
+        command = format!("{command} --{name} {value}");
+    }
+    let RunnerPlan { plan, .. } = runner;
+    rust::one_line(&format!(
+        "@generated by {} from {}. Do not edit: `{command}` writes it anew.",
+        plan.generator, plan.source
+    ))
+}
+
+fn plan_json(runner: &RunnerPlan) -> String {
+    let mut json = serde_json::to_string_pretty(&runner.plan).expect("a plan is plain data");
+    json.push('\n');
+    json
+}
+
+/// SHA-256 of texts in a row, in hexadecimal.
+fn sha256(texts: impl Iterator<Item = String>) -> String {
+    let mut hash = Sha256::new();
+    texts.for_each(|text| hash.update(text.as_bytes()));
+    hex(&hash.finalize())
+}
+
+/// SHA-256 of a file's contents, in hexadecimal.
+pub(crate) fn hash(contents: &str) -> String {
+    hex(&Sha256::digest(contents.as_bytes()))
+}
+
+fn hex(bytes: &[u8]) -> String {
+    use std::fmt::Write as _;
+    bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut text, byte| {
+        write!(text, "{byte:02x}").expect("text grows as needed");
+        text
+    })
+}

@@ -1,0 +1,94 @@
+//! `Cargo.toml` of a runner.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use toml::{Table, Value};
+
+/// The dependencies, with these features of the runtime.
+pub(super) fn with_features(dependencies: &BTreeMap<String, Value>, features: &[&str]) -> BTreeMap<String, Value> {
+    let mut dependencies = dependencies.clone();
+    if let Some(runtime) = dependencies.get_mut("sesame-runtime") {
+        let mut table = match &*runtime {
+            Value::Table(table) => table.clone(),
+            version => Table::from_iter([("version".to_owned(), version.clone())]),
+        };
+        // What the user asks for in [runtime] comes first.
+        let wanted = table.entry("features").or_insert_with(|| Value::Array(Vec::new()));
+        if let Some(wanted) = wanted.as_array_mut() {
+            for &feature in features {
+                if !wanted.iter().any(|known| known.as_str() == Some(feature)) {
+                    wanted.push(feature.into());
+                }
+            }
+        }
+        *runtime = Value::Table(table);
+    }
+    dependencies
+}
+
+/// The manifest. Names of packages and dependencies are checked by those who made them; values are printed by toml.
+pub(super) fn cargo_toml(note: &str, package: &str, dependencies: &BTreeMap<String, Value>) -> String {
+    let mut text = format!(
+        "# {note}\n\
+         # What hooks need goes into [dependencies] of the sesame.toml beside the .sesame file.\n\
+         \n\
+         [package]\n\
+         name = {}\n\
+         version = \"0.0.0\"\n\
+         edition = \"2024\"\n\
+         publish = false\n\
+         \n\
+         [dependencies]\n",
+        Value::from(package)
+    );
+    for (name, value) in dependencies {
+        writeln!(text, "{name} = {value}").expect("text grows as needed");
+    }
+    text.push_str(
+        "\n\
+         # The runner is a workspace of its own, whatever folder it lies in.\n\
+         [workspace]\n\
+         \n\
+         # What rarely changes runs at full speed; hooks and generated code are built quickly.\n\
+         [profile.dev]\n\
+         opt-level = 1\n\
+         debug = \"line-tables-only\"\n\
+         \n\
+         [profile.dev.package.\"*\"]\n\
+         opt-level = 3\n\
+         debug = false\n",
+    );
+    text
+}
+
+/// Whether a dependency's name is one that cargo knows of, and so a bare key of TOML.
+pub(super) fn is_dependency(name: &str) -> bool {
+    !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_are_added_to_whatever_the_runtime_is() {
+        let with = |runtime: Value| {
+            let dependencies = BTreeMap::from([("sesame-runtime".to_owned(), runtime)]);
+            with_features(&dependencies, &["a", "b"])["sesame-runtime"].to_string()
+        };
+        assert_eq!(with("=1".into()), "{ features = [\"a\", \"b\"], version = \"=1\" }");
+        let table: Value = toml::from_str("path = \"p\"\nfeatures = [\"b\", \"c\"]").unwrap();
+        assert_eq!(with(table), "{ features = [\"b\", \"c\", \"a\"], path = \"p\" }");
+    }
+
+    #[test]
+    fn hostile_dependencies_stay_data() {
+        assert!(!is_dependency("x\"]\n[evil"));
+        let value: Value = toml::from_str("version = \"1\"\nfeatures = [\"a\\\"\\n[evil]\"]").unwrap();
+        let text = cargo_toml("note", "space-campaign", &BTreeMap::from([("x".to_owned(), value.clone())]));
+        let parsed: toml::Table = toml::from_str(&text).unwrap();
+        assert_eq!(parsed["dependencies"]["x"], value);
+        assert_eq!(parsed.keys().collect::<Vec<_>>(), ["dependencies", "package", "profile", "workspace"]);
+    }
+}

@@ -1,0 +1,400 @@
+//! Files in memory → disk. The only module of this crate that writes.
+//!
+//! Nothing is written before everything has been looked at: if one machine file was edited by hand, nothing changes.
+//! Files that would come out the same are not touched, others are written beside their place and renamed into it, and
+//! a tree's manifest comes last. A user's file is never written twice and never deleted.
+
+mod manifest;
+
+use std::fs;
+use std::io;
+use std::path::{Component, Path, PathBuf};
+
+use similar::TextDiff;
+
+use self::manifest::{Entry, Manifest};
+use crate::files::{Owner, Tree};
+
+/// What to do about the difference between generated files and those on disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mode {
+    /// Only say what would be done.
+    Check,
+    /// Write, but refuse to overwrite what was edited by hand.
+    Write,
+    /// Write, and overwrite machine files that were edited by hand.
+    Force,
+}
+
+/// What became, or would become, of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Change {
+    /// It was not there.
+    Created,
+    /// It was different.
+    Updated,
+    /// It is as it should be and was not touched.
+    Unchanged,
+    /// It is the user's (or cargo's) and there already.
+    Kept,
+    /// It is generated no longer, and was as generated.
+    Removed,
+}
+
+/// A file and what became of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileReport {
+    /// Its path relative to the output folder.
+    pub path: String,
+    /// Whose it is.
+    pub owner: Owner,
+    /// What became of it.
+    pub change: Change,
+}
+
+/// Something that is left in the output folder although the space has no use for it any more.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Orphan {
+    /// The hook of a metric that is gone: its file, and the metric's name.
+    Hook {
+        /// Path relative to the output folder.
+        path: String,
+        /// The metric.
+        metric: String,
+    },
+    /// A machine file that was edited by hand.
+    Edited {
+        /// Path relative to the output folder.
+        path: String,
+    },
+    /// The runner of a campaign that is gone, with its results.
+    Runner {
+        /// Its folder inside the output folder.
+        folder: String,
+    },
+}
+
+/// A user's hook whose metric is given something else than when the hook was last generated for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ChangedHook {
+    /// The hook's file, relative to the output folder.
+    pub path: String,
+    /// The metric.
+    pub metric: String,
+    /// What it was given and is not any more.
+    pub gone: Vec<String>,
+    /// What it is given now and was not.
+    pub new: Vec<String>,
+}
+
+/// What was done, or would be done.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Report {
+    /// Every file, in the order of the trees and by path.
+    pub files: Vec<FileReport>,
+    /// What is left over.
+    pub orphans: Vec<Orphan>,
+    /// Hooks that may need a change.
+    pub changed_hooks: Vec<ChangedHook>,
+}
+
+impl Report {
+    /// How many files met this fate.
+    pub fn count(&self, change: Change) -> usize {
+        self.files.iter().filter(|file| file.change == change).count()
+    }
+
+    /// Whether the disk differs from what is generated.
+    pub fn out_of_date(&self) -> bool {
+        self.files.iter().any(|file| {
+            file.owner != Owner::Seed && matches!(file.change, Change::Created | Change::Updated | Change::Removed)
+        })
+    }
+}
+
+/// A machine file that was edited by hand, or a foreign file in its place.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct EditedFile {
+    /// Its path relative to the output folder.
+    pub path: String,
+    /// From what is generated to what is there, as a unified diff.
+    pub diff: String,
+}
+
+/// Why nothing, or not everything, was written.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// Machine files were edited.
+    #[error("{}", edited_files(files))]
+    Edited {
+        /// Which, and how.
+        files: Vec<EditedFile>,
+    },
+    /// The output folder holds the runners of another `.sesame` file.
+    #[error(
+        "{} holds the runners of `{other}`, and these are of `{source_file}`: \
+         give them a folder of their own with `-o`, or take this one over with `--force`",
+        folder.display()
+    )]
+    OtherSpace {
+        /// The output folder.
+        folder: PathBuf,
+        /// File name of the `.sesame` file whose runners are there.
+        other: String,
+        /// File name of the `.sesame` file that was to be generated.
+        source_file: String,
+    },
+    /// A new project would be mixed with something else.
+    #[error("{} is there already and not empty: choose another name", folder.display())]
+    NotEmpty {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A manifest that cannot be read.
+    #[error(
+        "the manifest {} cannot be used ({problem}): restore it, or delete it and generate with `--force`",
+        path.display()
+    )]
+    Manifest {
+        /// Where.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// The file system refused.
+    #[error("cannot {action} {}: {cause}", path.display())]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// On what.
+        path: PathBuf,
+        /// What the system says.
+        cause: io::Error,
+    },
+}
+
+fn edited_files(files: &[EditedFile]) -> String {
+    let mut text = "generated files were edited by hand, so nothing was written:\n".to_owned();
+    for EditedFile { path, diff } in files {
+        text = format!("{text}\n{path}\n{diff}");
+    }
+    text.push_str(
+        "\nmove what you need into the .sesame file, a hook or sesame.toml; `--force` overwrites these files",
+    );
+    text
+}
+
+/// Brings an output folder up to date with its trees, or says what that would do.
+pub fn apply(out: &Path, trees: &[Tree], mode: Mode) -> Result<Report, Error> {
+    let mut report = Report::default();
+    let mut edited = Vec::new();
+    let mut steps = Vec::new();
+    for tree in trees {
+        survey(out, tree, mode, &mut report, &mut edited, &mut steps)?;
+    }
+    if !edited.is_empty() {
+        return Err(Error::Edited { files: edited });
+    }
+    report.orphans.sort();
+    if mode != Mode::Check {
+        steps.iter().try_for_each(Step::take)?;
+    }
+    Ok(report)
+}
+
+/// Writes a new project into a folder that must be empty or not there yet.
+pub fn create(folder: &Path, files: &std::collections::BTreeMap<String, String>) -> Result<(), Error> {
+    let failed = |cause| Error::Io { action: "look into", path: folder.to_owned(), cause };
+    match fs::read_dir(folder) {
+        Ok(mut entries) => {
+            if entries.next().transpose().map_err(failed)?.is_some() {
+                return Err(Error::NotEmpty { folder: folder.to_owned() });
+            }
+        }
+        Err(cause) if cause.kind() == io::ErrorKind::NotFound => {}
+        Err(cause) => return Err(failed(cause)),
+    }
+    files.iter().try_for_each(|(path, contents)| {
+        assert!(is_inside(path), "a project's path stays in its folder: {path}");
+        write(&folder.join(path), contents)
+    })
+}
+
+/// Something to be done on disk.
+enum Step {
+    Write { path: PathBuf, contents: String },
+    Remove { path: PathBuf },
+}
+
+impl Step {
+    fn take(&self) -> Result<(), Error> {
+        match self {
+            Step::Write { path, contents } => write(path, contents),
+            Step::Remove { path } => match fs::remove_file(path) {
+                Err(cause) if cause.kind() != io::ErrorKind::NotFound => {
+                    Err(Error::Io { action: "remove", path: path.clone(), cause })
+                }
+                _ => Ok(()),
+            },
+        }
+    }
+}
+
+/// Writes beside the file's place and renames, so that a reader sees the old file or the new one, never half of it.
+fn write(path: &Path, contents: &str) -> Result<(), Error> {
+    let failed = |action, path: &Path| {
+        let path = path.to_owned();
+        move |cause| Error::Io { action, path, cause }
+    };
+    let parent = path.parent().expect("a generated file is in a folder");
+    fs::create_dir_all(parent).map_err(failed("create the folder", parent))?;
+    let mut name = path.file_name().expect("a generated file has a name").to_owned();
+    name.push(".sesame-new");
+    let temporary = path.with_file_name(name);
+    fs::write(&temporary, contents).map_err(failed("write", &temporary))?;
+    fs::rename(&temporary, path).map_err(failed("write", path))
+}
+
+/// A file's text; `None` when there is no file. What is not UTF-8 was not generated and counts as edited.
+fn read(path: &Path) -> Result<Option<String>, Error> {
+    match fs::read(path) {
+        Ok(bytes) => Ok(Some(String::from_utf8_lossy(&bytes).into_owned())),
+        Err(cause) if cause.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(cause) => Err(Error::Io { action: "read", path: path.to_owned(), cause }),
+    }
+}
+
+/// Compares a tree with the disk.
+fn survey(
+    out: &Path,
+    tree: &Tree,
+    mode: Mode,
+    report: &mut Report,
+    edited: &mut Vec<EditedFile>,
+    steps: &mut Vec<Step>,
+) -> Result<(), Error> {
+    let root = if tree.folder.is_empty() { out.to_owned() } else { out.join(&tree.folder) };
+    let shown = |path: &str| if tree.folder.is_empty() { path.to_owned() } else { format!("{}/{path}", tree.folder) };
+    let manifest_path = root.join(manifest::PATH);
+    let old_text = read(&manifest_path)?;
+    let old = old_text
+        .as_deref()
+        .map(Manifest::parse)
+        .transpose()
+        .map_err(|problem| Error::Manifest { path: manifest_path.clone(), problem })?;
+    if let Some(old) = &old
+        && old.source != tree.source
+        && mode != Mode::Force
+    {
+        return Err(Error::OtherSpace { folder: root, other: old.source.clone(), source_file: tree.source.clone() });
+    }
+    let mut new = Manifest::of(tree);
+
+    for (path, file) in &tree.files {
+        assert!(is_inside(path), "a generated path stays in its folder: {path}");
+        let on_disk = root.join(path);
+        let change = match (file.owner, read(&on_disk)?) {
+            (_, None) => Change::Created,
+            (Owner::User | Owner::Seed, Some(_)) => Change::Kept,
+            (Owner::Machine, Some(text)) if text == file.contents => Change::Unchanged,
+            (Owner::Machine, Some(text)) => {
+                let generated = old.as_ref().and_then(|old| old.files.get(path)).and_then(|entry| entry.hash.as_ref());
+                if mode != Mode::Force && generated != Some(&crate::emit::hash(&text)) {
+                    edited.push(EditedFile { path: shown(path), diff: diff(&file.contents, &text) });
+                }
+                Change::Updated
+            }
+        };
+        if matches!(change, Change::Created | Change::Updated) {
+            steps.push(Step::Write { path: on_disk, contents: file.contents.clone() });
+        }
+        report.files.push(FileReport { path: shown(path), owner: file.owner, change });
+    }
+
+    if let Some(old) = &old {
+        compare_hooks(old, &new, &shown, &root, report);
+        leftovers(old, &mut new, &shown, &root, out, report, steps)?;
+    }
+    let text = new.text();
+    let change = match &old_text {
+        None => Change::Created,
+        Some(old) if *old == text => Change::Unchanged,
+        Some(_) => Change::Updated,
+    };
+    if change != Change::Unchanged {
+        steps.push(Step::Write { path: manifest_path, contents: text });
+    }
+    report.files.push(FileReport { path: shown(manifest::PATH), owner: Owner::Machine, change });
+    Ok(())
+}
+
+/// Hooks on disk whose metric is now given something else.
+fn compare_hooks(old: &Manifest, new: &Manifest, shown: &dyn Fn(&str) -> String, root: &Path, report: &mut Report) {
+    for (path, hook) in &new.hooks {
+        let Some(before) = old.hooks.get(path) else { continue };
+        if before.inputs == hook.inputs || !root.join(path).exists() {
+            continue;
+        }
+        let missing = |from: &[String], of: &[String]| of.iter().filter(|line| !from.contains(line)).cloned().collect();
+        report.changed_hooks.push(ChangedHook {
+            path: shown(path),
+            metric: hook.metric.clone(),
+            gone: missing(&hook.inputs, &before.inputs),
+            new: missing(&before.inputs, &hook.inputs),
+        });
+    }
+}
+
+/// What an earlier generation left and this one has no use for. What the user may want to keep stays in the manifest,
+/// so that it is named each time until it is gone.
+fn leftovers(
+    old: &Manifest,
+    new: &mut Manifest,
+    shown: &dyn Fn(&str) -> String,
+    root: &Path,
+    out: &Path,
+    report: &mut Report,
+    steps: &mut Vec<Step>,
+) -> Result<(), Error> {
+    for (path, entry) in &old.files {
+        if new.files.contains_key(path) || !is_inside(path) {
+            continue;
+        }
+        let on_disk = root.join(path);
+        let Some(text) = read(&on_disk)? else { continue };
+        match (entry.owner, &entry.hash) {
+            (Owner::Machine, Some(hash)) if *hash == crate::emit::hash(&text) => {
+                steps.push(Step::Remove { path: on_disk });
+                report.files.push(FileReport { path: shown(path), owner: Owner::Machine, change: Change::Removed });
+                continue;
+            }
+            (Owner::User, _) => {
+                let hook = old.hooks.get(path);
+                let metric = hook.map(|hook| hook.metric.clone()).unwrap_or_default();
+                new.hooks.extend(hook.map(|hook| (path.clone(), hook.clone())));
+                report.orphans.push(Orphan::Hook { path: shown(path), metric });
+            }
+            _ => report.orphans.push(Orphan::Edited { path: shown(path) }),
+        }
+        new.files.insert(path.clone(), Entry { owner: entry.owner, hash: entry.hash.clone() });
+    }
+    for folder in &old.runners {
+        let gone = !new.runners.contains(folder);
+        if gone && is_inside(folder) && out.join(folder).join(manifest::PATH).exists() {
+            report.orphans.push(Orphan::Runner { folder: folder.clone() });
+            new.runners.push(folder.clone());
+        }
+    }
+    Ok(())
+}
+
+/// Whether a relative path stays in its folder, on every system.
+fn is_inside(path: &str) -> bool {
+    !path.is_empty()
+        && !path.contains(['\\', ':', '\0'])
+        && Path::new(path).components().all(|part| matches!(part, Component::Normal(_)))
+}
+
+fn diff(generated: &str, found: &str) -> String {
+    TextDiff::from_lines(generated, found).unified_diff().header("generated", "found").context_radius(2).to_string()
+}

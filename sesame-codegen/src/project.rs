@@ -1,0 +1,74 @@
+//! A new project: a space with a simulator of its own, so that its first run works.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Serialize;
+use toml::Value;
+
+use crate::emit::text;
+use crate::environment::{self, RuntimeChoice};
+use crate::names;
+
+/// The line that fills in the hook of a new project.
+pub const HOOK_LINE: &str = "if clearance < 0.5 && ctx.every_seconds(0.2) { ctx.add(1.0); }";
+
+/// The hook of a new project, inside its folder.
+pub const HOOK_FILE: &str = "runners/hooks/close_calls.rs";
+
+/// Why there is no project of a name.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The name cannot be that of a space.
+    #[error("`{}` cannot be the name of a space: use lower-case letters, digits and `_`, a letter first", name.escape_debug())]
+    Name {
+        /// The name.
+        name: String,
+    },
+    /// The runtime was not found.
+    #[error(transparent)]
+    Runtime(#[from] environment::Error),
+}
+
+#[derive(Serialize)]
+struct Project<'a> {
+    name: &'a str,
+    hook_line: &'a str,
+}
+
+/// The files of a project, by path inside its folder.
+pub fn files(folder: &Path, runtime: Option<&RuntimeChoice>) -> Result<BTreeMap<String, String>, Error> {
+    let name = folder.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let plain = name.starts_with(|first: char| first.is_ascii_lowercase()) && names::snake(name) == name;
+    if !plain || !names::check(name) {
+        return Err(Error::Name { name: name.to_owned() });
+    }
+    let runtime = environment::runtime_for(&folder.join("simulator"), runtime)?;
+    let project = Project { name, hook_line: HOOK_LINE };
+    Ok([
+        (format!("{name}.sesame"), text::render(sesame_templates::project::SPACE, &project)),
+        ("README.md".to_owned(), text::render(sesame_templates::project::README, &project)),
+        ("sesame.toml".to_owned(), text::render(sesame_templates::project::SETTINGS, &project)),
+        (".gitignore".to_owned(), "target/\n".to_owned()),
+        ("simulator/Cargo.toml".to_owned(), simulator_manifest(name, &runtime)),
+        ("simulator/src/lib.rs".to_owned(), text::render(sesame_templates::project::SIMULATOR, &project)),
+    ]
+    .into())
+}
+
+/// The simulator's `Cargo.toml`. The name is an identifier, and toml prints the value.
+fn simulator_manifest(name: &str, runtime: &Value) -> String {
+    format!(
+        "[package]\n\
+         name = \"{name}_sim\"\n\
+         version = \"0.1.0\"\n\
+         edition = \"2024\"\n\
+         publish = false\n\
+         \n\
+         [dependencies]\n\
+         sesame-runtime = {runtime}\n\
+         \n\
+         # A crate of its own, whatever workspace the project lies in.\n\
+         [workspace]\n"
+    )
+}

@@ -1,0 +1,116 @@
+//! The command, with a language that reads every text as the same space.
+
+use std::fs;
+use std::path::Path;
+use std::process::ExitCode;
+
+use sesame_codegen::cli::{Checked, Language, Shell, run};
+
+use crate::plans::small;
+
+fn check(file: &str, text: &str, _colour: bool) -> Checked {
+    if text.contains("mistake") {
+        return Checked { diagnostics: format!("error: {file}"), errors: 1, ..Checked::default() };
+    }
+    Checked { summary: "2 campaigns".into(), plans: vec![small("day"), small("night")], ..Checked::default() }
+}
+
+const LANGUAGE: Language = Language { check, explain: |code| (code == "E0203").then_some("# E0203") };
+
+fn sesamec(arguments: &[&str]) -> bool {
+    let arguments = ["sesamec"].iter().chain(arguments);
+    run(Shell::plain(), &LANGUAGE, arguments) == ExitCode::SUCCESS
+}
+
+/// A project whose space is read by the language above.
+fn project(folder: &Path, text: &str) -> String {
+    fs::create_dir_all(folder.join("simulator")).unwrap();
+    fs::write(folder.join("simulator/Cargo.toml"), "[package]\nname = \"kuka_cell_sim\"\n").unwrap();
+    let file = folder.join("kuka_cell.sesame");
+    fs::write(&file, text).unwrap();
+    file.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn generating_makes_all_runners_beside_the_space() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = project(folder.path(), "");
+    assert!(sesamec(&["generate", &file]));
+    for path in ["hooks/top_speed.rs", "day/src/main.rs", "night/src/main.rs", "night/Cargo.lock", "README.md"] {
+        assert!(folder.path().join("runners").join(path).is_file(), "{path}");
+    }
+}
+
+#[test]
+fn generating_one_campaign_makes_only_its_runner_and_it_stays_the_same_with_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = project(folder.path(), "");
+    assert!(sesamec(&["generate", &file, "--campaign", "night"]));
+    assert!(!folder.path().join("runners/day").exists());
+    let before = fs::read_to_string(folder.path().join("runners/.sesame/manifest.json")).unwrap();
+    assert!(sesamec(&["generate", &file]));
+    assert_eq!(fs::read_to_string(folder.path().join("runners/.sesame/manifest.json")).unwrap(), before);
+}
+
+#[test]
+fn a_campaign_that_is_not_there_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = project(folder.path(), "");
+    assert!(!sesamec(&["generate", &file, "--campaign", "nihgt"]));
+    assert!(!sesamec(&["run", &file]), "there are two to choose from");
+    assert!(!folder.path().join("runners").exists());
+}
+
+#[test]
+fn a_space_with_mistakes_generates_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = project(folder.path(), "mistake");
+    assert!(!sesamec(&["check", &file]));
+    assert!(!sesamec(&["generate", &file]));
+    assert!(!folder.path().join("runners").exists());
+}
+
+#[test]
+fn checking_what_was_generated_tells_by_its_exit_code() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = project(folder.path(), "");
+    assert!(!sesamec(&["generate", "--check", &file]));
+    assert!(sesamec(&["generate", &file]));
+    assert!(sesamec(&["generate", "--check", &file]));
+}
+
+#[test]
+fn a_new_project_is_never_mixed_with_something_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let demo = folder.path().join("demo");
+    assert!(sesamec(&["new", demo.to_str().unwrap()]));
+    assert!(!sesamec(&["new", demo.to_str().unwrap()]));
+    fs::create_dir(folder.path().join("empty")).unwrap();
+    assert!(sesamec(&["new", folder.path().join("empty").to_str().unwrap()]));
+}
+
+#[test]
+fn a_new_project_has_a_name_that_a_space_can_have() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["My-Cell", "1st", "cell.two", "Cell"] {
+        assert!(!sesamec(&["new", folder.path().join(name).to_str().unwrap()]), "{name}");
+        assert!(!folder.path().join(name).exists(), "{name}");
+    }
+}
+
+#[test]
+fn the_texts_of_a_new_project() {
+    let files = sesame_codegen::project::files(
+        Path::new("demo"),
+        Some(&sesame_codegen::environment::RuntimeChoice::Version("0.1.0".into())),
+    )
+    .unwrap();
+    let shown: Vec<String> = files.iter().map(|(path, text)| format!("═══ {path}\n{text}")).collect();
+    insta::assert_snapshot!(shown.join("\n"));
+}
+
+#[test]
+fn explaining_an_unknown_code_is_an_error() {
+    assert!(sesamec(&["explain", "E0203"]));
+    assert!(!sesamec(&["explain", "E9999"]));
+}

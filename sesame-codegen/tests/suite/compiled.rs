@@ -1,0 +1,118 @@
+//! Generated crates really compile, and say it in our words when a hook is wrong.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use sesame_codegen::emit::emit;
+use sesame_codegen::environment::environment;
+use sesame_codegen::output::{Mode, apply};
+use sesame_codegen::plan::RunnerPlan;
+
+use crate::plans::{awkward, small};
+
+/// A project with a simulator that does nothing, and its runners.
+fn generated(folder: &Path, plans: &[RunnerPlan]) {
+    let runtime = sesame_codegen::environment::checkout_runtime().expect("tests run in a checkout");
+    let manifest = format!(
+        "[package]\nname = \"kuka_cell_sim\"\nedition = \"2024\"\n[workspace]\n[dependencies]\nsesame-runtime.path = {}\n",
+        toml::Value::from(runtime.canonicalize().unwrap().to_str().unwrap())
+    );
+    fs::create_dir_all(folder.join("simulator/src")).unwrap();
+    fs::write(folder.join("simulator/Cargo.toml"), manifest).unwrap();
+    fs::write(
+        folder.join("simulator/src/lib.rs"),
+        "use sesame_runtime::simulator::*;
+        pub struct Cell;
+        impl Simulator for Cell {
+            fn start(_: &Setup, _: &mut Bus<'_>) -> Result<Self, SimulatorError> { Ok(Cell) }
+            fn step(&mut self, _: &mut Bus<'_>) -> Result<Progress, SimulatorError> { Ok(Progress::Running) }
+        }",
+    )
+    .unwrap();
+    let out = folder.join("runners");
+    let environment = environment(&folder.join("kuka_cell.sesame"), &out, plans, None).unwrap();
+    apply(&out, &emit(plans, &environment).unwrap(), Mode::Write).unwrap();
+}
+
+/// Checks a runner with the versions that this workspace has locked; what rustc says.
+fn check(folder: &Path, runner: &str) -> (bool, String) {
+    let output = Command::new(env!("CARGO"))
+        .args(["check", "--offline", "--quiet", "--color", "never"])
+        // Nothing is run here: what rustc and the C compiler would spend on optimising is saved.
+        .args(["--config", "profile.dev.package.\"*\".opt-level=0"])
+        .current_dir(folder.join("runners").join(runner))
+        // One folder for all of these tests and their later runs: the runtime is checked once.
+        .env("CARGO_TARGET_DIR", Path::new(env!("CARGO_TARGET_TMPDIR")).join("emitted"))
+        .env_remove("RUSTFLAGS")
+        .output()
+        .unwrap();
+    (output.status.success(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn fresh_stubs_of_every_type_and_name_compile_without_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    generated(folder.path(), &[awkward(), small("coverage")]);
+    for runner in ["type", "coverage"] {
+        let (compiles, said) = check(folder.path(), runner);
+        assert!(compiles, "{said}");
+        assert!(!said.contains("src/generated") && !said.contains("hooks/"), "{said}");
+    }
+}
+
+#[test]
+fn a_hook_without_its_impl_is_named_with_its_line_in_the_space() {
+    let folder = tempfile::tempdir().unwrap();
+    generated(folder.path(), &[small("coverage")]);
+    fs::write(
+        folder.path().join("runners/hooks/collision_occurrence.rs"),
+        "#[derive(Default)]\npub struct CollisionOccurrence {}\n",
+    )
+    .unwrap();
+    let (compiles, said) = check(folder.path(), "coverage");
+    assert!(!compiles);
+    assert!(said.contains("error[E0277]: metric `collision_occurrence` (kuka_cell.sesame:31) has no hook"), "{said}");
+    assert_eq!(said.matches("error[").count(), 1, "{said}");
+}
+
+#[test]
+fn a_hook_without_its_struct_is_named_with_its_line_in_the_space() {
+    let folder = tempfile::tempdir().unwrap();
+    generated(folder.path(), &[small("coverage")]);
+    fs::write(folder.path().join("runners/hooks/collision_occurrence.rs"), "").unwrap();
+    let (compiles, said) = check(folder.path(), "coverage");
+    assert!(!compiles);
+    assert!(said.contains("// metric `collision_occurrence` (kuka_cell.sesame:31)"), "{said}");
+}
+
+#[test]
+fn hooks_may_share_a_file_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    generated(folder.path(), &[small("coverage")]);
+    let hook = folder.path().join("runners/hooks/collision_occurrence.rs");
+    let filled =
+        fs::read_to_string(&hook).unwrap().replace("ctx.unimplemented();", "ctx.add(shared::ONE);") + "\nmod shared;\n";
+    fs::write(&hook, filled).unwrap();
+    fs::write(hook.with_file_name("shared.rs"), "pub const ONE: f64 = 1.0;\n").unwrap();
+    let (compiles, said) = check(folder.path(), "coverage");
+    assert!(compiles && !said.contains("hooks/"), "{said}");
+}
+
+#[test]
+fn the_simulator_of_a_new_project_passes_its_own_tests() {
+    let folder = tempfile::tempdir().unwrap();
+    let project = folder.path().join("demo");
+    sesame_codegen::output::create(&project, &sesame_codegen::project::files(&project, None).unwrap()).unwrap();
+    let workspace = sesame_codegen::environment::checkout_runtime().unwrap();
+    fs::copy(workspace.parent().unwrap().join("Cargo.lock"), project.join("simulator/Cargo.lock")).unwrap();
+    let output = Command::new(env!("CARGO"))
+        .args(["test", "--offline", "--quiet", "--color", "never"])
+        .current_dir(project.join("simulator"))
+        .env("CARGO_TARGET_DIR", Path::new(env!("CARGO_TARGET_TMPDIR")).join("emitted"))
+        .env_remove("RUSTFLAGS")
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("1 passed"));
+}

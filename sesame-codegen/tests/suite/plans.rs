@@ -1,0 +1,197 @@
+//! Plans to generate from.
+
+use sesame_codegen::emit::Environment;
+use sesame_codegen::plan::{HookPlan, RunnerPlan};
+use sesame_plan::{
+    ActivationMode, Campaign, CampaignPlan, Count, Direction, Field, FieldRef, MessageId, MessageType, Metric,
+    MetricId, MetricSource, Node, Search, Simulator, Topic, TopicId, Transport, Type,
+};
+
+fn field(name: &str, doc: &str, ty: Type) -> Field {
+    Field { name: name.into(), doc: doc.into(), ty }
+}
+
+fn real(unit: &str) -> Type {
+    Type::Real { unit: Some(unit.into()) }
+}
+
+fn topic(name: &str, doc: &str, paths: &[&str], ty: Type) -> Topic {
+    Topic { name: name.into(), doc: doc.into(), paths: paths.iter().map(|&path| path.into()).collect(), ty }
+}
+
+pub(crate) fn hook(metric: &str, line: u32, inputs: &[u32]) -> HookPlan {
+    HookPlan {
+        metric: metric.into(),
+        doc: String::new(),
+        unit: None,
+        direction: None,
+        line,
+        inputs: inputs.iter().map(|&input| TopicId(input)).collect(),
+    }
+}
+
+/// Measures the hook in the campaign of the plan.
+pub(crate) fn measured(runner: &mut RunnerPlan, metric: &str) {
+    let hook = runner.hooks.iter().find(|hook| hook.metric == metric).expect("the space has the hook");
+    runner.plan.metrics.push(Metric {
+        name: hook.metric.clone(),
+        doc: hook.doc.clone(),
+        unit: hook.unit.clone(),
+        direction: hook.direction,
+        default: Some(0.0),
+        source: MetricSource::Hook { topics: hook.inputs.clone() },
+        line: hook.line,
+    });
+}
+
+/// A small space like that of the language's first example, with the campaign's name to choose.
+pub(crate) fn small(campaign: &str) -> RunnerPlan {
+    let mut runner = RunnerPlan {
+        plan: CampaignPlan {
+            schema: sesame_plan::SCHEMA,
+            generator: "sesamec 0.1.0".into(),
+            source: "kuka_cell.sesame".into(),
+            space: "kuka_cell".into(),
+            doc: "The gearbox cell.".into(),
+            simulator: Simulator {
+                name: "cell".into(),
+                transport: Transport::InProcess { path: "kuka_cell_sim::Cell".into(), step_ns: 20_000_000 },
+            },
+            messages: vec![MessageType {
+                name: "SafetyZone".into(),
+                doc: "A zone that people may be in.".into(),
+                fields: vec![
+                    field("zone", "Its name.", Type::Text),
+                    field("level", "Distance of the gripper sphere's surface, negative inside.", real("mm")),
+                ],
+            }],
+            topics: vec![
+                topic("link0", "", &["joints/R3200/Link0/position"], real("rad")),
+                topic("zones", "", &["safetyzones/Z1", "safetyzones/Z2"], Type::Message { id: MessageId(0) }),
+                topic("speed", "Of the fastest gripper.", &["cell/gripper_speed"], real("m/s")),
+            ],
+            nodes: vec![Node {
+                name: "plc".into(),
+                doc: String::new(),
+                publishes: vec![TopicId(0)],
+                subscribes: vec![TopicId(1)],
+            }],
+            metrics: vec![Metric {
+                name: "fuzzing_time".into(),
+                doc: String::new(),
+                unit: Some("s".into()),
+                direction: Some(Direction::Minimise),
+                default: None,
+                source: MetricSource::FuzzingTime,
+                line: 30,
+            }],
+            requirements: Vec::new(),
+            operations: Vec::new(),
+            tests: Vec::new(),
+            campaign: Campaign {
+                name: campaign.into(),
+                doc: "Finds tests.".into(),
+                objectives: vec![MetricId(0)],
+                operations: Vec::new(),
+                count: Count { min: 1, max: 5 },
+                activation: ActivationMode::Time,
+                search: Search::Random { evaluations: 10 },
+                seed: 42,
+                end_after: 70.0,
+            },
+        },
+        hooks: vec![
+            HookPlan {
+                doc: "R1: intervals of 0.2 s in which the gripper was inside a safety zone.".into(),
+                direction: Some(Direction::Maximise),
+                ..hook("collision_occurrence", 31, &[1])
+            },
+            HookPlan { unit: Some("m/s".into()), direction: Some(Direction::Maximise), ..hook("top_speed", 35, &[2]) },
+        ],
+        simulator_crate: Some("simulator".into()),
+    };
+    measured(&mut runner, "collision_occurrence");
+    runner
+}
+
+/// A plan with every type and every awkward name there is.
+pub(crate) fn awkward() -> RunnerPlan {
+    let mut runner = small("type");
+    let plan = &mut runner.plan;
+    plan.messages.push(MessageType {
+        name: "Text".into(),
+        doc: "Called like a type of the runtime.\n*/ fn evil() {} // {{ evil }} \u{2028}\" r#\"".into(),
+        fields: vec![
+            field("type", "A keyword.", Type::Bool),
+            field("self", "A keyword that cannot be escaped.", Type::Int { unit: None }),
+            field("frameId", "Not in snake case.", Type::Text),
+            field("frame_id", "The same in snake case.", Type::Text),
+            field("where", "", Type::Point { unit: Some("m".into()) }),
+            field("values", "", Type::List { of: Box::new(real("N")) }),
+            field("zones", "", Type::List { of: Box::new(Type::Message { id: MessageId(0) }) }),
+            field("matrix", "", Type::List { of: Box::new(Type::List { of: Box::new(Type::Int { unit: None }) }) }),
+            field("gen", "Reserved since edition 2024.", Type::Message { id: MessageId(0) }),
+        ],
+    });
+    plan.messages.push(MessageType { name: "empty".into(), doc: String::new(), fields: Vec::new() });
+    plan.messages.push(MessageType {
+        name: "Metric".into(),
+        doc: "A hook of the same name takes it.".into(),
+        fields: vec![field("ok", "", Type::Bool)],
+    });
+    let unit = |unit: &str| Some(unit.to_owned());
+    let first = u32::try_from(plan.topics.len()).expect("few topics");
+    let list = |of: Type| Type::List { of: Box::new(of) };
+    plan.topics.extend([
+        topic("start", "Clashes with the start of a run.", &["a"], Type::Bool),
+        topic("end", "", &["b"], Type::Int { unit: unit("V") }),
+        topic("ctx", "", &["c"], Type::Text),
+        topic("fn", "", &["d"], Type::Point { unit: unit("m") }),
+        topic("texts", "", &["e"], list(Type::Text)),
+        topic("zoneList", "", &["f"], list(Type::Message { id: MessageId(0) })),
+        topic("text", "", &["path \" with \\ quotes \n and */ lines {{ x }}"], Type::Message { id: MessageId(1) }),
+        topic("nothing", "", &["h"], Type::Message { id: MessageId(2) }),
+        topic("metric_in", "", &["i/1", "j/2"], Type::Message { id: MessageId(3) }),
+    ]);
+    let all: Vec<u32> = (0..u32::try_from(plan.topics.len()).expect("few topics")).collect();
+    runner.hooks.push(HookPlan {
+        doc: "Takes everything.\n\nIn two paragraphs. {% raw %}".into(),
+        unit: unit("V"),
+        direction: Some(Direction::Minimise),
+        ..hook("everything", 50, &all)
+    });
+    for (line, name) in (51..).zip(["self", "match", "metric", "messages", "context", "std", "sesame_runtime", "box"]) {
+        runner.hooks.push(hook(name, line, &[first + 8]));
+    }
+    runner.hooks.push(HookPlan { direction: Some(Direction::Maximise), ..hook("unused", 70, &[0]) });
+    for name in ["everything", "self", "match", "metric", "messages", "context", "std", "sesame_runtime", "box"] {
+        measured(&mut runner, name);
+    }
+    runner.plan.metrics.push(Metric {
+        name: "last_level".into(),
+        doc: String::new(),
+        unit: unit("mm"),
+        direction: None,
+        default: None,
+        source: MetricSource::Last { input: FieldRef { topic: TopicId(1), path: vec!["level".into()] } },
+        line: 71,
+    });
+    runner
+}
+
+pub(crate) fn environment() -> Environment {
+    let path = |path: &str| {
+        let mut table = toml::Table::new();
+        table.insert("path".into(), path.into());
+        toml::Value::Table(table)
+    };
+    Environment {
+        dependencies: [
+            ("kuka_cell_sim".to_owned(), path("../../simulator")),
+            ("sesame-runtime".to_owned(), path("../../../../runtime")),
+        ]
+        .into(),
+        lock: None,
+        options: [].into(),
+    }
+}

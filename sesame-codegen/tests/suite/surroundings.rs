@@ -1,0 +1,118 @@
+//! Where runners find the runtime, the simulator and what hooks need.
+
+use std::fs;
+use std::path::Path;
+
+use sesame_codegen::environment::{Error, RuntimeChoice, checkout_runtime, environment};
+use sesame_codegen::plan::RunnerPlan;
+
+use crate::plans::small;
+
+/// A project in a folder: a simulator crate, and a `sesame.toml` if it is not empty.
+fn project(folder: &Path, settings: &str) {
+    fs::create_dir_all(folder.join("simulator")).unwrap();
+    fs::write(folder.join("simulator/Cargo.toml"), "[package]\nname = \"kuka-cell-sim\"\n").unwrap();
+    if !settings.is_empty() {
+        fs::write(folder.join("sesame.toml"), settings).unwrap();
+    }
+}
+
+fn dependencies(folder: &Path, plan: RunnerPlan, runtime: Option<&str>) -> Result<String, String> {
+    let runtime = runtime.map(|text| RuntimeChoice::parse(text).unwrap());
+    let found = environment(&folder.join("kuka_cell.sesame"), &folder.join("runners"), &[plan], runtime.as_ref());
+    let lines = |(name, value): (&String, &toml::Value)| format!("{name} = {value}");
+    let mentioned = |error: &Error| error.to_string().replace(&folder.display().to_string(), "PROJECT");
+    found
+        .map(|environment| environment.dependencies.iter().map(lines).collect::<Vec<_>>().join("\n"))
+        .map_err(|errors| errors.iter().map(mentioned).collect::<Vec<_>>().join("\n"))
+}
+
+#[test]
+fn a_simulator_beside_the_space_is_reached_by_a_relative_path_and_its_own_name() {
+    let folder = tempfile::tempdir().unwrap();
+    project(folder.path(), "");
+    assert_eq!(
+        dependencies(folder.path(), small("c"), Some("0.1.0")).unwrap(),
+        "kuka_cell_sim = { package = \"kuka-cell-sim\", path = \"../../simulator\" }\nsesame-runtime = \"0.1.0\""
+    );
+}
+
+#[test]
+fn the_settings_choose_the_runtime_and_bring_dependencies_with_their_paths_adjusted() {
+    let folder = tempfile::tempdir().unwrap();
+    project(
+        folder.path(),
+        "[runtime]\nversion = \"0.3\"\n[dependencies]\ngeometry = { path = \"my/geometry\" }\nlibm = \"0.2\"\n",
+    );
+    assert_eq!(
+        dependencies(folder.path(), small("c"), None).unwrap(),
+        "geometry = { path = \"../../my/geometry\" }\n\
+         kuka_cell_sim = { package = \"kuka-cell-sim\", path = \"../../simulator\" }\n\
+         libm = \"0.2\"\n\
+         sesame-runtime = { version = \"0.3\" }"
+    );
+}
+
+#[test]
+fn the_command_line_wins_over_the_settings() {
+    let folder = tempfile::tempdir().unwrap();
+    project(folder.path(), "[runtime]\nversion = \"0.3\"\n");
+    assert!(dependencies(folder.path(), small("c"), Some("0.4.0")).unwrap().contains("sesame-runtime = \"0.4.0\""));
+}
+
+#[test]
+fn a_checkout_build_uses_the_runtime_of_its_checkout_and_its_locked_versions() {
+    let folder = tempfile::tempdir().unwrap();
+    project(folder.path(), "");
+    let out = folder.path().join("runners");
+    let found = environment(&folder.path().join("kuka_cell.sesame"), &out, &[small("c")], None).unwrap();
+    let path = found.dependencies["sesame-runtime"]["path"].as_str().unwrap();
+    fs::create_dir_all(out.join("c")).unwrap();
+    assert_eq!(
+        out.join("c").join(path).canonicalize().unwrap(),
+        checkout_runtime().expect("tests run in a checkout").canonicalize().unwrap()
+    );
+    assert!(found.lock.expect("the workspace has a lock file").contains("name = \"sesame-runtime\""));
+}
+
+#[test]
+fn a_sibling_runners_lock_file_comes_first() {
+    let folder = tempfile::tempdir().unwrap();
+    project(folder.path(), "");
+    let out = folder.path().join("runners");
+    fs::create_dir_all(out.join("b")).unwrap();
+    fs::write(out.join("b/Cargo.lock"), "of b").unwrap();
+    let found = environment(&folder.path().join("kuka_cell.sesame"), &out, &[small("c")], None).unwrap();
+    assert_eq!(found.lock.as_deref(), Some("of b"));
+}
+
+#[test]
+fn all_that_is_wrong_is_said_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    project(folder.path(), "[dependencies]\nsesame_runtime = \"1\"\nkuka_cell_sim = \"1\"\n");
+    insta::assert_snapshot!(dependencies(folder.path(), small("c"), Some("path:nowhere")).unwrap_err());
+}
+
+#[test]
+fn a_missing_simulator_says_where_it_was_looked_for_and_how_to_name_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let missing = dependencies(folder.path(), small("c"), Some("1.0.0")).unwrap_err();
+    let unnamed = RunnerPlan { simulator_crate: None, ..small("c") };
+    let unnamed = dependencies(folder.path(), unnamed, Some("1.0.0")).unwrap_err();
+    insta::assert_snapshot!(format!("{missing}\n{unnamed}"));
+}
+
+#[test]
+fn a_misspelt_setting_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    project(folder.path(), "[dependancies]\nlibm = \"0.2\"\n");
+    assert!(dependencies(folder.path(), small("c"), Some("1.0.0")).unwrap_err().contains("dependancies"));
+}
+
+#[test]
+fn a_runtime_is_a_folder_or_a_version() {
+    assert_eq!(RuntimeChoice::parse("path:../runtime"), Ok(RuntimeChoice::Folder("../runtime".into())));
+    assert_eq!(RuntimeChoice::parse("=0.1.0"), Ok(RuntimeChoice::Version("=0.1.0".into())));
+    assert!(RuntimeChoice::parse("../runtime").is_err());
+    assert!(RuntimeChoice::parse("path:").is_err());
+}

@@ -1,0 +1,8 @@
+//! Texts of generated runners.
+
+/// The user's first version of a metric hook.
+pub const HOOK: &str = include_str!("../runner/hook.rs.tera");
+/// The README of the folder that holds the runners of a space.
+pub const SHARED_README: &str = include_str!("../runner/shared_readme.md.tera");
+/// The README of a runner.
+pub const RUNNER_README: &str = include_str!("../runner/runner_readme.md.tera");
