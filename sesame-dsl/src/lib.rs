@@ -5,8 +5,10 @@
 
 pub mod diagnostic;
 pub mod model;
+mod similar;
 pub mod source;
 pub mod span;
+mod syntax;
 pub mod units;
 
 use diagnostic::{Diagnostic, Severity};

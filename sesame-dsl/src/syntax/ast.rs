@@ -176,7 +176,7 @@ pub(crate) enum Comparison {
 /// A number with its sign and unit.
 #[derive(Debug, Clone)]
 pub(crate) struct Quantity {
-    /// Finite.
+    /// Finite, or NaN for one whose digits were already reported.
     pub(crate) value: f64,
     pub(crate) unit: Option<UnitName>,
     pub(crate) span: Span,
@@ -190,9 +190,10 @@ pub(crate) struct Range {
 }
 
 /// A whole number as written.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Count {
-    pub(crate) value: u64,
+    /// `None` for one that was already reported.
+    pub(crate) value: Option<u64>,
     pub(crate) span: Span,
 }
 

@@ -1,0 +1,10 @@
+//! From text to [`ast`]: parsing with recovery.
+
+pub(crate) mod ast;
+mod explain;
+mod limits;
+mod parse;
+mod token;
+
+pub(crate) use parse::parse;
+pub(crate) use token::is_keyword;
