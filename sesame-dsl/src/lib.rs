@@ -3,8 +3,10 @@
 //! Pure: no file system, no environment, no clock. [`analyse`] never stops at the first mistake, never panics on any
 //! text, and reports one mistake once.
 
+mod check;
 pub mod diagnostic;
 pub mod model;
+mod resolve;
 mod similar;
 pub mod source;
 pub mod span;
@@ -13,6 +15,8 @@ pub mod units;
 
 use diagnostic::{Diagnostic, Severity};
 use model::Space;
+use source::SourceMap;
+use span::FileId;
 
 /// What an analysis found.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,4 +32,19 @@ impl Analysis {
     pub fn has_errors(&self) -> bool {
         self.diagnostics.iter().any(|diagnostic| diagnostic.severity() == Severity::Error)
     }
+}
+
+/// Analyses the file `root` of `sources`: syntax, names, types and units, ranges, campaigns, and what deserves a warning.
+///
+/// All mistakes of all these kinds come out of one call.
+pub fn analyse(sources: &SourceMap, root: FileId) -> Analysis {
+    let mut diagnostics = Vec::new();
+    let file = syntax::parse(root, sources.file(root).text(), &mut diagnostics);
+    let model = resolve::resolve(sources, root, &file, &mut diagnostics);
+    if let Some(space) = &model {
+        diagnostics.extend(check::check(space));
+    }
+    diagnostics.sort_by(|a, b| (a.span, a.code).cmp(&(b.span, b.code)));
+    diagnostics.dedup();
+    Analysis { model, diagnostics }
 }

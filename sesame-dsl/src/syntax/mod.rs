@@ -7,4 +7,3 @@ mod parse;
 mod token;
 
 pub(crate) use parse::parse;
-pub(crate) use token::is_keyword;

@@ -7,6 +7,7 @@ use sesame_grammar::{Rule, SesameParser};
 use super::ast::*;
 use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, MAX_CALLS, MAX_DEPTH, too_deep};
+use super::token::{TokenKind, token_at};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::{FileId, Span};
 
@@ -126,7 +127,7 @@ impl Reader<'_> {
 
     fn not_closed(&mut self, block: &Pair<'_>, end: &Pair<'_>, opened: Option<Span>) {
         let opened = opened.expect("a block begins with its brace");
-        let at = super::token::token_at(self.text, end.as_span().start());
+        let at = token_at(self.text, end.as_span().start());
         let span = self.span_of(at.lo, at.hi());
         let what = match block.as_rule() {
             Rule::hook_block => "metric".to_owned(),
@@ -147,8 +148,16 @@ impl Reader<'_> {
     fn broken_names(&mut self, pair: &Pair<'_>) {
         let lo = pair.as_span().start();
         let mut at = lo;
+        // A misspelt first word may have been about to declare the second.
+        let first = token_at(self.text, lo);
+        let second = token_at(self.text, first.hi());
+        let both_words = [first, second].iter().all(|token| token.kind == TokenKind::Word);
+        if both_words && second.lo < pair.as_span().end() {
+            let span = self.span_of(second.lo, second.hi());
+            self.out.broken.push(Name { text: second.text.to_owned(), span });
+        }
         loop {
-            let token = super::token::token_at(self.text, at);
+            let token = token_at(self.text, at);
             if token.lo >= pair.as_span().end() || token.text.is_empty() {
                 return;
             }
@@ -158,8 +167,8 @@ impl Reader<'_> {
                 "simulator" | "message" | "topic" | "node" | "metric" | "requirement" | "operation" | "test" | "campaign"
             );
             if declares {
-                let name = super::token::token_at(self.text, at);
-                if name.kind == super::token::TokenKind::Word && name.lo < pair.as_span().end() {
+                let name = token_at(self.text, at);
+                if name.kind == TokenKind::Word && name.lo < pair.as_span().end() {
                     let span = self.span_of(name.lo, name.hi());
                     self.out.broken.push(Name { text: name.text.to_owned(), span });
                     at = name.hi();
