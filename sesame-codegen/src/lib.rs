@@ -1,1 +1,4 @@
 //! To be written.
+
+pub mod lower;
+pub mod plan;

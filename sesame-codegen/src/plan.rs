@@ -1,0 +1,46 @@
+//! What the generator is given: one campaign of a checked space, as data.
+//!
+//! `lower` makes it from the language's model. Everything a runner needs at run time is in the
+//! [`CampaignPlan`]; beside it stands only what decides the generated code.
+
+use sesame_plan::{CampaignPlan, Direction, MetricSource, TopicId};
+
+/// The plan of one runner crate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunnerPlan {
+    /// The campaign as the runner will read it. Its topics and messages are those of the whole space.
+    pub plan: CampaignPlan,
+    /// Every hook metric of the space in declaration order, measured by this campaign or not: the traits of all are
+    /// generated, so that a hook file shared by several campaigns compiles in each of them.
+    pub hooks: Vec<HookPlan>,
+    /// Folder of the simulator's crate as the `.sesame` file has it (`crate "simulator"`), relative to that file.
+    /// `None` when the file names none: the crate then comes from `[dependencies]` in `sesame.toml`.
+    pub simulator_crate: Option<String>,
+}
+
+/// A metric that the user writes in Rust.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HookPlan {
+    /// The metric's name in the space.
+    pub metric: String,
+    /// Its doc comment, lines joined by `\n`; empty when there is none.
+    pub doc: String,
+    /// The unit of its value; `None` for a plain number.
+    pub unit: Option<String>,
+    /// Which end of it is of interest.
+    pub direction: Option<Direction>,
+    /// Line of its declaration, from 1.
+    pub line: u32,
+    /// Its inputs in declaration order: positions in [`CampaignPlan::topics`], each at most once.
+    pub inputs: Vec<TopicId>,
+}
+
+impl RunnerPlan {
+    /// Whether this campaign measures a hook metric, and so needs its hook to be compiled.
+    pub fn uses(&self, hook: &HookPlan) -> bool {
+        self.plan
+            .metrics
+            .iter()
+            .any(|metric| metric.name == hook.metric && matches!(metric.source, MetricSource::Hook { .. }))
+    }
+}
