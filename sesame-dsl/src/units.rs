@@ -238,7 +238,8 @@ fn similar_symbols(symbol: &str) -> Vec<&'static str> {
 const SPELT_OUT: &[(&[&str], &str)] = &[
     (&["sec", "secs", "second", "seconds"], "s"),
     (&["msec", "millis", "millisecond", "milliseconds"], "ms"),
-    (&["usec", "micros", "microsecond", "microseconds"], "us"),
+    (&["usec", "micros", "microsecond", "microseconds", "µs", "μs"], "us"),
+    (&["µm", "μm"], "um"),
     (&["minute", "minutes", "mins"], "min"),
     (&["hour", "hours", "hr"], "h"),
     (&["degree", "degrees", "grad"], "deg"),

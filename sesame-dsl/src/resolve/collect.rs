@@ -129,7 +129,8 @@ impl<'a> Resolver<'a> {
 
     fn only_one(&mut self, spans: &[Span], what: &str) {
         for &again in spans.iter().skip(1) {
-            let title = format!("a space has one {what}, and this is another");
+            let holder = if what == "space" { "a file" } else { "a space" };
+            let title = format!("{holder} has one {what}, and this is another");
             let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, again, title)
                 .label("remove it, or move it to a file of its own")
                 .also(spans[0], "the first is here");

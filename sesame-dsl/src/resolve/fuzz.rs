@@ -94,7 +94,7 @@ impl<'a> Resolver<'a> {
     }
 
     fn within(&mut self, range: &ast::Range) -> Option<Range> {
-        let found = self.times(range, "the time of an operation")?;
+        let found = self.times(range, "`within`")?;
         if found.low == found.high {
             let diagnostic = Diagnostic::new(Code::BAD_WINDOW, range.span, "the operation is never active")
                 .label("this window is empty");
@@ -190,8 +190,8 @@ impl<'a> Resolver<'a> {
 
     fn test_window(&mut self, window: &ast::Range) -> Option<Range> {
         let seconds = Unit::seconds();
-        let low = self.value(&window.low, Some(&seconds), "a time of a test");
-        let high = self.value(&window.high, Some(&seconds), "a time of a test");
+        let low = self.value(&window.low, Some(&seconds), "an end of a window");
+        let high = self.value(&window.high, Some(&seconds), "an end of a window");
         let [low, high] = [low?, high?];
         if low > high {
             self.reversed(window, "this window ends before it begins");
@@ -215,9 +215,7 @@ impl<'a> Resolver<'a> {
     ) -> Option<Option<Choice>> {
         let name = &test.operation.text;
         let Some(parameter) = operation.parameter() else {
-            let (word, choice) = test.choices.first().map_or_else(|| None, Some)
-                .map_or((None, None), |(word, choice)| (Some(word), Some(choice)));
-            let (Some(word), Some(choice)) = (word, choice) else { return Some(None) };
+            let Some((word, choice)) = test.choices.first() else { return Some(None) };
             let title = format!("`{name}` has no parameter to choose");
             let span = word.span.to(choice.span());
             self.report(Diagnostic::new(Code::WRONG_CHOICE, span, title).label("leave this out"));

@@ -195,7 +195,8 @@ impl<'a> Resolver<'a> {
         } else if known.is_empty() {
             diagnostic = diagnostic.note(format!("this space declares no {word}"));
         } else if known.len() <= 8 {
-            diagnostic = diagnostic.note(format!("there are {}", list(&known)));
+            let verb = if known.len() == 1 { "is" } else { "are" };
+            diagnostic = diagnostic.note(format!("there {verb} {}", list(&known)));
         }
         self.report(diagnostic);
         None

@@ -1,7 +1,7 @@
 //! Numbers with units, in the unit that their place asks for.
 
 use super::Resolver;
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::Range;
 use crate::span::Span;
 use crate::syntax::ast::{self, Quantity, UnitName};
@@ -81,6 +81,10 @@ impl Resolver<'_> {
 
     /// A range in a unit, its ends in order.
     pub(super) fn range(&mut self, range: &ast::Range, unit: Option<&Unit>, what: &str) -> Option<Range> {
+        if let (None, None, Some(unit)) = (&range.low.unit, &range.high.unit, unit) {
+            self.lacks_unit(range, unit, what);
+            return None;
+        }
         let low = self.value(&range.low, unit, what);
         let high = self.value(&range.high, unit, what);
         let [low, high] = [low?, high?];
@@ -91,12 +95,24 @@ impl Resolver<'_> {
         None
     }
 
+    /// Both ends of a range lack their unit, which is one mistake.
+    fn lacks_unit(&mut self, range: &ast::Range, unit: &Unit, what: &str) {
+        let title = format!("`{}` lacks its units", self.text(range.span));
+        let mut diagnostic =
+            Diagnostic::new(Code::WRONG_UNIT, range.span, title).label(format!("{what} is {}", wanted(unit)));
+        diagnostic.suggestions.push(Suggestion {
+            message: format!("write it in `{}`", unit.text()),
+            edits: [&range.low, &range.high].map(|end| (end.span.end(), unit.text().to_owned())).into(),
+        });
+        self.report(diagnostic);
+    }
+
     pub(super) fn reversed(&mut self, range: &ast::Range, title: &str) {
         let code = if title.contains("window") { Code::BAD_WINDOW } else { Code::REVERSED_RANGE };
         let [low, high] = [&range.low, &range.high].map(|end| self.text(end.span));
         let mut diagnostic =
             Diagnostic::new(code, range.span, title).label(format!("`{low}` is more than `{high}`"));
-        diagnostic.suggestions.push(crate::diagnostic::Suggestion {
+        diagnostic.suggestions.push(Suggestion {
             message: "swap its ends".to_owned(),
             edits: vec![(range.low.span, high.to_owned()), (range.high.span, low.to_owned())],
         });

@@ -215,8 +215,10 @@ pub(super) fn explain(
         );
     }
     let next = token_at(text, found.hi());
-    let declares_next = next.kind == TokenKind::Word || next.text == "{";
-    if wants_name && found.kind == TokenKind::Word && is_keyword(found.text) && !declares_next {
+    // A keyword that begins the next declaration is in its place: what lacks is the name before it.
+    let declares = Place::File.starters().contains(&found.text) || Place::System.starters().contains(&found.text);
+    let declares = declares && (next.kind == TokenKind::Word || next.text == "{");
+    if wants_name && found.kind == TokenKind::Word && is_keyword(found.text) && !declares {
         return Some(
             Diagnostic::new(Code::KEYWORD_AS_NAME, span, format!("`{}` is a keyword and cannot be a name", found.text))
                 .label("choose another name")
@@ -346,6 +348,7 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::blackhole => "`blackhole`",
         Rule::last => "`last(…)`",
         Rule::fuzzing_time => "`fuzzing_time()`",
+        Rule::k_packet => "`packet loss`",
         Rule::k_when
         | Rule::k_condition
         | Rule::k_import

@@ -15,7 +15,7 @@ type Pair<'i> = PestPair<'i, Rule>;
 
 /// Reads one file. Never fails: what could not be read is in the diagnostics, and the rest is in the tree.
 pub(crate) fn parse(file: FileId, text: &str, diagnostics: &mut Vec<Diagnostic>) -> File {
-    let mut reader = Reader { file, text, diagnostics, out: File::default() };
+    let mut reader = Reader { file, text, diagnostics, out: File::default(), mistake: None };
     if text.len() > MAX_BYTES {
         let span = Span { file, lo: 0, hi: 0 };
         let title = format!("the file has {} bytes, more than the {MAX_BYTES} that are read", text.len());
@@ -50,6 +50,8 @@ struct Reader<'s> {
     text: &'s str,
     diagnostics: &'s mut Vec<Diagnostic>,
     out: File,
+    /// Where the last syntax error is.
+    mistake: Option<usize>,
 }
 
 fn child<'i>(pair: &Pair<'i>, rule: Rule) -> Option<Pair<'i>> {
@@ -68,6 +70,17 @@ fn first_of<'i>(pair: &Pair<'i>, rules: &[Rule]) -> Option<Pair<'i>> {
     pair.clone().into_inner().find(|inner| rules.contains(&inner.as_rule()))
 }
 
+/// Where a construct's last word ends. pest's own span goes on over the blanks before an optional part that is not there.
+fn end_of(pair: &Pair<'_>) -> usize {
+    let last = pair.clone().into_inner().filter(|inner| inner.as_rule() != Rule::COMMENT).last();
+    match last {
+        // The closing quote is no pair.
+        Some(_) if pair.as_rule() == Rule::text => pair.as_span().end(),
+        Some(last) => end_of(&last),
+        None => pair.as_span().end(),
+    }
+}
+
 impl Reader<'_> {
     fn span_of(&self, lo: usize, hi: usize) -> Span {
         let offset = |at: usize| u32::try_from(at).expect("files are at most MAX_BYTES long");
@@ -75,7 +88,7 @@ impl Reader<'_> {
     }
 
     fn span(&self, pair: &Pair<'_>) -> Span {
-        self.span_of(pair.as_span().start(), pair.as_span().end())
+        self.span_of(pair.as_span().start(), end_of(pair))
     }
 
     /// The span of a clause's first word.
@@ -110,7 +123,11 @@ impl Reader<'_> {
                     damaged = true;
                     let span = self.span(&pair);
                     self.broken_names(&pair);
-                    if let Some(diagnostic) = explain(self.file, self.text, span, place, previous) {
+                    // A stretch that begins at the mistake before it is the rest of the same mistake.
+                    let start = token_at(self.text, pair.as_span().start()).lo;
+                    let reported = self.mistake == Some(start);
+                    if !reported && let Some(diagnostic) = explain(self.file, self.text, span, place, previous) {
+                        self.mistake = Some(diagnostic.span.lo as usize);
                         self.report(diagnostic);
                     }
                     previous = None;
@@ -177,14 +194,27 @@ impl Reader<'_> {
         }
     }
 
-    fn unsupported(&mut self, pair: &Pair<'_>, words: Option<Span>) {
-        let span = words.unwrap_or_else(|| self.keyword_span(pair));
-        let what = self.text[span.range()].to_owned();
+    /// Says that a construct belongs to a later version. Its first word decides where; its rule decides what it is called.
+    fn unsupported(&mut self, pair: &Pair<'_>) {
+        let words = [Rule::k_node, Rule::k_parameter, Rule::k_custom, Rule::kind_name];
+        let span = first_of(pair, &words).map_or_else(|| self.keyword_span(pair), |word| self.span(&word));
+        let word = &self.text[span.range()];
+        let what = match pair.as_rule() {
+            Rule::unsupported_transport => format!("simulator kind `{word}`"),
+            Rule::unsupported_formula if word == "when" => "a metric by `when … then …`".to_owned(),
+            Rule::unsupported_formula => format!("a metric by `{word}(…)`"),
+            Rule::unsupported_operation if word != "custom" => format!("an operation on a `{word}`"),
+            Rule::unsupported_operation | Rule::unsupported_kind => format!("operation kind `{word}`"),
+            Rule::unsupported_window => "activation by `when`".to_owned(),
+            Rule::unsupported_from => "a campaign `from` another".to_owned(),
+            Rule::unsupported_activation => "activation by `condition`".to_owned(),
+            Rule::unsupported_strategy => format!("search strategy `{word}`"),
+            _ => format!("`{word}`"),
+        };
         self.broken_names(pair);
         self.report(
-            Diagnostic::new(Code::NOT_SUPPORTED, span, format!("`{what}` is not supported yet by this version of sesamec"))
-                .label("part of the language, but not of this version")
-                .note("run `sesamec explain E0104` for what to do"),
+            Diagnostic::new(Code::NOT_SUPPORTED, span, format!("{what} is not supported yet by this version of sesamec"))
+                .label("part of the language, but not of this version"),
         );
     }
 
@@ -227,7 +257,7 @@ impl Reader<'_> {
                 reader.out.campaigns.push(campaign);
             }
             Rule::unsupported_item => {
-                reader.unsupported(&item, None);
+                reader.unsupported(&item);
                 reader.out.damaged = true;
             }
             other => unreachable!("{other:?} is no declaration"),
@@ -250,7 +280,7 @@ impl Reader<'_> {
                 ty: reader.type_of(&expect_child(&member, Rule::type_of)),
             }),
             Rule::node => system.nodes.push(reader.node(&member)),
-            _ => reader.unsupported(&member, None),
+            _ => reader.unsupported(&member),
         });
         system
     }
@@ -258,7 +288,7 @@ impl Reader<'_> {
     fn simulator(&mut self, pair: &Pair<'_>) -> Simulator {
         let head = self.head(pair);
         if let Some(unsupported) = child(pair, Rule::unsupported_transport) {
-            self.unsupported(&unsupported, None);
+            self.unsupported(&unsupported);
             return Simulator { head, transport: None };
         }
         let in_process = expect_child(pair, Rule::in_process);
@@ -359,7 +389,7 @@ impl Reader<'_> {
             Rule::last => Some(MetricSource::Last(self.path(&expect_child(&source, Rule::path)))),
             Rule::fuzzing_time => Some(MetricSource::FuzzingTime),
             _ => {
-                self.unsupported(&source, None);
+                self.unsupported(&source);
                 None
             }
         };
@@ -388,11 +418,7 @@ impl Reader<'_> {
         let head = self.head(pair);
         let unsupported = first_of(pair, &[Rule::unsupported_operation, Rule::unsupported_kind]);
         if let Some(unsupported) = unsupported {
-            let first = unsupported.clone().into_inner().find(|inner| {
-                matches!(inner.as_rule(), Rule::k_node | Rule::k_parameter | Rule::k_custom | Rule::kind_name)
-            });
-            let span = first.map(|first| self.span(&first));
-            self.unsupported(&unsupported, span);
+            self.unsupported(&unsupported);
             return Operation { head, body: None };
         }
         let kinds = [Rule::random_value, Rule::packet_loss, Rule::latency, Rule::blackhole];
@@ -467,7 +493,7 @@ impl Reader<'_> {
                 Some(Range { span: low.span.to(high.span), low, high })
             }
             None => {
-                self.unsupported(&expect_child(pair, Rule::unsupported_window), None);
+                self.unsupported(&expect_child(pair, Rule::unsupported_window));
                 None
             }
         };
@@ -491,7 +517,7 @@ impl Reader<'_> {
         };
         let from = child(pair, Rule::unsupported_from);
         if let Some(from) = &from {
-            self.unsupported(from, None);
+            self.unsupported(from);
         }
         let damaged = self.members(pair, Place::Campaign, |reader, member| {
             let span = reader.keyword_span(&member);
@@ -508,7 +534,7 @@ impl Reader<'_> {
                 Rule::activate => {
                     campaign.activates.push(span);
                     if let Some(activation) = child(&member, Rule::unsupported_activation) {
-                        reader.unsupported(&activation, None);
+                        reader.unsupported(&activation);
                     }
                 }
                 Rule::search => campaign.searches.push(reader.search(&member, span)),
@@ -529,7 +555,7 @@ impl Reader<'_> {
                     });
                 }
                 _ => {
-                    reader.unsupported(&member, None);
+                    reader.unsupported(&member);
                 }
             }
         });
@@ -542,7 +568,7 @@ impl Reader<'_> {
         let mut search =
             Search { span, strategy: None, population: vec![], evaluations: vec![], seed: vec![], damaged: false };
         if let Some(strategy) = child(pair, Rule::unsupported_strategy) {
-            self.unsupported(&strategy, None);
+            self.unsupported(&strategy);
             return search;
         }
         let nsga2 = child(pair, Rule::k_nsga2).is_some();
