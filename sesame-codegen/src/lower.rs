@@ -66,8 +66,7 @@ impl Selection {
         let fits = |test: &model::Test| {
             test.operations.iter().all(|it| operations.contains(&it.operation) && it.window.low < campaign.end_after)
         };
-        let tests: Vec<model::TestId> =
-            space.tests.iter().filter(|(_, test)| fits(test)).map(|(id, _)| id).collect();
+        let tests: Vec<model::TestId> = space.tests.iter().filter(|(_, test)| fits(test)).map(|(id, _)| id).collect();
         let mut metrics: Vec<model::MetricId> = campaign.objectives.clone();
         metrics.extend(&campaign.observed);
         metrics.extend(space.requirements.values().map(|requirement| requirement.metric));

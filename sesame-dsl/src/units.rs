@@ -168,10 +168,10 @@ impl Unit {
                 Some((symbol, power)) => (symbol, power.parse::<i8>().map_err(|_| UnitError::TooLarge)?),
                 None => (&rest[..end], 1),
             };
-            let unit = UNITS.iter().find(|unit| unit.0 == symbol).ok_or_else(|| UnitError::Unknown {
-                symbol: symbol.to_owned(),
-                similar: similar_symbols(symbol),
-            })?;
+            let unit = UNITS
+                .iter()
+                .find(|unit| unit.0 == symbol)
+                .ok_or_else(|| UnitError::Unknown { symbol: symbol.to_owned(), similar: similar_symbols(symbol) })?;
             let power: i8 = power * sign;
             let factor = Scale { numerator: unit.2, denominator: unit.3, pi: unit.4 };
             let product = factor.power(power).and_then(|factor| scale.times(factor));
@@ -223,7 +223,8 @@ pub fn symbols() -> impl Iterator<Item = &'static str> {
 }
 
 fn similar_symbols(symbol: &str) -> Vec<&'static str> {
-    if let Some((_, meant)) = SPELT_OUT.iter().find(|(words, _)| words.contains(&symbol.to_ascii_lowercase().as_str())) {
+    if let Some((_, meant)) = SPELT_OUT.iter().find(|(words, _)| words.contains(&symbol.to_ascii_lowercase().as_str()))
+    {
         return vec![meant];
     }
     let same_but_case: Vec<_> = symbols().filter(|known| known.eq_ignore_ascii_case(symbol)).collect();

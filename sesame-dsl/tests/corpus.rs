@@ -76,7 +76,8 @@ fn ten_mistakes_give_ten_diagnostics_at_once() {
     let (sources, analysis) = analyse_text("ten_mistakes", text);
     let lines: Vec<u32> = analysis.diagnostics.iter().map(|it| sources.position(it.span).line).collect();
     // Each mistake is marked in the file by a comment on its line.
-    let marked: Vec<u32> = (1..).zip(text.lines()).filter(|(_, line)| line.contains("// mistake")).map(|(n, _)| n).collect();
+    let marked: Vec<u32> =
+        (1..).zip(text.lines()).filter(|(_, line)| line.contains("// mistake")).map(|(n, _)| n).collect();
     assert_eq!(marked.len(), 10);
     assert_eq!(lines, marked);
 }

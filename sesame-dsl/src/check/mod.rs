@@ -11,7 +11,8 @@ pub(crate) fn check(space: &Space) -> Vec<Diagnostic> {
     if space.campaigns.is_empty() {
         let title = format!("space `{}` has no campaign", space.declaration.name);
         diagnostics.push(
-            Diagnostic::new(Code::NO_CAMPAIGN, space.declaration.span, title).label("there is nothing to generate or run"),
+            Diagnostic::new(Code::NO_CAMPAIGN, space.declaration.span, title)
+                .label("there is nothing to generate or run"),
         );
     }
     diagnostics

@@ -189,9 +189,9 @@ pub struct Expectation {
 /// between versions.
 pub fn draw_seed(test: &str, position: usize) -> u64 {
     let position = (position as u64).to_le_bytes();
-    test.bytes().chain(position).fold(0xCBF2_9CE4_8422_2325, |hash: u64, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3)
-    })
+    test.bytes()
+        .chain(position)
+        .fold(0xCBF2_9CE4_8422_2325, |hash: u64, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3))
 }
 
 #[cfg(test)]

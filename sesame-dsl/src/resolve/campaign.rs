@@ -96,15 +96,12 @@ impl<'a> Resolver<'a> {
             complete = false;
             let declared = &self.file.metrics[definition.index];
             let at = declared.ty.as_ref().map_or(declared.head.name.span, |ty| ty.span).end();
-            let diagnostic = Diagnostic::new(
-                Code::NO_DIRECTION,
-                name.span,
-                format!("objective `{}` has no direction", name.text),
-            )
-            .label("is more of it of interest, or less?")
-            .also(declared.head.name.span, "the metric is declared here")
-            .suggest("search for large values", at, " maximise")
-            .suggest("search for small values", at, " minimise");
+            let diagnostic =
+                Diagnostic::new(Code::NO_DIRECTION, name.span, format!("objective `{}` has no direction", name.text))
+                    .label("is more of it of interest, or less?")
+                    .also(declared.head.name.span, "the metric is declared here")
+                    .suggest("search for large values", at, " maximise")
+                    .suggest("search for small values", at, " minimise");
             self.report(diagnostic);
         }
         found.filter(|_| complete)
@@ -123,7 +120,9 @@ impl<'a> Resolver<'a> {
         let found = self.find_all(&operations.names, Kind::Operation);
         for name in &operations.names {
             let Some(definition) = self.names.get(name.text.as_str()).copied() else { continue };
-            if definition.kind == Kind::Operation && let Some(end) = end_after {
+            if definition.kind == Kind::Operation
+                && let Some(end) = end_after
+            {
                 self.window_and_end(name, definition.index, end, campaign);
             }
         }
@@ -242,7 +241,8 @@ impl<'a> Resolver<'a> {
             let name = &written.operation.text;
             let diagnostic = if operation.window.low >= end {
                 let title = format!("`{name}` is never active: the tests of the campaign are over by then");
-                Diagnostic::new(Code::AFTER_THE_END, window.span, title).label(format!("begins after the end at {end}s"))
+                Diagnostic::new(Code::AFTER_THE_END, window.span, title)
+                    .label(format!("begins after the end at {end}s"))
             } else if operation.window.high > end {
                 let title = format!("`{name}` goes on after the end of the campaign that repeats this test");
                 Diagnostic::new(Code::OUTLASTS_THE_END, window.span, title)

@@ -120,7 +120,9 @@ impl<'a> Resolver<'a> {
             Some(System { span, damaged: false, .. }) if simulators.is_empty() => {
                 let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, *span, "this system has no simulator")
                     .label("nothing runs it")
-                    .note("for example `simulator cell = in_process \"my_sim::Cell\" { crate \"simulator\"  step 20ms }`");
+                    .note(
+                        "for example `simulator cell = in_process \"my_sim::Cell\" { crate \"simulator\"  step 20ms }`",
+                    );
                 self.report(diagnostic);
             }
             _ => {}

@@ -86,9 +86,10 @@ impl<'a> Resolver<'a> {
             return Some(target);
         }
         let fields = Span { lo: path.topic.span.hi, ..path.span };
-        let diagnostic = Diagnostic::new(Code::WRONG_TYPE, fields, format!("{does} whole messages, not a field of them"))
-            .label("expected a topic")
-            .suggest("leave the field out", fields, "");
+        let diagnostic =
+            Diagnostic::new(Code::WRONG_TYPE, fields, format!("{does} whole messages, not a field of them"))
+                .label("expected a topic")
+                .suggest("leave the field out", fields, "");
         self.report(diagnostic);
         None
     }
@@ -235,8 +236,8 @@ impl<'a> Resolver<'a> {
                 Some((word, _)) => (word.span, format!("`{name}` has no parameter named `{}`", word.text)),
                 None => (test.operation.span, format!("no `{}` is chosen for `{name}`", parameter.name)),
             };
-            let mut diagnostic = Diagnostic::new(Code::WRONG_CHOICE, span, title)
-                .label(format!("expected for example `{example}`"));
+            let mut diagnostic =
+                Diagnostic::new(Code::WRONG_CHOICE, span, title).label(format!("expected for example `{example}`"));
             if !test.choices.is_empty() {
                 diagnostic = diagnostic.suggest("its parameter is", span, parameter.name);
             }
@@ -287,9 +288,12 @@ impl<'a> Resolver<'a> {
                 return None;
             }
             (ast::Choice::Range(range), Shape::Value) => {
-                let diagnostic =
-                    Diagnostic::new(Code::WRONG_CHOICE, range.span, format!("{what} is one value in a test, not a range"))
-                        .label(format!("expected one value, for example `{example}`"));
+                let diagnostic = Diagnostic::new(
+                    Code::WRONG_CHOICE,
+                    range.span,
+                    format!("{what} is one value in a test, not a range"),
+                )
+                .label(format!("expected one value, for example `{example}`"));
                 self.report(diagnostic);
                 return None;
             }

@@ -43,13 +43,7 @@ impl<'a> Resolver<'a> {
             Some(quantity) => Some(self.value(quantity, unit.as_ref(), &format!("metric `{}`", name.text))?),
             None => None,
         };
-        Some(model::Metric {
-            declaration: self.declaration(&metric.head),
-            unit,
-            direction,
-            default,
-            source: source?,
-        })
+        Some(model::Metric { declaration: self.declaration(&metric.head), unit, direction, default, source: source? })
     }
 
     fn hook(

@@ -187,9 +187,8 @@ impl<'a> Resolver<'a> {
         }
         self.silent.insert(&name.text);
         let known = self.names_of(kind);
-        let mut diagnostic =
-            Diagnostic::new(Code::UNKNOWN_NAME, name.span, format!("no {word} named `{}`", name.text))
-                .label(format!("not {} of this space", kind.with_article()));
+        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, format!("no {word} named `{}`", name.text))
+            .label(format!("not {} of this space", kind.with_article()));
         if let Some(similar) = most_similar(&name.text, known.iter().copied()) {
             diagnostic = diagnostic.suggest(format!("`{similar}` is"), name.span, similar);
         } else if known.is_empty() {

@@ -15,8 +15,9 @@ impl Resolver<'_> {
         };
         let diagnostic = match error {
             UnitError::Unknown { symbol, similar } => {
-                let mut diagnostic = Diagnostic::new(Code::UNKNOWN_UNIT, name.span, format!("no unit named `{symbol}`"))
-                    .label("not a unit");
+                let mut diagnostic =
+                    Diagnostic::new(Code::UNKNOWN_UNIT, name.span, format!("no unit named `{symbol}`"))
+                        .label("not a unit");
                 for meant in &similar {
                     let replacement = name.text.replace(&symbol, meant);
                     diagnostic = diagnostic.suggest(format!("`{meant}` is"), name.span, replacement);
@@ -110,8 +111,7 @@ impl Resolver<'_> {
     pub(super) fn reversed(&mut self, range: &ast::Range, title: &str) {
         let code = if title.contains("window") { Code::BAD_WINDOW } else { Code::REVERSED_RANGE };
         let [low, high] = [&range.low, &range.high].map(|end| self.text(end.span));
-        let mut diagnostic =
-            Diagnostic::new(code, range.span, title).label(format!("`{low}` is more than `{high}`"));
+        let mut diagnostic = Diagnostic::new(code, range.span, title).label(format!("`{low}` is more than `{high}`"));
         diagnostic.suggestions.push(Suggestion {
             message: "swap its ends".to_owned(),
             edits: vec![(range.low.span, high.to_owned()), (range.high.span, low.to_owned())],
@@ -179,5 +179,9 @@ pub(super) fn percent() -> Unit {
 }
 
 fn wanted(unit: &Unit) -> String {
-    if unit.text() == "%" { "a percentage, in `%`".to_owned() } else { format!("{}, in `{}`", unit.dimension().name(), unit.text()) }
+    if unit.text() == "%" {
+        "a percentage, in `%`".to_owned()
+    } else {
+        format!("{}, in `{}`", unit.dimension().name(), unit.text())
+    }
 }

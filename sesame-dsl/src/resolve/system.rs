@@ -8,7 +8,7 @@ use crate::model::{self, Id as _, MessageId, Simulator, TopicId, Transport, Type
 use crate::similar::most_similar;
 use crate::span::Span;
 use crate::syntax::ast::{self, Name, TypeKind};
-use crate::units::{Unit, dimension, Dimension};
+use crate::units::{Dimension, Unit, dimension};
 
 impl<'a> Resolver<'a> {
     pub(super) fn ast_messages(&self) -> impl Iterator<Item = &'a ast::Message> + use<'a> {
@@ -83,7 +83,11 @@ impl<'a> Resolver<'a> {
         // What is a whole number of nanoseconds in decimals may miss it by a rounding error.
         let rounded = value.round();
         if (1.0..=3.6e12).contains(&rounded) && (value - rounded).abs() <= rounded * 1e-12 {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is whole and in 1..=3.6e12")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "it is whole and in 1..=3.6e12"
+            )]
             return Some(rounded as u64);
         }
         let title = format!("`{}` cannot be the time of one step", self.text(step.span));

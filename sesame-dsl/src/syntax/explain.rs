@@ -99,16 +99,16 @@ impl Place {
     /// What can stand here, for a message.
     fn members(self) -> &'static str {
         match self {
-            Place::File => "a declaration: `space`, `system`, `metric`, `requirement`, `operation`, `test` or `campaign`",
+            Place::File => {
+                "a declaration: `space`, `system`, `metric`, `requirement`, `operation`, `test` or `campaign`"
+            }
             Place::System => "`simulator`, `message`, `topic` or `node`",
             Place::Simulator => "`crate` or `step`",
             Place::Message => "a field such as `level: real[mm]`",
             Place::Node => "`publishes` or `subscribes`",
             Place::Hook => "`hook on` and topics",
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
-            Place::Campaign => {
-                "`objectives`, `operations`, `observes`, `activate`, `search`, `repeat` or `end after`"
-            }
+            Place::Campaign => "`objectives`, `operations`, `observes`, `activate`, `search`, `repeat` or `end after`",
             Place::Search => "`population`, `evaluations` or `seed`",
             Place::Repeat => "`seed`",
         }

@@ -102,12 +102,7 @@ impl Reader<'_> {
     }
 
     /// Visits the members of a block. What could not be read is explained; returns whether there was such a thing.
-    fn members<'i>(
-        &mut self,
-        block: &Pair<'i>,
-        place: Place,
-        mut visit: impl FnMut(&mut Self, Pair<'i>),
-    ) -> bool {
+    fn members<'i>(&mut self, block: &Pair<'i>, place: Place, mut visit: impl FnMut(&mut Self, Pair<'i>)) -> bool {
         let mut damaged = false;
         let mut previous = None;
         let mut opened = None;
@@ -181,7 +176,15 @@ impl Reader<'_> {
             at = token.hi();
             let declares = matches!(
                 token.text,
-                "simulator" | "message" | "topic" | "node" | "metric" | "requirement" | "operation" | "test" | "campaign"
+                "simulator"
+                    | "message"
+                    | "topic"
+                    | "node"
+                    | "metric"
+                    | "requirement"
+                    | "operation"
+                    | "test"
+                    | "campaign"
             );
             if declares {
                 let name = token_at(self.text, at);
@@ -213,8 +216,12 @@ impl Reader<'_> {
         };
         self.broken_names(pair);
         self.report(
-            Diagnostic::new(Code::NOT_SUPPORTED, span, format!("{what} is not supported yet by this version of sesamec"))
-                .label("part of the language, but not of this version"),
+            Diagnostic::new(
+                Code::NOT_SUPPORTED,
+                span,
+                format!("{what} is not supported yet by this version of sesamec"),
+            )
+            .label("part of the language, but not of this version"),
         );
     }
 
@@ -696,7 +703,8 @@ impl Reader<'_> {
                 let at = inner.as_span().start() + offset;
                 let span = self.span_of(at, at + 1 + escaped.len_utf8());
                 let title = format!("unknown escape `\\{escaped}` in a text");
-                let diagnostic = Diagnostic::new(Code::BAD_TEXT, span, title).label("`\\\"` and `\\\\` are the only ones");
+                let diagnostic =
+                    Diagnostic::new(Code::BAD_TEXT, span, title).label("`\\\"` and `\\\\` are the only ones");
                 self.report(diagnostic.suggest("double the backslash to mean one", span, format!("\\\\{escaped}")));
             }
         }
