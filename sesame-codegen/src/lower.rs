@@ -155,8 +155,8 @@ impl Selection {
 }
 
 /// The position of a selected item. The selection holds everything that is asked for, by its construction.
-fn position<I: Copy + Ord>(selected: &[I], id: I) -> u32 {
-    let position = selected.binary_search(&id).ok().expect("the plan holds what its parts mention");
+fn position<I: Copy + Eq>(selected: &[I], id: I) -> u32 {
+    let position = selected.iter().position(|&selected| selected == id).expect("the plan holds what its parts mention");
     u32::try_from(position).expect("a file holds fewer than 2^32 declarations")
 }
 

@@ -44,7 +44,7 @@ pub fn analyse(sources: &SourceMap, root: FileId) -> Analysis {
     if let Some(space) = &model {
         diagnostics.extend(check::check(space));
     }
-    diagnostics.sort_by(|a, b| (a.span, a.code).cmp(&(b.span, b.code)));
+    diagnostics.sort_by_key(|diagnostic| (diagnostic.span, diagnostic.code));
     diagnostics.dedup();
     Analysis { model, diagnostics }
 }

@@ -138,7 +138,8 @@ fn deep_nesting_and_long_repetition_are_refused_or_read_but_never_overflow() {
 
 #[test]
 fn a_long_chain_of_messages_is_sorted_without_a_stack() {
-    let chain: String = (0..2_000).map(|n| format!("  message M{n} {{ next: M{} }}\n", n + 1)).collect();
+    let chain: Vec<String> = (0..2_000).map(|n| format!("  message M{n} {{ next: M{} }}\n", n + 1)).collect();
+    let chain = chain.concat();
     let text = format!(
         "space s\nsystem {{\n{chain}  message M2000 {{ x: int }}\n  simulator sim = in_process \"a::B\" {{ step 1ms }}\n}}\n"
     );
@@ -158,7 +159,9 @@ fn every_suggestion_of_the_corpus_can_be_applied() {
         let mut edits = suggestion.edits.clone();
         edits.sort_by_key(|(span, _)| std::cmp::Reverse(span.lo));
         let mut mended = text.to_owned();
-        edits.iter().for_each(|(span, replacement)| mended.replace_range(span.range(), replacement));
+        for (span, replacement) in &edits {
+            mended.replace_range(span.range(), replacement);
+        }
         let (_, _, after) = analyse_text(&mended);
         assert!(after.diagnostics.len() < before, "{} stays after: {}", diagnostic.title, suggestion.message);
     }

@@ -171,15 +171,10 @@ impl<'a> Resolver<'a> {
         let strategy = search.strategy?;
         let population = self.single(&search.population, "population").copied();
         let evaluations = self.single(&search.evaluations, "evaluations").copied();
-        let found = match evaluations {
-            Some(count) => self.count(count, 1, "a search evaluates"),
-            None => {
-                if !search.damaged {
-                    self.missing(&campaign.head.name, "the number of tests to evaluate", "evaluations 200");
-                }
-                None
-            }
-        };
+        if evaluations.is_none() && !search.damaged {
+            self.missing(&campaign.head.name, "the number of tests to evaluate", "evaluations 200");
+        }
+        let found = evaluations.and_then(|count| self.count(count, 1, "a search evaluates"));
         match strategy {
             Strategy::Random => {
                 if let Some((span, _)) = search.population.first() {

@@ -207,7 +207,8 @@ impl<'a> Resolver<'a> {
         Some(Range { low, high })
     }
 
-    /// The choice for the operation's parameter: `Some(None)` for an operation without one.
+    /// The choice for the operation's parameter.
+    #[expect(clippy::option_option, reason = "the outer says whether it was in order, the inner is the model's")]
     fn choice(
         &mut self,
         test: &'a ast::TestOperation,

@@ -21,24 +21,24 @@ impl<'a> Resolver<'a> {
             ast::Direction::Minimise => model::Direction::Minimise,
         });
         let default = self.single(&metric.defaults, "default");
-        // The unit is `None` when it could not be found out, `Some(None)` for a plain number.
-        let (source, unit): (Option<MetricSource>, Option<Option<Unit>>) = match metric.source.as_ref()? {
+        // Both are looked at, so that a mistake in one does not hide one in the other or in the default.
+        let (source, ty): (Option<MetricSource>, Option<Type>) = match metric.source.as_ref()? {
             ast::MetricSource::Hook { hooks, damaged } => {
-                (self.hook(name, hooks, *damaged), self.hook_unit(metric.ty.as_ref()))
+                (self.hook(name, hooks, *damaged), self.hook_type(metric.ty.as_ref()))
             }
             ast::MetricSource::FuzzingTime => {
                 self.no_type(metric.ty.as_ref(), "`fuzzing_time()` is in seconds");
-                (Some(MetricSource::FuzzingTime), Some(Some(Unit::seconds())))
+                (Some(MetricSource::FuzzingTime), Some(Type::Real(Some(Unit::seconds()))))
             }
             ast::MetricSource::Last(path) => {
                 self.no_type(metric.ty.as_ref(), "the unit of `last(…)` is that of the topic or field");
                 match self.last(path) {
-                    Some((source, unit)) => (Some(source), Some(unit)),
+                    Some((source, unit)) => (Some(source), Some(Type::Real(unit))),
                     None => (None, None),
                 }
             }
         };
-        let unit = unit?;
+        let Type::Real(unit) = ty? else { return None };
         let default = match default {
             Some(quantity) => Some(self.value(quantity, unit.as_ref(), &format!("metric `{}`", name.text))?),
             None => None,
@@ -62,10 +62,11 @@ impl<'a> Resolver<'a> {
         Some(MetricSource::Hook(topics.into_iter().map(TopicId::from_index).collect()))
     }
 
-    fn hook_unit(&mut self, ty: Option<&'a ast::Type>) -> Option<Option<Unit>> {
-        let Some(ty) = ty else { return Some(None) };
+    /// The type of a hook's metric, which is `Type::Real`.
+    fn hook_type(&mut self, ty: Option<&'a ast::Type>) -> Option<Type> {
+        let Some(ty) = ty else { return Some(Type::Real(None)) };
         match self.type_of(ty)? {
-            Type::Real(unit) => Some(unit),
+            real @ Type::Real(_) => Some(real),
             other => {
                 let title = format!("a metric is a real number, not {}", super::system::type_in_words(&other));
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, ty.span, title)

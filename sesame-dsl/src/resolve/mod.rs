@@ -1,10 +1,10 @@
 //! From syntax to model, in passes:
 //!
-//! 1. [`collect`]: who is called what; doubles; what a space cannot do without
-//! 2. [`system`]: message types (in an order in which each follows those it contains), topics, nodes, the simulator
-//! 3. [`measure`]: metrics and requirements
-//! 4. [`fuzz`]: operations and known tests
-//! 5. [`campaign`]: campaigns
+//! 1. [`collect`] has who is called what, doubles, and what a space cannot do without
+//! 2. [`system`] has message types (in an order in which each follows those it contains), topics, nodes, the simulator
+//! 3. [`measure`] has metrics and requirements
+//! 4. [`fuzz`] has operations and known tests
+//! 5. [`campaign`] has campaigns
 //!
 //! Each pass reports all it finds. A declaration with a mistake is `None` from then on, and whoever mentions it says
 //! nothing: so one mistake is one diagnostic.

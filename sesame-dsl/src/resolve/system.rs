@@ -37,15 +37,11 @@ impl<'a> Resolver<'a> {
         let in_process = simulator.transport.as_ref()?;
         let path = self.rust_path(&in_process.path);
         let folder = self.single(&in_process.crates, "crate");
-        let step = match self.single(&in_process.steps, "step") {
-            Some(step) => self.step(step),
-            None => {
-                if !in_process.damaged {
-                    self.missing(&simulator.head.name, "the time of one step", "step 20ms");
-                }
-                None
-            }
-        };
+        let step = self.single(&in_process.steps, "step");
+        if step.is_none() && !in_process.damaged {
+            self.missing(&simulator.head.name, "the time of one step", "step 20ms");
+        }
+        let step = step.and_then(|step| self.step(step));
         let transport = Transport::InProcess {
             path: path?,
             crate_folder: folder.map(|folder| folder.text.clone()),
@@ -158,7 +154,9 @@ impl<'a> Resolver<'a> {
                     Mark::Open => {
                         let start = stack.iter().position(|&(open, _)| open == inner).unwrap_or(0);
                         let cycle: Vec<usize> = stack[start..].iter().map(|&(open, _)| open).collect();
-                        cycle.iter().for_each(|&member| cyclic[member] = true);
+                        for &member in &cycle {
+                            cyclic[member] = true;
+                        }
                         self.recursive(messages, &cycle, mention);
                     }
                 }

@@ -148,14 +148,8 @@ fn read(text: &str, lo: usize, hi: usize, rule: Rule) -> Option<Failure> {
     }
 }
 
-/// Explains a swallowed stretch, given the good construct before it. `None` when the mistake is another's to report.
-pub(super) fn explain(
-    file: FileId,
-    text: &str,
-    region: Span,
-    place: Place,
-    previous: Option<Span>,
-) -> Option<Diagnostic> {
+/// Explains a swallowed stretch, given the good construct before it.
+pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, previous: Option<Span>) -> Diagnostic {
     let span_of = |token: Token<'_>| Span {
         file,
         lo: u32::try_from(token.lo).expect("files are small"),
@@ -168,15 +162,13 @@ pub(super) fn explain(
     }
     if first.kind == TokenKind::Doc || first.lo >= hi {
         let doc = token_at(text, lo);
-        return Some(
-            Diagnostic::new(Code::SYNTAX, span_of(doc), "this doc comment belongs to nothing")
-                .label("no declaration follows it")
-                .suggest("make it a plain comment", Span { hi: region.lo + 3, ..region }, "//"),
-        );
+        return Diagnostic::new(Code::SYNTAX, span_of(doc), "this doc comment belongs to nothing")
+            .label("no declaration follows it")
+            .suggest("make it a plain comment", Span { hi: region.lo + 3, ..region }, "//");
     }
     if first.text == "}" {
         let title = "this `}` closes nothing";
-        return Some(Diagnostic::new(Code::NOT_CLOSED, span_of(first), title).label("no block is open here"));
+        return Diagnostic::new(Code::NOT_CLOSED, span_of(first), title).label("no block is open here");
     }
 
     let begins = place.starters().contains(&first.text) || matches!(place, Place::Message | Place::Test);
@@ -197,33 +189,31 @@ pub(super) fn explain(
     let after = text[found.hi()..].chars().next();
     let joins = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
     if found.text == "-" && joins(before) && joins(after) {
-        return Some(
-            Diagnostic::new(Code::NOT_A_NAME, span, "a name cannot hold `-`")
-                .label("names are letters, digits and `_`")
-                .suggest("use `_`", span, "_"),
-        );
+        return Diagnostic::new(Code::NOT_A_NAME, span, "a name cannot hold `-`")
+            .label("names are letters, digits and `_`")
+            .suggest("use `_`", span, "_");
     }
     if found.kind == TokenKind::OpenText {
         let title = "this text does not end on its line";
-        return Some(Diagnostic::new(Code::BAD_TEXT, span, title).label("no closing `\"`"));
+        return Diagnostic::new(Code::BAD_TEXT, span, title).label("no closing `\"`");
     }
     if found.kind == TokenKind::Doc {
-        return Some(
-            Diagnostic::new(Code::SYNTAX, span, "a doc comment cannot stand here")
-                .label(format!("expected {expected}"))
-                .note("`///` belongs above a declaration; `//` may stand anywhere"),
-        );
+        return Diagnostic::new(Code::SYNTAX, span, "a doc comment cannot stand here")
+            .label(format!("expected {expected}"))
+            .note("`///` belongs above a declaration; `//` may stand anywhere");
     }
     let next = token_at(text, found.hi());
     // A keyword that begins the next declaration is in its place: what lacks is the name before it.
     let declares = Place::File.starters().contains(&found.text) || Place::System.starters().contains(&found.text);
     let declares = declares && (next.kind == TokenKind::Word || next.text == "{");
     if wants_name && found.kind == TokenKind::Word && is_keyword(found.text) && !declares {
-        return Some(
-            Diagnostic::new(Code::KEYWORD_AS_NAME, span, format!("`{}` is a keyword and cannot be a name", found.text))
-                .label("choose another name")
-                .suggest("add to it", span, format!("{}_1", found.text)),
-        );
+        return Diagnostic::new(
+            Code::KEYWORD_AS_NAME,
+            span,
+            format!("`{}` is a keyword and cannot be a name", found.text),
+        )
+        .label("choose another name")
+        .suggest("add to it", span, format!("{}_1", found.text));
     }
 
     let title = match found.kind {
@@ -252,7 +242,7 @@ pub(super) fn explain(
     if found.kind == TokenKind::Sign && found.text == "=" && failure.expected.contains(&Rule::equal_to) {
         diagnostic = diagnostic.suggest("compare with `==`", span, "==");
     }
-    Some(diagnostic)
+    diagnostic
 }
 
 /// What would fit, in words.
@@ -288,10 +278,8 @@ fn describe(failure: &Failure, place: Place, at_start: bool) -> String {
 
 /// The word a keyword rule stands for.
 fn keyword_of(rule: Rule) -> Option<&'static str> {
-    // Rule names are the words with a prefix; pest offers them as text only.
-    Rule::all_rules().iter().find(|&&known| known == rule)?;
-    let name = rule_name(rule);
-    name.strip_prefix("k_")
+    // Rule names are the words with a prefix.
+    rule_name(rule).strip_prefix("k_")
 }
 
 fn rule_name(rule: Rule) -> &'static str {
@@ -304,10 +292,9 @@ fn rule_name(rule: Rule) -> &'static str {
 fn in_words(rule: Rule) -> Option<String> {
     let words = match rule {
         Rule::equals => "`=`",
-        Rule::colon => "`:`",
+        Rule::colon | Rule::metric_type => "`:`",
         Rule::comma => "`,`",
         Rule::dots => "`..`",
-        Rule::minus => return None,
         Rule::paren_open => "`(`",
         Rule::paren_close => "`)`",
         Rule::bracket_open => "`[`",
@@ -339,17 +326,16 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::drain => "`drain`",
         Rule::direction => "`maximise` or `minimise`",
         Rule::default_value => "`default`",
-        Rule::metric_type => "`:`",
         Rule::value_mode => "`offset` or `absolute`",
         Rule::in_process => "`in_process`",
         Rule::random_value => "`random`",
-        Rule::packet_loss => "`packet loss`",
+        Rule::packet_loss | Rule::k_packet => "`packet loss`",
         Rule::latency => "`latency`",
         Rule::blackhole => "`blackhole`",
         Rule::last => "`last(…)`",
         Rule::fuzzing_time => "`fuzzing_time()`",
-        Rule::k_packet => "`packet loss`",
-        Rule::k_when
+        Rule::minus
+        | Rule::k_when
         | Rule::k_condition
         | Rule::k_import
         | Rule::k_eddi

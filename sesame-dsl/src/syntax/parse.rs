@@ -4,7 +4,12 @@ use pest::Parser as _;
 use pest::iterators::Pair as PestPair;
 use sesame_grammar::{Rule, SesameParser};
 
-use super::ast::*;
+use super::ast::{
+    Bound, Campaign, Choice, Comparison, Count, Direction, Drain, Expectation, Field, File, Head, InProcess, Message,
+    Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Path, Quantity, Range,
+    Repeat, Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Text, Topic, Type, TypeKind,
+    UnitName,
+};
 use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, MAX_CALLS, MAX_DEPTH, too_deep};
 use super::token::{TokenKind, token_at};
@@ -30,7 +35,7 @@ pub(crate) fn parse(file: FileId, text: &str, diagnostics: &mut Vec<Diagnostic>)
         match SesameParser::parse(Rule::file, text) {
             Ok(mut pairs) => {
                 let root = pairs.next().expect("a parse that succeeds has its rule's pair");
-                reader.file(root);
+                reader.file(&root);
                 return reader.out;
             }
             // The entry rule accepts every text, so only the limit on calls is left.
@@ -121,7 +126,8 @@ impl Reader<'_> {
                     // A stretch that begins at the mistake before it is the rest of the same mistake.
                     let start = token_at(self.text, pair.as_span().start()).lo;
                     let reported = self.mistake == Some(start);
-                    if !reported && let Some(diagnostic) = explain(self.file, self.text, span, place, previous) {
+                    if !reported {
+                        let diagnostic = explain(self.file, self.text, span, place, previous);
                         self.mistake = Some(diagnostic.span.lo as usize);
                         self.report(diagnostic);
                     }
@@ -225,8 +231,8 @@ impl Reader<'_> {
         );
     }
 
-    fn file(&mut self, root: Pair<'_>) {
-        let damaged = self.members(&root, Place::File, |reader, item| match item.as_rule() {
+    fn file(&mut self, root: &Pair<'_>) {
+        let damaged = self.members(root, Place::File, |reader, item| match item.as_rule() {
             Rule::space => {
                 let head = reader.head(&item);
                 reader.out.spaces.push(head);
@@ -320,7 +326,7 @@ impl Reader<'_> {
         let damaged = self.members(pair, Place::Message, |reader, field| {
             let name = expect_child(&field, Rule::field_name);
             fields.push(Field {
-                head: Head { name: reader.field_name(&name), doc: reader.doc(&field) },
+                head: Head { name: reader.field_name(&name), doc: Self::doc(&field) },
                 ty: reader.type_of(&expect_child(&field, Rule::type_of)),
             });
         });
@@ -492,18 +498,15 @@ impl Reader<'_> {
                 (name, value)
             })
             .collect();
-        let window = match child(pair, Rule::window) {
-            Some(window) => {
-                let mut ends = children(&window, Rule::signed).map(|end| self.signed(&end)).collect::<Vec<_>>();
-                let high = ends.pop().expect("a window has an end");
-                let low = ends.pop().expect("a window has a start");
-                Some(Range { span: low.span.to(high.span), low, high })
-            }
-            None => {
-                self.unsupported(&expect_child(pair, Rule::unsupported_window));
-                None
-            }
-        };
+        let window = child(pair, Rule::window).map(|window| {
+            let mut ends = children(&window, Rule::signed).map(|end| self.signed(&end)).collect::<Vec<_>>();
+            let high = ends.pop().expect("a window has an end");
+            let low = ends.pop().expect("a window has a start");
+            Range { span: low.span.to(high.span), low, high }
+        });
+        if let Some(unsupported) = child(pair, Rule::unsupported_window) {
+            self.unsupported(&unsupported);
+        }
         let seed = child(pair, Rule::draw_seed).map(|seed| self.count(&expect_child(&seed, Rule::number)));
         TestOperation { operation, choices, window, seed }
     }
@@ -595,10 +598,10 @@ impl Reader<'_> {
     // ----- words and numbers
 
     fn head(&mut self, pair: &Pair<'_>) -> Head {
-        Head { name: self.name(&expect_child(pair, Rule::name)), doc: self.doc(pair) }
+        Head { name: self.name(&expect_child(pair, Rule::name)), doc: Self::doc(pair) }
     }
 
-    fn doc(&self, pair: &Pair<'_>) -> String {
+    fn doc(pair: &Pair<'_>) -> String {
         let docs = expect_child(pair, Rule::docs);
         let lines = children(&docs, Rule::doc).map(|doc| {
             let line = doc.as_str().trim_start_matches("///").trim_end();
