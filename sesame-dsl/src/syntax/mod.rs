@@ -5,5 +5,6 @@ mod explain;
 mod limits;
 mod parse;
 mod token;
+mod words;
 
 pub(crate) use parse::parse;
