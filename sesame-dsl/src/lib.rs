@@ -1,1 +1,50 @@
-//! To be written.
+//! The front end of the Sesame language: text in, resolved model and diagnostics out.
+//!
+//! Pure: no file system, no environment, no clock. [`analyse`] never stops at the first mistake, never panics on any
+//! text, and reports one mistake once.
+
+mod check;
+pub mod diagnostic;
+pub mod model;
+mod resolve;
+mod similar;
+pub mod source;
+pub mod span;
+mod syntax;
+pub mod units;
+
+use diagnostic::{Diagnostic, Severity};
+use model::Space;
+use source::SourceMap;
+use span::FileId;
+
+/// What an analysis found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Analysis {
+    /// The model; `Some` exactly when no diagnostic is an error.
+    pub model: Option<Space>,
+    /// Errors and warnings, sorted by position.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+impl Analysis {
+    /// Whether anything is an error.
+    pub fn has_errors(&self) -> bool {
+        self.diagnostics.iter().any(|diagnostic| diagnostic.severity() == Severity::Error)
+    }
+}
+
+/// Analyses the file `root` of `sources`: syntax, names, types and units, ranges, campaigns, and what deserves a warning.
+///
+/// All mistakes of all these kinds come out of one call.
+pub fn analyse(sources: &SourceMap, root: FileId) -> Analysis {
+    let mut diagnostics = Vec::new();
+    let file = syntax::parse(root, sources.file(root).text(), &mut diagnostics);
+    let model = resolve::resolve(sources, root, &file, &mut diagnostics);
+    if let Some(space) = &model {
+        diagnostics.extend(check::check(space));
+    }
+    diagnostics.sort_by_key(|diagnostic| (diagnostic.span, diagnostic.code));
+    diagnostics.dedup();
+    Analysis { model, diagnostics }
+}

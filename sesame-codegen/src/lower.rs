@@ -1,0 +1,416 @@
+//! From the language's model to the plan of one campaign's runner. Pure, and total: every campaign of a checked space
+//! has a plan.
+//!
+//! What a campaign's plan holds:
+//! - messages, topics, nodes and requirements of the whole space;
+//! - operations: those its tests may hold, or those of the test it repeats;
+//! - known tests: those whose operations are all in the plan and begin before the campaign's end;
+//! - metrics: its objectives, those it observes, and those of all requirements and of the expectations of these tests.
+
+use sesame_dsl::model::{self, CampaignId, Id as _, Space};
+use sesame_dsl::units::Unit;
+use sesame_plan as plan;
+
+use crate::plan::{HookPlan, RunnerPlan};
+
+/// The plan of a campaign's runner. `source` is the `.sesame` file's name without its folder, `generator` the name and
+/// version of what generates.
+pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str) -> RunnerPlan {
+    let declared = &space.campaigns[campaign];
+    let selection = Selection::of(space, declared);
+    let (transport, simulator_crate) = match &space.simulator.transport {
+        model::Transport::InProcess { path, crate_folder, step_ns } => {
+            (plan::Transport::InProcess { path: path.clone(), step_ns: *step_ns }, crate_folder.clone())
+        }
+    };
+    let plan = plan::CampaignPlan {
+        schema: plan::SCHEMA,
+        generator: generator.to_owned(),
+        source: source.to_owned(),
+        space: space.declaration.name.clone(),
+        doc: space.declaration.doc.clone(),
+        simulator: plan::Simulator { name: space.simulator.declaration.name.clone(), transport },
+        messages: space.messages.values().map(message).collect(),
+        topics: space.topics.values().map(topic).collect(),
+        nodes: space.nodes.values().map(node).collect(),
+        metrics: selection.metrics.iter().map(|&id| metric(&space.metrics[id])).collect(),
+        requirements: space.requirements.values().map(|requirement| selection.requirement(requirement)).collect(),
+        operations: selection
+            .operations
+            .iter()
+            .map(|&id| operation(&space.operations[id], declared.end_after))
+            .collect(),
+        tests: selection.tests.iter().map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect(),
+        campaign: selection.campaign(space, declared),
+    };
+    RunnerPlan { plan, hooks: hooks(space), simulator_crate }
+}
+
+/// The parts of a space that are in a campaign's plan, in declaration order: a position here is the id there.
+struct Selection {
+    metrics: Vec<model::MetricId>,
+    operations: Vec<model::OperationId>,
+    tests: Vec<model::TestId>,
+}
+
+impl Selection {
+    fn of(space: &Space, campaign: &model::Campaign) -> Self {
+        let mut operations: Vec<model::OperationId> = match &campaign.search {
+            model::Search::Nsga2 { content, .. } | model::Search::Random { content, .. } => content.operations.clone(),
+            model::Search::Repeat { test, .. } => {
+                space.tests[*test].operations.iter().map(|operation| operation.operation).collect()
+            }
+        };
+        operations.sort();
+        operations.dedup();
+        let fits = |test: &model::Test| {
+            test.operations.iter().all(|it| operations.contains(&it.operation) && it.window.low < campaign.end_after)
+        };
+        let tests: Vec<model::TestId> = space.tests.iter().filter(|(_, test)| fits(test)).map(|(id, _)| id).collect();
+        let mut metrics: Vec<model::MetricId> = campaign.objectives.clone();
+        metrics.extend(&campaign.observed);
+        metrics.extend(space.requirements.values().map(|requirement| requirement.metric));
+        let expectations = tests.iter().flat_map(|&test| &space.tests[test].expectations);
+        metrics.extend(expectations.map(|expectation| expectation.metric));
+        metrics.sort();
+        metrics.dedup();
+        Selection { metrics, operations, tests }
+    }
+
+    fn metric(&self, id: model::MetricId) -> plan::MetricId {
+        plan::MetricId(position(&self.metrics, id))
+    }
+
+    fn operation(&self, id: model::OperationId) -> plan::OperationId {
+        plan::OperationId(position(&self.operations, id))
+    }
+
+    fn requirement(&self, requirement: &model::Requirement) -> plan::Requirement {
+        plan::Requirement {
+            name: requirement.declaration.name.clone(),
+            text: requirement.text.clone(),
+            metric: self.metric(requirement.metric),
+            bound: bound(requirement.bound),
+        }
+    }
+
+    fn test(&self, space: &Space, test: &model::Test, end_after: f64) -> plan::KnownTest {
+        let operations = test.operations.iter().map(|it| {
+            let within = within(&space.operations[it.operation], end_after);
+            plan::TestOperation {
+                operation: self.operation(it.operation),
+                // Nothing is active after the end, so a window cut there is the same test.
+                activation: plan::Activation::Time { start: it.window.low, end: it.window.high.min(within.end) },
+                parameters: it.choice.iter().map(choice).collect(),
+                draw_seed: it.draw_seed,
+            }
+        });
+        let expectations = test.expectations.iter().map(|expectation| plan::Expectation {
+            metric: self.metric(expectation.metric),
+            bound: bound(expectation.bound),
+        });
+        plan::KnownTest {
+            name: test.declaration.name.clone(),
+            doc: test.declaration.doc.clone(),
+            test: plan::Test { operations: operations.collect() },
+            expectations: expectations.collect(),
+        }
+    }
+
+    fn campaign(&self, space: &Space, campaign: &model::Campaign) -> plan::Campaign {
+        let (search, operations, count) = match &campaign.search {
+            model::Search::Nsga2 { content, population, evaluations } => (
+                plan::Search::Nsga2 { population: *population, evaluations: *evaluations },
+                &content.operations,
+                plan::Count { min: content.min, max: content.max },
+            ),
+            model::Search::Random { content, evaluations } => (
+                plan::Search::Random { evaluations: *evaluations },
+                &content.operations,
+                plan::Count { min: content.min, max: content.max },
+            ),
+            model::Search::Repeat { test, times } => {
+                let held = space.tests[*test].operations.len();
+                let held = u32::try_from(held).expect("a file holds fewer than 2^32 operations");
+                (
+                    plan::Search::Repeat { test: plan::KnownTestId(position(&self.tests, *test)), times: *times },
+                    &self.operations,
+                    plan::Count { min: held, max: held },
+                )
+            }
+        };
+        plan::Campaign {
+            name: campaign.declaration.name.clone(),
+            doc: campaign.declaration.doc.clone(),
+            objectives: campaign.objectives.iter().map(|&id| self.metric(id)).collect(),
+            operations: operations.iter().map(|&id| self.operation(id)).collect(),
+            count,
+            // The language has no other activation yet, and a repeated test brings its own.
+            activation: plan::ActivationMode::Time,
+            search,
+            seed: campaign.seed,
+            end_after: campaign.end_after,
+        }
+    }
+}
+
+/// The position of a selected item. The selection holds everything that is asked for, by its construction.
+fn position<I: Copy + Eq>(selected: &[I], id: I) -> u32 {
+    let position = selected.iter().position(|&selected| selected == id).expect("the plan holds what its parts mention");
+    u32::try_from(position).expect("a file holds fewer than 2^32 declarations")
+}
+
+fn hooks(space: &Space) -> Vec<HookPlan> {
+    let hooks = space.metrics.values().filter_map(|metric| match &metric.source {
+        model::MetricSource::Hook(topics) => Some(HookPlan {
+            metric: metric.declaration.name.clone(),
+            doc: metric.declaration.doc.clone(),
+            unit: unit(metric.unit.as_ref()),
+            direction: metric.direction.map(direction),
+            line: metric.declaration.line,
+            inputs: topics.iter().map(|&id| topic_id(id)).collect(),
+        }),
+        model::MetricSource::FuzzingTime | model::MetricSource::Last(_) => None,
+    });
+    hooks.collect()
+}
+
+fn message(message: &model::Message) -> plan::MessageType {
+    let fields = message.fields.iter().map(|field| plan::Field {
+        name: field.declaration.name.clone(),
+        doc: field.declaration.doc.clone(),
+        ty: ty(&field.ty),
+    });
+    plan::MessageType {
+        name: message.declaration.name.clone(),
+        doc: message.declaration.doc.clone(),
+        fields: fields.collect(),
+    }
+}
+
+fn ty(of: &model::Type) -> plan::Type {
+    match of {
+        model::Type::Bool => plan::Type::Bool,
+        model::Type::Int(it) => plan::Type::Int { unit: unit(it.as_ref()) },
+        model::Type::Real(it) => plan::Type::Real { unit: unit(it.as_ref()) },
+        model::Type::Text => plan::Type::Text,
+        model::Type::Point(it) => plan::Type::Point { unit: unit(it.as_ref()) },
+        model::Type::List(of) => plan::Type::List { of: Box::new(ty(of)) },
+        model::Type::Message(id) => plan::Type::Message { id: plan::MessageId(raw(id.index())) },
+    }
+}
+
+fn topic(topic: &model::Topic) -> plan::Topic {
+    plan::Topic {
+        name: topic.declaration.name.clone(),
+        doc: topic.declaration.doc.clone(),
+        paths: topic.paths.clone(),
+        ty: ty(&topic.ty),
+    }
+}
+
+fn node(node: &model::Node) -> plan::Node {
+    plan::Node {
+        name: node.declaration.name.clone(),
+        doc: node.declaration.doc.clone(),
+        publishes: node.publishes.iter().map(|&id| topic_id(id)).collect(),
+        subscribes: node.subscribes.iter().map(|&id| topic_id(id)).collect(),
+    }
+}
+
+fn metric(metric: &model::Metric) -> plan::Metric {
+    plan::Metric {
+        name: metric.declaration.name.clone(),
+        doc: metric.declaration.doc.clone(),
+        unit: unit(metric.unit.as_ref()),
+        direction: metric.direction.map(direction),
+        default: metric.default,
+        source: match &metric.source {
+            model::MetricSource::Hook(topics) => {
+                plan::MetricSource::Hook { topics: topics.iter().map(|&id| topic_id(id)).collect() }
+            }
+            model::MetricSource::FuzzingTime => plan::MetricSource::FuzzingTime,
+            model::MetricSource::Last(input) => plan::MetricSource::Last {
+                input: plan::FieldRef { topic: topic_id(input.topic), path: input.fields.clone() },
+            },
+        },
+        line: metric.declaration.line,
+    }
+}
+
+fn operation(operation: &model::Operation, end_after: f64) -> plan::Operation {
+    let kind = match &operation.kind {
+        model::OperationKind::RandomValue { mode, integer, .. } => plan::OperationKind::RandomValue {
+            path: operation.target.fields.clone(),
+            mode: match mode {
+                model::ValueMode::Absolute => plan::ValueMode::Absolute,
+                model::ValueMode::Offset => plan::ValueMode::Offset,
+            },
+            integer: *integer,
+        },
+        model::OperationKind::PacketLoss { .. } => plan::OperationKind::PacketLoss,
+        model::OperationKind::Latency { distribution, drain, .. } => plan::OperationKind::Latency {
+            distribution: match distribution {
+                model::Distribution::Fixed => plan::Distribution::Fixed,
+                model::Distribution::Uniform => plan::Distribution::Uniform,
+            },
+            drain: match drain {
+                model::Drain::Finish => plan::Drain::Finish,
+                model::Drain::Flush => plan::Drain::Flush,
+                model::Drain::Drop => plan::Drain::Drop,
+            },
+        },
+        model::OperationKind::Blackhole => plan::OperationKind::Blackhole,
+    };
+    let parameters = operation.parameter().into_iter().map(|parameter| plan::Parameter {
+        name: parameter.name.to_owned(),
+        unit: unit(parameter.unit.as_ref()),
+        low: parameter.range.low,
+        high: parameter.range.high,
+        shape: match parameter.shape {
+            model::Shape::Value => plan::Shape::Value,
+            model::Shape::Range => plan::Shape::Range,
+        },
+        integer: parameter.integer,
+    });
+    plan::Operation {
+        name: operation.declaration.name.clone(),
+        doc: operation.declaration.doc.clone(),
+        topic: topic_id(operation.topic()),
+        kind,
+        parameters: parameters.collect(),
+        within: within(operation, end_after),
+        priority: operation.priority,
+        inclusion: operation.inclusion,
+    }
+}
+
+/// The window of an operation; one without `within` may be active during the whole test.
+fn within(operation: &model::Operation, end_after: f64) -> plan::Span {
+    match operation.within {
+        Some(window) => plan::Span { start: window.low, end: window.high },
+        None => plan::Span { start: 0.0, end: end_after },
+    }
+}
+
+fn choice(choice: &model::Choice) -> plan::Choice {
+    match *choice {
+        model::Choice::Value(value) => plan::Choice::Value { value },
+        model::Choice::Range(range) => plan::Choice::Range { low: range.low, high: range.high },
+    }
+}
+
+fn bound(bound: model::Bound) -> plan::Bound {
+    match bound {
+        model::Bound::AtMost(value) => plan::Bound::AtMost { value },
+        model::Bound::Below(value) => plan::Bound::Below { value },
+        model::Bound::AtLeast(value) => plan::Bound::AtLeast { value },
+        model::Bound::Above(value) => plan::Bound::Above { value },
+        model::Bound::Equal(value) => plan::Bound::Equal { value },
+        model::Bound::Within(range) => plan::Bound::Within { low: range.low, high: range.high },
+    }
+}
+
+fn direction(direction: model::Direction) -> plan::Direction {
+    match direction {
+        model::Direction::Maximise => plan::Direction::Maximise,
+        model::Direction::Minimise => plan::Direction::Minimise,
+    }
+}
+
+fn unit(unit: Option<&Unit>) -> Option<String> {
+    unit.map(|unit| unit.text().to_owned())
+}
+
+fn topic_id(id: model::TopicId) -> plan::TopicId {
+    plan::TopicId(raw(id.index()))
+}
+
+fn raw(index: usize) -> u32 {
+    u32::try_from(index).expect("a file holds fewer than 2^32 declarations")
+}
+
+#[cfg(test)]
+mod tests {
+    use sesame_dsl::analyse;
+    use sesame_dsl::source::SourceMap;
+
+    use super::*;
+
+    const CELL: &str = r#"
+        space cell
+        system {
+          simulator sim = in_process "cell_sim::Cell" { crate "simulator"  step 20ms }
+          message Zone { name: text  level: real[mm] }
+          topic link = "link" : real[rad]
+          topic count = "count" : int
+          topic zones = "zones/{A,B}" : Zone
+        }
+        metric collisions maximise default 0 { hook on zones }
+        metric unused: real[m/s] { hook on link, zones }
+        metric seen = last(count)
+        metric time minimise = fuzzing_time()
+        requirement R1 "nothing is hit" = collisions <= 0
+        operation swing on link = random offset [-18deg, 18deg] within [0s, 1min]
+        operation lose on link = packet loss [0%, 50%]
+        operation recount on count = random absolute [-3, 3] priority 2 inclusion 40%
+        operation level on zones.level = random absolute [0m, 1m]
+        test early { lose loss 25% from 1s to 30s  expect seen > 3 }
+        test late { lose loss 25% from 20s to 21s }
+        campaign look { objectives time, collisions  operations recount, swing 1..3 per test
+                        search nsga2 { population 4  evaluations 8 }  end after 10s }
+        campaign again { repeat early 3 times { seed 9 }  observes time  end after 10s }
+    "#;
+
+    fn lowered(campaign: &str) -> RunnerPlan {
+        let mut sources = SourceMap::new();
+        let file = sources.add("cell.sesame", CELL);
+        let analysis = analyse(&sources, file);
+        let space = analysis.model.unwrap_or_else(|| panic!("{:#?}", analysis.diagnostics));
+        lower(&space, space.campaign(campaign).unwrap(), "cell.sesame", "sesamec 0.0.0")
+    }
+
+    #[test]
+    fn a_search_has_the_parts_it_needs_and_all_hooks() {
+        let RunnerPlan { plan, hooks, simulator_crate } = lowered("look");
+        let names: Vec<&str> = plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
+        assert_eq!(names, ["collisions", "time"]);
+        assert_eq!(plan.campaign.objectives, [plan::MetricId(1), plan::MetricId(0)]);
+        let names: Vec<&str> = plan.operations.iter().map(|operation| operation.name.as_str()).collect();
+        assert_eq!(names, ["swing", "recount"]);
+        assert_eq!(plan.campaign.operations, [plan::OperationId(1), plan::OperationId(0)]);
+        assert!(plan.tests.is_empty(), "the known tests use another operation");
+        let names: Vec<&str> = hooks.iter().map(|hook| hook.metric.as_str()).collect();
+        assert_eq!(names, ["collisions", "unused"]);
+        assert_eq!(simulator_crate.as_deref(), Some("simulator"));
+    }
+
+    #[test]
+    fn a_repetition_has_its_test_with_windows_cut_at_the_end() {
+        let RunnerPlan { plan, .. } = lowered("again");
+        assert_eq!(plan.tests.len(), 1, "the other test begins after the end");
+        assert_eq!(plan.campaign.search, plan::Search::Repeat { test: plan::KnownTestId(0), times: 3 });
+        assert_eq!(plan.campaign.seed, 9);
+        assert_eq!(plan.operations[0].within, plan::Span { start: 0.0, end: 10.0 });
+        assert_eq!(plan.tests[0].test.operations[0].activation, plan::Activation::Time { start: 1.0, end: 10.0 });
+        assert_eq!(plan.tests[0].test.operations[0].parameters, [plan::Choice::Value { value: 0.25 }]);
+        let names: Vec<&str> = plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
+        assert_eq!(names, ["collisions", "seen", "time"]);
+    }
+
+    #[test]
+    fn quantities_arrive_in_the_units_of_the_wire() {
+        let RunnerPlan { plan, .. } = lowered("look");
+        let swing = &plan.operations[0];
+        assert_eq!(swing.parameters[0].high, std::f64::consts::PI / 10.0);
+        assert_eq!(swing.within, plan::Span { start: 0.0, end: 60.0 });
+        assert_eq!(plan.operations[1].inclusion, 0.4);
+        assert!(plan.operations[1].parameters[0].integer);
+    }
+
+    #[test]
+    fn the_whole_plan_is_as_blessed() {
+        let plan = serde_json::to_string_pretty(&lowered("again").plan).unwrap();
+        insta::assert_snapshot!(plan);
+    }
+}

@@ -1,0 +1,92 @@
+//! For programs: one JSON object per line.
+
+use serde::Serialize;
+
+use crate::diagnostic::{Diagnostic, Severity};
+use crate::source::SourceMap;
+use crate::span::Span;
+
+/// Where something stands: bytes from 0, lines and columns (in characters) from 1; the end is exclusive.
+#[derive(Serialize)]
+struct Place<'a> {
+    file: &'a str,
+    start: Position,
+    end: Position,
+}
+
+#[derive(Serialize)]
+struct Position {
+    byte: u32,
+    line: u32,
+    column: u32,
+}
+
+#[derive(Serialize)]
+struct Label<'a> {
+    at: Place<'a>,
+    text: &'a str,
+}
+
+#[derive(Serialize)]
+struct Line<'a> {
+    code: &'static str,
+    severity: &'static str,
+    title: &'a str,
+    primary: Label<'a>,
+    secondary: Vec<Label<'a>>,
+    notes: &'a [String],
+    suggestions: Vec<Suggested<'a>>,
+}
+
+#[derive(Serialize)]
+struct Suggested<'a> {
+    message: &'a str,
+    edits: Vec<Edit<'a>>,
+}
+
+#[derive(Serialize)]
+struct Edit<'a> {
+    at: Place<'a>,
+    replacement: &'a str,
+}
+
+/// One JSON object per line and diagnostic.
+pub fn json(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
+    let place = |span: Span| {
+        let file = sources.file(span.file);
+        let position = |byte| {
+            let at = file.position(byte);
+            Position { byte, line: at.line, column: at.column }
+        };
+        Place { file: file.name(), start: position(span.lo), end: position(span.hi) }
+    };
+    let mut out = String::new();
+    for diagnostic in diagnostics {
+        let line = Line {
+            code: diagnostic.code.text(),
+            severity: match diagnostic.severity() {
+                Severity::Error => "error",
+                Severity::Warning => "warning",
+            },
+            title: &diagnostic.title,
+            primary: Label { at: place(diagnostic.span), text: &diagnostic.label },
+            secondary: diagnostic.secondary.iter().map(|(span, text)| Label { at: place(*span), text }).collect(),
+            notes: &diagnostic.notes,
+            suggestions: diagnostic
+                .suggestions
+                .iter()
+                .map(|suggestion| Suggested {
+                    message: &suggestion.message,
+                    edits: suggestion
+                        .edits
+                        .iter()
+                        .map(|(span, replacement)| Edit { at: place(*span), replacement })
+                        .collect(),
+                })
+                .collect(),
+        };
+        out.push_str(&serde_json::to_string(&line).expect("strings and numbers serialise"));
+        out.push('\n');
+    }
+    out
+}

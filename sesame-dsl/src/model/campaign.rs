@@ -1,0 +1,68 @@
+//! Campaigns: how tests are found and run.
+
+use super::{Declaration, MetricId, OperationId, TestId};
+
+/// A campaign.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Campaign {
+    /// Its name and doc comment.
+    pub declaration: Declaration,
+    /// What the search optimises, in written order; each has a direction. Empty exactly for a campaign that repeats.
+    pub objectives: Vec<MetricId>,
+    /// Metrics measured besides the objectives, those of all requirements, and those of expectations.
+    pub observed: Vec<MetricId>,
+    /// How its tests are found.
+    pub search: Search,
+    /// The one seed that decides everything. Default 1.
+    pub seed: u64,
+    /// Simulation time at which a test ends, in seconds; positive.
+    pub end_after: f64,
+}
+
+/// How the tests of a campaign are found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Search {
+    /// NSGA-II over tests of these operations.
+    Nsga2 {
+        /// What a test holds.
+        content: Content,
+        /// Tests per generation: even, at least 2.
+        population: u32,
+        /// Tests in total: at least `population`.
+        evaluations: u32,
+    },
+    /// Independent random tests of these operations.
+    Random {
+        /// What a test holds.
+        content: Content,
+        /// Tests in total: at least 1.
+        evaluations: u32,
+    },
+    /// One known test again and again.
+    Repeat {
+        /// Which.
+        test: TestId,
+        /// How often: at least 1.
+        times: u32,
+    },
+}
+
+/// What a searched test holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Content {
+    /// The operations it may hold, in written order; at least one, each once.
+    pub operations: Vec<OperationId>,
+    /// At least so many operations: 1 or more.
+    pub min: u32,
+    /// At most so many operations: `min` or more.
+    pub max: u32,
+    /// How tests switch their operations on and off.
+    pub activation: Activation,
+}
+
+/// How tests switch their operations on and off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Activation {
+    /// In windows of simulation time.
+    Time,
+}

@@ -1,0 +1,85 @@
+//! What is measured, and what must hold of it.
+
+use super::{Declaration, FieldPath, MetricId, TopicId};
+use crate::units::Unit;
+
+/// A number computed from the messages of a test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Metric {
+    /// Its name and doc comment.
+    pub declaration: Declaration,
+    /// The unit of its value; `None` for a plain number.
+    pub unit: Option<Unit>,
+    /// Which way an objective on it goes; a metric that is an objective of some campaign has one.
+    pub direction: Option<Direction>,
+    /// The value of a test in which it was never set, in its unit.
+    pub default: Option<f64>,
+    /// Where its value comes from.
+    pub source: MetricSource,
+}
+
+/// Which end of a metric is of interest to a tester.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// Larger is more dangerous.
+    Maximise,
+    /// Smaller is more dangerous (or cheaper).
+    Minimise,
+}
+
+/// Where a metric's value comes from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum MetricSource {
+    /// The user's Rust code, called with each message of these topics; at least one, each once.
+    Hook(Vec<TopicId>),
+    /// `fuzzing_time()`: the sum over operations of observed active time, in seconds.
+    FuzzingTime,
+    /// `last(…)`: the last value received.
+    Last(FieldPath),
+}
+
+/// What must hold in every test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Requirement {
+    /// Its name and doc comment.
+    pub declaration: Declaration,
+    /// Its sentence.
+    pub text: String,
+    /// The metric it bounds.
+    pub metric: MetricId,
+    /// The bound, in the metric's unit.
+    pub bound: Bound,
+}
+
+/// What must hold of a metric's value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bound {
+    /// `<=`
+    AtMost(f64),
+    /// `<`
+    Below(f64),
+    /// `>=`
+    AtLeast(f64),
+    /// `>`
+    Above(f64),
+    /// `==`
+    Equal(f64),
+    /// `in [low, high]`, both ends included.
+    Within(Range),
+}
+
+/// A range of numbers, `low <= high`, both ends included.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+impl Range {
+    /// Whether all of another range lies in this one.
+    pub fn contains(self, other: Range) -> bool {
+        self.low <= other.low && other.high <= self.high
+    }
+}

@@ -1,0 +1,98 @@
+//! The system under test: simulator, messages, topics, nodes.
+
+use super::{Declaration, MessageId, TopicId};
+use crate::units::Unit;
+
+/// The simulator under test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulator {
+    /// Its name and doc comment.
+    pub declaration: Declaration,
+    /// How a runner reaches it.
+    pub transport: Transport,
+}
+
+/// How a runner exchanges messages with a simulator.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Transport {
+    /// A Rust type linked into the runner, stepped in lock-step with the relay.
+    InProcess {
+        /// Path of the type: two or more identifiers joined by `::`, the first being the crate's name.
+        path: String,
+        /// The crate's folder as written, relative to the `.sesame` file; `None` when the crate comes from the space's
+        /// `sesame.toml`.
+        crate_folder: Option<String>,
+        /// Simulation time of one step, in nanoseconds; positive.
+        step_ns: u64,
+    },
+}
+
+/// A named message type.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Message {
+    /// Its name and doc comment.
+    pub declaration: Declaration,
+    /// Its fields, in declaration order; names are unique among them.
+    pub fields: Vec<Field>,
+}
+
+/// One field of a message type. Its name is the one on the wire, so a keyword of the language is allowed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    /// Its name and doc comment.
+    pub declaration: Declaration,
+    /// Its type.
+    pub ty: Type,
+}
+
+/// The type of a field or topic.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Type {
+    /// True or false.
+    Bool,
+    /// A whole number, in a unit if one is declared.
+    Int(Option<Unit>),
+    /// A real number, in a unit if one is declared.
+    Real(Option<Unit>),
+    /// Text.
+    Text,
+    /// A point in space, in a unit if one is declared.
+    Point(Option<Unit>),
+    /// Any number of values of one type.
+    List(Box<Type>),
+    /// A message type.
+    Message(MessageId),
+}
+
+/// A topic, or a group of topics of one type.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Topic {
+    /// Its name and doc comment.
+    pub declaration: Declaration,
+    /// The path as written, for example `safetyzones/{Z1,Z2}`.
+    pub written: String,
+    /// Names on the wire: one, or the members of the group in written order. No other topic has any of them.
+    pub paths: Vec<String>,
+    /// What it carries.
+    pub ty: Type,
+}
+
+/// A node: a program that publishes and subscribes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Node {
+    /// Its name and doc comment.
+    pub declaration: Declaration,
+    /// Topics it publishes.
+    pub publishes: Vec<TopicId>,
+    /// Topics it subscribes to.
+    pub subscribes: Vec<TopicId>,
+}
+
+/// A value inside the messages of a topic.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FieldPath {
+    /// The topic.
+    pub topic: TopicId,
+    /// Field names from the message inwards; empty for a topic that carries the value itself.
+    pub fields: Vec<String>,
+}

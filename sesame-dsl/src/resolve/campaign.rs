@@ -1,0 +1,298 @@
+//! Campaigns.
+
+use super::{Kind, Resolver};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::model::{self, Activation, Content, Id as _, MetricId, OperationId, Search, TestId};
+use crate::span::Span;
+use crate::syntax::ast::{self, Count, Strategy};
+use crate::units::Unit;
+
+/// The seed of a campaign that names none.
+const DEFAULT_SEED: u64 = 1;
+
+impl<'a> Resolver<'a> {
+    pub(super) fn campaigns(&mut self) -> Vec<Option<model::Campaign>> {
+        let file = self.file;
+        file.campaigns.iter().map(|campaign| self.campaign(campaign)).collect()
+    }
+
+    fn campaign(&mut self, campaign: &'a ast::Campaign) -> Option<model::Campaign> {
+        let end_after = self.end(campaign);
+        let objectives = self.objectives(campaign);
+        let observed = match self.single(&campaign.observes, "observes") {
+            Some(names) => self.find_all(names, Kind::Metric),
+            None => Some(vec![]),
+        };
+        self.at_most_one(&campaign.activates, "activate");
+        let searches: Vec<Span> = campaign.searches.iter().map(|search| search.span).collect();
+        self.at_most_one(&searches, "search");
+        let repeats: Vec<Span> = campaign.repeats.iter().map(|repeat| repeat.span).collect();
+        self.at_most_one(&repeats, "repeat");
+        let content = self.content(campaign, end_after);
+        let (search, seed) = match (campaign.searches.first(), campaign.repeats.first()) {
+            (_, Some(repeat)) => {
+                self.only_repeats(campaign, repeat);
+                let search = self.repeat(repeat, end_after);
+                (search, self.seed(&repeat.seed))
+            }
+            (Some(search), None) => (self.search(campaign, search, content), self.seed(&search.seed)),
+            (None, None) => {
+                if !campaign.damaged {
+                    let title = format!("campaign `{}` neither searches nor repeats", campaign.head.name.text);
+                    let diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, campaign.head.name.span, title)
+                        .label("add `search` or `repeat`")
+                        .note("for example `search nsga2 { population 10  evaluations 200  seed 42 }`");
+                    self.report(diagnostic);
+                }
+                return None;
+            }
+        };
+        let metric_ids = |found: Vec<usize>| found.into_iter().map(MetricId::from_index).collect();
+        Some(model::Campaign {
+            declaration: self.declaration(&campaign.head),
+            objectives: metric_ids(objectives?),
+            observed: metric_ids(observed?),
+            search: search?,
+            seed: seed?,
+            end_after: end_after?,
+        })
+    }
+
+    fn end(&mut self, campaign: &'a ast::Campaign) -> Option<f64> {
+        let Some(end) = self.single(&campaign.ends, "end after") else {
+            if !campaign.damaged {
+                self.missing(&campaign.head.name, "the time at which its tests end", "end after 70s");
+            }
+            return None;
+        };
+        let value = self.value(end, Some(&Unit::seconds()), "the end of a test")?;
+        if value > 0.0 {
+            return Some(value);
+        }
+        let title = format!("a test cannot end after `{}`", self.text(end.span));
+        self.report(Diagnostic::new(Code::OUT_OF_RANGE, end.span, title).label("expected more than 0s"));
+        None
+    }
+
+    fn objectives(&mut self, campaign: &'a ast::Campaign) -> Option<Vec<usize>> {
+        let Some(names) = self.single(&campaign.objectives, "objectives") else {
+            if campaign.repeats.is_empty() && !campaign.searches.is_empty() && !campaign.damaged {
+                self.missing(&campaign.head.name, "its objectives", "objectives fuzzing_time, collision_occurrence");
+            }
+            return Some(vec![]);
+        };
+        let found = self.find_all(names, Kind::Metric);
+        let mut complete = true;
+        // A repetition optimises nothing, which is reported as that.
+        for name in names.iter().filter(|_| campaign.repeats.is_empty()) {
+            let Some(definition) = self.names.get(name.text.as_str()).copied() else { continue };
+            if definition.kind != Kind::Metric {
+                continue;
+            }
+            let Some(metric) = &self.metrics[definition.index] else { continue };
+            if metric.direction.is_some() {
+                continue;
+            }
+            complete = false;
+            let declared = &self.file.metrics[definition.index];
+            let at = declared.ty.as_ref().map_or(declared.head.name.span, |ty| ty.span).end();
+            let diagnostic =
+                Diagnostic::new(Code::NO_DIRECTION, name.span, format!("objective `{}` has no direction", name.text))
+                    .label("is more of it of interest, or less?")
+                    .also(declared.head.name.span, "the metric is declared here")
+                    .suggest("search for large values", at, " maximise")
+                    .suggest("search for small values", at, " minimise");
+            self.report(diagnostic);
+        }
+        found.filter(|_| complete)
+    }
+
+    /// What the tests of a search hold.
+    fn content(&mut self, campaign: &'a ast::Campaign, end_after: Option<f64>) -> Option<Content> {
+        let spans: Vec<Span> = campaign.operations.iter().map(|it| it.span).collect();
+        self.at_most_one(&spans, "operations");
+        let Some(operations) = campaign.operations.first() else {
+            if campaign.repeats.is_empty() && !campaign.searches.is_empty() && !campaign.damaged {
+                self.missing(&campaign.head.name, "the operations of its tests", "operations jitter 1..5 per test");
+            }
+            return None;
+        };
+        let found = self.find_all(&operations.names, Kind::Operation);
+        for name in &operations.names {
+            let Some(definition) = self.names.get(name.text.as_str()).copied() else { continue };
+            if definition.kind == Kind::Operation
+                && let Some(end) = end_after
+            {
+                self.window_and_end(name, definition.index, end, campaign);
+            }
+        }
+        let min = self.count(operations.min, 1, "a test holds");
+        let max = self.count(operations.max, 1, "a test holds");
+        let [min, max] = [min?, max?];
+        if min > max {
+            let span = operations.min.span.to(operations.max.span);
+            let mut diagnostic = Diagnostic::new(Code::BAD_COUNT, span, format!("`{min}..{max}` is reversed"))
+                .label("the smaller number comes first");
+            diagnostic = diagnostic.suggest("swap them", span, format!("{max}..{min}"));
+            self.report(diagnostic);
+            return None;
+        }
+        let operations = found?.into_iter().map(OperationId::from_index).collect();
+        Some(Content { operations, min, max, activation: Activation::Time })
+    }
+
+    /// Compares the permitted window of an operation with the end of a campaign that uses it.
+    fn window_and_end(&mut self, name: &ast::Name, index: usize, end: f64, campaign: &'a ast::Campaign) {
+        let Some(within) = self.operations[index].as_ref().and_then(|operation| operation.within) else { return };
+        let Some(body) = &self.file.operations[index].body else { return };
+        let Some((_, written)) = body.within.first() else { return };
+        let Some((_, end_written)) = campaign.ends.first() else { return };
+        let end_text = self.text(end_written.span);
+        let diagnostic = if within.low >= end {
+            let title = format!("`{}` can never be active in campaign `{}`", name.text, campaign.head.name.text);
+            Diagnostic::new(Code::AFTER_THE_END, name.span, title)
+                .label(format!("permitted only after the campaign's end at {end_text}"))
+        } else if within.high > end {
+            let title = format!("`{}` may go on after the end of campaign `{}`", name.text, campaign.head.name.text);
+            Diagnostic::new(Code::OUTLASTS_THE_END, name.span, title)
+                .label(format!("tests end at {end_text}; what is later never happens"))
+        } else {
+            return;
+        };
+        self.report(diagnostic.also(written.span, "its permitted window").also(end_written.span, "the end"));
+    }
+
+    fn search(
+        &mut self,
+        campaign: &'a ast::Campaign,
+        search: &'a ast::Search,
+        content: Option<Content>,
+    ) -> Option<Search> {
+        let strategy = search.strategy?;
+        let population = self.single(&search.population, "population").copied();
+        let evaluations = self.single(&search.evaluations, "evaluations").copied();
+        if evaluations.is_none() && !search.damaged {
+            self.missing(&campaign.head.name, "the number of tests to evaluate", "evaluations 200");
+        }
+        let found = evaluations.and_then(|count| self.count(count, 1, "a search evaluates"));
+        match strategy {
+            Strategy::Random => {
+                if let Some((span, _)) = search.population.first() {
+                    let title = "a random search has no setting `population`";
+                    let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, *span, title)
+                        .label("leave it out")
+                        .note("its settings are `evaluations` and `seed`");
+                    self.report(diagnostic);
+                    return None;
+                }
+                Some(Search::Random { content: content?, evaluations: found? })
+            }
+            Strategy::Nsga2 => {
+                let Some(count) = population else {
+                    if !search.damaged {
+                        self.missing(&campaign.head.name, "the size of its population", "population 10");
+                    }
+                    return None;
+                };
+                let size = self.count(count, 2, "a population has")?;
+                if size % 2 == 1 {
+                    let title = format!("a population of {size} is odd");
+                    let diagnostic = Diagnostic::new(Code::BAD_COUNT, count.span, title)
+                        .label("expected an even number: children are made in pairs")
+                        .suggest("make it even", count.span, (size + 1).to_string());
+                    self.report(diagnostic);
+                    return None;
+                }
+                let found = found?;
+                if found < size {
+                    let title = format!("{found} evaluations do not fill a population of {size}");
+                    let span = evaluations.map_or(count.span, |count| count.span);
+                    let diagnostic = Diagnostic::new(Code::BAD_COUNT, span, title)
+                        .label(format!("expected at least {size}"))
+                        .also(count.span, "the population");
+                    self.report(diagnostic);
+                    return None;
+                }
+                Some(Search::Nsga2 { content: content?, population: size, evaluations: found })
+            }
+        }
+    }
+
+    fn repeat(&mut self, repeat: &'a ast::Repeat, end_after: Option<f64>) -> Option<Search> {
+        let times = self.count(repeat.times, 1, "a test is repeated");
+        let index = self.find(&repeat.test, Kind::Test)?;
+        if let Some(end) = end_after {
+            self.test_and_end(index, end, repeat);
+        }
+        Some(Search::Repeat { test: TestId::from_index(index), times: times? })
+    }
+
+    /// Compares the windows of a repeated test with the campaign's end.
+    fn test_and_end(&mut self, index: usize, end: f64, repeat: &ast::Repeat) {
+        let Some(test) = self.tests[index].clone() else { return };
+        let written = &self.file.tests[index].operations;
+        for (operation, written) in test.operations.iter().zip(written) {
+            let Some(window) = &written.window else { continue };
+            let name = &written.operation.text;
+            let diagnostic = if operation.window.low >= end {
+                let title = format!("`{name}` is never active: the tests of the campaign are over by then");
+                Diagnostic::new(Code::AFTER_THE_END, window.span, title)
+                    .label(format!("begins after the end at {end}s"))
+            } else if operation.window.high > end {
+                let title = format!("`{name}` goes on after the end of the campaign that repeats this test");
+                Diagnostic::new(Code::OUTLASTS_THE_END, window.span, title)
+                    .label(format!("tests end at {end}s; what is later never happens"))
+            } else {
+                continue;
+            };
+            self.report(diagnostic.also(repeat.test.span, "repeated here"));
+        }
+    }
+
+    fn only_repeats(&mut self, campaign: &'a ast::Campaign, repeat: &ast::Repeat) {
+        let clauses = [
+            (campaign.searches.first().map(|search| search.span), "search"),
+            (campaign.operations.first().map(|operations| operations.span), "operations"),
+            (campaign.objectives.first().map(|(span, _)| *span), "objectives"),
+        ];
+        for (span, word) in clauses {
+            let Some(span) = span else { continue };
+            let title = format!("a campaign that repeats a test has no `{word}`");
+            let mut diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, span, title)
+                .label("a campaign either searches or repeats")
+                .also(repeat.span, "repeats here");
+            if word == "objectives" {
+                diagnostic = diagnostic.suggest("measure them with", span, "observes");
+            }
+            self.report(diagnostic);
+        }
+    }
+
+    fn seed(&mut self, clauses: &'a [(Span, Count)]) -> Option<u64> {
+        match self.single(clauses, "seed") {
+            Some(seed) => seed.value,
+            None => Some(DEFAULT_SEED),
+        }
+    }
+
+    /// A count of at least `min`. `what` begins a sentence, for example "a test holds".
+    fn count(&mut self, count: Count, min: u32, what: &str) -> Option<u32> {
+        let value = count.value?;
+        match u32::try_from(value) {
+            Ok(found) if found >= min => Some(found),
+            Ok(_) => {
+                let times = if what.ends_with("repeated") { " times" } else { "" };
+                let title = format!("{what} at least {min}{times}, not {value}{times}");
+                let diagnostic = Diagnostic::new(Code::BAD_COUNT, count.span, title);
+                self.report(diagnostic.label(format!("expected {min} or more")));
+                None
+            }
+            Err(_) => {
+                let title = format!("`{value}` is too large a count");
+                let diagnostic = Diagnostic::new(Code::BAD_NUMBER, count.span, title);
+                self.report(diagnostic.label(format!("expected at most {}", u32::MAX)));
+                None
+            }
+        }
+    }
+}

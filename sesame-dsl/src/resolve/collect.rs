@@ -1,0 +1,142 @@
+//! Who is called what; doubles; what a space cannot do without.
+
+use std::collections::BTreeMap;
+
+use heck::{ToSnakeCase as _, ToUpperCamelCase as _};
+
+use super::{Definition, Kind, Resolver};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::span::Span;
+use crate::syntax::ast::{Head, Simulator, System};
+
+impl<'a> Resolver<'a> {
+    pub(super) fn collect(&mut self) {
+        let mut heads = self.heads();
+        heads.sort_by_key(|(_, _, head)| head.name.span);
+        for &(kind, index, head) in &heads {
+            let name = head.name.text.as_str();
+            let Some(first) = self.names.get(name).copied() else {
+                self.names.insert(name, Definition { kind, index, span: head.name.span });
+                continue;
+            };
+            let mut diagnostic =
+                Diagnostic::new(Code::DEFINED_TWICE, head.name.span, format!("`{name}` is defined twice"))
+                    .label(format!("here as {}", kind.with_article()))
+                    .also(first.span, format!("first defined here, as {}", first.kind.with_article()));
+            if kind != first.kind {
+                diagnostic = diagnostic.note("a name means one thing in a space");
+            }
+            self.report(diagnostic);
+        }
+        let broken = self.file.broken.iter().map(|name| name.text.as_str());
+        self.silent.extend(broken);
+        self.collisions(&heads);
+        self.required();
+    }
+
+    fn heads(&self) -> Vec<(Kind, usize, &'a Head)> {
+        let file = self.file;
+        let mut heads: Vec<(Kind, usize, &'a Head)> = Vec::new();
+        let mut add = |kind, kind_heads: Vec<&'a Head>| {
+            heads.extend(kind_heads.into_iter().enumerate().map(|(index, head)| (kind, index, head)));
+        };
+        add(Kind::Simulator, self.simulators().map(|it| &it.head).collect());
+        add(Kind::Message, self.ast_messages().map(|it| &it.head).collect());
+        add(Kind::Topic, self.ast_topics().map(|it| &it.head).collect());
+        add(Kind::Node, self.ast_nodes().map(|it| &it.head).collect());
+        add(Kind::Metric, file.metrics.iter().map(|it| &it.head).collect());
+        add(Kind::Requirement, file.requirements.iter().map(|it| &it.head).collect());
+        add(Kind::Operation, file.operations.iter().map(|it| &it.head).collect());
+        add(Kind::Test, file.tests.iter().map(|it| &it.head).collect());
+        add(Kind::Campaign, file.campaigns.iter().map(|it| &it.head).collect());
+        heads
+    }
+
+    pub(super) fn simulators(&self) -> impl Iterator<Item = &'a Simulator> + use<'a> {
+        self.file.systems.iter().flat_map(|system| &system.simulators)
+    }
+
+    /// Names that differ in the file but meet in the generated code or on a disk.
+    fn collisions(&mut self, heads: &[(Kind, usize, &'a Head)]) {
+        let mut taken: BTreeMap<(&str, String), (&str, Span)> = BTreeMap::new();
+        for (kind, _, head) in heads {
+            let name = head.name.text.as_str();
+            let (what, generated) = match kind {
+                // A metric is a module and a file as well as a type; equal camel case implies the others' equality but
+                // for digits, so both are looked at.
+                Kind::Metric => ("file and module", name.to_snake_case()),
+                Kind::Message => ("type", name.to_upper_camel_case()),
+                Kind::Topic => ("function suffix", name.to_snake_case()),
+                Kind::Campaign => ("folder", name.to_ascii_lowercase()),
+                _ => continue,
+            };
+            let mut keys = vec![(what, generated)];
+            if *kind == Kind::Metric {
+                keys.push(("hook type", name.to_upper_camel_case()));
+            }
+            for (what, generated) in keys {
+                match taken.get(&(what, generated.clone())) {
+                    // The same name twice is reported as that.
+                    Some((first, _)) if *first == name => break,
+                    Some(&(first, span)) => {
+                        let title = format!("`{name}` and `{first}` meet in the generated code");
+                        let diagnostic = Diagnostic::new(Code::GENERATED_COLLISION, head.name.span, title)
+                            .label(format!("its {what} would be `{generated}`"))
+                            .also(span, "and so would this one's");
+                        self.report(diagnostic);
+                        break;
+                    }
+                    None => {
+                        taken.insert((what, generated), (name, head.name.span));
+                    }
+                }
+            }
+        }
+    }
+
+    fn required(&mut self) {
+        let start = Span { file: self.root, lo: 0, hi: 0 };
+        let file = self.file;
+        if file.spaces.is_empty() && !file.damaged {
+            let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, start, "this file names no space")
+                .label("expected `space` and a name")
+                .note("for example `space kuka_cell`");
+            self.report(diagnostic);
+        }
+        let spaces: Vec<Span> = file.spaces.iter().map(|head| head.name.span).collect();
+        self.only_one(&spaces, "space");
+        let systems: Vec<Span> = file.systems.iter().map(|system| system.span).collect();
+        self.only_one(&systems, "system");
+        let simulators: Vec<Span> = self.simulators().map(|simulator| simulator.head.name.span).collect();
+        self.only_one(&simulators, "simulator");
+        match file.systems.first() {
+            None if !file.damaged => {
+                let at = spaces.first().copied().unwrap_or(start);
+                let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, at, "this space has no system")
+                    .label("nothing says what is tested")
+                    .note("a `system { … }` declares simulator, messages, topics and nodes");
+                self.report(diagnostic);
+            }
+            Some(System { span, damaged: false, .. }) if simulators.is_empty() => {
+                let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, *span, "this system has no simulator")
+                    .label("nothing runs it")
+                    .note(
+                        "for example `simulator cell = in_process \"my_sim::Cell\" { crate \"simulator\"  step 20ms }`",
+                    );
+                self.report(diagnostic);
+            }
+            _ => {}
+        }
+    }
+
+    fn only_one(&mut self, spans: &[Span], what: &str) {
+        for &again in spans.iter().skip(1) {
+            let holder = if what == "space" { "a file" } else { "a space" };
+            let title = format!("{holder} has one {what}, and this is another");
+            let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, again, title)
+                .label("remove it, or move it to a file of its own")
+                .also(spans[0], "the first is here");
+            self.report(diagnostic);
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Metrics and requirements.
+
+use super::{Kind, Resolver};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::model::{self, Bound, Id as _, MetricId, MetricSource, TopicId, Type};
+use crate::syntax::ast::{self, Comparison, Name};
+use crate::units::Unit;
+
+impl<'a> Resolver<'a> {
+    pub(super) fn metrics(&mut self) {
+        for metric in &self.file.metrics {
+            let resolved = self.metric(metric);
+            self.metrics.push(resolved);
+        }
+    }
+
+    fn metric(&mut self, metric: &'a ast::Metric) -> Option<model::Metric> {
+        let name = &metric.head.name;
+        let direction = self.single(&metric.directions, "maximise` or `minimise").map(|direction| match direction {
+            ast::Direction::Maximise => model::Direction::Maximise,
+            ast::Direction::Minimise => model::Direction::Minimise,
+        });
+        let default = self.single(&metric.defaults, "default");
+        // Both are looked at, so that a mistake in one does not hide one in the other or in the default.
+        let (source, ty): (Option<MetricSource>, Option<Type>) = match metric.source.as_ref()? {
+            ast::MetricSource::Hook { hooks, damaged } => {
+                (self.hook(name, hooks, *damaged), self.hook_type(metric.ty.as_ref()))
+            }
+            ast::MetricSource::FuzzingTime => {
+                self.no_type(metric.ty.as_ref(), "`fuzzing_time()` is in seconds");
+                (Some(MetricSource::FuzzingTime), Some(Type::Real(Some(Unit::seconds()))))
+            }
+            ast::MetricSource::Last(path) => {
+                self.no_type(metric.ty.as_ref(), "the unit of `last(…)` is that of the topic or field");
+                match self.last(path) {
+                    Some((source, unit)) => (Some(source), Some(Type::Real(unit))),
+                    None => (None, None),
+                }
+            }
+        };
+        let Type::Real(unit) = ty? else { return None };
+        let default = match default {
+            Some(quantity) => Some(self.value(quantity, unit.as_ref(), &format!("metric `{}`", name.text))?),
+            None => None,
+        };
+        Some(model::Metric { declaration: self.declaration(&metric.head), unit, direction, default, source: source? })
+    }
+
+    fn hook(
+        &mut self,
+        name: &Name,
+        hooks: &'a [(crate::span::Span, Vec<Name>)],
+        damaged: bool,
+    ) -> Option<MetricSource> {
+        let Some(topics) = self.single(hooks, "hook on") else {
+            if !damaged {
+                self.missing(name, "the topics its hook hears", "hook on zones");
+            }
+            return None;
+        };
+        let topics = self.find_all(topics, Kind::Topic)?;
+        Some(MetricSource::Hook(topics.into_iter().map(TopicId::from_index).collect()))
+    }
+
+    /// The type of a hook's metric, which is `Type::Real`.
+    fn hook_type(&mut self, ty: Option<&'a ast::Type>) -> Option<Type> {
+        let Some(ty) = ty else { return Some(Type::Real(None)) };
+        match self.type_of(ty)? {
+            real @ Type::Real(_) => Some(real),
+            other => {
+                let title = format!("a metric is a real number, not {}", super::system::type_in_words(&other));
+                let diagnostic = Diagnostic::new(Code::WRONG_TYPE, ty.span, title)
+                    .label("expected `real`, with a unit if it has one")
+                    .suggest("make it `real`", ty.span, "real");
+                self.report(diagnostic);
+                None
+            }
+        }
+    }
+
+    fn no_type(&mut self, ty: Option<&'a ast::Type>, why: &str) {
+        if let Some(ty) = ty {
+            let title = "this metric's type is given by its formula";
+            self.report(Diagnostic::new(Code::WRONG_TYPE, ty.span, title).label("leave it out").note(why));
+        }
+    }
+
+    fn last(&mut self, path: &'a ast::Path) -> Option<(MetricSource, Option<Unit>)> {
+        let (found, unit, _) = self.number_field(path, "`last(…)`")?;
+        let members = self.system.topics[found.topic.index()].as_ref().map_or(0, |topic| topic.paths.len());
+        if members > 1 {
+            let title = "`last(…)` of a group of topics is not supported yet by this version of sesamec";
+            let diagnostic = Diagnostic::new(Code::NOT_SUPPORTED, path.span, title)
+                .label(format!("`{}` is a group of {members}", path.topic.text))
+                .note("declare the member you mean as a topic of its own");
+            self.report(diagnostic);
+            return None;
+        }
+        Some((MetricSource::Last(found), unit))
+    }
+
+    pub(super) fn requirements(&mut self) -> Vec<Option<model::Requirement>> {
+        let file = self.file;
+        let requirements = file.requirements.iter().map(|requirement| {
+            let (metric, bound) = self.bound(&requirement.metric, &requirement.bound)?;
+            let text = requirement.text.text.clone();
+            Some(model::Requirement { declaration: self.declaration(&requirement.head), text, metric, bound })
+        });
+        requirements.collect()
+    }
+
+    /// A bound on a metric, in the metric's unit.
+    pub(super) fn bound(&mut self, name: &'a Name, bound: &'a ast::Bound) -> Option<(MetricId, Bound)> {
+        let index = self.find(name, Kind::Metric)?;
+        let unit = self.metrics[index].as_ref()?.unit.clone();
+        let what = format!("metric `{}`", name.text);
+        let bound = match bound {
+            ast::Bound::Within(range) => Bound::Within(self.range(range, unit.as_ref(), &what)?),
+            ast::Bound::Compare(comparison, quantity) => {
+                let value = self.value(quantity, unit.as_ref(), &what)?;
+                match comparison {
+                    Comparison::AtMost => Bound::AtMost(value),
+                    Comparison::Below => Bound::Below(value),
+                    Comparison::AtLeast => Bound::AtLeast(value),
+                    Comparison::Above => Bound::Above(value),
+                    Comparison::Equal => Bound::Equal(value),
+                }
+            }
+        };
+        Some((MetricId::from_index(index), bound))
+    }
+}

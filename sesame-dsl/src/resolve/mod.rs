@@ -1,0 +1,267 @@
+//! From syntax to model, in passes:
+//!
+//! 1. [`collect`] has who is called what, doubles, and what a space cannot do without
+//! 2. [`system`] has message types (in an order in which each follows those it contains), topics, nodes, the simulator
+//! 3. [`measure`] has metrics and requirements
+//! 4. [`fuzz`] has operations and known tests
+//! 5. [`campaign`] has campaigns
+//!
+//! Each pass reports all it finds. A declaration with a mistake is `None` from then on, and whoever mentions it says
+//! nothing: so one mistake is one diagnostic.
+
+mod campaign;
+mod collect;
+mod fuzz;
+mod measure;
+mod quantity;
+mod system;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::diagnostic::{Code, Diagnostic, Severity};
+use crate::model::{self, Arena, Declaration, Id, Space};
+use crate::similar::most_similar;
+use crate::source::SourceMap;
+use crate::span::{FileId, Span};
+use crate::syntax::ast::{self, Name};
+
+/// Resolves a file. `None` exactly when there is an error, be it in `diagnostics` before or after.
+pub(crate) fn resolve(
+    sources: &SourceMap,
+    root: FileId,
+    file: &ast::File,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<Space> {
+    let mut resolver = Resolver {
+        sources,
+        root,
+        file,
+        diagnostics,
+        names: BTreeMap::new(),
+        silent: BTreeSet::new(),
+        system: SystemPart::default(),
+        metrics: Vec::new(),
+        operations: Vec::new(),
+        tests: Vec::new(),
+    };
+    resolver.collect();
+    let simulator = resolver.system();
+    resolver.metrics();
+    let requirements = resolver.requirements();
+    resolver.operations();
+    resolver.tests();
+    let campaigns = resolver.campaigns();
+
+    let Resolver { system, metrics, operations, tests, diagnostics, .. } = resolver;
+    if diagnostics.iter().any(|diagnostic| diagnostic.severity() == Severity::Error) {
+        return None;
+    }
+    // Without an error every declaration is there.
+    Some(Space {
+        declaration: declaration(sources, file.spaces.first()?),
+        simulator: simulator?,
+        messages: arena(system.messages)?,
+        topics: arena(system.topics)?,
+        nodes: arena(system.nodes)?,
+        metrics: arena(metrics)?,
+        requirements: arena(requirements)?,
+        operations: arena(operations)?,
+        tests: arena(tests)?,
+        campaigns: arena(campaigns)?,
+    })
+}
+
+fn arena<I: Id, T>(items: Vec<Option<T>>) -> Option<Arena<I, T>> {
+    let mut arena = Arena::new();
+    for item in items {
+        arena.push(item?);
+    }
+    Some(arena)
+}
+
+fn declaration(sources: &SourceMap, head: &ast::Head) -> Declaration {
+    Declaration {
+        name: head.name.text.clone(),
+        span: head.name.span,
+        line: sources.position(head.name.span).line,
+        doc: head.doc.clone(),
+    }
+}
+
+/// What a name can be that of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Simulator,
+    Message,
+    Topic,
+    Node,
+    Metric,
+    Requirement,
+    Operation,
+    Test,
+    Campaign,
+}
+
+impl Kind {
+    fn word(self) -> &'static str {
+        match self {
+            Kind::Simulator => "simulator",
+            Kind::Message => "message",
+            Kind::Topic => "topic",
+            Kind::Node => "node",
+            Kind::Metric => "metric",
+            Kind::Requirement => "requirement",
+            Kind::Operation => "operation",
+            Kind::Test => "test",
+            Kind::Campaign => "campaign",
+        }
+    }
+
+    fn with_article(self) -> String {
+        let article = if self == Kind::Operation { "an" } else { "a" };
+        format!("{article} {}", self.word())
+    }
+}
+
+/// What a name stands for: the position among the declarations of its kind.
+#[derive(Debug, Clone, Copy)]
+struct Definition {
+    kind: Kind,
+    index: usize,
+    span: Span,
+}
+
+#[derive(Default)]
+struct SystemPart {
+    /// In the order of ids, which is not that of the file.
+    messages: Vec<Option<model::Message>>,
+    /// Per message in the order of the file: its id.
+    message_ids: Vec<model::MessageId>,
+    topics: Vec<Option<model::Topic>>,
+    nodes: Vec<Option<model::Node>>,
+}
+
+struct Resolver<'a> {
+    sources: &'a SourceMap,
+    root: FileId,
+    file: &'a ast::File,
+    diagnostics: &'a mut Vec<Diagnostic>,
+    names: BTreeMap<&'a str, Definition>,
+    /// Names that nobody needs to hear of again: broken where they are declared, or already reported as unknown.
+    silent: BTreeSet<&'a str>,
+    system: SystemPart,
+    metrics: Vec<Option<model::Metric>>,
+    operations: Vec<Option<model::Operation>>,
+    tests: Vec<Option<model::Test>>,
+}
+
+impl<'a> Resolver<'a> {
+    fn report(&mut self, diagnostic: Diagnostic) {
+        self.diagnostics.push(diagnostic);
+    }
+
+    fn text(&self, span: Span) -> &'a str {
+        self.sources.snippet(span)
+    }
+
+    fn declaration(&self, head: &ast::Head) -> Declaration {
+        declaration(self.sources, head)
+    }
+
+    /// The position of a name among the declarations of its kind.
+    fn find(&mut self, name: &'a Name, kind: Kind) -> Option<usize> {
+        let word = kind.word();
+        match self.names.get(name.text.as_str()) {
+            Some(definition) if definition.kind == kind => return Some(definition.index),
+            Some(_) | None if self.silent.contains(name.text.as_str()) => return None,
+            Some(definition) => {
+                let is = definition.kind.with_article();
+                let title = format!("`{}` is {is}, not {}", name.text, kind.with_article());
+                let diagnostic = Diagnostic::new(Code::OTHER_KIND, name.span, title)
+                    .label(format!("expected {}", kind.with_article()))
+                    .also(definition.span, format!("{is} by this declaration"));
+                self.report(diagnostic);
+                return None;
+            }
+            None => {}
+        }
+        self.silent.insert(&name.text);
+        let known = self.names_of(kind);
+        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, format!("no {word} named `{}`", name.text))
+            .label(format!("not {} of this space", kind.with_article()));
+        if let Some(similar) = most_similar(&name.text, known.iter().copied()) {
+            diagnostic = diagnostic.suggest(format!("`{similar}` is"), name.span, similar);
+        } else if known.is_empty() {
+            diagnostic = diagnostic.note(format!("this space declares no {word}"));
+        } else if known.len() <= 8 {
+            let verb = if known.len() == 1 { "is" } else { "are" };
+            diagnostic = diagnostic.note(format!("there {verb} {}", list(&known)));
+        }
+        self.report(diagnostic);
+        None
+    }
+
+    fn names_of(&self, kind: Kind) -> Vec<&'a str> {
+        let mut known: Vec<_> = self.names.iter().filter(|(_, definition)| definition.kind == kind).collect();
+        known.sort_by_key(|(_, definition)| definition.span);
+        known.into_iter().map(|(name, _)| *name).collect()
+    }
+
+    /// Finds each name of a list, and reports those that stand in it twice.
+    fn find_all(&mut self, names: &'a [Name], kind: Kind) -> Option<Vec<usize>> {
+        let mut found: Vec<usize> = Vec::new();
+        let mut first: BTreeMap<&str, Span> = BTreeMap::new();
+        let mut complete = true;
+        for name in names {
+            if let Some(&before) = first.get(name.text.as_str()) {
+                let title = format!("`{}` stands twice in this list", name.text);
+                let diagnostic = Diagnostic::new(Code::LISTED_TWICE, name.span, title)
+                    .label("again here")
+                    .also(before, "first here");
+                self.report(diagnostic);
+                complete = false;
+                continue;
+            }
+            first.insert(&name.text, name.span);
+            match self.find(name, kind) {
+                Some(index) => found.push(index),
+                None => complete = false,
+            }
+        }
+        complete.then_some(found)
+    }
+
+    /// The one clause of a list of at most one; further ones are reported.
+    fn single<T>(&mut self, clauses: &'a [(Span, T)], what: &str) -> Option<&'a T> {
+        let spans: Vec<Span> = clauses.iter().map(|(span, _)| *span).collect();
+        self.at_most_one(&spans, what);
+        clauses.first().map(|(_, clause)| clause)
+    }
+
+    fn at_most_one(&mut self, spans: &[Span], what: &str) {
+        for &again in spans.iter().skip(1) {
+            let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, again, format!("`{what}` stands twice"))
+                .label("remove this one or the other")
+                .also(spans[0], "first here");
+            self.report(diagnostic);
+        }
+    }
+
+    fn missing(&mut self, at: &Name, what: &str, example: &str) {
+        let title = format!("`{}` lacks {what}", at.text);
+        let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, at.span, title)
+            .label(format!("add {what}"))
+            .note(format!("for example `{example}`"));
+        self.report(diagnostic);
+    }
+}
+
+/// Names in backquotes, joined for a sentence.
+fn list(names: &[&str]) -> String {
+    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    match quoted.split_last() {
+        Some((last, [])) => last.clone(),
+        Some((last, others)) => format!("{} and {last}", others.join(", ")),
+        None => String::new(),
+    }
+}

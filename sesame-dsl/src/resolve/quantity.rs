@@ -1,0 +1,187 @@
+//! Numbers with units, in the unit that their place asks for.
+
+use super::Resolver;
+use crate::diagnostic::{Code, Diagnostic, Suggestion};
+use crate::model::Range;
+use crate::span::Span;
+use crate::syntax::ast::{self, Quantity, UnitName};
+use crate::units::{Unit, UnitError, convert, dimension};
+
+impl Resolver<'_> {
+    pub(super) fn unit(&mut self, name: &UnitName) -> Option<Unit> {
+        let error = match Unit::parse(&name.text) {
+            Ok(unit) => return Some(unit),
+            Err(error) => error,
+        };
+        let diagnostic = match error {
+            UnitError::Unknown { symbol, similar } => {
+                let mut diagnostic =
+                    Diagnostic::new(Code::UNKNOWN_UNIT, name.span, format!("no unit named `{symbol}`"))
+                        .label("not a unit");
+                for meant in &similar {
+                    let replacement = name.text.replace(&symbol, meant);
+                    diagnostic = diagnostic.suggest(format!("`{meant}` is"), name.span, replacement);
+                }
+                if similar.is_empty() {
+                    diagnostic = diagnostic.note("`sesamec explain E0301` lists the units");
+                }
+                diagnostic
+            }
+            UnitError::TooLarge => {
+                let title = format!("`{}` is too large or too small a unit", name.text);
+                Diagnostic::new(Code::UNKNOWN_UNIT, name.span, title).label("its scale cannot be represented")
+            }
+        };
+        self.report(diagnostic);
+        None
+    }
+
+    /// A quantity as a number in a unit. `what` completes "… is": for example "the field `level`".
+    pub(super) fn value(&mut self, quantity: &Quantity, unit: Option<&Unit>, what: &str) -> Option<f64> {
+        let from = match &quantity.unit {
+            Some(name) => Some(self.unit(name)?),
+            None => None,
+        };
+        if quantity.value.is_nan() {
+            return None;
+        }
+        let written = self.text(quantity.span);
+        // A plain number is no percentage: `0.4` and `40` would both be plausible.
+        if dimension(from.as_ref()) == dimension(unit) && (from.is_some() || unit.is_none()) {
+            let value = convert(quantity.value, from.as_ref(), unit);
+            if !value.is_finite() {
+                let title = format!("`{written}` is too large for a number in its unit");
+                self.report(Diagnostic::new(Code::BAD_NUMBER, quantity.span, title).label("beyond 1.8e308"));
+                return None;
+            }
+            return Some(value);
+        }
+        let diagnostic = match (from, unit) {
+            (None, Some(unit)) => {
+                let is = wanted(unit);
+                Diagnostic::new(Code::WRONG_UNIT, quantity.span, format!("`{written}` lacks its unit"))
+                    .label(format!("{what} is {is}"))
+                    .suggest(format!("write it in `{}`", unit.text()), quantity.span.end(), unit.text())
+            }
+            (Some(from), None) => {
+                let title = format!("`{written}` is {}, but {what} is a plain number", from.dimension().name());
+                let diagnostic = Diagnostic::new(Code::WRONG_UNIT, quantity.span, title).label("expected no unit");
+                let name = quantity.unit.as_ref().map_or(quantity.span, |name| name.span);
+                diagnostic.suggest("leave the unit out", name, "")
+            }
+            (from, unit) => {
+                let is = unit.map_or("a plain number".to_owned(), wanted);
+                let measures = dimension(from.as_ref()).name();
+                let title = format!("`{written}` is {measures}, but {what} is {is}");
+                Diagnostic::new(Code::WRONG_UNIT, quantity.span, title).label(format!("expected {is}"))
+            }
+        };
+        self.report(diagnostic);
+        None
+    }
+
+    /// A range in a unit, its ends in order.
+    pub(super) fn range(&mut self, range: &ast::Range, unit: Option<&Unit>, what: &str) -> Option<Range> {
+        if let (None, None, Some(unit)) = (&range.low.unit, &range.high.unit, unit) {
+            self.lacks_unit(range, unit, what);
+            return None;
+        }
+        let low = self.value(&range.low, unit, what);
+        let high = self.value(&range.high, unit, what);
+        let [low, high] = [low?, high?];
+        if low <= high {
+            return Some(Range { low, high });
+        }
+        self.reversed(range, "this range is reversed");
+        None
+    }
+
+    /// Both ends of a range lack their unit, which is one mistake.
+    fn lacks_unit(&mut self, range: &ast::Range, unit: &Unit, what: &str) {
+        let title = format!("`{}` lacks its units", self.text(range.span));
+        let mut diagnostic =
+            Diagnostic::new(Code::WRONG_UNIT, range.span, title).label(format!("{what} is {}", wanted(unit)));
+        diagnostic.suggestions.push(Suggestion {
+            message: format!("write it in `{}`", unit.text()),
+            edits: [&range.low, &range.high].map(|end| (end.span.end(), unit.text().to_owned())).into(),
+        });
+        self.report(diagnostic);
+    }
+
+    pub(super) fn reversed(&mut self, range: &ast::Range, title: &str) {
+        let code = if title.contains("window") { Code::BAD_WINDOW } else { Code::REVERSED_RANGE };
+        let [low, high] = [&range.low, &range.high].map(|end| self.text(end.span));
+        let mut diagnostic = Diagnostic::new(code, range.span, title).label(format!("`{low}` is more than `{high}`"));
+        diagnostic.suggestions.push(Suggestion {
+            message: "swap its ends".to_owned(),
+            edits: vec![(range.low.span, high.to_owned()), (range.high.span, low.to_owned())],
+        });
+        self.report(diagnostic);
+    }
+
+    /// Checks that a range lies inside another, in words of the source.
+    pub(super) fn inside(
+        &mut self,
+        inner: Range,
+        span: Span,
+        outer: Range,
+        what: &str,
+        permitted: &str,
+        declared: Option<Span>,
+    ) -> bool {
+        if outer.contains(inner) {
+            return true;
+        }
+        let written = self.text(span);
+        let mut diagnostic =
+            Diagnostic::new(Code::OUT_OF_RANGE, span, format!("`{written}` is out of range for {what}"))
+                .label(format!("permitted is {permitted}"));
+        if let Some(declared) = declared {
+            diagnostic = diagnostic.also(declared, "by this declaration");
+        }
+        self.report(diagnostic);
+        false
+    }
+
+    /// Checks that a number of a field of whole numbers is whole.
+    pub(super) fn whole(&mut self, value: f64, span: Span, what: &str) -> bool {
+        // Beyond 2^53 not every whole number is represented, so a range there would not mean what it says.
+        let exact = value.fract() == 0.0 && value.abs() <= (1u64 << 53) as f64;
+        if !exact {
+            let title = format!("`{}` is not a whole number, but {what} takes whole numbers", self.text(span));
+            let diagnostic = Diagnostic::new(Code::BAD_NUMBER, span, title);
+            self.report(diagnostic.label("expected a whole number of at most 2^53"));
+        }
+        exact
+    }
+
+    /// A range of percentages between 0 and 100, as probabilities.
+    pub(super) fn probabilities(&mut self, range: &ast::Range, what: &str) -> Option<Range> {
+        let percent = percent();
+        let found = self.range(range, Some(&percent), what)?;
+        let all = Range { low: 0.0, high: 100.0 };
+        let probability = |value| convert(value, Some(&percent), None);
+        self.inside(found, range.span, all, what, "0% to 100%", None)
+            .then(|| Range { low: probability(found.low), high: probability(found.high) })
+    }
+
+    /// A range of times, none negative, in seconds.
+    pub(super) fn times(&mut self, range: &ast::Range, what: &str) -> Option<Range> {
+        let found = self.range(range, Some(&Unit::seconds()), what)?;
+        let all = Range { low: 0.0, high: f64::INFINITY };
+        self.inside(found, range.span, all, what, "0s and more", None).then_some(found)
+    }
+}
+
+/// The unit of probabilities in the language.
+pub(super) fn percent() -> Unit {
+    Unit::parse("%").expect("`%` is in the table")
+}
+
+fn wanted(unit: &Unit) -> String {
+    if unit.text() == "%" {
+        "a percentage, in `%`".to_owned()
+    } else {
+        format!("{}, in `{}`", unit.dimension().name(), unit.text())
+    }
+}

@@ -1,0 +1,477 @@
+//! Message types, topics, nodes, the simulator.
+
+use std::collections::BTreeMap;
+
+use super::{Kind, Resolver};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::model::{self, Id as _, MessageId, Simulator, TopicId, Transport, Type};
+use crate::similar::most_similar;
+use crate::span::Span;
+use crate::syntax::ast::{self, Name, TypeKind};
+use crate::units::{Dimension, Unit, dimension};
+
+impl<'a> Resolver<'a> {
+    pub(super) fn ast_messages(&self) -> impl Iterator<Item = &'a ast::Message> + use<'a> {
+        self.file.systems.iter().flat_map(|system| &system.messages)
+    }
+
+    pub(super) fn ast_topics(&self) -> impl Iterator<Item = &'a ast::Topic> + use<'a> {
+        self.file.systems.iter().flat_map(|system| &system.topics)
+    }
+
+    pub(super) fn ast_nodes(&self) -> impl Iterator<Item = &'a ast::Node> + use<'a> {
+        self.file.systems.iter().flat_map(|system| &system.nodes)
+    }
+
+    pub(super) fn system(&mut self) -> Option<Simulator> {
+        let simulator = self.simulators().next().and_then(|simulator| self.simulator(simulator));
+        self.messages();
+        self.topics();
+        self.nodes();
+        simulator
+    }
+
+    // ----- the simulator
+
+    fn simulator(&mut self, simulator: &'a ast::Simulator) -> Option<Simulator> {
+        let in_process = simulator.transport.as_ref()?;
+        let path = self.rust_path(&in_process.path);
+        let folder = self.single(&in_process.crates, "crate");
+        let step = self.single(&in_process.steps, "step");
+        if step.is_none() && !in_process.damaged {
+            self.missing(&simulator.head.name, "the time of one step", "step 20ms");
+        }
+        let step = step.and_then(|step| self.step(step));
+        let transport = Transport::InProcess {
+            path: path?,
+            crate_folder: folder.map(|folder| folder.text.clone()),
+            step_ns: step?,
+        };
+        Some(Simulator { declaration: self.declaration(&simulator.head), transport })
+    }
+
+    fn rust_path(&mut self, path: &ast::Text) -> Option<String> {
+        if path.text.trim().is_empty() {
+            return None;
+        }
+        let identifier = |part: &str| {
+            part.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
+                && part.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
+                && !matches!(part, "self" | "Self" | "super" | "crate" | "_")
+        };
+        let parts: Vec<&str> = path.text.split("::").collect();
+        if parts.len() >= 2 && parts.iter().all(|part| identifier(part)) {
+            return Some(path.text.clone());
+        }
+        let title = format!("`{}` is not the path of a Rust type", path.text);
+        let diagnostic = Diagnostic::new(Code::BAD_PATH, path.span, title)
+            .label("expected crate and type, for example `kuka_cell_sim::Cell`");
+        self.report(diagnostic);
+        None
+    }
+
+    fn step(&mut self, step: &ast::Quantity) -> Option<u64> {
+        let nanoseconds = Unit::parse("ns").expect("`ns` is in the table");
+        let seconds = Unit::seconds();
+        self.value(step, Some(&seconds), "the time of one step")?;
+        let unit = step.unit.as_ref().and_then(|unit| Unit::parse(&unit.text).ok())?;
+        let value = unit.convert(step.value, &nanoseconds);
+        // What is a whole number of nanoseconds in decimals may miss it by a rounding error.
+        let rounded = value.round();
+        if (1.0..=3.6e12).contains(&rounded) && (value - rounded).abs() <= rounded * 1e-12 {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "it is whole and in 1..=3.6e12"
+            )]
+            return Some(rounded as u64);
+        }
+        let title = format!("`{}` cannot be the time of one step", self.text(step.span));
+        let label = "expected a whole number of nanoseconds, more than 0s, at most 1h";
+        self.report(Diagnostic::new(Code::OUT_OF_RANGE, step.span, title).label(label));
+        None
+    }
+
+    // ----- messages
+
+    fn messages(&mut self) {
+        let messages: Vec<&'a ast::Message> = self.ast_messages().collect();
+        let (order, cyclic) = self.topological_order(&messages);
+        self.system.message_ids = vec![MessageId::from_index(0); messages.len()];
+        for (id, &index) in order.iter().enumerate() {
+            self.system.message_ids[index] = MessageId::from_index(id);
+        }
+        for &index in &order {
+            let message = self.message(messages[index]);
+            self.system.messages.push(message.filter(|_| !cyclic[index]));
+        }
+    }
+
+    /// Positions of messages such that each comes after those it contains, and which of them contain themselves.
+    fn topological_order(&mut self, messages: &[&'a ast::Message]) -> (Vec<usize>, Vec<bool>) {
+        #[derive(Clone, Copy, PartialEq)]
+        enum Mark {
+            New,
+            Open,
+            Done,
+        }
+        // Contained messages by position, with the place of the mention. Unknown names are reported where types are.
+        let contained: Vec<Vec<(usize, Span)>> = messages
+            .iter()
+            .map(|message| {
+                let names = message.fields.iter().filter_map(|field| message_name(&field.ty));
+                names
+                    .filter_map(|name| {
+                        let definition = self.names.get(name.text.as_str())?;
+                        (definition.kind == Kind::Message).then_some((definition.index, name.span))
+                    })
+                    .collect()
+            })
+            .collect();
+        let mut marks = vec![Mark::New; messages.len()];
+        let mut cyclic = vec![false; messages.len()];
+        let mut order = Vec::new();
+        for root in 0..messages.len() {
+            if marks[root] != Mark::New {
+                continue;
+            }
+            // A stack of our own: a chain of messages may be as long as the file.
+            marks[root] = Mark::Open;
+            let mut stack = vec![(root, 0)];
+            while let Some((message, next)) = stack.pop() {
+                let Some(&(inner, mention)) = contained[message].get(next) else {
+                    marks[message] = Mark::Done;
+                    order.push(message);
+                    continue;
+                };
+                stack.push((message, next + 1));
+                match marks[inner] {
+                    Mark::Done => {}
+                    Mark::New => {
+                        marks[inner] = Mark::Open;
+                        stack.push((inner, 0));
+                    }
+                    Mark::Open => {
+                        let start = stack.iter().position(|&(open, _)| open == inner).unwrap_or(0);
+                        let cycle: Vec<usize> = stack[start..].iter().map(|&(open, _)| open).collect();
+                        for &member in &cycle {
+                            cyclic[member] = true;
+                        }
+                        self.recursive(messages, &cycle, mention);
+                    }
+                }
+            }
+        }
+        (order, cyclic)
+    }
+
+    fn recursive(&mut self, messages: &[&'a ast::Message], cycle: &[usize], mention: Span) {
+        let name = |index: usize| &messages[index].head.name;
+        let first = name(cycle[0]);
+        let title = if cycle.len() == 1 {
+            format!("message `{}` contains itself", first.text)
+        } else {
+            let names: Vec<String> = cycle.iter().skip(1).map(|&index| format!("`{}`", name(index).text)).collect();
+            format!("message `{}` contains itself by way of {}", first.text, names.join(", "))
+        };
+        let diagnostic = Diagnostic::new(Code::RECURSIVE_MESSAGE, mention, title)
+            .label("its values would have no end")
+            .also(first.span, "declared here");
+        self.report(diagnostic);
+    }
+
+    fn message(&mut self, message: &'a ast::Message) -> Option<model::Message> {
+        let mut first: BTreeMap<&str, Span> = BTreeMap::new();
+        let mut fields = Vec::new();
+        let mut complete = !message.damaged;
+        for field in &message.fields {
+            let name = &field.head.name;
+            if let Some(&before) = first.get(name.text.as_str()) {
+                let title = format!("field `{}` of `{}` is defined twice", name.text, message.head.name.text);
+                let diagnostic = Diagnostic::new(Code::DEFINED_TWICE, name.span, title)
+                    .label("again here")
+                    .also(before, "first defined here");
+                self.report(diagnostic);
+                complete = false;
+            }
+            first.entry(&name.text).or_insert(name.span);
+            match self.type_of(&field.ty) {
+                Some(ty) => fields.push(model::Field { declaration: self.declaration(&field.head), ty }),
+                None => complete = false,
+            }
+        }
+        if message.fields.is_empty() && !message.damaged {
+            self.missing(&message.head.name, "a field", "level: real[mm]");
+            complete = false;
+        }
+        complete.then(|| model::Message { declaration: self.declaration(&message.head), fields })
+    }
+
+    pub(super) fn type_of(&mut self, ty: &'a ast::Type) -> Option<Type> {
+        let unit = match &ty.unit {
+            Some(name) => Some(self.unit(name)?),
+            None => None,
+        };
+        let without_unit = |resolver: &mut Self, found: Type| match &ty.unit {
+            None => Some(found),
+            Some(unit) => {
+                let title = format!("`{}` takes no unit", resolver.text(ty.span));
+                let brackets = Span { lo: unit.span.lo - 1, hi: unit.span.hi + 1, ..unit.span };
+                let diagnostic = Diagnostic::new(Code::WRONG_TYPE, unit.span, title)
+                    .label("only `int`, `real` and `point` have units")
+                    .suggest("leave the unit out", brackets, "");
+                resolver.report(diagnostic);
+                None
+            }
+        };
+        match &ty.kind {
+            TypeKind::Bool => without_unit(self, Type::Bool),
+            TypeKind::Text => without_unit(self, Type::Text),
+            TypeKind::Int => Some(Type::Int(unit)),
+            TypeKind::Real => Some(Type::Real(unit)),
+            TypeKind::Point => Some(Type::Point(unit)),
+            TypeKind::List(of) => Some(Type::List(Box::new(self.type_of(of)?))),
+            TypeKind::Message(name) => {
+                let index = self.find_type(name)?;
+                without_unit(self, Type::Message(self.system.message_ids[index]))
+            }
+        }
+    }
+
+    fn find_type(&mut self, name: &'a Name) -> Option<usize> {
+        const SCALARS: [&str; 5] = ["bool", "int", "real", "text", "point"];
+        const ELSEWHERE: [(&str, &str); 9] = [
+            ("float", "real"),
+            ("double", "real"),
+            ("number", "real"),
+            ("f64", "real"),
+            ("integer", "int"),
+            ("i64", "int"),
+            ("string", "text"),
+            ("String", "text"),
+            ("boolean", "bool"),
+        ];
+        if self.names.contains_key(name.text.as_str()) || self.silent.contains(name.text.as_str()) {
+            return self.find(name, Kind::Message);
+        }
+        let messages = self.names_of(Kind::Message);
+        let similar = ELSEWHERE
+            .iter()
+            .find(|(word, _)| *word == name.text)
+            .map(|(_, meant)| *meant)
+            .or_else(|| most_similar(&name.text, messages.iter().copied().chain(SCALARS)));
+        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, format!("no type named `{}`", name.text))
+            .label("neither a message of this space nor a type of the language");
+        diagnostic = match similar {
+            Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
+            None => diagnostic.note("types are `bool`, `int`, `real`, `text`, `point`, `list of …`, and messages"),
+        };
+        self.silent.insert(&name.text);
+        self.report(diagnostic);
+        None
+    }
+
+    // ----- topics and nodes
+
+    fn topics(&mut self) {
+        let mut paths: BTreeMap<String, Span> = BTreeMap::new();
+        for topic in self.ast_topics() {
+            let ty = self.type_of(&topic.ty);
+            let members = self.topic_paths(&topic.path);
+            for member in members.iter().flatten() {
+                if let Some(&first) = paths.get(member) {
+                    let diagnostic =
+                        Diagnostic::new(Code::SAME_PATH, topic.path.span, format!("path `{member}` has two topics"))
+                            .label("again here")
+                            .also(first, "first here");
+                    self.report(diagnostic);
+                } else {
+                    paths.insert(member.clone(), topic.path.span);
+                }
+            }
+            let resolved = ty.zip(members).map(|(ty, paths)| model::Topic {
+                declaration: self.declaration(&topic.head),
+                written: topic.path.text.clone(),
+                paths,
+                ty,
+            });
+            self.system.topics.push(resolved);
+        }
+    }
+
+    /// The paths of a topic: one, or the members of its group.
+    fn topic_paths(&mut self, path: &ast::Text) -> Option<Vec<String>> {
+        if path.text.trim().is_empty() {
+            return None;
+        }
+        match expand_group(&path.text) {
+            Ok(paths) => Some(paths),
+            Err(why) => {
+                let title = format!("`{}` is not the path of a topic", path.text);
+                self.report(Diagnostic::new(Code::BAD_PATH, path.span, title).label(why));
+                None
+            }
+        }
+    }
+
+    fn nodes(&mut self) {
+        for node in self.ast_nodes() {
+            let mut topics = |clauses: &'a [(Span, Vec<Name>)], word: &str| -> Option<Vec<TopicId>> {
+                let Some(names) = self.single(clauses, word) else { return Some(vec![]) };
+                let found = self.find_all(names, Kind::Topic)?;
+                Some(found.into_iter().map(TopicId::from_index).collect())
+            };
+            let publishes = topics(&node.publishes, "publishes");
+            let subscribes = topics(&node.subscribes, "subscribes");
+            let resolved = publishes.zip(subscribes).map(|(publishes, subscribes)| model::Node {
+                declaration: self.declaration(&node.head),
+                publishes,
+                subscribes,
+            });
+            self.system.nodes.push(resolved);
+        }
+    }
+
+    // ----- fields
+
+    /// What a path leads to: its topic, and the type at its end. `None` was reported, here or before.
+    pub(super) fn field(&mut self, path: &'a ast::Path) -> Option<(model::FieldPath, Type)> {
+        let index = self.find(&path.topic, Kind::Topic)?;
+        let topic = self.system.topics[index].as_ref()?;
+        let mut ty = topic.ty.clone();
+        let mut holder = format!("topic `{}`", path.topic.text);
+        for name in &path.fields {
+            let Type::Message(id) = ty else {
+                let title = format!("{holder} has no fields");
+                let label = format!("it is {}", type_in_words(&ty));
+                self.report(Diagnostic::new(Code::WRONG_TYPE, name.span, title).label(label));
+                return None;
+            };
+            let message = self.system.messages[id.index()].as_ref()?;
+            let Some(field) = message.fields.iter().find(|field| field.declaration.name == name.text) else {
+                let known: Vec<&str> = message.fields.iter().map(|field| field.declaration.name.as_str()).collect();
+                let mut diagnostic = Diagnostic::new(
+                    Code::UNKNOWN_NAME,
+                    name.span,
+                    format!("message `{}` has no field named `{}`", message.declaration.name, name.text),
+                )
+                .label("no such field")
+                .also(message.declaration.span, "the message is declared here");
+                diagnostic = match most_similar(&name.text, known.iter().copied()) {
+                    Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
+                    None => diagnostic.note(format!("its fields are {}", super::list(&known))),
+                };
+                self.report(diagnostic);
+                return None;
+            };
+            holder = format!("field `{}`", name.text);
+            ty = field.ty.clone();
+        }
+        let fields = path.fields.iter().map(|name| name.text.clone()).collect();
+        Some((model::FieldPath { topic: TopicId::from_index(index), fields }, ty))
+    }
+
+    /// A path to a single number: with its unit, and whether it is whole.
+    pub(super) fn number_field(
+        &mut self,
+        path: &'a ast::Path,
+        user: &str,
+    ) -> Option<(model::FieldPath, Option<Unit>, bool)> {
+        let (found, ty) = self.field(path)?;
+        match ty {
+            Type::Int(unit) => Some((found, unit, true)),
+            Type::Real(unit) => Some((found, unit, false)),
+            other => {
+                let title = format!("{user} needs a number, but `{}` is not one", self.text(path.span));
+                let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, path.span, title)
+                    .label(format!("it is {}", type_in_words(&other)));
+                if let Type::Message(id) = other
+                    && let Some(message) = self.system.messages[id.index()].as_ref()
+                {
+                    let numbers = message.fields.iter().filter(|it| matches!(it.ty, Type::Int(_) | Type::Real(_)));
+                    for field in numbers.take(3) {
+                        let name = &field.declaration.name;
+                        diagnostic = diagnostic.suggest(
+                            format!("its field `{name}` is a number"),
+                            path.span.end(),
+                            format!(".{name}"),
+                        );
+                    }
+                }
+                self.report(diagnostic);
+                None
+            }
+        }
+    }
+}
+
+/// The message a type mentions, inside of lists too.
+fn message_name(ty: &ast::Type) -> Option<&Name> {
+    match &ty.kind {
+        TypeKind::Message(name) => Some(name),
+        TypeKind::List(of) => message_name(of),
+        _ => None,
+    }
+}
+
+pub(super) fn type_in_words(ty: &Type) -> String {
+    let unit = |unit: &Option<Unit>| match unit {
+        Some(it) if dimension(Some(it)) != Dimension::NONE => format!(" in `{}`", it.text()),
+        _ => String::new(),
+    };
+    match ty {
+        Type::Bool => "true or false".to_owned(),
+        Type::Int(it) => format!("a whole number{}", unit(it)),
+        Type::Real(it) => format!("a number{}", unit(it)),
+        Type::Text => "a text".to_owned(),
+        Type::Point(it) => format!("a point{}", unit(it)),
+        Type::List(_) => "a list".to_owned(),
+        Type::Message(_) => "a message".to_owned(),
+    }
+}
+
+/// Writes out a path with at most one group, `zones/{A,B}/level`.
+fn expand_group(path: &str) -> Result<Vec<String>, String> {
+    if let Some(c) = path.chars().find(|c| c.is_whitespace() || c.is_control()) {
+        return Err(format!("a path holds no {}", if c == ' ' { "spaces".to_owned() } else { format!("{c:?}") }));
+    }
+    let Some((before, rest)) = path.split_once('{') else {
+        return if path.contains('}') { Err("`}` closes no group".to_owned()) } else { Ok(vec![path.to_owned()]) };
+    };
+    if before.contains('}') {
+        return Err("`}` closes no group".to_owned());
+    }
+    let Some((group, after)) = rest.split_once('}') else { return Err("its group is not closed".to_owned()) };
+    if group.contains('{') || after.contains(['{', '}']) {
+        return Err("a path has at most one group, as in `zones/{Z1,Z2}`".to_owned());
+    }
+    let members: Vec<&str> = group.split(',').collect();
+    if members.contains(&"") {
+        return Err("a member of its group is empty".to_owned());
+    }
+    for (position, member) in members.iter().enumerate() {
+        if members[..position].contains(member) {
+            return Err(format!("its group has `{member}` twice"));
+        }
+    }
+    Ok(members.into_iter().map(|member| format!("{before}{member}{after}")).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::expand_group;
+
+    #[test]
+    fn a_group_is_written_out_in_order() {
+        assert_eq!(expand_group("a/{Z2,Z1}/x").unwrap(), ["a/Z2/x", "a/Z1/x"]);
+        assert_eq!(expand_group("/plain").unwrap(), ["/plain"]);
+        assert_eq!(expand_group("{one}").unwrap(), ["one"]);
+    }
+
+    #[test]
+    fn malformed_groups_are_refused() {
+        for path in ["a b", "a/{", "a/}", "}{", "{a,}", "{}", "{a,a}", "{a}{b}", "{a{b}}", "a\tb"] {
+            assert!(expand_group(path).is_err(), "{path}");
+        }
+    }
+}

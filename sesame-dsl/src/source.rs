@@ -1,0 +1,107 @@
+//! Source files in memory, and where their lines begin.
+
+use crate::span::{FileId, Span};
+
+/// The files of one analysis. Nothing here touches a disk: the caller reads files and adds their text.
+#[derive(Debug, Clone, Default)]
+pub struct SourceMap {
+    files: Vec<SourceFile>,
+}
+
+/// One file: its name as shown to people, its text, and where its lines begin.
+#[derive(Debug, Clone)]
+pub struct SourceFile {
+    name: String,
+    text: String,
+    /// Byte offset of each line's first character; the first is 0, and they increase.
+    line_starts: Vec<u32>,
+}
+
+/// A position for people: line and column count from 1, columns in characters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct LineColumn {
+    /// The line, from 1.
+    pub line: u32,
+    /// The character in the line, from 1.
+    pub column: u32,
+}
+
+impl SourceMap {
+    /// No files.
+    pub fn new() -> Self {
+        SourceMap::default()
+    }
+
+    /// Adds a file under the name that diagnostics show.
+    pub fn add(&mut self, name: impl Into<String>, text: impl Into<String>) -> FileId {
+        let id = FileId(u32::try_from(self.files.len()).expect("fewer than 2^32 files"));
+        self.files.push(SourceFile::new(name.into(), text.into()));
+        id
+    }
+
+    /// The file of an id of this map.
+    pub fn file(&self, id: FileId) -> &SourceFile {
+        &self.files[id.0 as usize]
+    }
+
+    /// The text a span covers.
+    pub fn snippet(&self, span: Span) -> &str {
+        &self.file(span.file).text[span.range()]
+    }
+
+    /// Line and column of a span's first character.
+    pub fn position(&self, span: Span) -> LineColumn {
+        self.file(span.file).position(span.lo)
+    }
+}
+
+impl SourceFile {
+    fn new(name: String, text: String) -> Self {
+        let mut line_starts = vec![0];
+        line_starts.extend(text.bytes().enumerate().filter(|&(_, byte)| byte == b'\n').map(|(offset, _)| {
+            // Text beyond 4 GiB is refused by the parser before any offset in it is used.
+            u32::try_from(offset + 1).unwrap_or(u32::MAX)
+        }));
+        SourceFile { name, text, line_starts }
+    }
+
+    /// The name that diagnostics show.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The whole text.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Line and column of a byte offset, which is at most the text's length.
+    pub fn position(&self, offset: u32) -> LineColumn {
+        let line = self.line_starts.partition_point(|&start| start <= offset);
+        let start = self.line_starts[line - 1] as usize;
+        let column = self.text[start..offset as usize].chars().count() + 1;
+        let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+        LineColumn { line: count(line), column: count(column) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_and_columns_count_from_one_and_in_characters() {
+        let mut sources = SourceMap::new();
+        let file = sources.add("a.sesame", "ab\nµx\n\n");
+        let at = |offset| {
+            let LineColumn { line, column } = sources.file(file).position(offset);
+            (line, column)
+        };
+        assert_eq!(at(0), (1, 1));
+        assert_eq!(at(2), (1, 3));
+        assert_eq!(at(3), (2, 1));
+        assert_eq!(at(5), (2, 2));
+        assert_eq!(at(7), (3, 1));
+        assert_eq!(at(8), (4, 1));
+    }
+}

@@ -1,0 +1,314 @@
+//! What a file says, before names mean anything: the grammar's constructs with their spans and doc comments.
+//!
+//! A construct with a syntax error is not here; but the name it was about to declare is kept in [`File::broken`], and the
+//! block around it is marked as damaged, so that one mistake does not look like several.
+
+use crate::span::Span;
+
+/// A whole file. Order between kinds never matters; within a kind it is the order of the file.
+#[derive(Debug, Default)]
+pub(crate) struct File {
+    pub(crate) spaces: Vec<Head>,
+    pub(crate) systems: Vec<System>,
+    pub(crate) metrics: Vec<Metric>,
+    pub(crate) requirements: Vec<Requirement>,
+    pub(crate) operations: Vec<Operation>,
+    pub(crate) tests: Vec<Test>,
+    pub(crate) campaigns: Vec<Campaign>,
+    /// Names that a broken or unsupported construct was about to declare.
+    pub(crate) broken: Vec<Name>,
+    /// Whether anything at the top level could not be read.
+    pub(crate) damaged: bool,
+}
+
+/// A name, where it stands.
+#[derive(Debug, Clone)]
+pub(crate) struct Name {
+    pub(crate) text: String,
+    pub(crate) span: Span,
+}
+
+/// The head of a declaration.
+#[derive(Debug, Clone)]
+pub(crate) struct Head {
+    pub(crate) name: Name,
+    pub(crate) doc: String,
+}
+
+#[derive(Debug)]
+pub(crate) struct System {
+    /// The keyword.
+    pub(crate) span: Span,
+    pub(crate) simulators: Vec<Simulator>,
+    pub(crate) messages: Vec<Message>,
+    pub(crate) topics: Vec<Topic>,
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) damaged: bool,
+}
+
+#[derive(Debug)]
+pub(crate) struct Simulator {
+    pub(crate) head: Head,
+    /// `None` for a transport that is not supported yet.
+    pub(crate) transport: Option<InProcess>,
+}
+
+#[derive(Debug)]
+pub(crate) struct InProcess {
+    pub(crate) path: Text,
+    pub(crate) crates: Vec<(Span, Text)>,
+    pub(crate) steps: Vec<(Span, Quantity)>,
+    pub(crate) damaged: bool,
+}
+
+/// A quoted text without its quotes and escapes; the span includes the quotes.
+#[derive(Debug, Clone)]
+pub(crate) struct Text {
+    pub(crate) text: String,
+    pub(crate) span: Span,
+}
+
+#[derive(Debug)]
+pub(crate) struct Message {
+    pub(crate) head: Head,
+    pub(crate) fields: Vec<Field>,
+    pub(crate) damaged: bool,
+}
+
+#[derive(Debug)]
+pub(crate) struct Field {
+    pub(crate) head: Head,
+    pub(crate) ty: Type,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Type {
+    pub(crate) kind: TypeKind,
+    pub(crate) unit: Option<UnitName>,
+    pub(crate) span: Span,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum TypeKind {
+    Bool,
+    Int,
+    Real,
+    Text,
+    Point,
+    List(Box<Type>),
+    Message(Name),
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct UnitName {
+    pub(crate) text: String,
+    pub(crate) span: Span,
+}
+
+#[derive(Debug)]
+pub(crate) struct Topic {
+    pub(crate) head: Head,
+    pub(crate) path: Text,
+    pub(crate) ty: Type,
+}
+
+#[derive(Debug)]
+pub(crate) struct Node {
+    pub(crate) head: Head,
+    pub(crate) publishes: Vec<(Span, Vec<Name>)>,
+    pub(crate) subscribes: Vec<(Span, Vec<Name>)>,
+}
+
+#[derive(Debug)]
+pub(crate) struct Metric {
+    pub(crate) head: Head,
+    pub(crate) ty: Option<Type>,
+    pub(crate) directions: Vec<(Span, Direction)>,
+    pub(crate) defaults: Vec<(Span, Quantity)>,
+    /// `None` for a formula that is not supported yet.
+    pub(crate) source: Option<MetricSource>,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Direction {
+    Maximise,
+    Minimise,
+}
+
+#[derive(Debug)]
+pub(crate) enum MetricSource {
+    Hook { hooks: Vec<(Span, Vec<Name>)>, damaged: bool },
+    FuzzingTime,
+    Last(Path),
+}
+
+/// A topic, and fields of its message.
+#[derive(Debug, Clone)]
+pub(crate) struct Path {
+    pub(crate) topic: Name,
+    pub(crate) fields: Vec<Name>,
+    pub(crate) span: Span,
+}
+
+#[derive(Debug)]
+pub(crate) struct Requirement {
+    pub(crate) head: Head,
+    pub(crate) text: Text,
+    pub(crate) metric: Name,
+    pub(crate) bound: Bound,
+}
+
+#[derive(Debug)]
+pub(crate) enum Bound {
+    Compare(Comparison, Quantity),
+    Within(Range),
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Comparison {
+    AtMost,
+    Below,
+    AtLeast,
+    Above,
+    Equal,
+}
+
+/// A number with its sign and unit.
+#[derive(Debug, Clone)]
+pub(crate) struct Quantity {
+    /// Finite, or NaN for one whose digits were already reported.
+    pub(crate) value: f64,
+    pub(crate) unit: Option<UnitName>,
+    pub(crate) span: Span,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Range {
+    pub(crate) low: Quantity,
+    pub(crate) high: Quantity,
+    pub(crate) span: Span,
+}
+
+/// A whole number as written.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Count {
+    /// `None` for one that was already reported.
+    pub(crate) value: Option<u64>,
+    pub(crate) span: Span,
+}
+
+#[derive(Debug)]
+pub(crate) struct Operation {
+    pub(crate) head: Head,
+    /// `None` for a kind that is not supported yet.
+    pub(crate) body: Option<OperationBody>,
+}
+
+#[derive(Debug)]
+pub(crate) struct OperationBody {
+    pub(crate) target: Path,
+    pub(crate) kind: OperationKind,
+    pub(crate) within: Vec<(Span, Range)>,
+    pub(crate) priority: Vec<(Span, Quantity)>,
+    pub(crate) inclusion: Vec<(Span, Quantity)>,
+}
+
+#[derive(Debug)]
+pub(crate) enum OperationKind {
+    Random { absolute: bool, range: Range },
+    PacketLoss(Range),
+    Latency { range: Range, uniform: Vec<Span>, drain: Vec<(Span, Drain)> },
+    Blackhole,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Drain {
+    Finish,
+    Flush,
+    Drop,
+}
+
+#[derive(Debug)]
+pub(crate) struct Test {
+    pub(crate) head: Head,
+    pub(crate) operations: Vec<TestOperation>,
+    pub(crate) expectations: Vec<Expectation>,
+    pub(crate) damaged: bool,
+}
+
+#[derive(Debug)]
+pub(crate) struct TestOperation {
+    pub(crate) operation: Name,
+    pub(crate) choices: Vec<(Name, Choice)>,
+    /// `None` for a window that is not supported yet.
+    pub(crate) window: Option<Range>,
+    pub(crate) seed: Option<Count>,
+}
+
+#[derive(Debug)]
+pub(crate) enum Choice {
+    Value(Quantity),
+    Range(Range),
+}
+
+impl Choice {
+    pub(crate) fn span(&self) -> Span {
+        match self {
+            Choice::Value(quantity) => quantity.span,
+            Choice::Range(range) => range.span,
+        }
+    }
+}
+
+#[derive(Debug)]
+pub(crate) struct Expectation {
+    pub(crate) metric: Name,
+    pub(crate) bound: Bound,
+}
+
+#[derive(Debug)]
+pub(crate) struct Campaign {
+    pub(crate) head: Head,
+    pub(crate) objectives: Vec<(Span, Vec<Name>)>,
+    pub(crate) observes: Vec<(Span, Vec<Name>)>,
+    pub(crate) operations: Vec<Operations>,
+    pub(crate) activates: Vec<Span>,
+    pub(crate) searches: Vec<Search>,
+    pub(crate) repeats: Vec<Repeat>,
+    pub(crate) ends: Vec<(Span, Quantity)>,
+    /// Something of it could not be read or is not supported: what is missing may be there.
+    pub(crate) damaged: bool,
+}
+
+#[derive(Debug)]
+pub(crate) struct Operations {
+    pub(crate) span: Span,
+    pub(crate) names: Vec<Name>,
+    pub(crate) min: Count,
+    pub(crate) max: Count,
+}
+
+#[derive(Debug)]
+pub(crate) struct Search {
+    pub(crate) span: Span,
+    /// `None` for a strategy that is not supported yet.
+    pub(crate) strategy: Option<Strategy>,
+    pub(crate) population: Vec<(Span, Count)>,
+    pub(crate) evaluations: Vec<(Span, Count)>,
+    pub(crate) seed: Vec<(Span, Count)>,
+    pub(crate) damaged: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Strategy {
+    Nsga2,
+    Random,
+}
+
+#[derive(Debug)]
+pub(crate) struct Repeat {
+    pub(crate) span: Span,
+    pub(crate) test: Name,
+    pub(crate) times: Count,
+    pub(crate) seed: Vec<(Span, Count)>,
+}

@@ -1,0 +1,355 @@
+//! What is wrong where the grammar gave up, in words.
+//!
+//! pest reports only the first failure of a parse and speaks in rule names. So each swallowed stretch is read once more,
+//! by the rule its first word asks for, or as the continuation of the construct before it; the furthest failure of that
+//! reading is the mistake, and the rules it names are what would fit.
+
+use std::collections::BTreeSet;
+
+use pest::Parser as _;
+use pest::error::{ErrorVariant, InputLocation};
+use sesame_grammar::{Rule, SesameParser};
+
+use super::token::{Token, TokenKind, is_keyword, token_at};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::span::{FileId, Span};
+use crate::units::Unit;
+
+/// A place in the grammar where recovery happens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Place {
+    File,
+    System,
+    Simulator,
+    Message,
+    Node,
+    Hook,
+    Test,
+    Campaign,
+    Search,
+    Repeat,
+}
+
+impl Place {
+    pub(super) fn error_rule(self) -> Rule {
+        match self {
+            Place::File => Rule::error_item,
+            Place::System => Rule::error_system_member,
+            Place::Simulator => Rule::error_simulator_setting,
+            Place::Message => Rule::error_field,
+            Place::Node => Rule::error_node_member,
+            Place::Hook => Rule::error_hook_member,
+            Place::Test => Rule::error_test_member,
+            Place::Campaign => Rule::error_campaign_member,
+            Place::Search => Rule::error_search_setting,
+            Place::Repeat => Rule::error_repeat_setting,
+        }
+    }
+
+    pub(super) fn member_rules(self) -> &'static [Rule] {
+        match self {
+            Place::File => &[
+                Rule::space,
+                Rule::system,
+                Rule::metric,
+                Rule::requirement,
+                Rule::operation,
+                Rule::test,
+                Rule::campaign,
+                Rule::unsupported_item,
+            ],
+            Place::System => {
+                &[Rule::simulator, Rule::message, Rule::topic, Rule::node, Rule::unsupported_system_member]
+            }
+            Place::Simulator => &[Rule::setting_crate, Rule::setting_step],
+            Place::Message => &[Rule::field],
+            Place::Node => &[Rule::publishes, Rule::subscribes],
+            Place::Hook => &[Rule::hook_on],
+            Place::Test => &[Rule::expectation, Rule::test_operation],
+            Place::Campaign => &[
+                Rule::objectives,
+                Rule::operations,
+                Rule::observes,
+                Rule::activate,
+                Rule::search,
+                Rule::end,
+                Rule::repeat,
+                Rule::unsupported_campaign_member,
+            ],
+            Place::Search => &[Rule::setting_population, Rule::setting_evaluations, Rule::setting_seed],
+            Place::Repeat => &[Rule::setting_seed],
+        }
+    }
+
+    fn one_rule(self) -> Rule {
+        match self {
+            Place::File => Rule::one_item,
+            Place::System => Rule::one_system_member,
+            Place::Simulator => Rule::one_simulator_setting,
+            Place::Message => Rule::one_field,
+            Place::Node => Rule::one_node_member,
+            Place::Hook => Rule::one_hook_member,
+            Place::Test => Rule::one_test_member,
+            Place::Campaign => Rule::one_campaign_member,
+            Place::Search => Rule::one_search_setting,
+            Place::Repeat => Rule::one_repeat_setting,
+        }
+    }
+
+    /// What can stand here, for a message.
+    fn members(self) -> &'static str {
+        match self {
+            Place::File => {
+                "a declaration: `space`, `system`, `metric`, `requirement`, `operation`, `test` or `campaign`"
+            }
+            Place::System => "`simulator`, `message`, `topic` or `node`",
+            Place::Simulator => "`crate` or `step`",
+            Place::Message => "a field such as `level: real[mm]`",
+            Place::Node => "`publishes` or `subscribes`",
+            Place::Hook => "`hook on` and topics",
+            Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
+            Place::Campaign => "`objectives`, `operations`, `observes`, `activate`, `search`, `repeat` or `end after`",
+            Place::Search => "`population`, `evaluations` or `seed`",
+            Place::Repeat => "`seed`",
+        }
+    }
+
+    /// The words that begin something here.
+    fn starters(self) -> &'static [&'static str] {
+        match self {
+            Place::File => &["space", "system", "metric", "requirement", "operation", "test", "campaign"],
+            Place::System => &["simulator", "message", "topic", "node"],
+            Place::Simulator => &["crate", "step"],
+            Place::Message => &[],
+            Place::Node => &["publishes", "subscribes"],
+            Place::Hook => &["hook"],
+            Place::Test => &["expect"],
+            Place::Campaign => &["objectives", "operations", "observes", "activate", "search", "repeat", "end"],
+            Place::Search => &["population", "evaluations", "seed"],
+            Place::Repeat => &["seed"],
+        }
+    }
+}
+
+/// The furthest failure of a reading: where, and which rules would have fitted.
+struct Failure {
+    at: usize,
+    expected: Vec<Rule>,
+}
+
+fn read(text: &str, lo: usize, hi: usize, rule: Rule) -> Option<Failure> {
+    let error = SesameParser::parse(rule, &text[lo..hi]).err()?;
+    let at = match error.location {
+        InputLocation::Pos(at) | InputLocation::Span((at, _)) => lo + at,
+    };
+    match error.variant {
+        ErrorVariant::ParsingError { positives, .. } => Some(Failure { at, expected: positives }),
+        ErrorVariant::CustomError { .. } => None,
+    }
+}
+
+/// Explains a swallowed stretch, given the good construct before it.
+pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, previous: Option<Span>) -> Diagnostic {
+    let span_of = |token: Token<'_>| Span {
+        file,
+        lo: u32::try_from(token.lo).expect("files are small"),
+        hi: u32::try_from(token.hi()).expect("files are small"),
+    };
+    let [lo, hi] = [region.lo as usize, region.hi as usize];
+    let mut first = token_at(text, lo);
+    while first.kind == TokenKind::Doc && first.hi() < hi {
+        first = token_at(text, first.hi());
+    }
+    if first.kind == TokenKind::Doc || first.lo >= hi {
+        let doc = token_at(text, lo);
+        return Diagnostic::new(Code::SYNTAX, span_of(doc), "this doc comment belongs to nothing")
+            .label("no declaration follows it")
+            .suggest("make it a plain comment", Span { hi: region.lo + 3, ..region }, "//");
+    }
+    if first.text == "}" {
+        let title = "this `}` closes nothing";
+        return Diagnostic::new(Code::NOT_CLOSED, span_of(first), title).label("no block is open here");
+    }
+
+    let begins = place.starters().contains(&first.text) || matches!(place, Place::Message | Place::Test);
+    let continued = previous
+        .and_then(|previous| read(text, previous.lo as usize, hi, place.one_rule()))
+        .filter(|failure| token_at(text, failure.at).lo >= first.lo);
+    let alone = read(text, lo, hi, place.one_rule()).filter(|failure| failure.at >= lo);
+    let failure = if begins { alone.or(continued) } else { continued.or(alone) };
+    let failure = failure.unwrap_or(Failure { at: first.lo, expected: vec![] });
+
+    let found = token_at(text, failure.at);
+    let span = span_of(found);
+    let words: BTreeSet<&'static str> = failure.expected.iter().filter_map(|&rule| keyword_of(rule)).collect();
+    let wants_name = failure.expected.iter().any(|&rule| matches!(rule, Rule::name | Rule::names | Rule::path));
+    let expected = describe(&failure, place, found.lo == first.lo);
+
+    let before = text[..found.lo].chars().next_back();
+    let after = text[found.hi()..].chars().next();
+    let joins = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
+    if found.text == "-" && joins(before) && joins(after) {
+        return Diagnostic::new(Code::NOT_A_NAME, span, "a name cannot hold `-`")
+            .label("names are letters, digits and `_`")
+            .suggest("use `_`", span, "_");
+    }
+    if found.kind == TokenKind::OpenText {
+        let title = "this text does not end on its line";
+        return Diagnostic::new(Code::BAD_TEXT, span, title).label("no closing `\"`");
+    }
+    if found.kind == TokenKind::Doc {
+        return Diagnostic::new(Code::SYNTAX, span, "a doc comment cannot stand here")
+            .label(format!("expected {expected}"))
+            .note("`///` belongs above a declaration; `//` may stand anywhere");
+    }
+    let next = token_at(text, found.hi());
+    // A keyword that begins the next declaration is in its place: what lacks is the name before it.
+    let declares = Place::File.starters().contains(&found.text) || Place::System.starters().contains(&found.text);
+    let declares = declares && (next.kind == TokenKind::Word || next.text == "{");
+    if wants_name && found.kind == TokenKind::Word && is_keyword(found.text) && !declares {
+        return Diagnostic::new(
+            Code::KEYWORD_AS_NAME,
+            span,
+            format!("`{}` is a keyword and cannot be a name", found.text),
+        )
+        .label("choose another name")
+        .suggest("add to it", span, format!("{}_1", found.text));
+    }
+
+    let title = match found.kind {
+        TokenKind::End => "the file ends in the middle of a declaration".to_owned(),
+        TokenKind::Text => format!("unexpected text {}", found.text),
+        TokenKind::Number => format!("unexpected number `{}`", found.text),
+        _ => format!("unexpected `{}`", found.text),
+    };
+    let mut diagnostic = Diagnostic::new(Code::SYNTAX, span, title).label(format!("expected {expected}"));
+    if found.kind == TokenKind::Word {
+        let candidates = words.into_iter().chain(place.starters().iter().copied().filter(|_| found.lo == first.lo));
+        if let Some(similar) = crate::similar::most_similar(found.text, candidates) {
+            diagnostic = diagnostic.suggest(format!("`{similar}` is a word that fits here"), span, similar);
+        }
+        let number_before = before.is_some_and(char::is_whitespace)
+            && text[..found.lo].trim_end().ends_with(|c: char| c.is_ascii_digit());
+        if number_before && Unit::parse(found.text).is_ok() {
+            let gap = text[..found.lo].trim_end().len();
+            let gap = Span { lo: u32::try_from(gap).expect("files are small"), hi: span.lo, ..span };
+            diagnostic = diagnostic.suggest("glue the unit to its number", gap, "");
+        }
+        if place == Place::File && Place::System.starters().contains(&found.text) {
+            diagnostic = diagnostic.note(format!("`{}` is declared inside of `system {{ … }}`", found.text));
+        }
+    }
+    if found.kind == TokenKind::Sign && found.text == "=" && failure.expected.contains(&Rule::equal_to) {
+        diagnostic = diagnostic.suggest("compare with `==`", span, "==");
+    }
+    diagnostic
+}
+
+/// What would fit, in words.
+fn describe(failure: &Failure, place: Place, at_start: bool) -> String {
+    let mut words = BTreeSet::new();
+    let mut members = false;
+    for &rule in &failure.expected {
+        match rule {
+            Rule::EOI => members = true,
+            _ if rule == place.one_rule() => members = true,
+            _ => {
+                if let Some(word) = in_words(rule) {
+                    // The words that begin a member are said once, as a group.
+                    if keyword_of(rule).is_some_and(|word| place.starters().contains(&word)) && at_start {
+                        members = true;
+                    } else {
+                        words.insert(word);
+                    }
+                }
+            }
+        }
+    }
+    let mut words: Vec<String> = words.into_iter().collect();
+    if words.is_empty() {
+        return place.members().to_owned();
+    }
+    if members && at_start {
+        words.push(if place == Place::File { "a declaration".to_owned() } else { place.members().to_owned() });
+    }
+    let last = words.pop().expect("it is not empty");
+    if words.is_empty() { last } else { format!("{} or {last}", words.join(", ")) }
+}
+
+/// The word a keyword rule stands for.
+fn keyword_of(rule: Rule) -> Option<&'static str> {
+    // Rule names are the words with a prefix.
+    rule_name(rule).strip_prefix("k_")
+}
+
+fn rule_name(rule: Rule) -> &'static str {
+    static NAMES: std::sync::LazyLock<Vec<(Rule, String)>> =
+        std::sync::LazyLock::new(|| Rule::all_rules().iter().map(|&rule| (rule, format!("{rule:?}"))).collect());
+    NAMES.iter().find(|(known, _)| *known == rule).map_or("", |(_, name)| name)
+}
+
+/// A rule as people call it; `None` for what is not worth naming: recovery, comments, constructs of later versions.
+fn in_words(rule: Rule) -> Option<String> {
+    let words = match rule {
+        Rule::equals => "`=`",
+        Rule::colon | Rule::metric_type => "`:`",
+        Rule::comma => "`,`",
+        Rule::dots => "`..`",
+        Rule::paren_open => "`(`",
+        Rule::paren_close => "`)`",
+        Rule::bracket_open => "`[`",
+        Rule::bracket_close => "`]`",
+        Rule::open | Rule::hook_block | Rule::simulator_settings | Rule::search_settings => "`{`",
+        Rule::close => "`}`",
+        Rule::name | Rule::names | Rule::path | Rule::identifier => "a name",
+        Rule::field_name | Rule::field => "a field such as `level: real[mm]`",
+        Rule::text => "a text in double quotes",
+        Rule::number | Rule::count => "a number",
+        Rule::signed | Rule::quantity => "a quantity such as `20ms`",
+        Rule::range => "a range such as `[0s, 65s]`",
+        Rule::unit | Rule::unit_symbol => "a unit",
+        Rule::unit_in_brackets => "a unit in brackets",
+        Rule::type_of | Rule::scalar_type | Rule::message_type => "a type such as `real[mm]`",
+        Rule::bound => "a bound such as `<= 0` or `in [1, 40]`",
+        Rule::at_most => "`<=`",
+        Rule::at_least => "`>=`",
+        Rule::equal_to => "`==`",
+        Rule::below => "`<`",
+        Rule::above => "`>`",
+        Rule::bound_within => "`in`",
+        Rule::parameter_name | Rule::choice => "a parameter such as `offset`, `value`, `loss` or `delay`",
+        Rule::window | Rule::test_window => "`from`",
+        Rule::draw_seed | Rule::setting_seed => "`seed`",
+        Rule::within => "`within`",
+        Rule::priority => "`priority`",
+        Rule::inclusion => "`inclusion`",
+        Rule::drain => "`drain`",
+        Rule::direction => "`maximise` or `minimise`",
+        Rule::default_value => "`default`",
+        Rule::value_mode => "`offset` or `absolute`",
+        Rule::in_process => "`in_process`",
+        Rule::random_value => "`random`",
+        Rule::packet_loss | Rule::k_packet => "`packet loss`",
+        Rule::latency => "`latency`",
+        Rule::blackhole => "`blackhole`",
+        Rule::last => "`last(…)`",
+        Rule::fuzzing_time => "`fuzzing_time()`",
+        Rule::minus
+        | Rule::k_when
+        | Rule::k_condition
+        | Rule::k_import
+        | Rule::k_eddi
+        | Rule::k_physical
+        | Rule::k_launch
+        | Rule::k_terminate
+        | Rule::k_relay
+        | Rule::k_coverage
+        | Rule::k_boost
+        | Rule::k_record
+        | Rule::k_custom
+        | Rule::k_node
+        | Rule::k_parameter => return None,
+        _ => return keyword_of(rule).map(|word| format!("`{word}`")),
+    };
+    Some(words.to_owned())
+}

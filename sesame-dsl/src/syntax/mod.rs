@@ -1,0 +1,10 @@
+//! From text to [`ast`]: parsing with recovery.
+
+pub(crate) mod ast;
+mod explain;
+mod limits;
+mod parse;
+mod token;
+mod words;
+
+pub(crate) use parse::parse;

@@ -1,0 +1,596 @@
+//! From the grammar's pairs to the syntax tree.
+
+use pest::Parser as _;
+use pest::iterators::Pair as PestPair;
+use sesame_grammar::{Rule, SesameParser};
+
+use super::ast::{
+    Bound, Campaign, Choice, Comparison, Count, Direction, Drain, Expectation, Field, File, Head, InProcess, Message,
+    Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Range, Repeat, Requirement,
+    Search, Simulator, Strategy, System, Test, TestOperation, Topic, Type, TypeKind,
+};
+use super::explain::{Place, explain};
+use super::limits::{MAX_BYTES, MAX_CALLS, MAX_DEPTH, too_deep};
+use super::token::{TokenKind, token_at};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::span::{FileId, Span};
+
+pub(super) type Pair<'i> = PestPair<'i, Rule>;
+
+/// Reads one file. Never fails: what could not be read is in the diagnostics, and the rest is in the tree.
+pub(crate) fn parse(file: FileId, text: &str, diagnostics: &mut Vec<Diagnostic>) -> File {
+    let mut reader = Reader { file, text, diagnostics, out: File::default(), mistake: None };
+    if text.len() > MAX_BYTES {
+        let span = Span { file, lo: 0, hi: 0 };
+        let title = format!("the file has {} bytes, more than the {MAX_BYTES} that are read", text.len());
+        reader.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, span, title));
+    } else if let Some(at) = too_deep(text) {
+        let span = reader.span_of(at, at + 1);
+        let title = format!("blocks are nested more than {MAX_DEPTH} deep");
+        reader.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, span, title).label("this one is too deep"));
+    } else {
+        // Process-wide in pest; every caller sets the same value.
+        pest::set_call_limit(Some(MAX_CALLS));
+        match SesameParser::parse(Rule::file, text) {
+            Ok(mut pairs) => {
+                let root = pairs.next().expect("a parse that succeeds has its rule's pair");
+                reader.file(&root);
+                return reader.out;
+            }
+            // The entry rule accepts every text, so only the limit on calls is left.
+            Err(error) => {
+                let span = Span { file, lo: 0, hi: 0 };
+                let title = format!("the file takes too long to read: {}", error.variant.message());
+                reader.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, span, title));
+            }
+        }
+    }
+    reader.out.damaged = true;
+    reader.out
+}
+
+pub(super) struct Reader<'s> {
+    file: FileId,
+    text: &'s str,
+    diagnostics: &'s mut Vec<Diagnostic>,
+    out: File,
+    /// Where the last syntax error is.
+    mistake: Option<usize>,
+}
+
+pub(super) fn child<'i>(pair: &Pair<'i>, rule: Rule) -> Option<Pair<'i>> {
+    pair.clone().into_inner().find(|inner| inner.as_rule() == rule)
+}
+
+pub(super) fn expect_child<'i>(pair: &Pair<'i>, rule: Rule) -> Pair<'i> {
+    child(pair, rule).unwrap_or_else(|| panic!("the grammar puts a {rule:?} into every {:?}", pair.as_rule()))
+}
+
+pub(super) fn children<'i>(pair: &Pair<'i>, rule: Rule) -> impl Iterator<Item = Pair<'i>> {
+    pair.clone().into_inner().filter(move |inner| inner.as_rule() == rule)
+}
+
+fn first_of<'i>(pair: &Pair<'i>, rules: &[Rule]) -> Option<Pair<'i>> {
+    pair.clone().into_inner().find(|inner| rules.contains(&inner.as_rule()))
+}
+
+/// Where a construct's last word ends. pest's own span goes on over the blanks before an optional part that is not there.
+fn end_of(pair: &Pair<'_>) -> usize {
+    let last = pair.clone().into_inner().filter(|inner| inner.as_rule() != Rule::COMMENT).last();
+    match last {
+        // The closing quote is no pair.
+        Some(_) if pair.as_rule() == Rule::text => pair.as_span().end(),
+        Some(last) => end_of(&last),
+        None => pair.as_span().end(),
+    }
+}
+
+impl Reader<'_> {
+    pub(super) fn span_of(&self, lo: usize, hi: usize) -> Span {
+        let offset = |at: usize| u32::try_from(at).expect("files are at most MAX_BYTES long");
+        Span { file: self.file, lo: offset(lo), hi: offset(hi) }
+    }
+
+    pub(super) fn span(&self, pair: &Pair<'_>) -> Span {
+        self.span_of(pair.as_span().start(), end_of(pair))
+    }
+
+    /// The span of a clause's first word.
+    fn keyword_span(&self, pair: &Pair<'_>) -> Span {
+        let first = pair.clone().into_inner().find(|inner| !matches!(inner.as_rule(), Rule::docs | Rule::COMMENT));
+        self.span(&first.unwrap_or_else(|| pair.clone()))
+    }
+
+    pub(super) fn report(&mut self, diagnostic: Diagnostic) {
+        self.diagnostics.push(diagnostic);
+    }
+
+    /// Visits the members of a block. What could not be read is explained; returns whether there was such a thing.
+    fn members<'i>(&mut self, block: &Pair<'i>, place: Place, mut visit: impl FnMut(&mut Self, Pair<'i>)) -> bool {
+        let mut damaged = false;
+        let mut previous = None;
+        let mut opened = None;
+        for pair in block.clone().into_inner() {
+            match pair.as_rule() {
+                Rule::COMMENT => {}
+                Rule::open => opened = Some(self.span(&pair)),
+                Rule::not_closed | Rule::fields_not_closed => {
+                    damaged = true;
+                    self.not_closed(block, &pair, opened);
+                }
+                rule if rule == place.error_rule() => {
+                    damaged = true;
+                    let span = self.span(&pair);
+                    self.broken_names(&pair);
+                    // A stretch that begins at the mistake before it is the rest of the same mistake.
+                    let start = token_at(self.text, pair.as_span().start()).lo;
+                    let reported = self.mistake == Some(start);
+                    if !reported {
+                        let diagnostic = explain(self.file, self.text, span, place, previous);
+                        self.mistake = Some(diagnostic.span.lo as usize);
+                        self.report(diagnostic);
+                    }
+                    previous = None;
+                }
+                rule if place.member_rules().contains(&rule) => {
+                    previous = Some(self.span(&pair));
+                    visit(self, pair);
+                }
+                _ => {}
+            }
+        }
+        damaged
+    }
+
+    fn not_closed(&mut self, block: &Pair<'_>, end: &Pair<'_>, opened: Option<Span>) {
+        let opened = opened.expect("a block begins with its brace");
+        let at = token_at(self.text, end.as_span().start());
+        let span = self.span_of(at.lo, at.hi());
+        let what = match block.as_rule() {
+            Rule::hook_block => "metric".to_owned(),
+            rule => format!("{rule:?}").replace("_settings", ""),
+        };
+        let label = if at.text.is_empty() {
+            "the file ends here".to_owned()
+        } else {
+            format!("`{}` begins a new declaration", at.text)
+        };
+        let diagnostic = Diagnostic::new(Code::NOT_CLOSED, span, format!("the block of this `{what}` is not closed"))
+            .label(label)
+            .also(opened, "opened here");
+        self.report(diagnostic);
+    }
+
+    /// Keeps the name that a broken or unsupported construct was about to declare.
+    fn broken_names(&mut self, pair: &Pair<'_>) {
+        let lo = pair.as_span().start();
+        let mut at = lo;
+        // A misspelt first word may have been about to declare the second.
+        let first = token_at(self.text, lo);
+        let second = token_at(self.text, first.hi());
+        let both_words = [first, second].iter().all(|token| token.kind == TokenKind::Word);
+        if both_words && second.lo < pair.as_span().end() {
+            let span = self.span_of(second.lo, second.hi());
+            self.out.broken.push(Name { text: second.text.to_owned(), span });
+        }
+        loop {
+            let token = token_at(self.text, at);
+            if token.lo >= pair.as_span().end() || token.text.is_empty() {
+                return;
+            }
+            at = token.hi();
+            let declares = matches!(
+                token.text,
+                "simulator"
+                    | "message"
+                    | "topic"
+                    | "node"
+                    | "metric"
+                    | "requirement"
+                    | "operation"
+                    | "test"
+                    | "campaign"
+            );
+            if declares {
+                let name = token_at(self.text, at);
+                if name.kind == TokenKind::Word && name.lo < pair.as_span().end() {
+                    let span = self.span_of(name.lo, name.hi());
+                    self.out.broken.push(Name { text: name.text.to_owned(), span });
+                    at = name.hi();
+                }
+            }
+        }
+    }
+
+    /// Says that a construct belongs to a later version. Its first word decides where; its rule decides what it is called.
+    fn unsupported(&mut self, pair: &Pair<'_>) {
+        let words = [Rule::k_node, Rule::k_parameter, Rule::k_custom, Rule::kind_name];
+        let span = first_of(pair, &words).map_or_else(|| self.keyword_span(pair), |word| self.span(&word));
+        let word = &self.text[span.range()];
+        let what = match pair.as_rule() {
+            Rule::unsupported_transport => format!("simulator kind `{word}`"),
+            Rule::unsupported_formula if word == "when" => "a metric by `when … then …`".to_owned(),
+            Rule::unsupported_formula => format!("a metric by `{word}(…)`"),
+            Rule::unsupported_operation if word != "custom" => format!("an operation on a `{word}`"),
+            Rule::unsupported_operation | Rule::unsupported_kind => format!("operation kind `{word}`"),
+            Rule::unsupported_window => "activation by `when`".to_owned(),
+            Rule::unsupported_from => "a campaign `from` another".to_owned(),
+            Rule::unsupported_activation => "activation by `condition`".to_owned(),
+            Rule::unsupported_strategy => format!("search strategy `{word}`"),
+            _ => format!("`{word}`"),
+        };
+        self.broken_names(pair);
+        self.report(
+            Diagnostic::new(
+                Code::NOT_SUPPORTED,
+                span,
+                format!("{what} is not supported yet by this version of sesamec"),
+            )
+            .label("part of the language, but not of this version"),
+        );
+    }
+
+    fn file(&mut self, root: &Pair<'_>) {
+        let damaged = self.members(root, Place::File, |reader, item| match item.as_rule() {
+            Rule::space => {
+                let head = reader.head(&item);
+                reader.out.spaces.push(head);
+            }
+            Rule::system => {
+                let system = reader.system(&item);
+                reader.out.systems.push(system);
+            }
+            Rule::metric => {
+                let metric = reader.metric(&item);
+                reader.out.metrics.push(metric);
+            }
+            Rule::requirement => {
+                let requirement = Requirement {
+                    head: reader.head(&item),
+                    text: reader.text_of(&expect_child(&item, Rule::text)),
+                    metric: {
+                        let name = children(&item, Rule::name).nth(1).expect("a requirement names its metric");
+                        reader.name(&name)
+                    },
+                    bound: reader.bound(&expect_child(&item, Rule::bound)),
+                };
+                reader.out.requirements.push(requirement);
+            }
+            Rule::operation => {
+                let operation = reader.operation(&item);
+                reader.out.operations.push(operation);
+            }
+            Rule::test => {
+                let test = reader.test(&item);
+                reader.out.tests.push(test);
+            }
+            Rule::campaign => {
+                let campaign = reader.campaign(&item);
+                reader.out.campaigns.push(campaign);
+            }
+            Rule::unsupported_item => {
+                reader.unsupported(&item);
+                reader.out.damaged = true;
+            }
+            other => unreachable!("{other:?} is no declaration"),
+        });
+        self.out.damaged |= damaged;
+    }
+
+    // ----- the system
+
+    fn system(&mut self, pair: &Pair<'_>) -> System {
+        let span = self.span(&expect_child(pair, Rule::k_system));
+        let mut system =
+            System { span, simulators: vec![], messages: vec![], topics: vec![], nodes: vec![], damaged: false };
+        system.damaged = self.members(pair, Place::System, |reader, member| match member.as_rule() {
+            Rule::simulator => system.simulators.push(reader.simulator(&member)),
+            Rule::message => system.messages.push(reader.message(&member)),
+            Rule::topic => system.topics.push(Topic {
+                head: reader.head(&member),
+                path: reader.text_of(&expect_child(&member, Rule::text)),
+                ty: reader.type_of(&expect_child(&member, Rule::type_of)),
+            }),
+            Rule::node => system.nodes.push(reader.node(&member)),
+            _ => reader.unsupported(&member),
+        });
+        system
+    }
+
+    fn simulator(&mut self, pair: &Pair<'_>) -> Simulator {
+        let head = self.head(pair);
+        if let Some(unsupported) = child(pair, Rule::unsupported_transport) {
+            self.unsupported(&unsupported);
+            return Simulator { head, transport: None };
+        }
+        let in_process = expect_child(pair, Rule::in_process);
+        let path = self.text_of(&expect_child(&in_process, Rule::text));
+        let mut transport = InProcess { path, crates: vec![], steps: vec![], damaged: false };
+        let settings = expect_child(&in_process, Rule::simulator_settings);
+        transport.damaged = self.members(&settings, Place::Simulator, |reader, setting| {
+            let span = reader.keyword_span(&setting);
+            match setting.as_rule() {
+                Rule::setting_crate => {
+                    transport.crates.push((span, reader.text_of(&expect_child(&setting, Rule::text))));
+                }
+                _ => transport.steps.push((span, reader.signed(&expect_child(&setting, Rule::signed)))),
+            }
+        });
+        Simulator { head, transport: Some(transport) }
+    }
+
+    fn message(&mut self, pair: &Pair<'_>) -> Message {
+        let head = self.head(pair);
+        let mut fields = Vec::new();
+        let damaged = self.members(pair, Place::Message, |reader, field| {
+            let name = expect_child(&field, Rule::field_name);
+            fields.push(Field {
+                head: Head { name: reader.field_name(&name), doc: Self::doc(&field) },
+                ty: reader.type_of(&expect_child(&field, Rule::type_of)),
+            });
+        });
+        Message { head, fields, damaged }
+    }
+
+    fn type_of(&mut self, pair: &Pair<'_>) -> Type {
+        const MAX_LISTS: usize = 8;
+        let inner = first_of(pair, &[Rule::scalar_type, Rule::message_type]).expect("a type is one of two");
+        let kind = match inner.as_rule() {
+            Rule::scalar_type => {
+                let word = inner.clone().into_inner().next().expect("a scalar type has a word");
+                match word.as_rule() {
+                    Rule::k_bool => TypeKind::Bool,
+                    Rule::k_int => TypeKind::Int,
+                    Rule::k_real => TypeKind::Real,
+                    Rule::k_text => TypeKind::Text,
+                    _ => TypeKind::Point,
+                }
+            }
+            _ => TypeKind::Message(self.name(&expect_child(&inner, Rule::name))),
+        };
+        let unit = child(&inner, Rule::unit_in_brackets).map(|unit| self.unit(&expect_child(&unit, Rule::unit)));
+        let span = self.span(pair);
+        let lists = children(pair, Rule::list_of).count();
+        if lists > MAX_LISTS {
+            let title = format!("lists are nested {lists} deep, more than the {MAX_LISTS} that are supported");
+            self.report(Diagnostic::new(Code::TOO_LARGE, span, title));
+        }
+        (0..lists.min(MAX_LISTS)).fold(Type { kind, unit, span }, |of, _| Type {
+            kind: TypeKind::List(Box::new(of)),
+            unit: None,
+            span,
+        })
+    }
+
+    fn node(&mut self, pair: &Pair<'_>) -> Node {
+        let mut node = Node { head: self.head(pair), publishes: vec![], subscribes: vec![] };
+        self.members(pair, Place::Node, |reader, member| {
+            let list = (reader.keyword_span(&member), reader.names(&member));
+            match member.as_rule() {
+                Rule::publishes => node.publishes.push(list),
+                _ => node.subscribes.push(list),
+            }
+        });
+        node
+    }
+
+    // ----- metrics
+
+    fn metric(&mut self, pair: &Pair<'_>) -> Metric {
+        let head = self.head(pair);
+        let ty = child(pair, Rule::metric_type).map(|ty| self.type_of(&expect_child(&ty, Rule::type_of)));
+        let directions = children(pair, Rule::direction).map(|direction| {
+            let value =
+                if child(&direction, Rule::k_maximise).is_some() { Direction::Maximise } else { Direction::Minimise };
+            (self.span(&direction), value)
+        });
+        let directions = directions.collect();
+        let defaults = children(pair, Rule::default_value)
+            .map(|default| (self.keyword_span(&default), self.signed(&expect_child(&default, Rule::signed))))
+            .collect();
+        let sources = [Rule::hook_block, Rule::last, Rule::fuzzing_time, Rule::unsupported_formula];
+        let source = first_of(pair, &sources).expect("a metric has a source");
+        let source = match source.as_rule() {
+            Rule::hook_block => {
+                let mut hooks = Vec::new();
+                let damaged = self.members(&source, Place::Hook, |reader, hook| {
+                    hooks.push((reader.keyword_span(&hook), reader.names(&hook)));
+                });
+                Some(MetricSource::Hook { hooks, damaged })
+            }
+            Rule::last => Some(MetricSource::Last(self.path(&expect_child(&source, Rule::path)))),
+            Rule::fuzzing_time => Some(MetricSource::FuzzingTime),
+            _ => {
+                self.unsupported(&source);
+                None
+            }
+        };
+        Metric { head, ty, directions, defaults, source }
+    }
+
+    fn bound(&mut self, pair: &Pair<'_>) -> Bound {
+        if let Some(within) = child(pair, Rule::bound_within) {
+            return Bound::Within(self.range(&expect_child(&within, Rule::range)));
+        }
+        let comparisons = [
+            (Rule::at_most, Comparison::AtMost),
+            (Rule::at_least, Comparison::AtLeast),
+            (Rule::equal_to, Comparison::Equal),
+            (Rule::below, Comparison::Below),
+            (Rule::above, Comparison::Above),
+        ];
+        let comparison = comparisons.into_iter().find(|&(rule, _)| child(pair, rule).is_some());
+        let (_, comparison) = comparison.expect("a bound compares or encloses");
+        Bound::Compare(comparison, self.signed(&expect_child(pair, Rule::signed)))
+    }
+
+    // ----- operations and tests
+
+    fn operation(&mut self, pair: &Pair<'_>) -> Operation {
+        let head = self.head(pair);
+        let unsupported = first_of(pair, &[Rule::unsupported_operation, Rule::unsupported_kind]);
+        if let Some(unsupported) = unsupported {
+            self.unsupported(&unsupported);
+            return Operation { head, body: None };
+        }
+        let kinds = [Rule::random_value, Rule::packet_loss, Rule::latency, Rule::blackhole];
+        let kind = first_of(pair, &kinds).expect("an operation has a kind");
+        let kind = match kind.as_rule() {
+            Rule::random_value => OperationKind::Random {
+                absolute: child(&expect_child(&kind, Rule::value_mode), Rule::k_absolute).is_some(),
+                range: self.range(&expect_child(&kind, Rule::range)),
+            },
+            Rule::packet_loss => OperationKind::PacketLoss(self.range(&expect_child(&kind, Rule::range))),
+            Rule::latency => OperationKind::Latency {
+                range: self.range(&expect_child(&kind, Rule::range)),
+                uniform: children(&kind, Rule::k_uniform).map(|uniform| self.span(&uniform)).collect(),
+                drain: children(&kind, Rule::drain)
+                    .map(|drain| {
+                        let mode = if child(&drain, Rule::k_finish).is_some() {
+                            Drain::Finish
+                        } else if child(&drain, Rule::k_flush).is_some() {
+                            Drain::Flush
+                        } else {
+                            Drain::Drop
+                        };
+                        (self.keyword_span(&drain), mode)
+                    })
+                    .collect(),
+            },
+            _ => OperationKind::Blackhole,
+        };
+        let mut signed = |rule| {
+            let clauses = children(pair, rule);
+            clauses.map(|it| (self.keyword_span(&it), self.signed(&expect_child(&it, Rule::signed)))).collect()
+        };
+        let priority = signed(Rule::priority);
+        let inclusion = signed(Rule::inclusion);
+        let within = children(pair, Rule::within)
+            .map(|within| (self.keyword_span(&within), self.range(&expect_child(&within, Rule::range))))
+            .collect();
+        let target = self.path(&expect_child(pair, Rule::path));
+        Operation { head, body: Some(OperationBody { target, kind, within, priority, inclusion }) }
+    }
+
+    fn test(&mut self, pair: &Pair<'_>) -> Test {
+        let mut test = Test { head: self.head(pair), operations: vec![], expectations: vec![], damaged: false };
+        test.damaged = self.members(pair, Place::Test, |reader, member| match member.as_rule() {
+            Rule::expectation => test.expectations.push(Expectation {
+                metric: reader.name(&expect_child(&member, Rule::name)),
+                bound: reader.bound(&expect_child(&member, Rule::bound)),
+            }),
+            _ => test.operations.push(reader.test_operation(&member)),
+        });
+        test
+    }
+
+    fn test_operation(&mut self, pair: &Pair<'_>) -> TestOperation {
+        let operation = self.name(&expect_child(pair, Rule::name));
+        let choices = children(pair, Rule::choice)
+            .map(|choice| {
+                let word = expect_child(&choice, Rule::parameter_name);
+                let name = Name { text: word.as_str().to_owned(), span: self.span(&word) };
+                let value = match child(&choice, Rule::range) {
+                    Some(range) => Choice::Range(self.range(&range)),
+                    None => Choice::Value(self.signed(&expect_child(&choice, Rule::signed))),
+                };
+                (name, value)
+            })
+            .collect();
+        let window = child(pair, Rule::window).map(|window| {
+            let mut ends = children(&window, Rule::signed).map(|end| self.signed(&end)).collect::<Vec<_>>();
+            let high = ends.pop().expect("a window has an end");
+            let low = ends.pop().expect("a window has a start");
+            Range { span: low.span.to(high.span), low, high }
+        });
+        if let Some(unsupported) = child(pair, Rule::unsupported_window) {
+            self.unsupported(&unsupported);
+        }
+        let seed = child(pair, Rule::draw_seed).map(|seed| self.count(&expect_child(&seed, Rule::number)));
+        TestOperation { operation, choices, window, seed }
+    }
+
+    // ----- campaigns
+
+    fn campaign(&mut self, pair: &Pair<'_>) -> Campaign {
+        let mut campaign = Campaign {
+            head: self.head(pair),
+            objectives: vec![],
+            observes: vec![],
+            operations: vec![],
+            activates: vec![],
+            searches: vec![],
+            repeats: vec![],
+            ends: vec![],
+            damaged: false,
+        };
+        let from = child(pair, Rule::unsupported_from);
+        if let Some(from) = &from {
+            self.unsupported(from);
+        }
+        let damaged = self.members(pair, Place::Campaign, |reader, member| {
+            let span = reader.keyword_span(&member);
+            match member.as_rule() {
+                Rule::objectives => campaign.objectives.push((span, reader.names(&member))),
+                Rule::observes => campaign.observes.push((span, reader.names(&member))),
+                Rule::operations => {
+                    let count = expect_child(&member, Rule::count);
+                    let counts: Vec<Count> = children(&count, Rule::number).map(|it| reader.count(&it)).collect();
+                    let min = *counts.first().expect("a count has a number");
+                    let max = *counts.last().expect("a count has a number");
+                    campaign.operations.push(Operations { span, names: reader.names(&member), min, max });
+                }
+                Rule::activate => {
+                    campaign.activates.push(span);
+                    if let Some(activation) = child(&member, Rule::unsupported_activation) {
+                        reader.unsupported(&activation);
+                    }
+                }
+                Rule::search => campaign.searches.push(reader.search(&member, span)),
+                Rule::end => campaign.ends.push((span, reader.signed(&expect_child(&member, Rule::signed)))),
+                Rule::repeat => {
+                    let mut seed = Vec::new();
+                    if let Some(settings) = child(&member, Rule::repeat_settings) {
+                        reader.members(&settings, Place::Repeat, |reader, setting| {
+                            let span = reader.keyword_span(&setting);
+                            seed.push((span, reader.count(&expect_child(&setting, Rule::number))));
+                        });
+                    }
+                    campaign.repeats.push(Repeat {
+                        span,
+                        test: reader.name(&expect_child(&member, Rule::name)),
+                        times: reader.count(&expect_child(&member, Rule::number)),
+                        seed,
+                    });
+                }
+                _ => {
+                    reader.unsupported(&member);
+                }
+            }
+        });
+        // A `from` brings clauses that are not written here; the other unsupported ones replace none.
+        campaign.damaged = damaged || from.is_some();
+        campaign
+    }
+
+    fn search(&mut self, pair: &Pair<'_>, span: Span) -> Search {
+        let mut search =
+            Search { span, strategy: None, population: vec![], evaluations: vec![], seed: vec![], damaged: false };
+        if let Some(strategy) = child(pair, Rule::unsupported_strategy) {
+            self.unsupported(&strategy);
+            return search;
+        }
+        let nsga2 = child(pair, Rule::k_nsga2).is_some();
+        search.strategy = Some(if nsga2 { Strategy::Nsga2 } else { Strategy::Random });
+        let settings = expect_child(pair, Rule::search_settings);
+        search.damaged = self.members(&settings, Place::Search, |reader, setting| {
+            let value = (reader.keyword_span(&setting), reader.count(&expect_child(&setting, Rule::number)));
+            match setting.as_rule() {
+                Rule::setting_population => search.population.push(value),
+                Rule::setting_evaluations => search.evaluations.push(value),
+                _ => search.seed.push(value),
+            }
+        });
+        search
+    }
+}

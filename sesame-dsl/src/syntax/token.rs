@@ -1,0 +1,87 @@
+//! What stands at a place, for messages: words, texts, numbers, signs.
+
+use pest::Parser as _;
+use sesame_grammar::{Rule, SesameParser};
+
+/// The token at or after an offset, comments skipped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Token<'t> {
+    pub(super) kind: TokenKind,
+    pub(super) lo: usize,
+    pub(super) text: &'t str,
+}
+
+impl Token<'_> {
+    pub(super) fn hi(&self) -> usize {
+        self.lo + self.text.len()
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum TokenKind {
+    Word,
+    Number,
+    Text,
+    /// A quote that does not end on its line, with the rest of the line.
+    OpenText,
+    Doc,
+    Sign,
+    End,
+}
+
+/// The token at or after an offset.
+pub(super) fn token_at(text: &str, offset: usize) -> Token<'_> {
+    let mut at = offset;
+    loop {
+        let rest = &text[at..];
+        let trimmed = rest.trim_start_matches([' ', '\t', '\r', '\n', '\u{FEFF}']);
+        at += rest.len() - trimmed.len();
+        if !trimmed.starts_with("//") || is_doc(trimmed) {
+            break;
+        }
+        at += trimmed.find('\n').unwrap_or(trimmed.len());
+    }
+    let rest = &text[at..];
+    let token = |kind, length| Token { kind, lo: at, text: &rest[..length] };
+    let line = || rest.find(['\r', '\n']).unwrap_or(rest.len());
+    let Some(first) = rest.chars().next() else { return token(TokenKind::End, 0) };
+    let word = |rest: &str| rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
+    match first {
+        '"' => match text_end(text, at) {
+            Some(end) => token(TokenKind::Text, end - at),
+            None => token(TokenKind::OpenText, line()),
+        },
+        _ if is_doc(rest) => token(TokenKind::Doc, line()),
+        _ if first.is_ascii_digit() => {
+            let length = SesameParser::parse(Rule::quantity, rest).map_or(1, |pairs| pairs.as_str().len());
+            token(TokenKind::Number, length)
+        }
+        _ if first.is_alphabetic() || first == '_' => token(TokenKind::Word, word(rest)),
+        '<' | '>' | '=' | '.' if rest[1..].starts_with(['=', '.']) => token(TokenKind::Sign, 2),
+        _ => token(TokenKind::Sign, first.len_utf8()),
+    }
+}
+
+fn is_doc(text: &str) -> bool {
+    text.starts_with("///") && !text.starts_with("////")
+}
+
+/// One past the closing quote of the text that begins at an offset; `None` when it does not end on its line.
+pub(super) fn text_end(text: &str, open: usize) -> Option<usize> {
+    let mut escaped = false;
+    for (offset, c) in text[open + 1..].char_indices() {
+        match c {
+            '\n' | '\r' => return None,
+            _ if escaped => escaped = false,
+            '\\' => escaped = true,
+            '"' => return Some(open + 1 + offset + 1),
+            _ => {}
+        }
+    }
+    None
+}
+
+/// Whether a word is reserved.
+pub(super) fn is_keyword(word: &str) -> bool {
+    SesameParser::parse(Rule::keyword, word).is_ok_and(|pairs| pairs.as_str() == word)
+}

@@ -1,0 +1,118 @@
+//! Files of the corpus against their blessed outcome: `good/` gives models, `bad/` gives diagnostics.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use sesame_dsl::diagnostic::{CODES, page, render};
+use sesame_dsl::source::SourceMap;
+use sesame_dsl::{Analysis, analyse};
+
+#[expect(clippy::disallowed_methods, reason = "the crate is pure; its tests read their corpus")]
+fn corpus(folder: &str) -> Vec<(String, String)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests").join(folder);
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
+        .expect("the corpus is beside this file")
+        .map(|entry| entry.expect("the corpus can be listed").path())
+        .collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "sesame"));
+    files.sort();
+    assert!(!files.is_empty());
+    let name =
+        |file: &PathBuf| file.file_stem().and_then(|stem| stem.to_str()).expect("corpus names are plain").to_owned();
+    files.iter().map(|file| (name(file), std::fs::read_to_string(file).expect("the corpus is text"))).collect()
+}
+
+fn analyse_text(name: &str, text: &str) -> (SourceMap, Analysis) {
+    let mut sources = SourceMap::new();
+    let file = sources.add(format!("{name}.sesame"), text);
+    let analysis = analyse(&sources, file);
+    (sources, analysis)
+}
+
+/// A model's debug text without spans and scales, whose numbers nobody can check by eye.
+fn without_places(model: &str) -> String {
+    let mut out = String::new();
+    let mut skipping: Option<String> = None;
+    for line in model.lines() {
+        let indent = &line[..line.len() - line.trim_start().len()];
+        match &skipping {
+            Some(end) if line == end => skipping = None,
+            Some(_) => {}
+            None if ["span: Span {", "dimension: Dimension {", "scale: Scale {"].contains(&line.trim_start()) => {
+                skipping = Some(format!("{indent}}},"));
+            }
+            None => out.extend([line, "\n"]),
+        }
+    }
+    out
+}
+
+#[test]
+fn good_files_give_their_models() {
+    for (name, text) in corpus("good") {
+        let (sources, analysis) = analyse_text(&name, &text);
+        let said = render::human(&analysis.diagnostics, &sources, false);
+        assert!(!analysis.has_errors(), "{said}");
+        let model = analysis.model.unwrap_or_else(|| panic!("{name} has no errors and no model"));
+        insta::assert_snapshot!(format!("good_{name}"), format!("{said}{}", without_places(&format!("{model:#?}"))));
+    }
+}
+
+#[test]
+fn bad_files_give_their_diagnostics() {
+    for (name, text) in corpus("bad") {
+        let (sources, analysis) = analyse_text(&name, &text);
+        assert!(!analysis.diagnostics.is_empty(), "{name} is not bad");
+        assert_eq!(analysis.model.is_some(), !analysis.has_errors(), "{name}");
+        insta::assert_snapshot!(format!("bad_{name}"), render::human(&analysis.diagnostics, &sources, false));
+    }
+}
+
+#[test]
+fn every_code_occurs_in_the_corpus_file_named_after_it() {
+    let files = corpus("bad");
+    for (code, page) in CODES {
+        let prefix = format!("{}_", code.text().to_lowercase());
+        let own: Vec<_> = files.iter().filter(|(name, _)| name.starts_with(&prefix)).collect();
+        assert!(!own.is_empty(), "no file tests/bad/{prefix}….sesame");
+        for (name, text) in own {
+            let (_, analysis) = analyse_text(name, text);
+            let found: BTreeSet<_> = analysis.diagnostics.iter().map(|diagnostic| diagnostic.code).collect();
+            assert!(found.contains(code), "{name} gives {found:?}");
+        }
+        assert!(page.starts_with(&format!("# {code}: ")), "the page of {code} begins with its heading");
+    }
+}
+
+#[test]
+fn codes_are_unique_and_sorted_and_found_in_any_case() {
+    assert!(CODES.windows(2).all(|pair| pair[0].0 < pair[1].0));
+    assert_eq!(page("e0203"), page("E0203"));
+    assert!(page("E0203").is_some());
+    assert_eq!(page("E9999"), None);
+}
+
+#[test]
+fn ten_mistakes_give_ten_diagnostics_at_once() {
+    let text = include_str!("bad/ten_mistakes.sesame");
+    let (sources, analysis) = analyse_text("ten_mistakes", text);
+    let lines: Vec<u32> = analysis.diagnostics.iter().map(|it| sources.position(it.span).line).collect();
+    // Each mistake is marked in the file by a comment on its line.
+    let marked: Vec<u32> =
+        (1..).zip(text.lines()).filter(|(_, line)| line.contains("// mistake")).map(|(n, _)| n).collect();
+    assert_eq!(marked.len(), 10);
+    assert_eq!(lines, marked);
+}
+
+#[test]
+fn one_line_and_json_say_the_same_as_the_long_form() {
+    let (sources, analysis) = analyse_text("ten_mistakes", include_str!("bad/ten_mistakes.sesame"));
+    insta::assert_snapshot!("ten_mistakes_short", render::short(&analysis.diagnostics, &sources));
+    insta::assert_snapshot!("ten_mistakes_json", render::json(&analysis.diagnostics, &sources));
+    let json = render::json(&analysis.diagnostics, &sources);
+    for (line, diagnostic) in json.lines().zip(&analysis.diagnostics) {
+        let value: serde_json::Value = serde_json::from_str(line).unwrap();
+        assert_eq!(value["code"], diagnostic.code.text());
+        assert_eq!(value["primary"]["at"]["start"]["byte"], diagnostic.span.lo);
+    }
+}
