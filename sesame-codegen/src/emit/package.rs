@@ -50,14 +50,19 @@ pub(super) fn cargo_toml(note: &str, package: &str, dependencies: &BTreeMap<Stri
          # The runner is a workspace of its own, whatever folder it lies in.\n\
          [workspace]\n\
          \n\
-         # What rarely changes runs at full speed; hooks and generated code are built quickly.\n\
+         # Simulator and runtime run at full speed. Hooks and generated code are built quickly, since they change; build\n\
+         # scripts and macros are not optimised at all (a profile for package.\"*\" would do that too, and take twice as long).\n\
          [profile.dev]\n\
-         opt-level = 1\n\
-         debug = \"line-tables-only\"\n\
-         \n\
-         [profile.dev.package.\"*\"]\n\
          opt-level = 3\n\
-         debug = false\n",
+         debug = false\n\
+         \n",
+    );
+    let own = format!("[profile.dev.package.{package}]\nopt-level = 1\ndebug = \"line-tables-only\"\n\n");
+    text.push_str(&own);
+    text.push_str(
+        "# SQLite would take long to optimise, and has little to do in a campaign.\n\
+         [profile.dev.package.libsqlite3-sys]\n\
+         opt-level = 1\n",
     );
     text
 }

@@ -2,8 +2,8 @@
 #![cfg(test)]
 
 mod command;
-mod compiled;
 mod emission;
+mod emitted;
 mod plans;
 mod regeneration;
 mod surroundings;
