@@ -54,7 +54,7 @@ pub struct Progress<'a> {
 #[derive(Debug)]
 pub enum Conducted {
     /// All tests were evaluated.
-    Finished(Repository),
+    Finished(Box<Repository>),
     /// The user stopped it; `resume` goes on.
     Interrupted,
 }
@@ -103,12 +103,11 @@ pub fn conduct(
     })?;
     let mut desk = Desk { recorder: &mut recorder, recorded, pool, interrupted };
 
-    let mut reference = None;
-    if !desk.evaluate(vec![undisturbed(0, settings.seed)], &mut |record| reference = Some(record.clone()))? {
+    let mut ended = None;
+    if !desk.evaluate(vec![undisturbed(0, settings.seed)], &mut |record| ended = Some(record.observation.clone()))? {
         return interrupt(recorder);
     }
-    let reference =
-        reference.map(|record| record.observation).unwrap_or_else(|| unreachable!("one test was evaluated"));
+    let Some(reference) = ended else { unreachable!("every test handed in is seen") };
     if let Outcome::Crash { .. } | Outcome::Timeout { .. } = reference.outcome {
         return Err(CampaignError::Reference(reference.outcome.detail().unwrap_or_default()));
     }
@@ -186,7 +185,7 @@ pub fn conduct(
             members: front.numbers(),
         })?;
     }
-    Ok(Conducted::Finished(recorder.finish("all tests were evaluated")?))
+    Ok(Conducted::Finished(Box::new(recorder.finish("all tests were evaluated")?)))
 }
 
 fn interrupt(recorder: Recorder) -> Result<Conducted, CampaignError> {
@@ -291,22 +290,22 @@ impl Desk<'_> {
             }
             let Some((number, observation)) = self.pool.next(Duration::from_millis(100))? else { continue };
             let Some(test) = waiting.remove(&number) else { continue };
-            self.record(test.with(observation), each)?;
+            self.record(&test.with(observation), each)?;
         }
         for (original, test) in duplicates {
             let observation = self.recorder.repository().test(original)?.observation;
-            self.record(test.with(observation), each)?;
+            self.record(&test.with(observation), each)?;
         }
         Ok(true)
     }
 
-    fn record(&mut self, record: TestRecord, each: &mut dyn FnMut(&TestRecord)) -> Result<(), CampaignError> {
-        self.recorder.commit(&record)?;
+    fn record(&mut self, record: &TestRecord, each: &mut dyn FnMut(&TestRecord)) -> Result<(), CampaignError> {
+        self.recorder.commit(record)?;
         for warning in &record.observation.warnings {
             let event = Event { kind: EventKind::Warning, test: Some(record.number), text: warning.clone() };
             self.recorder.put_event(&event)?;
         }
-        each(&record);
+        each(record);
         Ok(())
     }
 }

@@ -1,0 +1,90 @@
+//! What the relay costs per message, beside a bare copy of the message.
+
+use std::hint::black_box;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use sesame_plan::{Activation, CampaignPlan, Choice, OperationId, Shape, Test, TestOperation};
+use sesame_runtime::metric::MetricTable;
+use sesame_runtime::relay::{Exchange as _, Relay};
+use sesame_runtime::time::SimTime;
+use sesame_runtime::value::{Fields, Record, Value};
+use sesame_runtime::wire::WireTable;
+
+const MESSAGES: u32 = 10_000;
+
+/// A test that keeps these operations active all the time, with the middle of what is permitted.
+fn active(plan: &CampaignPlan, names: &[&str]) -> Test {
+    let operation = |name: &&str| {
+        let at = plan.operations.iter().position(|operation| operation.name == **name).expect("it is declared");
+        let parameters = plan.operations[at].parameters.iter().map(|parameter| {
+            let (low, high) = (parameter.low * 0.75 + parameter.high * 0.25, parameter.high * 0.75 + parameter.low * 0.25);
+            match parameter.shape {
+                Shape::Value => Choice::Value { value: (low + high) / 2.0 },
+                Shape::Range => Choice::Range { low, high },
+            }
+        });
+        TestOperation {
+            operation: OperationId(u32::try_from(at).expect("few operations")),
+            activation: Activation::Time { start: 0.0, end: 1000.0 },
+            parameters: parameters.collect(),
+            draw_seed: 1,
+        }
+    };
+    Test { operations: names.iter().map(operation).collect() }
+}
+
+fn zone() -> Value {
+    let fields = Fields::new(["zone", "level", "object1", "object2"]);
+    Record::new(&fields, vec!["Z1".into(), 700.0.into(), "Z1".into(), "gripper".into()]).into()
+}
+
+fn relay(criterion: &mut Criterion) {
+    let plan = sesame_bench::plan();
+    let wires = WireTable::new(&plan);
+    let metrics = MetricTable::new(&plan, &wires, &[]).expect("the space has no hooks");
+    let mut group = criterion.benchmark_group("per_message");
+    group.throughput(Throughput::Elements(u64::from(MESSAGES)));
+
+    let cases: [(&str, &str, Value, &[&str]); 7] = [
+        ("number, untouched", "arm/command", Value::Real(1.0), &[]),
+        ("number, offset", "arm/command", Value::Real(1.0), &["jitter"]),
+        ("number, loss", "arm/command", Value::Real(1.0), &["lose"]),
+        ("number, latency", "arm/command", Value::Real(1.0), &["lag"]),
+        ("number, four operations", "arm/command", Value::Real(1.0), &["jitter", "jitter", "lose", "lag"]),
+        ("message, untouched and measured", "zones/Z1", zone(), &[]),
+        ("message, offset and measured", "zones/Z1", zone(), &["shift"]),
+    ];
+    for (name, path, value, operations) in cases {
+        let wire = wires.find(path).expect("the topic is declared");
+        let test = active(&plan, operations);
+        group.bench_function(BenchmarkId::new("relay", name), |bencher| {
+            bencher.iter(|| {
+                let mut relay = Relay::new(&plan, &wires, &test, metrics.start()).expect("the test fits");
+                let mut deliveries = Vec::new();
+                for step in 0..MESSAGES {
+                    let now = SimTime::from_nanos(i64::from(step) * 1_000_000);
+                    relay.advance(now, &mut deliveries);
+                    relay.message(now, wire, value.clone(), &mut deliveries);
+                    black_box(&deliveries);
+                    deliveries.clear();
+                }
+            });
+        });
+    }
+    for (name, value) in [("number", Value::Real(1.0)), ("message", zone())] {
+        group.bench_function(BenchmarkId::new("bare copy", name), |bencher| {
+            bencher.iter(|| {
+                let mut deliveries = Vec::new();
+                for _ in 0..MESSAGES {
+                    deliveries.push(value.clone());
+                    black_box(&deliveries);
+                    deliveries.clear();
+                }
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, relay);
+criterion_main!(benches);

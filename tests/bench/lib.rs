@@ -1,0 +1,42 @@
+//! What the benchmarks share: the plan of a small space with one topic of each kind.
+
+use sesame_codegen::lower::lower;
+use sesame_dsl::source::SourceMap;
+use sesame_plan::CampaignPlan;
+
+/// A space with a scalar topic, a message topic, and operations of every kind on the scalar one.
+const SPACE: &str = r#"
+space bench
+
+system {
+  simulator sim = in_process "sim::Sim" { crate "simulator"  step 1ms }
+  message Zone { zone: text  level: real[mm]  object1: text  object2: text }
+  topic command = "arm/command" : real[rad]
+  topic zone    = "zones/Z1"    : Zone
+}
+
+metric fuzzing_time minimise = fuzzing_time()
+metric level minimise default 0mm = last(zone.level)
+
+operation jitter on command    = random offset [-0.3rad, 0.3rad]
+operation shift  on zone.level = random offset [-5mm, 5mm]
+operation lose   on command    = packet loss [0%, 100%]
+operation lag    on command    = latency [0ms, 500ms] uniform
+
+campaign all {
+  objectives fuzzing_time, level
+  operations jitter, shift, lose, lag   1..5 per test
+  search     nsga2 { population 10  evaluations 210  seed 42 }
+  end        after 1000s
+}
+"#;
+
+/// The plan of the space above.
+pub fn plan() -> CampaignPlan {
+    let mut sources = SourceMap::new();
+    let root = sources.add("bench.sesame", SPACE);
+    let analysis = sesame_dsl::analyse(&sources, root);
+    let space = analysis.model.unwrap_or_else(|| panic!("the space is sound: {:?}", analysis.diagnostics));
+    let campaign = space.campaign("all").expect("the space has the campaign");
+    lower(&space, campaign, "bench.sesame", "bench").plan
+}
