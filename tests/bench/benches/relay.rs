@@ -19,7 +19,7 @@ fn active(plan: &CampaignPlan, names: &[&str]) -> Test {
         let parameters = plan.operations[at].parameters.iter().map(|parameter| {
             let (low, high) = (parameter.low * 0.75 + parameter.high * 0.25, parameter.high * 0.75 + parameter.low * 0.25);
             match parameter.shape {
-                Shape::Value => Choice::Value { value: (low + high) / 2.0 },
+                Shape::Value => Choice::Value { value: f64::midpoint(low, high) },
                 Shape::Range => Choice::Range { low, high },
             }
         });
