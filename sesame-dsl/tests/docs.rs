@@ -1,0 +1,226 @@
+//! The documentation against the compiler: every example in it is checked, and what it lists is complete.
+//!
+//! Examples are fenced blocks whose first word is `sesame`. A plain one is a whole file. The standard space
+//! (`sesame,standard`, once, in the language reference) is one too, and completes the others:
+//!
+//! | info string       | how the block is read                                                     |
+//! |-------------------|---------------------------------------------------------------------------|
+//! | `sesame,fragment` | after the standard space                                                  |
+//! | `sesame,system`   | inside the `system { … }` of the standard space, at its beginning         |
+//! | `sesame,E0402`    | after the standard space, and gives exactly this diagnostic               |
+//!
+//! A block of any language with `from=PATH` stands in that file of the project word for word, indentation aside, where
+//! templates are taken to be of a project `demo`. `text,keywords` lists reserved words.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use sesame_dsl::diagnostic::{CODES, Severity, render};
+use sesame_dsl::source::SourceMap;
+use sesame_dsl::{analyse, units};
+
+const GRAMMAR: &str = include_str!("../../grammars/sesame.pest");
+
+fn project() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate lies in the project").to_owned()
+}
+
+#[expect(clippy::disallowed_methods, reason = "the crate is pure; this test reads the project's documentation")]
+fn read(path: &str) -> String {
+    let file = project().join(path);
+    std::fs::read_to_string(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()))
+}
+
+#[expect(clippy::disallowed_methods, reason = "the crate is pure; this test reads the project's documentation")]
+fn pages() -> Vec<(String, String)> {
+    let folder = project().join("docs");
+    let mut paths: Vec<String> = std::fs::read_dir(&folder)
+        .expect("the project has documentation")
+        .map(|entry| entry.expect("the folder can be listed").path())
+        .filter(|file| file.extension().is_some_and(|extension| extension == "md"))
+        .map(|file| format!("docs/{}", file.file_name().and_then(|name| name.to_str()).expect("names are plain")))
+        .collect();
+    assert!(paths.len() >= 2, "guide and reference are there");
+    paths.extend(["README.md".to_owned(), "examples/kuka_cell/README.md".to_owned()]);
+    paths.sort();
+    paths.into_iter().map(|path| (path.clone(), read(&path))).collect()
+}
+
+/// A fenced block.
+struct Block {
+    /// Page and line, for messages.
+    place: String,
+    /// What stands behind the opening fence.
+    info: String,
+    text: String,
+}
+
+fn blocks(page: &str, text: &str) -> Vec<Block> {
+    let mut found: Vec<Block> = Vec::new();
+    let mut open: Option<String> = None;
+    for (number, line) in (1..).zip(text.lines()) {
+        let bare = line.trim_start();
+        match &open {
+            None if bare.starts_with("```") => {
+                let fence: String = bare.chars().take_while(|&c| c == '`').collect();
+                let info = bare[fence.len()..].trim().to_owned();
+                found.push(Block { place: format!("{page}:{number}"), info, text: String::new() });
+                open = Some(fence);
+            }
+            Some(fence) if bare == fence => open = None,
+            Some(_) => {
+                let block = found.last_mut().expect("an open block was pushed");
+                block.text.push_str(line);
+                block.text.push('\n');
+            }
+            None => {}
+        }
+    }
+    assert!(open.is_none(), "{page} ends inside a fenced block");
+    found
+}
+
+fn all_blocks() -> Vec<Block> {
+    pages().iter().flat_map(|(page, text)| blocks(page, text)).collect()
+}
+
+/// The codes that a file gives, each with whether it is an error, and all of it in words.
+fn check(text: &str) -> (Vec<(String, bool)>, String) {
+    let mut sources = SourceMap::new();
+    let file = sources.add("example.sesame", text);
+    let analysis = analyse(&sources, file);
+    let codes = analysis.diagnostics.iter();
+    let codes = codes.map(|it| (it.code.text().to_owned(), it.severity() == Severity::Error)).collect();
+    (codes, render::human(&analysis.diagnostics, &sources, false))
+}
+
+fn standard(blocks: &[Block]) -> String {
+    let found: Vec<&Block> = blocks.iter().filter(|block| block.info == "sesame,standard").collect();
+    let [standard] = found[..] else { panic!("there is one standard space, not {}", found.len()) };
+    standard.text.clone()
+}
+
+#[test]
+fn every_example_says_what_it_claims_to_say() {
+    let blocks = all_blocks();
+    let standard = standard(&blocks);
+    let mut checked = 0;
+    for block in blocks.iter().filter(|block| block.info.starts_with("sesame") && !block.info.contains(" from=")) {
+        let after = format!("{standard}\n{}", block.text);
+        let place = &block.place;
+        match block.info.as_str() {
+            "sesame" | "sesame,standard" => {
+                let (codes, said) = check(&block.text);
+                assert!(codes.is_empty(), "{place}\n{said}");
+            }
+            "sesame,fragment" => {
+                let (codes, said) = check(&after);
+                // A fragment may leave an operation to its reader, but nothing else.
+                assert!(codes.iter().all(|(code, _)| code == "W0002"), "{place}\n{said}");
+            }
+            "sesame,system" => {
+                let inside = standard.replacen("system {\n", &format!("system {{\n{}", block.text), 1);
+                assert_ne!(inside, standard, "the standard space has a system");
+                let (codes, said) = check(&inside);
+                assert!(codes.is_empty(), "{place}\n{said}");
+            }
+            info => {
+                let code = info.strip_prefix("sesame,").unwrap_or_default();
+                let (codes, said) = check(&after);
+                let found: Vec<&str> = codes.iter().map(|(code, _)| code.as_str()).collect();
+                assert_eq!(found, [code], "{place}\n{said}");
+            }
+        }
+        checked += 1;
+    }
+    assert!(checked >= 12, "the reference has examples, not {checked}");
+}
+
+fn unindented(text: &str) -> String {
+    text.lines().map(str::trim).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn code_in_the_guide_is_that_of_files_that_are_tested() {
+    let mut compared = 0;
+    for block in all_blocks() {
+        let Some((_, path)) = block.info.split_once(" from=") else {
+            assert!(!block.info.starts_with("rust"), "{}: Rust comes from a file that is compiled", block.place);
+            continue;
+        };
+        let file = unindented(&read(path)).replace("{{ name }}", "demo");
+        assert!(file.contains(&unindented(&block.text)), "{}: not what stands in {path}", block.place);
+        compared += 1;
+    }
+    assert!(compared >= 4, "the guide shows a simulator, its declaration, its test and a hook, not {compared}");
+}
+
+#[test]
+fn what_hooks_are_said_to_call_exists() {
+    let metric = read("runtime/src/metric.rs");
+    let mut seen = BTreeSet::new();
+    for (page, text) in pages() {
+        for call in text.split("ctx.").skip(1) {
+            let name: String = call.chars().take_while(|&c| c.is_ascii_lowercase() || c == '_').collect();
+            assert!(metric.contains(&format!("pub fn {name}(")), "{page}: a context has no `{name}`");
+            seen.insert(name);
+        }
+    }
+    assert!(seen.len() >= 7, "the guide shows what a context can do, not only {seen:?}");
+}
+
+#[test]
+fn the_reference_lists_every_code_and_every_unit() {
+    let reference = read("docs/language.md");
+    for (code, _) in CODES {
+        assert!(reference.contains(&format!("| {} |", code.text())), "{code} is not in the table");
+    }
+    for symbol in units::symbols() {
+        assert!(reference.contains(&format!("`{symbol}`")), "the unit {symbol} is not in the table");
+    }
+}
+
+#[test]
+fn the_reference_lists_exactly_the_reserved_words() {
+    let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+    let listed: BTreeSet<String> = all_blocks()
+        .iter()
+        .filter(|block| block.info == "text,keywords")
+        .flat_map(|block| words(&block.text))
+        .collect();
+    let rule = GRAMMAR.split("\nkeyword = @{").nth(1).and_then(|rest| rest.split('}').next()).expect("it is a rule");
+    let reserved: BTreeSet<String> = rule.split('"').skip(1).step_by(2).map(str::to_owned).collect();
+    assert_eq!(listed, reserved);
+}
+
+/// The anchor of a heading, as GitHub makes it.
+fn anchor(heading: &str) -> String {
+    let kept = heading.trim_start_matches('#').trim().to_lowercase();
+    kept.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c)).map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
+#[test]
+#[expect(clippy::disallowed_methods, reason = "the crate is pure; this test looks at the project's documentation")]
+fn every_link_inside_the_project_leads_somewhere() {
+    let pages = pages();
+    let mut followed = 0;
+    for (page, text) in &pages {
+        for link in text.split("](").skip(1) {
+            let target = link.split(')').next().unwrap_or_default();
+            if target.contains("://") {
+                continue;
+            }
+            let (path, fragment) = target.split_once('#').map_or((target, None), |(path, at)| (path, Some(at)));
+            let folder = project().join(page).parent().expect("a page lies in a folder").to_owned();
+            let file = if path.is_empty() { project().join(page) } else { folder.join(path) };
+            assert!(file.exists(), "{page}: nothing is at `{target}`");
+            if let Some(fragment) = fragment {
+                let text = std::fs::read_to_string(&file).expect("only pages have headings");
+                let headings = text.lines().filter(|line| line.starts_with('#'));
+                assert!(headings.map(anchor).any(|it| it == fragment), "{page}: no heading for `{target}`");
+            }
+            followed += 1;
+        }
+    }
+    assert!(followed >= 10, "pages are linked with each other, not by {followed} links");
+}
