@@ -1,10 +1,12 @@
 //! One test, one run: relay, metrics and transport put together.
 
+use std::panic::{self, AssertUnwindSafe};
 use std::time::Instant;
 
 use sesame_plan::{CampaignPlan, Test};
 
 use crate::fuzz::ChoiceError;
+use crate::last_panic;
 use crate::metric::MetricTable;
 use crate::observation::{Observation, Outcome, WallTime};
 use crate::relay::Relay;
@@ -13,8 +15,9 @@ use crate::time::SimTime;
 use crate::transport::{Transport, TransportError};
 use crate::wire::WireTable;
 
-/// Runs a test and reports what was observed. A failing simulator is an observation too, with what was seen until then;
-/// only a test that does not fit the plan is an error.
+/// Runs a test and reports what was observed. A simulator that fails, or a panic in it or in a hook, is an observation
+/// too, with what was seen until then; only a test that does not fit the plan is an error. After a crash the transport
+/// is in an unknown state and must not be used again.
 pub fn evaluate(
     plan: &CampaignPlan,
     wires: &WireTable,
@@ -25,12 +28,17 @@ pub fn evaluate(
 ) -> Result<Observation, ChoiceError> {
     let started = Instant::now();
     let mut relay = Relay::new(plan, wires, test, metrics.start())?;
-    let failure = drive(transport, &mut relay, simulator_seed, SimTime::from_seconds(plan.campaign.end_after)).err();
+    let until = SimTime::from_seconds(plan.campaign.end_after);
+    let driven = AssertUnwindSafe(|| drive(transport, &mut relay, simulator_seed, until));
+    let failure = match panic::catch_unwind(driven) {
+        Ok(driven) => driven.err().map(|error| error.to_string()),
+        Err(_) => Some(last_panic::take()),
+    };
     let end = transport.now();
     let finished = relay.finish(end);
     let effect = finished.operations.iter().any(|operation| operation.counters.any_effect());
     let outcome = match failure {
-        Some(error) => Outcome::Crash { message: error.to_string() },
+        Some(message) => Outcome::Crash { message },
         None if test.operations.is_empty() || effect => Outcome::Completed,
         None => Outcome::Void,
     };
@@ -46,7 +54,126 @@ pub fn evaluate(
 }
 
 fn drive(transport: &mut dyn Transport, relay: &mut Relay<'_>, seed: u64, end: SimTime) -> Result<(), TransportError> {
+    relay.begin();
     transport.reset(seed, relay)?;
     while transport.advance(end, relay)? == Progress::Running {}
+    relay.end(transport.now());
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::{MetricSource, OperationKind, TopicId};
+
+    use super::*;
+    use crate::fixture::{operation, plan, test_of, use_of};
+    use crate::metric::{Context, Hook, HookEntry};
+    use crate::relay::Exchange;
+    use crate::transport::Capabilities;
+    use crate::value::Value;
+
+    /// Publishes its time on `arm/command` every tenth of a second, and fails at some time if told to.
+    struct Ticker {
+        now: SimTime,
+        fails_at: Option<f64>,
+    }
+
+    impl Transport for Ticker {
+        fn capabilities(&self) -> Capabilities {
+            Capabilities { lock_stepped: true, resets: true }
+        }
+        fn reset(&mut self, _: u64, _: &mut dyn Exchange) -> Result<(), TransportError> {
+            self.now = SimTime::ZERO;
+            Ok(())
+        }
+        fn advance(&mut self, until: SimTime, relay: &mut dyn Exchange) -> Result<Progress, TransportError> {
+            if self.now >= until {
+                return Ok(Progress::Ended);
+            }
+            self.now = self.now + SimTime::from_seconds(0.1);
+            if self.fails_at.is_some_and(|time| self.now.seconds() >= time) {
+                return Err(TransportError::Simulator("out of breath".to_owned()));
+            }
+            let wire = relay.wires().find("arm/command").unwrap();
+            relay.advance(self.now, &mut Vec::new());
+            relay.message(self.now, wire, Value::Real(self.now.seconds()), &mut Vec::new());
+            Ok(Progress::Running)
+        }
+        fn now(&self) -> SimTime {
+            self.now
+        }
+        fn close(&mut self) {}
+    }
+
+    /// Counts messages, panics at five seconds, and has an opinion on the end.
+    struct Counter {
+        panics: bool,
+    }
+
+    impl Hook for Counter {
+        fn on_start(&mut self, _: &mut Context) {}
+        fn on_message(&mut self, _: usize, _: &Value, ctx: &mut Context) {
+            assert!(!self.panics || ctx.now() < 5.0, "five seconds are too much");
+            ctx.add(1.0);
+        }
+        fn on_end(&mut self, ctx: &mut Context) {
+            ctx.add(1000.0);
+        }
+    }
+
+    /// A stub as the generator writes it.
+    struct Stub;
+
+    impl Hook for Stub {
+        fn on_start(&mut self, _: &mut Context) {}
+        fn on_message(&mut self, _: usize, _: &Value, ctx: &mut Context) {
+            ctx.unimplemented();
+        }
+        fn on_end(&mut self, _: &mut Context) {}
+    }
+
+    /// A run with a blackhole from one to two seconds and a third metric with this hook, default 7.
+    fn observed(build: fn() -> Box<dyn Hook>, fails_at: Option<f64>) -> Observation {
+        let mut plan = plan(vec![operation(0, OperationKind::Blackhole)]);
+        let mut counted = plan.metrics[1].clone();
+        "counted".clone_into(&mut counted.name);
+        counted.default = Some(7.0);
+        counted.source = MetricSource::Hook { topics: vec![TopicId(0)] };
+        plan.metrics.push(counted);
+        let wires = WireTable::new(&plan);
+        let metrics = MetricTable::new(&plan, &wires, &[HookEntry { metric: "counted", build }]).unwrap();
+        let test = test_of(vec![use_of(0, 1.0, 2.0, vec![], 1)]);
+        evaluate(&plan, &wires, &metrics, &mut Ticker { now: SimTime::ZERO, fails_at }, &test, 1).unwrap()
+    }
+
+    #[test]
+    fn a_run_to_its_end_is_complete() {
+        let run = observed(|| Box::new(Counter { panics: false }), None);
+        assert_eq!((run.outcome, run.end, run.messages), (Outcome::Completed, 10.0, 100));
+        assert_eq!(run.metrics[2].value, Some(1100.0), "a hundred messages, and the end");
+        assert_eq!(run.operations[0].counters.dropped, 10);
+    }
+
+    #[test]
+    fn what_was_seen_before_a_hook_panics_stands() {
+        let run = observed(|| Box::new(Counter { panics: true }), None);
+        assert!(matches!(&run.outcome, Outcome::Crash { .. }), "{:?}", run.outcome);
+        assert_eq!(run.end, 5.0);
+        assert_eq!(run.metrics[2].value, Some(49.0), "and nobody is told of an end");
+        assert_eq!(run.metrics[0].value, Some(1.0), "fuzzing time");
+        assert_eq!(run.operations[0].counters.dropped, 10);
+    }
+
+    #[test]
+    fn what_was_seen_before_a_simulator_fails_stands() {
+        let run = observed(|| Box::new(Counter { panics: false }), Some(3.0));
+        assert_eq!(run.outcome, Outcome::Crash { message: "the simulator failed: out of breath".to_owned() });
+        assert_eq!((run.end, run.metrics[2].value), (3.0, Some(29.0)));
+    }
+
+    #[test]
+    fn a_hook_that_is_not_filled_in_has_no_value_not_even_its_default() {
+        let run = observed(|| Box::new(Stub), None);
+        assert_eq!((run.metrics[2].value, run.metrics[2].set), (None, false));
+    }
 }

@@ -13,6 +13,7 @@ pub mod evaluate;
 #[cfg(test)]
 mod fixture;
 pub mod fuzz;
+mod last_panic;
 pub mod message;
 pub mod metric;
 pub mod observation;

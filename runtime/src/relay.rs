@@ -125,7 +125,17 @@ impl<'a> Relay<'a> {
         })
     }
 
-    /// Ends the run at `end`: what is still held is lost, open intervals are closed.
+    /// Tells the metrics' hooks that the run begins.
+    pub fn begin(&mut self) {
+        self.metrics.begin();
+    }
+
+    /// Tells the metrics' hooks that the run has come to its end.
+    pub fn end(&mut self, now: SimTime) {
+        self.metrics.end(now);
+    }
+
+    /// Closes the books at `end`, where the run ended or broke off: what is still held is lost, open intervals are closed.
     pub fn finish(mut self, end: SimTime) -> Finished {
         self.follow_time(end, &mut Vec::new());
         let operations: Vec<OperationEffect> = self
@@ -138,7 +148,7 @@ impl<'a> Relay<'a> {
                 last_touch: stage.last_touch.map(SimTime::seconds),
             })
             .collect();
-        let (metrics, mut warnings) = self.metrics.finish(end, &operations);
+        let (metrics, mut warnings) = self.metrics.finish(&operations);
         if self.overflowed {
             warnings
                 .push(format!("more than {HELD_LIMIT} messages were held back at once; the oldest were let go early"));

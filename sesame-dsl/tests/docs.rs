@@ -181,6 +181,18 @@ fn the_reference_lists_every_code_and_every_unit() {
 }
 
 #[test]
+fn no_reserved_word_can_be_a_name() {
+    let listed = all_blocks().into_iter().filter(|block| block.info == "text,keywords").map(|block| block.text);
+    for word in listed.collect::<Vec<_>>().join(" ").split_whitespace() {
+        let mut sources = SourceMap::new();
+        let text = format!("space s\nmetric {word} = fuzzing_time()\n");
+        let root = sources.add("s.sesame", &text);
+        let codes: Vec<String> = analyse(&sources, root).diagnostics.iter().map(|one| one.code.to_string()).collect();
+        assert!(codes.contains(&"E0102".to_owned()), "{word}: {codes:?}");
+    }
+}
+
+#[test]
 fn the_reference_lists_exactly_the_reserved_words() {
     let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     let listed: BTreeSet<String> = all_blocks()

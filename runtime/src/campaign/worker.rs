@@ -2,8 +2,6 @@
 
 use std::io;
 use std::net::{SocketAddr, TcpStream};
-use std::panic::{self, AssertUnwindSafe};
-use std::sync::Mutex;
 use std::sync::mpsc;
 use std::thread;
 
@@ -11,13 +9,11 @@ use sesame_plan::CampaignPlan;
 
 use super::frames::{self, Hello, Job, Reply};
 use crate::evaluate::evaluate;
+use crate::last_panic;
 use crate::metric::MetricTable;
 use crate::observation::{Observation, Outcome, WallTime};
 use crate::runner::Runner;
 use crate::wire::WireTable;
-
-/// The last panic's place and words, kept by the panic hook for the test's outcome.
-static LAST_PANIC: Mutex<Option<String>> = Mutex::new(None);
 
 /// Serves the supervisor at this address until it closes the connection.
 ///
@@ -27,31 +23,19 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: SocketAddr, token
     let mut stream = TcpStream::connect(supervisor)?;
     stream.set_nodelay(true)?;
     frames::send(&mut stream, &Hello { token })?;
-    panic::set_hook(Box::new(|panic| {
-        eprintln!("{panic}");
-        if let Ok(mut last) = LAST_PANIC.lock() {
-            *last = Some(panic.to_string());
-        }
-    }));
+    last_panic::listen();
 
     let wires = WireTable::new(plan);
     let metrics = MetricTable::new(plan, &wires, runner.hooks).map_err(io::Error::other)?;
     let jobs = read_jobs(stream.try_clone()?);
     let mut transport = None;
     for Job { number, test, simulator_seed } in jobs {
-        let run = AssertUnwindSafe(|| {
-            let transport = transport.get_or_insert_with(|| runner.connect.transport(plan));
-            evaluate(plan, &wires, &metrics, transport.as_mut(), &test, simulator_seed)
-        });
-        let observation = match panic::catch_unwind(run) {
-            Ok(Ok(observation)) => observation,
-            Ok(Err(misfit)) => crashed(misfit.to_string()),
-            Err(_) => {
-                transport = None;
-                let words = LAST_PANIC.lock().ok().and_then(|mut last| last.take());
-                crashed(words.unwrap_or_else(|| "a panic without words".to_owned()))
-            }
-        };
+        let simulator = transport.get_or_insert_with(|| runner.connect.transport(plan));
+        let observation = evaluate(plan, &wires, &metrics, simulator.as_mut(), &test, simulator_seed)
+            .unwrap_or_else(|misfit| crashed(misfit.to_string()));
+        if matches!(observation.outcome, Outcome::Crash { .. }) {
+            transport = None;
+        }
         frames::send(&mut stream, &Reply { number, observation })?;
     }
     Ok(())

@@ -54,13 +54,7 @@ impl<'p> MetricTable<'p> {
         let states = self
             .hooks
             .iter()
-            .map(|hook| {
-                let mut state = State { hook: hook.map(|hook| (hook.build)()), context: Context::default() };
-                if let Some(hook) = &mut state.hook {
-                    hook.on_start(&mut state.context);
-                }
-                state
-            })
+            .map(|hook| State { hook: hook.map(|hook| (hook.build)()), context: Context::default() })
             .collect();
         Metrics { table: self, states }
     }
@@ -78,6 +72,25 @@ struct State {
 }
 
 impl Metrics<'_> {
+    /// Tells the hooks that the run begins.
+    pub fn begin(&mut self) {
+        for State { hook, context } in &mut self.states {
+            if let Some(hook) = hook {
+                hook.on_start(context);
+            }
+        }
+    }
+
+    /// Tells the hooks that the run has come to its end. After a failure nobody does.
+    pub fn end(&mut self, now: SimTime) {
+        for State { hook, context } in &mut self.states {
+            context.now = now;
+            if let Some(hook) = hook {
+                hook.on_end(context);
+            }
+        }
+    }
+
     /// A message, as the simulator sent it.
     pub fn message(&mut self, now: SimTime, wire: Wire, value: &Value) {
         for &(at, input) in &self.table.taps[wire.index()] {
@@ -99,16 +112,13 @@ impl Metrics<'_> {
         }
     }
 
-    /// Closes the run: a metric never set takes its default. Also what the user should know, one line per metric.
-    pub fn finish(mut self, end: SimTime, operations: &[OperationEffect]) -> (Vec<MetricObservation>, Vec<String>) {
+    /// What the run showed, as far as it went: a metric never set takes its default, one whose hook is not filled in has
+    /// no value. Also what the user should know, one line per metric. No hook is called any more.
+    pub fn finish(mut self, operations: &[OperationEffect]) -> (Vec<MetricObservation>, Vec<String>) {
         let mut warnings = Vec::new();
         let mut observations = Vec::with_capacity(self.states.len());
         for (state, metric) in self.states.iter_mut().zip(&self.table.plan.metrics) {
             let context = &mut state.context;
-            context.now = end;
-            if let Some(hook) = &mut state.hook {
-                hook.on_end(context);
-            }
             if matches!(metric.source, MetricSource::FuzzingTime) {
                 for (time, total) in fuzzing_time(operations) {
                     context.now = SimTime::from_seconds(time);
@@ -117,8 +127,12 @@ impl Metrics<'_> {
             }
             warnings.extend(context.problem.take().map(|problem| format!("metric `{}`: {problem}", metric.name)));
             let set = context.value.is_some();
-            let value = context.value.or(metric.default);
-            observations.push(MetricObservation { value, set, series: std::mem::take(&mut context.series) });
+            let value = if context.unimplemented { None } else { context.value.or(metric.default) };
+            observations.push(MetricObservation {
+                value,
+                set: set && value.is_some(),
+                series: std::mem::take(&mut context.series),
+            });
         }
         (observations, warnings)
     }

@@ -17,7 +17,8 @@ fn active(plan: &CampaignPlan, names: &[&str]) -> Test {
     let operation = |name: &&str| {
         let at = plan.operations.iter().position(|operation| operation.name == **name).expect("it is declared");
         let parameters = plan.operations[at].parameters.iter().map(|parameter| {
-            let (low, high) = (parameter.low * 0.75 + parameter.high * 0.25, parameter.high * 0.75 + parameter.low * 0.25);
+            let (low, high) =
+                (parameter.low * 0.75 + parameter.high * 0.25, parameter.high * 0.75 + parameter.low * 0.25);
             match parameter.shape {
                 Shape::Value => Choice::Value { value: f64::midpoint(low, high) },
                 Shape::Range => Choice::Range { low, high },
