@@ -1,0 +1,9 @@
+//! Behaviour across crates, as a user meets it.
+
+mod faults;
+mod first_front;
+mod interruption;
+mod kuka_cell;
+mod regeneration;
+mod search;
+mod tampering;
