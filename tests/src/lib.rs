@@ -95,7 +95,9 @@ impl Done {
 
 /// Runs a command to its end.
 pub fn done(command: &mut Command) -> Done {
-    Done::of(&command.output().unwrap_or_else(|error| panic!("{} does not start: {error}", command.get_program().display())))
+    Done::of(
+        &command.output().unwrap_or_else(|error| panic!("{} does not start: {error}", command.get_program().display())),
+    )
 }
 
 /// A folder with a space in it, and the runners that come of it.

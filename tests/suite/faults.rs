@@ -71,7 +71,7 @@ fn every_fault_is_the_outcome_of_its_test_and_the_campaign_goes_on() {
     }
     let (aborted, _) = by_fault["do_abort"][0];
     let shown = runner.run(&["show", &format!("T{aborted}"), "--results", "all/3"]).expect(0).out;
-    assert!(shown.contains("about to abort"), "the worker's last words help: {shown}");
+    assert!(shown.contains("the worker's last words:\nabout to abort"), "{shown}");
 
     // Nothing of this depends on workers, on what a worker had printed before, or on the clock.
     let one = runner.run(&["--results", "one", "--timeout", "1.5", "--workers", "1"]).expect(0);

@@ -162,7 +162,8 @@ fn killed_at_random_moments(name: &str, moments: u32) {
     assert!(status.success(), "{}", said.err);
     assert_eq!(said.digest(), whole, "wall time decides nothing");
     let takes = started.elapsed();
-    let config = ProptestConfig { cases: moments, failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..Default::default() };
+    let config =
+        ProptestConfig { cases: moments, failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..Default::default() };
     TestRunner::new(config)
         .run(&(0.0..1.0f64), |moment| {
             killed_at(&runner, moment, &whole, takes);
@@ -194,7 +195,8 @@ fn a_killed_worker_is_a_crash_of_its_test_and_the_campaign_goes_on() {
     let (status, said) = running.ended();
     assert!(status.success(), "{}", said.err);
     let repository = Repository::open(&folder).unwrap();
-    let crashes: Vec<_> = repository.tests().unwrap().into_iter().filter(|row| row.outcome != Outcome::Completed).collect();
+    let crashes: Vec<_> =
+        repository.tests().unwrap().into_iter().filter(|row| row.outcome != Outcome::Completed).collect();
     let [crash] = &crashes[..] else { panic!("one test was running: {crashes:?}") };
     assert!(crash.outcome.detail().unwrap().contains("signal: 9 (SIGKILL)"), "{crash:?}");
     assert!(said.out.contains(&format!("T{} ", crash.number)), "{}", said.out);

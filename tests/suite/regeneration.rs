@@ -35,7 +35,7 @@ fn a_new_metric_and_operation_leave_earlier_hooks_as_they_are() {
          operation lose_level on level = packet loss [0%, 100%] within [0s, 1s]\n\n\
          campaign harmless {",
     );
-    edit(&project.space, "operations do_nothing   1..3", "operations do_nothing, lose_level   1..3");
+    edit(&project.space, "operations do_nothing   1..3", "observes loudest  operations do_nothing, lose_level   1..3");
     let check = project.sesamec("generate", &["--check"]).expect(1);
     assert!(check.err.contains("loudest.rs is missing"), "{}", check.err);
     assert!(!project.runners.join("hooks/loudest.rs").exists(), "`--check` writes nothing");

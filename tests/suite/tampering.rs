@@ -56,7 +56,11 @@ fn foreign_newer_and_damaged_results_are_refused_and_left_alone() {
     refused(&runner, &missing, "no results here");
     assert_eq!(fs::read_dir(&missing).unwrap().count(), 0, "not even a lock");
 
-    refused(&runner, &spoiled(&runner, run, "text", |path| fs::write(path, "My notes\n".repeat(500)).unwrap()), "not an SQLite file");
+    refused(
+        &runner,
+        &spoiled(&runner, run, "text", |path| fs::write(path, "My notes\n".repeat(500)).unwrap()),
+        "not an SQLite file",
+    );
     refused(
         &runner,
         &spoiled(&runner, run, "other", |path| {
@@ -75,7 +79,11 @@ fn foreign_newer_and_damaged_results_are_refused_and_left_alone() {
         }),
         "damaged",
     );
-    refused(&runner, &spoiled(&runner, run, "no_campaign", |path| sql(path, "DELETE FROM campaign")), "there is no campaign");
+    refused(
+        &runner,
+        &spoiled(&runner, run, "no_campaign", |path| sql(path, "DELETE FROM campaign")),
+        "there is no campaign",
+    );
 }
 
 #[test]
@@ -83,7 +91,8 @@ fn whatever_is_done_to_a_file_it_is_read_or_refused() {
     let runner = faulty("scribbled", "harmless");
     let run = unfinished(&runner);
     let length = fs::metadata(runner.folder.join(run).join("results.sqlite")).unwrap().len();
-    let config = ProptestConfig { cases: 25, failure_persistence: None, rng_seed: RngSeed::Fixed(2), ..Default::default() };
+    let config =
+        ProptestConfig { cases: 25, failure_persistence: None, rng_seed: RngSeed::Fixed(2), ..Default::default() };
     let scribbles = prop::collection::vec((0..length, any::<u8>(), 1..300usize), 1..4);
     TestRunner::new(config)
         .run(&(scribbles, prop::option::of(1..length)), |(scribbles, cut)| {
