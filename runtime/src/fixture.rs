@@ -106,11 +106,11 @@ pub(crate) fn latency(distribution: Distribution, drain: Drain) -> OperationKind
 }
 
 /// A use of an operation between two times.
-pub(crate) fn use_of(operation: u32, start: f64, end: f64, choice: Option<Choice>, draw_seed: u64) -> TestOperation {
+pub(crate) fn use_of(operation: u32, start: f64, end: f64, parameters: Vec<Choice>, draw_seed: u64) -> TestOperation {
     TestOperation {
         operation: OperationId(operation),
         activation: Activation::Time { start, end },
-        parameters: choice.into_iter().collect(),
+        parameters,
         draw_seed,
     }
 }

@@ -51,7 +51,7 @@ pub enum TransportError {
     #[error("the simulator failed: {0}")]
     Simulator(String),
     /// The space names a topic that the simulator does not have.
-    #[error("the simulator has no topic `{path}`{}", hint(near, known))]
+    #[error("the simulator has no topic `{path}`{}", hint(near.as_deref(), known))]
     UnknownTopic {
         /// The name in the space.
         path: String,
@@ -70,7 +70,7 @@ pub enum TransportError {
     },
 }
 
-fn hint(near: &Option<String>, known: &[String]) -> String {
+fn hint(near: Option<&str>, known: &[String]) -> String {
     match near {
         Some(near) => format!("; did you mean `{near}`?"),
         None => format!("; it has {}", known.join(", ")),

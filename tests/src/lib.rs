@@ -49,6 +49,8 @@ pub fn command(program: impl AsRef<Path>) -> Command {
     }
     command
         .env("CARGO_TARGET_DIR", scratch().join("target"))
+        // The root's test command has fetched what runners need: what the workspace's lock names.
+        .env("CARGO_NET_OFFLINE", "true")
         .env("NO_COLOR", "1")
         .env("RUST_BACKTRACE", "0")
         .stdin(Stdio::null());
@@ -139,8 +141,8 @@ impl Project {
         copy(&workspace().join("tests/simulators").join(simulator).join("src"), &folder.join("simulator/src"));
         let manifest = format!(
             "[package]\nname = \"{simulator}_sim\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n[dependencies]\n\
-             sesame-runtime = {{ path = {:?} }}\n\n[workspace]\n",
-            workspace().join("runtime")
+             sesame-runtime = {{ path = \"{}\" }}\n\n[workspace]\n",
+            workspace().join("runtime").display()
         );
         fs::write(folder.join("simulator/Cargo.toml"), manifest).expect("a manifest can be written");
         Project { space: path, runners: folder.join("runners"), folder }

@@ -22,7 +22,7 @@ fn front(folder: &Path) -> Vec<(TestRow, f64)> {
     let row = |number: u32| tests.iter().find(|row| row.number == number).unwrap().clone();
     members
         .into_iter()
-        .map(|number| row(number))
+        .map(row)
         .map(|row| (row.clone(), row.values[collisions].value.unwrap()))
         .collect()
 }

@@ -1,4 +1,5 @@
 //! Behaviour across crates, as a user meets it.
+#![cfg(test)]
 
 mod faults;
 mod first_front;

@@ -40,9 +40,10 @@ fn quartiles(values: &[f64]) -> [f64; 3] {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     [0.25, 0.5, 0.75].map(|share| {
-        let at = share * (sorted.len() - 1) as f64;
-        let (below, above) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
-        below + (above - below) * at.fract()
+        let last = sorted.len() - 1;
+        let at = share * last as f64;
+        let below = (0..=last).rev().find(|&below| below as f64 <= at).unwrap();
+        sorted[below] + (sorted[last.min(below + 1)] - sorted[below]) * at.fract()
     })
 }
 

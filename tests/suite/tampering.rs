@@ -118,6 +118,13 @@ fn whatever_is_done_to_a_file_it_is_read_or_refused() {
                 prop_assert!(clear, "{command:?}: {said:?}");
                 prop_assert!(fs::read(&file).unwrap() == before, "{command:?} changed the file");
             }
+            let said = runner.run(&["resume", folder.to_str().unwrap()]);
+            match said.code {
+                Some(0) => {}
+                // Even what looks whole may have become another campaign's.
+                Some(1) => prop_assert!(said.err.contains("error: ") && !said.err.contains("panicked"), "{said:?}"),
+                _ => prop_assert!(false, "{said:?}"),
+            }
             Ok(())
         })
         .unwrap();

@@ -54,7 +54,7 @@ pub struct Progress<'a> {
 #[derive(Debug)]
 pub enum Conducted {
     /// All tests were evaluated.
-    Finished(Repository),
+    Finished(Box<Repository>),
     /// The user stopped it; `resume` goes on.
     Interrupted,
 }
@@ -103,12 +103,11 @@ pub fn conduct(
     })?;
     let mut desk = Desk { recorder: &mut recorder, recorded, pool, interrupted };
 
-    let mut reference = None;
-    if !desk.evaluate(vec![undisturbed(0, settings.seed)], &mut |record| reference = Some(record.clone()))? {
+    let mut ended = None;
+    if !desk.evaluate(vec![undisturbed(0, settings.seed)], &mut |record| ended = Some(record.observation.clone()))? {
         return interrupt(recorder);
     }
-    let reference =
-        reference.map(|record| record.observation).unwrap_or_else(|| unreachable!("one test was evaluated"));
+    let Some(reference) = ended else { unreachable!("every test handed in is seen") };
     if let Outcome::Crash { .. } | Outcome::Timeout { .. } = reference.outcome {
         // The record of it stays as it is, so there is nothing that `resume` could go on with.
         drop(desk);
@@ -189,7 +188,7 @@ pub fn conduct(
             members: front.numbers(),
         })?;
     }
-    Ok(Conducted::Finished(recorder.finish("all tests were evaluated")?))
+    Ok(Conducted::Finished(Box::new(recorder.finish("all tests were evaluated")?)))
 }
 
 fn interrupt(recorder: Recorder) -> Result<Conducted, CampaignError> {
@@ -296,7 +295,7 @@ impl Desk<'_> {
                 continue;
             };
             let Some(test) = waiting.remove(&number) else { continue };
-            self.record(test.with(observation), each)?;
+            self.record(&test.with(observation), each)?;
             if let Some(words) = last_words {
                 let text = format!("the worker's last words:\n{words}");
                 self.recorder.put_event(&Event { kind: EventKind::Session, test: Some(number), text })?;
@@ -304,18 +303,18 @@ impl Desk<'_> {
         }
         for (original, test) in duplicates {
             let observation = self.recorder.repository().test(original)?.observation;
-            self.record(test.with(observation), each)?;
+            self.record(&test.with(observation), each)?;
         }
         Ok(true)
     }
 
-    fn record(&mut self, record: TestRecord, each: &mut dyn FnMut(&TestRecord)) -> Result<(), CampaignError> {
-        self.recorder.commit(&record)?;
+    fn record(&mut self, record: &TestRecord, each: &mut dyn FnMut(&TestRecord)) -> Result<(), CampaignError> {
+        self.recorder.commit(record)?;
         for warning in &record.observation.warnings {
             let event = Event { kind: EventKind::Warning, test: Some(record.number), text: warning.clone() };
             self.recorder.put_event(&event)?;
         }
-        each(&record);
+        each(record);
         Ok(())
     }
 }

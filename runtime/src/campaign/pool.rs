@@ -169,7 +169,7 @@ impl Lane {
         self.settings.directory.join(self.number.to_string())
     }
 
-    fn refuse(&self, reason: impl ToString) -> PoolError {
+    fn refuse(&self, reason: &impl ToString) -> PoolError {
         PoolError { worker: self.number, reason: reason.to_string() }
     }
 }
@@ -183,11 +183,11 @@ struct Worker {
 impl Worker {
     fn start(lane: &Lane) -> Result<Self, PoolError> {
         let directory = lane.directory();
-        let refuse = |reason: io::Error| lane.refuse(reason);
+        let refuse = |reason: io::Error| lane.refuse(&reason);
         fs::create_dir_all(&directory).map_err(refuse)?;
         let output = File::options().create(true).append(true).open(output_file(&directory)).map_err(refuse)?;
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(refuse)?;
-        let token = token().map_err(|error| lane.refuse(error))?;
+        let token = token().map_err(|error| lane.refuse(&error))?;
         let mut command = Command::new(&lane.settings.program);
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
@@ -201,7 +201,7 @@ impl Worker {
             .stdout(output.try_clone().map_err(refuse)?)
             .stderr(output)
             .spawn()
-            .map_err(|error| lane.refuse(format!("{}: {error}", lane.settings.program.display())))?;
+            .map_err(|error| lane.refuse(&format!("{}: {error}", lane.settings.program.display())))?;
         let mut worker = Worker { process, stream: None };
         worker.stream = Some(worker.accept(&listener, &token, lane)?);
         Ok(worker)
@@ -209,14 +209,14 @@ impl Worker {
 
     /// Waits for the worker's connection. Whoever else connects, without the token, is turned away.
     fn accept(&mut self, listener: &TcpListener, token: &str, lane: &Lane) -> Result<TcpStream, PoolError> {
-        let refuse = |error: io::Error| lane.refuse(error);
+        let refuse = |error: io::Error| lane.refuse(&error);
         listener.set_nonblocking(true).map_err(refuse)?;
         let started = Instant::now();
         while started.elapsed() < START_LIMIT {
             if let Some(status) = self.process.try_wait().map_err(refuse)? {
                 let output = last_lines(&output_file(&lane.directory()), 0, 10);
                 let output = output.map_or_else(String::new, |lines| format!("; its last words:\n{lines}"));
-                return Err(lane.refuse(format!("it ended at once, {status}{output}")));
+                return Err(lane.refuse(&format!("it ended at once, {status}{output}")));
             }
             match listener.accept() {
                 Ok((mut stream, _)) => {
@@ -228,10 +228,10 @@ impl Worker {
                     }
                 }
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => thread::sleep(Duration::from_millis(2)),
-                Err(error) => return Err(lane.refuse(error)),
+                Err(error) => return Err(lane.refuse(&error)),
             }
         }
-        Err(lane.refuse(format!("it did not report within {} s", START_LIMIT.as_secs())))
+        Err(lane.refuse(&format!("it did not report within {} s", START_LIMIT.as_secs())))
     }
 
     /// Runs a test. The error is `TimedOut` when it took too long or the pool was told to stop.

@@ -25,9 +25,9 @@ pub(super) struct Options {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Evaluate this many tests instead of the campaign's number
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     evaluations: Option<u32>,
-    /// Optimise although a hook of an objective is not filled in: it takes its default
+    /// Run although a hook of an objective is not filled in: tests then count as unmeasured
     #[arg(long)]
     allow_unimplemented: bool,
     /// Folder for results; by default `results` in the runner's folder

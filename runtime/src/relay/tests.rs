@@ -12,12 +12,12 @@ use crate::wire::WireTable;
 
 const COMMAND: &str = "arm/command";
 
-fn one(value: f64) -> Option<Choice> {
-    Some(Choice::Value { value })
+fn one(value: f64) -> Vec<Choice> {
+    vec![Choice::Value { value }]
 }
 
-fn range(low: f64, high: f64) -> Option<Choice> {
-    Some(Choice::Range { low, high })
+fn range(low: f64, high: f64) -> Vec<Choice> {
+    vec![Choice::Range { low, high }]
 }
 
 /// Publishes messages `(seconds, topic, value)` with a tick every tenth of a second in between, up to ten seconds.
@@ -67,7 +67,7 @@ fn without_operations_everything_passes_at_once_and_as_it_came() {
 #[test]
 fn a_blackhole_drops_everything_while_it_is_active_and_nothing_else() {
     let hole = vec![operation(0, OperationKind::Blackhole)];
-    let (delivered, finished) = relayed(hole, &[use_of(0, 1.0, 2.0, None, 1)], &commands(50));
+    let (delivered, finished) = relayed(hole, &[use_of(0, 1.0, 2.0, vec![], 1)], &commands(50));
     let kept: Vec<f64> = numbers(&delivered).into_iter().map(|(_, n)| n).collect();
     assert_eq!(kept, (0..50).filter(|n| !(10..20).contains(n)).map(f64::from).collect::<Vec<_>>());
     let effect = &finished.operations[0];
@@ -192,7 +192,7 @@ fn operations_apply_in_priority_then_declaration_order() {
 #[test]
 fn a_delayed_message_goes_on_through_later_operations_when_it_is_released() {
     let chain = vec![operation(0, latency(Distribution::Fixed, Drain::Finish)), operation(0, OperationKind::Blackhole)];
-    let test = [use_of(0, 0.0, 10.0, one(1.0), 1), use_of(1, 1.0, 1.5, None, 1)];
+    let test = [use_of(0, 0.0, 10.0, one(1.0), 1), use_of(1, 1.0, 1.5, vec![], 1)];
     let (delivered, _) = relayed(chain, &test, &commands(10));
     // Messages of 0.0 to 0.4 s come to the blackhole from 1.0 to 1.4 s, while it is active.
     assert_eq!(numbers(&delivered), (5..10).map(|n| (f64::from(n + 10) / 10.0, f64::from(n))).collect::<Vec<_>>());
@@ -201,7 +201,7 @@ fn a_delayed_message_goes_on_through_later_operations_when_it_is_released() {
 #[test]
 fn metrics_see_what_was_sent_not_what_was_made_of_it() {
     let hole = vec![operation(0, OperationKind::Blackhole)];
-    let (_, finished) = relayed(hole, &[use_of(0, 0.0, 4.0, None, 1)], &commands(30));
+    let (_, finished) = relayed(hole, &[use_of(0, 0.0, 4.0, vec![], 1)], &commands(30));
     assert_eq!(finished.metrics[1].value, Some(29.0));
     assert_eq!(finished.metrics[0].value, Some(4.0), "fuzzing time");
 }
