@@ -10,5 +10,5 @@ mod pool;
 mod worker;
 
 pub use conduct::{CampaignError, Conducted, Progress, Settings, conduct};
-pub use pool::{Job, Pool, PoolError, PoolSettings};
+pub use pool::{Ended, Job, Pool, PoolError, PoolSettings};
 pub use worker::serve;
