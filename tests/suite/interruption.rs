@@ -63,15 +63,24 @@ fn recorded(folder: &Path) -> usize {
 
 /// The worker processes of a runner's program that are alive, whoever started them.
 fn workers(runner: &Runner) -> Vec<Pid> {
-    let alive = |pid: i32| {
-        let folder = format!("/proc/{pid}");
-        let program = fs::read_link(format!("{folder}/exe")).ok()?;
-        let arguments = fs::read(format!("{folder}/cmdline")).ok()?;
-        let is_worker = arguments.split(|&byte| byte == 0).nth(1) == Some(b"worker");
-        (program == runner.program && is_worker).then_some(Pid::from_raw(pid))
-    };
-    let names = fs::read_dir("/proc").unwrap().map(|entry| entry.unwrap().file_name());
-    names.filter_map(|name| name.to_str()?.parse().ok()).filter_map(alive).collect()
+    let wanted = format!("{} worker ", runner.program.display());
+    processes().into_iter().filter(|(_, words)| words.starts_with(&wanted)).map(|(pid, _)| Pid::from_raw(pid)).collect()
+}
+
+/// All processes with their command lines: from `/proc` where there is one, since not every Linux has `ps`.
+fn processes() -> Vec<(i32, String)> {
+    if let Ok(entries) = fs::read_dir("/proc") {
+        let pids = entries.filter_map(|entry| entry.unwrap().file_name().to_str()?.parse().ok());
+        let read = |pid: i32| {
+            // What has ended meanwhile has no command line.
+            let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+            (pid, String::from_utf8_lossy(&line).replace('\0', " "))
+        };
+        return pids.map(read).collect();
+    }
+    let said = sesame_tests::done(std::process::Command::new("ps").args(["-A", "-o", "pid=,args="])).expect(0).out;
+    let split = |line: &str| line.trim().split_once(' ').map(|(pid, words)| (pid.parse().unwrap(), words.to_owned()));
+    said.lines().filter_map(split).collect()
 }
 
 /// Insists that all workers are gone, which may take them a moment.
