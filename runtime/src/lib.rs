@@ -27,6 +27,7 @@ pub mod rng;
 mod runner;
 pub mod search;
 pub mod simulator;
+pub mod stl;
 pub mod time;
 pub mod transport;
 pub mod value;

@@ -9,6 +9,7 @@
 //! the wire), probabilities are in `0..=1`.
 
 mod model;
+pub mod stl;
 mod test;
 
 pub use model::*;

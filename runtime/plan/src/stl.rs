@@ -1,0 +1,102 @@
+//! Formulas of signal temporal logic over the input signals of a metric.
+//!
+//! Only what they are; what they mean, down to jumps and the end of a trace, is said in the runtime's room `stl`.
+
+use serde::{Deserialize, Serialize};
+
+/// A formula. Guarantees of a plan written by the generator: signals are in range, constants are finite, intervals
+/// are sound.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Formula {
+    /// A signal beside a constant.
+    Predicate {
+        /// Position in the metric's list of input signals.
+        signal: u32,
+        /// How they compare, the signal on the left.
+        comparison: Comparison,
+        /// The constant, in the signal's unit; finite.
+        constant: f64,
+    },
+    /// It does not hold.
+    Not {
+        /// What does not.
+        of: Box<Formula>,
+    },
+    /// Both hold.
+    And {
+        /// One.
+        left: Box<Formula>,
+        /// The other.
+        right: Box<Formula>,
+    },
+    /// At least one holds.
+    Or {
+        /// One.
+        left: Box<Formula>,
+        /// The other.
+        right: Box<Formula>,
+    },
+    /// The right one holds, or the left one does not.
+    Implies {
+        /// The premise.
+        left: Box<Formula>,
+        /// The conclusion.
+        right: Box<Formula>,
+    },
+    /// It holds all through the interval.
+    Always {
+        /// From now.
+        interval: Interval,
+        /// What holds.
+        of: Box<Formula>,
+    },
+    /// It holds at some time in the interval.
+    Eventually {
+        /// From now.
+        interval: Interval,
+        /// What holds.
+        of: Box<Formula>,
+    },
+    /// The right one holds at some time in the interval, and the left one from now up to that time, both included.
+    Until {
+        /// From now.
+        interval: Interval,
+        /// What holds until then.
+        left: Box<Formula>,
+        /// What then holds.
+        right: Box<Formula>,
+    },
+}
+
+/// How a signal compares with a constant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Comparison {
+    /// `<`
+    Below,
+    /// `<=`
+    AtMost,
+    /// `>`
+    Above,
+    /// `>=`
+    AtLeast,
+    /// `==`
+    Equal,
+    /// `!=`
+    NotEqual,
+}
+
+/// A stretch of time counted from the time at which a formula is evaluated, in seconds; both ends belong to it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Interval {
+    /// Where it begins; finite and at least 0.
+    pub from: f64,
+    /// Where it ends, finite and at least `from`; `None` for an interval without end.
+    pub to: Option<f64>,
+}
+
+impl Interval {
+    /// From now on: what an operator without an interval has.
+    pub const UNBOUNDED: Interval = Interval { from: 0.0, to: None };
+}
