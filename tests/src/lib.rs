@@ -3,6 +3,8 @@
 //! Everything lies below the workspace's target folder: projects in folders of fixed names, since a path is part of
 //! what cargo knows a crate by, and all runners in one target folder, so that the runtime is compiled once.
 
+pub mod rtamt;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

@@ -7,4 +7,5 @@ mod interruption;
 mod kuka_cell;
 mod regeneration;
 mod search;
+mod stl;
 mod tampering;
