@@ -12,5 +12,5 @@ mod worker;
 
 pub use alone::{AloneSettings, run_alone};
 pub use conduct::{CampaignError, Conducted, Progress, Settings, conduct, patience};
-pub use pool::{Job, Pool, PoolError, PoolSettings};
+pub use pool::{Ended, Job, Pool, PoolError, PoolSettings};
 pub use worker::serve;

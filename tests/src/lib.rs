@@ -1,1 +1,216 @@
-//! To be written.
+//! What the tests across crates share: the real `sesamec`, projects for it to work on, and the runners that come out.
+//!
+//! Everything lies below the workspace's target folder: projects in folders of fixed names, since a path is part of
+//! what cargo knows a crate by, and all runners in one target folder, so that the runtime is compiled once.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::{Mutex, OnceLock};
+
+/// The root of the workspace.
+pub fn workspace() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate lies in the workspace")
+}
+
+/// The folder of everything these tests make. The test program lies in `target/PROFILE/deps`.
+fn scratch() -> PathBuf {
+    let program = std::env::current_exe().expect("a test has a program");
+    let target = program.ancestors().nth(3).expect("cargo puts test programs three folders deep");
+    target.join("across")
+}
+
+/// The program `sesamec` of this workspace, built if it is not up to date.
+pub fn sesamec() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let output = Command::new(env!("CARGO"))
+            .args(["build", "--quiet", "--package", "sesame-codegen", "--message-format=json-render-diagnostics"])
+            .current_dir(workspace())
+            .output()
+            .expect("cargo starts");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let said = String::from_utf8_lossy(&output.stdout);
+        let mark = "\"executable\":\"";
+        let at = said.rfind(mark).expect("cargo names the program it built") + mark.len();
+        let rest = &said[at..];
+        PathBuf::from(&rest[..rest.find('"').expect("a name ends")])
+    })
+}
+
+/// A command with the surroundings of these tests: one target folder, no colours, nothing of the cargo around it.
+pub fn command(program: impl AsRef<Path>) -> Command {
+    let mut command = Command::new(program.as_ref());
+    for (name, _) in std::env::vars_os() {
+        let text = name.to_string_lossy();
+        if text.starts_with("CARGO_PKG_") || text == "CARGO_MANIFEST_DIR" || text == "RUSTFLAGS" || text == "CARGO" {
+            command.env_remove(name);
+        }
+    }
+    command
+        .env("CARGO_TARGET_DIR", scratch().join("target"))
+        // The root's test command has fetched what runners need: what the workspace's lock names.
+        .env("CARGO_NET_OFFLINE", "true")
+        .env("NO_COLOR", "1")
+        .env("RUST_BACKTRACE", "0")
+        .stdin(Stdio::null());
+    command
+}
+
+/// What a command did.
+#[derive(Debug)]
+pub struct Done {
+    /// Its exit code; `None` when a signal ended it.
+    pub code: Option<i32>,
+    /// Its standard output.
+    pub out: String,
+    /// Its standard error.
+    pub err: String,
+}
+
+impl Done {
+    /// What came of a process.
+    pub fn of(output: &Output) -> Done {
+        Done {
+            code: output.status.code(),
+            out: String::from_utf8_lossy(&output.stdout).into_owned(),
+            err: String::from_utf8_lossy(&output.stderr).into_owned(),
+        }
+    }
+
+    /// Insists on an exit code, and shows what was said otherwise.
+    #[track_caller]
+    pub fn expect(self, code: i32) -> Done {
+        assert_eq!(self.code, Some(code), "standard output:\n{}\nstandard error:\n{}", self.out, self.err);
+        self
+    }
+
+    /// The digest that a run prints last.
+    #[track_caller]
+    pub fn digest(&self) -> String {
+        let line = self.out.lines().find_map(|line| line.trim().strip_prefix("Digest "));
+        let digest = line.unwrap_or_else(|| panic!("no digest in:\n{}\n{}", self.out, self.err));
+        assert_eq!(digest.len(), 64, "{digest}");
+        digest.to_owned()
+    }
+}
+
+/// Runs a command to its end.
+pub fn done(command: &mut Command) -> Done {
+    Done::of(
+        &command.output().unwrap_or_else(|error| panic!("{} does not start: {error}", command.get_program().display())),
+    )
+}
+
+/// A folder with a space in it, and the runners that come of it.
+#[derive(Debug, Clone)]
+pub struct Project {
+    /// The `.sesame` file.
+    pub space: PathBuf,
+    /// The folder of the runners.
+    pub runners: PathBuf,
+    /// A folder for results and the like.
+    pub folder: PathBuf,
+}
+
+/// A fresh, empty folder of this name.
+pub fn fresh_folder(name: &str) -> PathBuf {
+    let folder = scratch().join("projects").join(name);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).expect("an old folder can be removed");
+    }
+    fs::create_dir_all(&folder).expect("a folder can be made");
+    folder
+}
+
+impl Project {
+    /// The example of the gearbox cell where it stands, with copies of its hooks, so that the checkout stays as it is.
+    pub fn kuka_cell(name: &str) -> Project {
+        let example = workspace().join("examples/kuka_cell");
+        let folder = fresh_folder(name);
+        let runners = folder.join("runners");
+        copy(&example.join("runners/hooks"), &runners.join("hooks"));
+        Project { space: example.join("kuka_cell.sesame"), runners, folder }
+    }
+
+    /// A space of these words, with a simulator out of `tests/simulators`.
+    pub fn new(name: &str, space: &str, simulator: &str) -> Project {
+        let folder = fresh_folder(name);
+        let path = folder.join(format!("{name}.sesame"));
+        fs::write(&path, space).expect("a space can be written");
+        copy(&workspace().join("tests/simulators").join(simulator).join("src"), &folder.join("simulator/src"));
+        let manifest = format!(
+            "[package]\nname = \"{simulator}_sim\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n[dependencies]\n\
+             sesame-runtime = {{ path = \"{}\" }}\n\n[workspace]\n",
+            workspace().join("runtime").display()
+        );
+        fs::write(folder.join("simulator/Cargo.toml"), manifest).expect("a manifest can be written");
+        Project { space: path, runners: folder.join("runners"), folder }
+    }
+
+    /// `sesamec SUBCOMMAND` on this space.
+    pub fn sesamec(&self, subcommand: &str, arguments: &[&str]) -> Done {
+        let mut sesamec = command(sesamec());
+        sesamec.arg(subcommand).arg(&self.space).arg("-o").arg(&self.runners).args(arguments);
+        done(sesamec.current_dir(&self.folder))
+    }
+
+    /// Generates and builds the runner of a campaign, without running it.
+    pub fn build(&self, campaign: &str) -> Runner {
+        // A copy of the program is this project's own: in the target folder, another project of the same name overwrites it.
+        static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+        self.sesamec("generate", &["--campaign", campaign]).expect(0);
+        let _turn = ONE_AT_A_TIME.lock();
+        let built = self.cargo(campaign, "build");
+        assert_eq!(built.code, Some(0), "{}", built.err);
+        let package = fs::read_to_string(self.runners.join(campaign).join("Cargo.toml")).expect("there is a manifest");
+        let name = package.lines().find_map(|line| line.strip_prefix("name = \"")).expect("a package has a name");
+        let name = name.trim_end_matches('"');
+        let program = self.folder.join(name);
+        fs::copy(scratch().join("target/debug").join(name), &program).expect("what was built can be copied");
+        Runner { program, folder: self.folder.clone() }
+    }
+
+    /// `cargo SUBCOMMAND` in the runner of a campaign.
+    pub fn cargo(&self, campaign: &str, subcommand: &str) -> Done {
+        let mut cargo = command(env!("CARGO"));
+        done(cargo.args([subcommand, "--quiet", "--color", "never"]).current_dir(self.runners.join(campaign)))
+    }
+}
+
+/// A built runner.
+#[derive(Debug, Clone)]
+pub struct Runner {
+    /// Its program.
+    pub program: PathBuf,
+    /// Where results go, each run in a folder of its own.
+    pub folder: PathBuf,
+}
+
+impl Runner {
+    /// The runner, told this.
+    pub fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = command(&self.program);
+        command.args(arguments).current_dir(&self.folder);
+        command
+    }
+
+    /// Runs it to its end.
+    pub fn run(&self, arguments: &[&str]) -> Done {
+        done(&mut self.command(arguments))
+    }
+}
+
+/// Copies a folder with all that is in it.
+pub fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).expect("a folder can be made");
+    for entry in fs::read_dir(from).unwrap_or_else(|error| panic!("cannot list {}: {error}", from.display())) {
+        let entry = entry.expect("a folder can be listed");
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), &target).expect("a file can be copied");
+        }
+    }
+}

@@ -4,8 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use super::pool::{Job, Pool, PoolError, PoolSettings};
-use crate::observation::Observation;
+use super::pool::{Ended, Job, Pool, PoolError, PoolSettings};
 
 /// Where and how long one test runs.
 #[derive(Debug, Clone)]
@@ -19,17 +18,13 @@ pub struct AloneSettings {
 }
 
 /// Runs a test in a worker of its own; `None` when the user stopped it.
-pub fn run_alone(
-    job: Job,
-    settings: &AloneSettings,
-    interrupted: &AtomicBool,
-) -> Result<Option<Observation>, PoolError> {
+pub fn run_alone(job: Job, settings: &AloneSettings, interrupted: &AtomicBool) -> Result<Option<Ended>, PoolError> {
     let AloneSettings { program, directory, timeout } = settings.clone();
     let pool = Pool::start(&PoolSettings { workers: 1, program, directory, timeout })?;
     pool.submit(job);
     while !interrupted.load(Ordering::Relaxed) {
-        if let Some((_, observation)) = pool.next(Duration::from_millis(100))? {
-            return Ok(Some(observation));
+        if let Some(ended) = pool.next(Duration::from_millis(100))? {
+            return Ok(Some(ended));
         }
     }
     Ok(None)

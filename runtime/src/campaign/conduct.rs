@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use sesame_plan::{CampaignPlan, Search, Test};
 
-use super::pool::{Job, Pool, PoolError, PoolSettings};
+use super::pool::{Ended, Job, Pool, PoolError, PoolSettings};
 use crate::observation::{Observation, Outcome};
 use crate::record::{
     Difference, Event, EventKind, MetricValue, Origin, RecordError, Recorder, Repository, ResultSet, Status,
@@ -114,6 +114,9 @@ pub fn conduct(
     }
     let Some(reference) = ended else { unreachable!("every test handed in is seen") };
     if let Outcome::Crash { .. } | Outcome::Timeout { .. } = reference.outcome {
+        // The record of it stays as it is, so there is nothing that `resume` could go on with.
+        drop(desk);
+        recorder.finish("the undisturbed reference run failed")?;
         return Err(CampaignError::Reference(reference.outcome.detail().unwrap_or_default()));
     }
     for text in reference_warnings(plan, &reference) {
@@ -294,9 +297,15 @@ impl Desk<'_> {
             if self.interrupted.load(Ordering::Relaxed) {
                 return Ok(false);
             }
-            let Some((number, observation)) = self.pool.next(Duration::from_millis(100))? else { continue };
+            let Some(Ended { number, observation, last_words }) = self.pool.next(Duration::from_millis(100))? else {
+                continue;
+            };
             let Some(test) = waiting.remove(&number) else { continue };
             self.record(&test.with(observation), each)?;
+            if let Some(words) = last_words {
+                let text = format!("the worker's last words:\n{words}");
+                self.recorder.put_event(&Event { kind: EventKind::Session, test: Some(number), text })?;
+            }
         }
         for (original, test) in duplicates {
             let observation = self.recorder.repository().test(original)?.observation;

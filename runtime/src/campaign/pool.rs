@@ -1,4 +1,8 @@
 //! The supervisor's side of its workers: starts them, hands out tests, and deals with those that die or hang.
+//!
+//! A worker that is killed from outside cannot be told from one that its simulator or a hook brought down: the test it
+//! ran is a crash. What Ctrl-C sends to all of a terminal's foreground processes does not reach workers, since that
+//! would look just the same: the supervisor ends them.
 
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
@@ -42,10 +46,21 @@ pub struct PoolError {
     pub reason: String,
 }
 
+/// A test that has ended.
+#[derive(Debug)]
+pub struct Ended {
+    /// Its number.
+    pub number: u32,
+    /// What its run showed.
+    pub observation: Observation,
+    /// What its worker printed last before it died, if it died. Of this one session: it may hold process numbers.
+    pub last_words: Option<String>,
+}
+
 /// Worker processes and the threads that talk to them.
 pub struct Pool {
     jobs: Option<mpsc::Sender<Job>>,
-    results: mpsc::Receiver<Result<Reply, PoolError>>,
+    results: mpsc::Receiver<Result<Ended, PoolError>>,
     lanes: Vec<JoinHandle<()>>,
     stop: Arc<AtomicBool>,
     /// Wall time after which a test is stopped, in milliseconds.
@@ -82,12 +97,9 @@ impl Pool {
         assert!(sent, "lanes live as long as their pool");
     }
 
-    /// The next test that ended, with its number; `None` after `wait` without one.
-    pub fn next(&self, wait: Duration) -> Result<Option<(u32, Observation)>, PoolError> {
-        match self.results.recv_timeout(wait) {
-            Ok(result) => result.map(|reply| Some((reply.number, reply.observation))),
-            Err(_) => Ok(None),
-        }
+    /// The next test that ended; `None` after `wait` without one.
+    pub fn next(&self, wait: Duration) -> Result<Option<Ended>, PoolError> {
+        self.results.recv_timeout(wait).map_or(Ok(None), |result| result.map(Some))
     }
 }
 
@@ -113,7 +125,7 @@ struct Lane {
 }
 
 impl Lane {
-    fn work(mut self, queue: &Mutex<mpsc::Receiver<Job>>, results: &mpsc::Sender<Result<Reply, PoolError>>) {
+    fn work(mut self, queue: &Mutex<mpsc::Receiver<Job>>, results: &mpsc::Sender<Result<Ended, PoolError>>) {
         loop {
             let job = match queue.lock() {
                 Ok(queue) => queue.recv(),
@@ -123,35 +135,34 @@ impl Lane {
             if self.stop.load(Ordering::Relaxed) {
                 return;
             }
-            let reply = self.run(&job).map(|observation| Reply { number: job.number, observation });
-            if results.send(reply).is_err() {
+            if results.send(self.run(&job)).is_err() {
                 return;
             }
         }
     }
 
-    fn run(&mut self, job: &Job) -> Result<Observation, PoolError> {
+    fn run(&mut self, job: &Job) -> Result<Ended, PoolError> {
         let mut worker = match self.worker.take() {
             Some(worker) => worker,
             None => Worker::start(self)?,
         };
-        let asked = Instant::now();
+        let printed = fs::metadata(output_file(&self.directory())).map_or(0, |file| file.len());
         let timeout = Duration::from_millis(self.timeout.load(Ordering::Relaxed));
-        match worker.ask(job, timeout, &self.stop) {
+        let (observation, last_words) = match worker.ask(job, timeout, &self.stop) {
             Ok(reply) => {
                 self.worker = Some(worker);
-                Ok(reply.observation)
+                (reply.observation, None)
             }
             Err(error) if error.kind() == io::ErrorKind::TimedOut => {
-                Ok(empty(Outcome::Timeout { limit: timeout.as_secs_f64() }))
+                (empty(Outcome::Timeout { limit: timeout.as_secs_f64() }), None)
             }
             Err(error) => {
-                let how = worker.how_it_ended(&error);
-                let output = last_lines(&output_file(&self.directory()), 5);
-                let after = asked.elapsed().as_secs_f64();
-                Ok(crashed(format!("the worker process ended after {after:.1} s: {how}{output}")))
+                // Only what is the same in every session: the cause is part of the digest.
+                let observation = crashed(format!("the worker process ended: {}", worker.how_it_ended(&error)));
+                (observation, last_lines(&output_file(&self.directory()), printed, 10))
             }
-        }
+        };
+        Ok(Ended { number: job.number, observation, last_words })
     }
 
     fn directory(&self) -> PathBuf {
@@ -177,7 +188,10 @@ impl Worker {
         let output = File::options().create(true).append(true).open(output_file(&directory)).map_err(refuse)?;
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(refuse)?;
         let token = token().map_err(|error| lane.refuse(&error))?;
-        let process = Command::new(&lane.settings.program)
+        let mut command = Command::new(&lane.settings.program);
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        let process = command
             .arg("worker")
             .arg(listener.local_addr().map_err(refuse)?.to_string())
             .env("SESAME_WORKER_TOKEN", &token)
@@ -200,7 +214,8 @@ impl Worker {
         let started = Instant::now();
         while started.elapsed() < START_LIMIT {
             if let Some(status) = self.process.try_wait().map_err(refuse)? {
-                let output = last_lines(&output_file(&lane.directory()), 10);
+                let output = last_lines(&output_file(&lane.directory()), 0, 10);
+                let output = output.map_or_else(String::new, |lines| format!("; its last words:\n{lines}"));
                 return Err(lane.refuse(&format!("it ended at once, {status}{output}")));
             }
             match listener.accept() {
@@ -272,20 +287,20 @@ fn output_file(directory: &Path) -> PathBuf {
     directory.join("output.log")
 }
 
-/// The end of what a worker printed, ready to be put behind a message.
-fn last_lines(path: &Path, count: usize) -> String {
+/// The last lines of what a worker printed from this byte of its output on; `None` when that is nothing.
+fn last_lines(path: &Path, from: u64, count: usize) -> Option<String> {
     let read = || -> io::Result<String> {
         let mut file = File::open(path)?;
         let length = file.metadata()?.len();
-        file.seek(SeekFrom::Start(length.saturating_sub(4096)))?;
+        file.seek(SeekFrom::Start(length.saturating_sub(4096).max(from)))?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())
     };
     let text = read().unwrap_or_default();
     let lines: Vec<&str> = text.lines().collect();
-    let tail = &lines[lines.len().saturating_sub(count)..];
-    if tail.is_empty() { String::new() } else { format!("; its last words:\n{}", tail.join("\n")) }
+    let tail = lines[lines.len().saturating_sub(count)..].join("\n");
+    (!tail.trim().is_empty()).then_some(tail)
 }
 
 fn token() -> Result<String, getrandom::Error> {

@@ -10,7 +10,7 @@ use sesame_plan::CampaignPlan;
 use super::recorded::{open, refuse_changed};
 use super::work::{interruptible, refuse_unfilled, seconds};
 use super::{Failure, Format, NOT_AS_REQUIRED, STOPPED, Which, print, print_json, text_options};
-use crate::campaign::{AloneSettings, Job, patience, run_alone};
+use crate::campaign::{AloneSettings, Ended, Job, patience, run_alone};
 use crate::observation::Outcome;
 use crate::record::{TestRecord, differences};
 use crate::report::{Replay, replay_text};
@@ -46,10 +46,13 @@ pub(super) fn replay(
         timeout: options.timeout.unwrap_or_else(|| limit(&record)),
     };
     let job = Job { number: record.number, test: record.test.clone(), simulator_seed: record.simulator_seed };
-    let Some(again) = run_alone(job, &settings, &interrupted)? else {
+    let Some(Ended { observation: again, last_words, .. }) = run_alone(job, &settings, &interrupted)? else {
         eprintln!("stopped; a replay leaves nothing behind");
         return Ok(ExitCode::from(STOPPED));
     };
+    if let Some(words) = last_words {
+        eprintln!("the worker's last words:\n{words}");
+    }
     let differences = differences(repository.plan(), &record.test, &record.observation, &again);
     let replay = Replay {
         test: format!("T{}", record.number),

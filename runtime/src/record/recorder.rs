@@ -48,6 +48,7 @@ impl Recorder {
         }
         let lock = Lock::acquire(folder)?;
         let connection = schema::open(&path, true)?;
+        schema::check_whole(&connection, &path)?;
         let repository = Repository::from_connection(connection, path)?;
         if repository.campaign().stop.is_some() {
             return Err(RecordError::Finished { path: repository.path });

@@ -136,3 +136,12 @@ pub(crate) fn open(path: &Path, writable: bool) -> Result<Connection, RecordErro
     }
     Ok(connection)
 }
+
+/// Makes sure that no part of the file was overwritten or cut off. Reading all of it is worth its time only before
+/// something is written behind it.
+pub(crate) fn check_whole(connection: &Connection, path: &Path) -> Result<(), RecordError> {
+    let found: String = connection
+        .query_row("PRAGMA quick_check(1)", [], |row| row.get(0))
+        .map_err(|e| RecordError::database("check the results", path, e))?;
+    if found == "ok" { Ok(()) } else { Err(RecordError::damaged(path, found.replace('\n', " "))) }
+}

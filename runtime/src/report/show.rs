@@ -5,7 +5,7 @@ use sesame_plan::{Activation, CampaignPlan, Choice, Span};
 
 use crate::observation::Counters;
 use crate::record::{
-    MetricValue, Origin, RecordError, Repository, TestRecord, TestRow, Verdict, verdict, violation_spans,
+    EventKind, MetricValue, Origin, RecordError, Repository, TestRecord, TestRow, Verdict, verdict, violation_spans,
 };
 use crate::report::{number, summary};
 
@@ -78,6 +78,8 @@ pub struct TestReport {
     pub requirements: Vec<VerdictReport>,
     /// What should be brought to the user's attention.
     pub warnings: Vec<String>,
+    /// What the session in which it ran left about it, such as the last words of its worker.
+    pub notes: Vec<String>,
 }
 
 /// One operation of a test.
@@ -188,10 +190,15 @@ fn origin(plan: &CampaignPlan, origin: Origin) -> String {
 pub fn show(repository: &Repository, name: &str) -> Result<TestReport, RecordError> {
     let record = repository.test(repository.find(name)?)?;
     let front = repository.latest_result_set()?.is_some_and(|set| set.members.contains(&record.number));
-    Ok(report_on(repository.plan(), &record, front))
+    let mut report = report_on(repository.plan(), &record, front);
+    let ran = record.duplicate_of.unwrap_or(record.number);
+    let notes = repository.events()?.into_iter();
+    let notes = notes.filter(|event| event.kind == EventKind::Session && event.test == Some(ran));
+    report.notes = notes.map(|event| event.text).collect();
+    Ok(report)
 }
 
-/// Everything on a test, from its record.
+/// Everything on a test, from its record; notes are not there.
 pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, front: bool) -> TestReport {
     let observation = &record.observation;
     TestReport {
@@ -225,6 +232,7 @@ pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, front: bool) -
             .collect(),
         requirements: verdicts(plan, record),
         warnings: observation.warnings.clone(),
+        notes: Vec::new(),
     }
 }
 

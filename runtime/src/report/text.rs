@@ -334,6 +334,9 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     for warning in &test.warnings {
         paragraph(&mut text, &format!("warning: {}", visible(warning)), options);
     }
+    for line in test.notes.iter().flat_map(|note| note.lines()) {
+        paragraph(&mut text, &visible(line), options);
+    }
     text
 }
 

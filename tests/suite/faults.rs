@@ -1,0 +1,114 @@
+//! What goes wrong in simulators and hooks ends a test, never a campaign; what is wrong without any disturbance is said
+//! before anything is fuzzed.
+
+use std::collections::BTreeMap;
+use std::fs;
+
+use sesame_runtime::observation::Outcome;
+use sesame_runtime::record::{Origin, Repository};
+use sesame_tests::{Done, Project, Runner, workspace};
+
+/// The runner of a campaign on the faulty simulator, with its hook filled in.
+pub(crate) fn faulty(name: &str, campaign: &str) -> Runner {
+    let space = fs::read_to_string(workspace().join("tests/simulators/faulty/space.sesame")).unwrap();
+    let project = Project::new(name, &space.replace("NAME", name), "faulty");
+    project.sesamec("generate", &["--campaign", campaign]).expect(0);
+    let hook = project.runners.join("hooks/fragile.rs");
+    let stub = fs::read_to_string(&hook).unwrap();
+    let body = "match heard {
+            1.0 => panic!(\"the hook was given a 1\"),
+            2.0 => ctx.set(f64::NAN),
+            _ => ctx.set(heard),
+        }";
+    fs::write(&hook, stub.replace("ctx.unimplemented();", body)).unwrap();
+    project.build(campaign)
+}
+
+#[test]
+fn every_fault_is_the_outcome_of_its_test_and_the_campaign_goes_on() {
+    let runner = faulty("breaking", "all_faults");
+    let said = runner.run(&["--results", "all", "--timeout", "1"]).expect(0);
+    let repository = Repository::open(&runner.folder.join("all/3")).unwrap();
+    let plan = repository.plan().clone();
+    let mut by_fault: BTreeMap<String, Vec<(u32, Outcome)>> = BTreeMap::new();
+    for row in repository.tests().unwrap() {
+        let fault = match row.origin {
+            Origin::Search => plan.operation(row.test.operations[0].operation).name.clone(),
+            _ => "undisturbed".to_owned(),
+        };
+        // An operation may end before the first message reaches it.
+        if row.outcome != Outcome::Void {
+            by_fault.entry(fault).or_default().push((row.number, row.outcome));
+        }
+    }
+    let expected = BTreeMap::from([
+        ("undisturbed", ("completed", "")),
+        ("do_nothing", ("completed", "")),
+        ("do_hook_nan", ("completed", "")),
+        ("do_panic", ("crash", "the simulator was disturbed at ")),
+        ("do_error", ("crash", "a joint broke at ")),
+        ("do_hook_panic", ("crash", "the hook was given a 1")),
+        ("do_abort", ("crash", "the worker process ended: signal: 6 (SIGABRT)")),
+        ("do_hang", ("timeout", "stopped after 1 s")),
+    ]);
+    assert_eq!(by_fault.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>(), "each fault occurs");
+    for (fault, tests) in &by_fault {
+        let (word, detail) = expected[fault.as_str()];
+        for (number, outcome) in tests {
+            assert_eq!(outcome.word(), word, "{fault}: T{number} {outcome:?}");
+            assert!(outcome.detail().unwrap_or_default().contains(detail), "{fault}: T{number} {outcome:?}");
+            let warned = !repository.test(*number).unwrap().observation.warnings.is_empty();
+            assert_eq!(warned, fault == "do_hook_nan", "{fault}: T{number}");
+            if matches!(word, "crash" | "timeout") {
+                assert!(said.out.contains(&format!("T{number} ")), "T{number} is listed as a finding: {}", said.out);
+            }
+        }
+    }
+    let front = repository.latest_result_set().unwrap().unwrap().members;
+    for (fault, tests) in &by_fault {
+        let failed = matches!(expected[fault.as_str()].0, "crash" | "timeout");
+        assert!(!failed || tests.iter().all(|(number, _)| !front.contains(number)), "{fault} on the front {front:?}");
+    }
+    let (aborted, _) = by_fault["do_abort"][0];
+    let shown = runner.run(&["show", &format!("T{aborted}"), "--results", "all/3"]).expect(0).out;
+    assert!(shown.contains("the worker's last words:\nabout to abort"), "{shown}");
+
+    // Nothing of this depends on workers, on what a worker had printed before, or on the clock.
+    let one = runner.run(&["--results", "one", "--timeout", "1.5", "--workers", "1"]).expect(0);
+    assert_eq!(one.digest(), said.digest());
+}
+
+/// A run of the harmless campaign in which the simulator has this fault without being disturbed.
+fn undisturbed(runner: &Runner, fault: &str) -> Done {
+    sesame_tests::done(runner.command(&["--results", fault]).env("FAULT", fault))
+}
+
+#[test]
+fn a_system_that_does_not_work_undisturbed_is_not_fuzzed() {
+    let runner = faulty("unready", "harmless");
+    for (fault, words) in [
+        ("crash", "the reference run is to crash"),
+        ("missing topic", "the simulator has no topic `faulty/level`; did you mean `faulty/lvel`?"),
+        ("wrong type", "a message on `faulty/level` is not of its declared type: "),
+    ] {
+        let said = undisturbed(&runner, fault).expect(1);
+        assert!(said.err.contains("the undisturbed reference run failed: "), "{}", said.err);
+        assert!(said.err.contains(words), "{}", said.err);
+        assert!(said.err.contains("nothing was fuzzed"), "{}", said.err);
+        let repository = Repository::open(&runner.folder.join(fault).join("3")).unwrap();
+        assert_eq!(repository.tests().unwrap().len(), 1);
+        // There is nothing to go on with: the next run must not point back here.
+        let next = sesame_tests::done(&mut runner.command(&["--results", fault])).expect(0);
+        assert!(!next.err.contains("unfinished"), "{}", next.err);
+    }
+}
+
+#[test]
+fn a_requirement_broken_undisturbed_is_a_warning() {
+    let runner = faulty("tilted", "harmless");
+    let said = undisturbed(&runner, "broken requirement").expect(0);
+    let words = "requirement R1 is broken before anything is fuzzed: `highest` is 5";
+    assert!(said.out.contains(words), "{}", said.out);
+    let repository = Repository::open(&runner.folder.join("broken requirement/3")).unwrap();
+    assert!(repository.events().unwrap().iter().any(|event| event.text == words));
+}

@@ -1,0 +1,213 @@
+//! A run that is stopped, in good order or not, goes on to what it would have been.
+
+use std::fs;
+use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::{Signal, kill, killpg};
+use nix::unistd::Pid;
+use proptest::prelude::*;
+use proptest::test_runner::{RngSeed, TestRunner};
+use sesame_runtime::observation::Outcome;
+use sesame_runtime::record::Repository;
+use sesame_tests::{Done, Runner};
+
+use crate::faults::faulty;
+
+/// Slows each of the 100 steps of a test down, so that there is a middle to stop in: 60 tests take some seconds.
+const PAUSE_US: &str = "500";
+
+/// A campaign in the background, in a process group of its own as a shell makes one.
+pub(crate) struct Running {
+    process: Child,
+    folder: std::path::PathBuf,
+}
+
+impl Running {
+    pub(crate) fn start(runner: &Runner, results: &str, workers: &str) -> Running {
+        let mut command = runner.command(&["--results", results, "--workers", workers]);
+        command.env("PAUSE_US", PAUSE_US).process_group(0).stdout(Stdio::piped()).stderr(Stdio::piped());
+        Running { process: command.spawn().unwrap(), folder: runner.folder.join(results).join("3") }
+    }
+
+    fn pid(&self) -> Pid {
+        Pid::from_raw(i32::try_from(self.process.id()).unwrap())
+    }
+
+    pub(crate) fn signal(&self, signal: Signal) {
+        kill(self.pid(), signal).unwrap();
+    }
+
+    /// Waits until so many tests are recorded.
+    pub(crate) fn until_recorded(&mut self, tests: usize) {
+        let patience = Instant::now();
+        while recorded(&self.folder) < tests {
+            assert!(patience.elapsed() < Duration::from_secs(60), "no {tests} tests after a minute");
+            assert!(self.process.try_wait().unwrap().is_none(), "it ended before {tests} tests were recorded");
+            sleep(Duration::from_millis(5));
+        }
+    }
+
+    pub(crate) fn ended(self) -> (std::process::ExitStatus, Done) {
+        let output = self.process.wait_with_output().unwrap();
+        (output.status, Done::of(&output))
+    }
+}
+
+fn recorded(folder: &Path) -> usize {
+    Repository::open(folder).and_then(|repository| repository.tests()).map_or(0, |tests| tests.len())
+}
+
+/// The worker processes of a runner's program that are alive, whoever started them.
+fn workers(runner: &Runner) -> Vec<Pid> {
+    let wanted = format!("{} worker ", runner.program.display());
+    processes().into_iter().filter(|(_, words)| words.starts_with(&wanted)).map(|(pid, _)| Pid::from_raw(pid)).collect()
+}
+
+/// All processes with their command lines: from `/proc` where there is one, since not every Linux has `ps`.
+fn processes() -> Vec<(i32, String)> {
+    if let Ok(entries) = fs::read_dir("/proc") {
+        let pids = entries.filter_map(|entry| entry.unwrap().file_name().to_str()?.parse().ok());
+        let read = |pid: i32| {
+            // What has ended meanwhile has no command line.
+            let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+            (pid, String::from_utf8_lossy(&line).replace('\0', " "))
+        };
+        return pids.map(read).collect();
+    }
+    let said = sesame_tests::done(std::process::Command::new("ps").args(["-A", "-o", "pid=,args="])).expect(0).out;
+    let split = |line: &str| line.trim().split_once(' ').map(|(pid, words)| (pid.parse().unwrap(), words.to_owned()));
+    said.lines().filter_map(split).collect()
+}
+
+/// Insists that all workers are gone, which may take them a moment.
+#[track_caller]
+fn no_worker_is_left(runner: &Runner) {
+    let patience = Instant::now();
+    while !workers(runner).is_empty() {
+        assert!(patience.elapsed() < Duration::from_secs(20), "left behind: {:?}", workers(runner));
+        sleep(Duration::from_millis(10));
+    }
+}
+
+fn undisturbed(runner: &Runner) -> String {
+    runner.run(&["--results", "undisturbed"]).expect(0).digest()
+}
+
+fn resumed(runner: &Runner, results: &str) -> String {
+    let folder = format!("{results}/3");
+    let digest = runner.run(&["resume", &folder]).expect(0).digest();
+    assert_eq!(recorded(&runner.folder.join(&folder)), 62);
+    digest
+}
+
+#[test]
+fn ctrl_c_stops_in_good_order_and_resume_gives_what_an_unbroken_run_gives() {
+    let runner = faulty("stopped", "harmless");
+    let whole = undisturbed(&runner);
+    for (at, tests) in [1, 7, 30].into_iter().enumerate() {
+        let results = format!("stopped{at}");
+        let mut running = Running::start(&runner, &results, "2");
+        running.until_recorded(tests);
+        // To all of the group, as a terminal does.
+        killpg(running.pid(), Signal::SIGINT).unwrap();
+        let (_, said) = running.ended();
+        let said = said.expect(130);
+        let advice = format!("`resume {}` goes on to the same results", Path::new(&results).join("3").display());
+        assert!(said.err.contains(&advice), "{}", said.err);
+        assert_eq!(said.out, "");
+        no_worker_is_left(&runner);
+        let tests = Repository::open(&runner.folder.join(&results).join("3")).unwrap().tests().unwrap();
+        assert!(tests.iter().all(|row| row.outcome == Outcome::Completed), "nothing is taken for a crash: {tests:?}");
+        assert_eq!(resumed(&runner, &results), whole);
+        let again = runner.run(&["resume", &format!("{results}/3")]).expect(1);
+        assert!(again.err.contains("finished"), "{}", again.err);
+    }
+}
+
+#[test]
+fn a_run_in_progress_is_not_resumed_by_another_process_but_can_be_read() {
+    let runner = faulty("busy", "harmless");
+    let mut running = Running::start(&runner, "busy", "1");
+    running.until_recorded(3);
+    let refused = runner.run(&["resume", "busy/3"]).expect(1);
+    assert!(refused.err.contains(&format!("process {} is writing", running.pid())), "{}", refused.err);
+    assert!(runner.run(&["list", "--results", "busy/3"]).expect(0).out.contains("T1"));
+    let (status, _) = running.ended();
+    assert!(status.success());
+}
+
+/// Kills the supervisor after this share of what a run takes, and resumes.
+fn killed_at(runner: &Runner, moment: f64, whole: &str, takes: Duration) {
+    let results = format!("killed{moment:.6}");
+    let running = Running::start(runner, &results, "2");
+    sleep(takes.mul_f64(moment));
+    kill(running.pid(), Signal::SIGKILL).unwrap();
+    let (status, _) = running.ended();
+    no_worker_is_left(runner);
+    if status.signal() == Some(9) {
+        let folder = runner.folder.join(&results).join("3");
+        if recorded(&folder) == 0 && Repository::open(&folder).is_err() {
+            // It had hardly begun: there is nothing yet, and nothing half done either.
+            runner.run(&["resume", &format!("{results}/3")]).expect(1);
+            return;
+        }
+        let tests = recorded(&folder);
+        let next = runner.run(&["--results", &results, "--evaluations", "1"]).expect(0);
+        assert!(next.err.contains("an earlier run is unfinished"), "{}", next.err);
+        assert_eq!(resumed(runner, &results), whole, "killed with {tests} tests recorded");
+    }
+    fs::remove_dir_all(runner.folder.join(&results)).unwrap();
+}
+
+fn killed_at_random_moments(name: &str, moments: u32) {
+    let runner = faulty(name, "harmless");
+    let whole = undisturbed(&runner);
+    let started = Instant::now();
+    let (status, said) = Running::start(&runner, "slow", "2").ended();
+    assert!(status.success(), "{}", said.err);
+    assert_eq!(said.digest(), whole, "wall time decides nothing");
+    let takes = started.elapsed();
+    let config =
+        ProptestConfig { cases: moments, failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..Default::default() };
+    TestRunner::new(config)
+        .run(&(0.0..1.0f64), |moment| {
+            killed_at(&runner, moment, &whole, takes);
+            Ok(())
+        })
+        .unwrap();
+}
+
+#[test]
+fn a_supervisor_killed_at_any_moment_loses_nothing_that_cannot_be_taken_up_again() {
+    killed_at_random_moments("killed", 5);
+}
+
+#[test]
+#[ignore = "long: a hundred kills"]
+fn a_supervisor_killed_at_a_hundred_moments_loses_nothing_that_cannot_be_taken_up_again() {
+    killed_at_random_moments("killed_often", 100);
+}
+
+/// A worker that someone kills cannot be told from one that its simulator brought down: its test is a crash.
+#[test]
+fn a_killed_worker_is_a_crash_of_its_test_and_the_campaign_goes_on() {
+    let runner = faulty("worker_killed", "harmless");
+    let mut running = Running::start(&runner, "results", "1");
+    running.until_recorded(5);
+    let [worker] = workers(&runner)[..] else { panic!("there is one worker") };
+    kill(worker, Signal::SIGKILL).unwrap();
+    let folder = running.folder.clone();
+    let (status, said) = running.ended();
+    assert!(status.success(), "{}", said.err);
+    let repository = Repository::open(&folder).unwrap();
+    let crashes: Vec<_> =
+        repository.tests().unwrap().into_iter().filter(|row| row.outcome != Outcome::Completed).collect();
+    let [crash] = &crashes[..] else { panic!("one test was running: {crashes:?}") };
+    assert!(crash.outcome.detail().unwrap().contains("signal: 9 (SIGKILL)"), "{crash:?}");
+    assert!(said.out.contains(&format!("T{} ", crash.number)), "{}", said.out);
+    no_worker_is_left(&runner);
+}

@@ -1,0 +1,10 @@
+//! Behaviour across crates, as a user meets it.
+#![cfg(test)]
+
+mod faults;
+mod first_front;
+mod interruption;
+mod kuka_cell;
+mod regeneration;
+mod search;
+mod tampering;
