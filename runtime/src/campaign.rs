@@ -4,11 +4,13 @@
 //! hangs takes nothing with it. Nothing here depends on how many workers there are: tests are numbered when they are
 //! asked for, and told in that order.
 
+mod alone;
 mod conduct;
 mod frames;
 mod pool;
 mod worker;
 
-pub use conduct::{CampaignError, Conducted, Progress, Settings, conduct};
+pub use alone::{AloneSettings, run_alone};
+pub use conduct::{CampaignError, Conducted, Progress, Settings, conduct, patience};
 pub use pool::{Ended, Job, Pool, PoolError, PoolSettings};
 pub use worker::serve;

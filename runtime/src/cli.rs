@@ -1,10 +1,17 @@
 //! The runner's command line.
 //!
 //! Results go to standard output, progress and problems to standard error. Exit codes: 0 done, 1 failed, 2 wrong usage,
-//! 130 stopped by the user.
+//! 3 done, but something is not as required where that was asked for, 130 stopped by the user.
 
+mod export;
+mod known;
 mod progress;
+mod recorded;
+mod repeat;
+mod replay;
+mod report_anew;
 mod run;
+mod work;
 
 use std::io::Write as _;
 use std::net::SocketAddr;
@@ -15,9 +22,12 @@ use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, V
 use sesame_plan::{CampaignPlan, SCHEMA};
 
 use crate::campaign;
-use crate::record::{self, Repository};
 use crate::report::{self, TextOptions};
 use crate::runner::Runner;
+
+/// Exit code of a command that did its work and found that something is not as required: a requirement or expectation
+/// is violated, where that was asked for, or a test came out different.
+const NOT_AS_REQUIRED: u8 = 3;
 
 /// Exit code of a run that the user stopped, as shells have it for an interrupted program.
 const STOPPED: u8 = 130;
@@ -26,7 +36,9 @@ const STOPPED: u8 = 130;
 #[command(
     version,
     args_conflicts_with_subcommands = true,
-    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 130 stopped by the user."
+    after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but not as required (`known`: an expectation is not \
+                  kept; `replay`: the test came out different; `--fail-on-violation`: a requirement or expectation is \
+                  violated); 130 stopped by the user."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -41,6 +53,16 @@ enum Command {
     Run(run::Options),
     /// Go on with a run that was stopped, to the same results
     Resume(run::ResumeOptions),
+    /// Run the known tests and compare what comes out with what they expect
+    Known(known::Options),
+    /// Run one test again and again, to see what of its result is chance
+    Repeat(repeat::Options),
+    /// Run a recorded test again just as it was and say whether it is the same, bit for bit
+    Replay(replay::Options),
+    /// Print a recorded test as a `test` block for the `.sesame` file
+    Export(export::Options),
+    /// Write the page with pictures anew and print what was found, also of an unfinished run
+    Report(report_anew::Options),
     /// List all tests of a run
     List(Which),
     /// Show one test whole: operations, effects, metrics, requirements
@@ -118,6 +140,11 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
         None => run::run(runner, &plan, &results, &cli.run),
         Some(Command::Run(options)) => run::run(runner, &plan, &results, &options),
         Some(Command::Resume(options)) => run::resume(runner, &plan, &results, &options),
+        Some(Command::Known(options)) => known::known(runner, &plan, &results, &options),
+        Some(Command::Repeat(options)) => repeat::repeat(runner, &plan, &results, &options),
+        Some(Command::Replay(options)) => replay::replay(runner, &plan, &results, &options),
+        Some(Command::Export(options)) => export::export(&results, &options),
+        Some(Command::Report(options)) => report_anew::report_anew(&results, &options),
         Some(Command::List(which)) => list(&results, &which),
         Some(Command::Show { test, which }) => show(&results, &which, &test),
         Some(Command::Digest(which)) => digest(&results, &which),
@@ -130,17 +157,8 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
     }
 }
 
-fn open(results: &Path, which: &Which) -> Result<Repository, Failure> {
-    let folder = match &which.results {
-        Some(folder) => folder.clone(),
-        None => record::latest_folder(results)?
-            .ok_or_else(|| Failure(format!("there are no results yet in {}: `run` makes some", results.display())))?,
-    };
-    Ok(Repository::open(&folder)?)
-}
-
 fn list(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
-    let list = report::list(&open(results, which)?)?;
+    let list = report::list(&recorded::open(results, which.results.as_deref())?)?;
     match which.format {
         Format::Text => print(&report::list_text(&list, text_options())),
         Format::Json => print_json(&list),
@@ -148,7 +166,7 @@ fn list(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
 }
 
 fn show(results: &Path, which: &Which, test: &str) -> Result<ExitCode, Failure> {
-    let shown = report::show(&open(results, which)?, test)?;
+    let shown = report::show(&recorded::open(results, which.results.as_deref())?, test)?;
     match which.format {
         Format::Text => print(&report::test_text(&shown, text_options())),
         Format::Json => print_json(&shown),
@@ -156,7 +174,7 @@ fn show(results: &Path, which: &Which, test: &str) -> Result<ExitCode, Failure> 
 }
 
 fn digest(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
-    let repository = open(results, which)?;
+    let repository = recorded::open(results, which.results.as_deref())?;
     let digest = repository.digest()?;
     match which.format {
         Format::Text => print(&format!("{digest}\n")),

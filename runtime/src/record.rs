@@ -7,6 +7,7 @@
 //!
 //! A [`Recorder`] writes while a campaign runs; a [`Repository`] reads, during a run or after it.
 
+mod difference;
 mod digest;
 mod error;
 mod folder;
@@ -24,6 +25,7 @@ use sesame_plan::{KnownTestId, Test};
 
 use crate::observation::{Observation, Outcome};
 
+pub use difference::{Difference, differences};
 pub use digest::digest;
 pub use error::RecordError;
 pub use folder::{Claim, DATABASE, LOCK, claim_folder, latest_folder};

@@ -5,9 +5,13 @@
 //! lay them out, [`page()`] draws them.
 
 mod axis;
+mod export;
+mod junit;
 mod markup;
 mod number;
 mod page;
+mod repetition;
+mod replay;
 mod scatter;
 mod show;
 mod summary;
@@ -15,7 +19,13 @@ mod table;
 mod text;
 mod timeline;
 
+#[cfg(feature = "campaign")]
+pub(crate) use export::is_name;
+pub use export::{Exported, export};
+pub use junit::{junit, write_junit};
 pub use page::{page, write_page};
+pub use repetition::{Repetition, ViolationRate};
+pub use replay::{Replay, replay_text};
 pub use show::{
     ChoiceReport, ListedTest, MetricReport, OperationReport, TestList, TestReport, VerdictReport, list, show,
 };

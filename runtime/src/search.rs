@@ -19,18 +19,20 @@ pub mod selection;
 pub mod sorting;
 pub mod vary;
 
+mod known;
 mod random;
 mod repeat;
 
 #[cfg(test)]
 mod landscape;
 
-use sesame_plan::{CampaignPlan, Direction, Search, Test};
+use sesame_plan::{CampaignPlan, Direction, KnownTestId, Search, Test};
 
 use crate::observation::{Observation, Outcome};
 
 pub use dominance::{Fitness, Unfit};
 pub use front::Front;
+pub use known::Known;
 pub use nsga2::Nsga2;
 pub use permitted::{Permitted, SearchError};
 pub use random::Random;
@@ -58,6 +60,8 @@ pub struct Candidate {
     pub parents: Vec<u32>,
     /// The generation it belongs to, from 0.
     pub generation: u32,
+    /// The known test it is, where a search runs known tests for their own sake.
+    pub known: Option<KnownTestId>,
 }
 
 /// A test with its result.
@@ -73,16 +77,19 @@ pub struct Evaluated {
 
 /// The strategy that a plan names. `seed` is the campaign's, or what `run --seed` put in its place.
 pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, SearchError> {
-    Ok(match plan.campaign.search {
+    Ok(match &plan.campaign.search {
         Search::Nsga2 { population: 0, .. } => {
             return Err(SearchError::NoPopulation { campaign: plan.campaign.name.clone() });
         }
-        Search::Nsga2 { population, evaluations } => {
+        &Search::Nsga2 { population, evaluations } => {
             let variation = TestVariation::new(Permitted::of(plan)?, vary::Rates::default(), seed);
             Box::new(Nsga2::new(nsga2::Settings { population, evaluations, seed }, variation))
         }
-        Search::Random { evaluations } => Box::new(Random::new(Permitted::of(plan)?, evaluations, seed)),
-        Search::Repeat { test, times } => Box::new(Repeat::new(plan.test(test).test.clone(), times)),
+        &Search::Random { evaluations } => Box::new(Random::new(Permitted::of(plan)?, evaluations, seed)),
+        &Search::Repeat { test, times } => Box::new(Repeat::new(plan.test(test).test.clone(), times)),
+        Search::Known { tests } => {
+            Box::new(Known::new(tests.iter().map(|&id| (id, plan.test(id).test.clone())).collect()))
+        }
     })
 }
 
@@ -109,7 +116,7 @@ impl Strategy for Nsga2<TestVariation> {
     fn ask(&mut self) -> Vec<Candidate> {
         let generation = self.generation();
         let asked = Nsga2::ask(self);
-        asked.into_iter().map(|a| Candidate { test: a.genome, parents: a.parents, generation }).collect()
+        asked.into_iter().map(|a| Candidate { test: a.genome, parents: a.parents, generation, known: None }).collect()
     }
 
     fn tell(&mut self, results: &[Evaluated]) {

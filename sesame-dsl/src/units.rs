@@ -201,11 +201,13 @@ impl Unit {
     }
 }
 
-/// A value from one unit to another of the same dimension; no unit is a plain number.
+/// A value from one unit to another of the same dimension; no unit is a plain number. In its own unit it is what it was,
+/// bit for bit.
 pub fn convert(value: f64, from: Option<&Unit>, to: Option<&Unit>) -> f64 {
     debug_assert_eq!(dimension(from), dimension(to), "conversion is between units of one dimension");
     let [from, to] = [from, to].map(|unit| unit.map_or(Scale::ONE, |unit| unit.scale));
     match from.times(to.inverse()) {
+        _ if from == to => value,
         Some(scale) => scale.apply(value),
         // Beyond 38 digits the two halves are applied one after the other.
         None => to.inverse().apply(from.apply(value)),

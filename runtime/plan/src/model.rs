@@ -525,14 +525,21 @@ pub enum Search {
         /// How often.
         times: u32,
     },
+    /// Known tests, each once. No campaign of a `.sesame` file does this: the runner's `known` puts it in the
+    /// campaign's place.
+    Known {
+        /// Which.
+        tests: Vec<KnownTestId>,
+    },
 }
 
 impl Search {
     /// How many tests the campaign evaluates.
     pub fn evaluations(&self) -> u32 {
-        match *self {
-            Search::Nsga2 { evaluations, .. } | Search::Random { evaluations } => evaluations,
-            Search::Repeat { times, .. } => times,
+        match self {
+            Search::Nsga2 { evaluations, .. } | Search::Random { evaluations } => *evaluations,
+            Search::Repeat { times, .. } => *times,
+            Search::Known { tests } => u32::try_from(tests.len()).unwrap_or(u32::MAX),
         }
     }
 }

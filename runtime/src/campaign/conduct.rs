@@ -11,8 +11,8 @@ use sesame_plan::{CampaignPlan, Search, Test};
 use super::pool::{Ended, Job, Pool, PoolError, PoolSettings};
 use crate::observation::{Observation, Outcome};
 use crate::record::{
-    Event, EventKind, MetricValue, Origin, RecordError, Recorder, Repository, ResultSet, Status, TestRecord, Verdict,
-    verdict,
+    Difference, Event, EventKind, MetricValue, Origin, RecordError, Recorder, Repository, ResultSet, Status,
+    TestRecord, Verdict, differences, verdict,
 };
 use crate::rng::derive_seed;
 use crate::search::{self, Candidate, Evaluated, Front, SearchError};
@@ -23,6 +23,11 @@ const PATIENCE: f64 = 20.0;
 const LEAST_TIMEOUT: Duration = Duration::from_secs(60);
 /// The limit of the undisturbed run, of which nothing is known yet.
 const FIRST_TIMEOUT: Duration = Duration::from_secs(600);
+
+/// How long a test may take, in wall time, when one like it took so many seconds.
+pub fn patience(seconds: f64) -> Duration {
+    Duration::from_secs_f64(seconds * PATIENCE).max(LEAST_TIMEOUT)
+}
 
 /// What a user decides about a run.
 #[derive(Debug, Clone)]
@@ -118,7 +123,7 @@ pub fn conduct(
         desk.recorder.put_event(&Event { kind: EventKind::Warning, test: Some(0), text })?;
     }
     if settings.timeout.is_none() {
-        desk.pool.set_timeout(Duration::from_secs_f64(reference.wall.run * PATIENCE).max(LEAST_TIMEOUT));
+        desk.pool.set_timeout(patience(reference.wall.run));
     }
 
     let total = plan.campaign.search.evaluations();
@@ -132,12 +137,12 @@ pub fn conduct(
         let candidates = strategy.ask();
         let Some(generation) = candidates.first().map(|candidate| candidate.generation) else { break };
         let mut planned = Vec::with_capacity(candidates.len());
-        for Candidate { test, parents, generation } in candidates {
+        for Candidate { test, parents, generation, known } in candidates {
             numbered += 1;
             planned.push(Planned {
                 number: numbered,
-                origin: Origin::Search,
-                generation: Some(generation),
+                origin: known.map_or(Origin::Search, Origin::Known),
+                generation: known.is_none().then_some(generation),
                 parents,
                 duplicate_of: if repeats { None } else { earlier.same(&test, numbered) },
                 test,
@@ -172,9 +177,10 @@ pub fn conduct(
     if !desk.evaluate(vec![last], &mut |record| again = Some(record.observation.clone()))? {
         return interrupt(recorder);
     }
-    if let Some(difference) = again.and_then(|again| difference(plan, &reference, &again)) {
+    let differing = again.map(|again| differences(plan, &Test::default(), &reference, &again)).unwrap_or_default();
+    if let Some(Difference { what, before, after }) = differing.first() {
         let text = format!(
-            "an undisturbed run after the campaign differs from the one before it: {difference}; \
+            "an undisturbed run after the campaign differs from the one before it: {what} was {before} and is {after}; \
             the simulator does not start afresh for each test"
         );
         desk.recorder.put_event(&Event { kind: EventKind::Warning, test: Some(numbered + 1), text })?;
@@ -331,13 +337,4 @@ fn reference_warnings(plan: &CampaignPlan, reference: &Observation) -> Vec<Strin
         })
     });
     broken.collect()
-}
-
-/// The first metric in which two undisturbed runs differ, in words.
-fn difference(plan: &CampaignPlan, before: &Observation, after: &Observation) -> Option<String> {
-    if before.outcome != after.outcome {
-        return Some(format!("it ended as {}, not as {}", after.outcome.word(), before.outcome.word()));
-    }
-    let pairs = plan.metrics.iter().zip(before.metrics.iter().zip(&after.metrics));
-    pairs.filter(|(_, (before, after))| before != after).map(|(metric, _)| format!("metric `{}`", metric.name)).next()
 }

@@ -71,7 +71,10 @@ impl<'a> Display<'a> {
     }
 
     fn rest(&self, progress: Progress<'_>) -> String {
-        let mut parts = vec![format!("front of {}", progress.front.numbers().len())];
+        let mut parts = Vec::new();
+        if !self.plan.campaign.objectives.is_empty() {
+            parts.push(format!("front of {}", progress.front.numbers().len()));
+        }
         for (worst, &id) in self.worst.iter().zip(&self.plan.campaign.objectives) {
             let metric = self.plan.metric(id);
             // The least fuzzing time is no news.

@@ -17,18 +17,19 @@ pub const LOCK: &str = "results.lock";
 pub struct Claim {
     /// The folder; it exists now, is empty, and is nobody else's.
     pub folder: PathBuf,
-    /// The latest run of the same seed that was begun, is not finished, and that no process is writing: what `resume`
+    /// The latest run of the same name that was begun, is not finished, and that no process is writing: what `resume`
     /// could go on with.
     pub unfinished: Option<PathBuf>,
 }
 
-/// Makes a fresh folder for a run: `<results>/<seed>`, and where that is taken `<seed>-2`, `<seed>-3`, …
-pub fn claim_folder(results: &Path, seed: u64) -> Result<Claim, RecordError> {
+/// Makes a fresh folder for a run: `<results>/<name>`, and where that is taken `<name>-2`, `<name>-3`, … A run of the
+/// campaign is named by its seed, so that [`latest_folder`] finds it.
+pub fn claim_folder(results: &Path, name: &str) -> Result<Claim, RecordError> {
     std::fs::create_dir_all(results).map_err(|e| RecordError::io("make the folder for results", results, e))?;
     let mut unfinished = None;
     let mut n = 1u32;
     loop {
-        let folder = results.join(if n == 1 { seed.to_string() } else { format!("{seed}-{n}") });
+        let folder = results.join(if n == 1 { name.to_owned() } else { format!("{name}-{n}") });
         // Making the folder is the claim: of two processes that try at once, one gets the next number.
         match std::fs::create_dir(&folder) {
             Ok(()) => return Ok(Claim { folder, unfinished }),
@@ -43,7 +44,8 @@ pub fn claim_folder(results: &Path, seed: u64) -> Result<Claim, RecordError> {
     }
 }
 
-/// The folder of the run whose results were written last, if there is any.
+/// The folder of the campaign's run whose results were written last, if there is any. Its name begins with its seed:
+/// what else was run on the side (known tests, repetitions) is looked at when it is asked for.
 pub fn latest_folder(results: &Path) -> Result<Option<PathBuf>, RecordError> {
     let failed = |error| RecordError::io("look for results", results, error);
     let entries = match std::fs::read_dir(results) {
@@ -54,6 +56,10 @@ pub fn latest_folder(results: &Path) -> Result<Option<PathBuf>, RecordError> {
     let mut latest = None;
     for entry in entries {
         let folder = entry.map_err(failed)?.path();
+        let name = folder.file_name().unwrap_or_default().to_string_lossy();
+        if !name.starts_with(|first: char| first.is_ascii_digit()) {
+            continue;
+        }
         let Ok(written) = std::fs::metadata(folder.join(DATABASE)).and_then(|file| file.modified()) else { continue };
         // Equal times are told apart by name, so that the answer does not depend on the order of the listing.
         latest = latest.max(Some((written, folder)));

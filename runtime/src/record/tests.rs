@@ -194,17 +194,17 @@ fn what_is_no_repository_of_this_release_is_refused_with_what_to_do() {
 #[test]
 fn a_taken_folder_gets_the_next_number_and_an_unfinished_one_is_named() {
     let results = folder();
-    let first = claim_folder(results.path(), 42).unwrap();
+    let first = claim_folder(results.path(), "42").unwrap();
     assert_eq!(first, Claim { folder: results.path().join("42"), unfinished: None });
     let running = commit_all(&first.folder, &[]);
-    let second = claim_folder(results.path(), 42).unwrap();
+    let second = claim_folder(results.path(), "42").unwrap();
     assert_eq!(second, Claim { folder: results.path().join("42-2"), unfinished: None }, "the first still runs");
     running.interrupt().unwrap();
-    let third = claim_folder(results.path(), 42).unwrap();
+    let third = claim_folder(results.path(), "42").unwrap();
     assert_eq!(third, Claim { folder: results.path().join("42-3"), unfinished: Some(first.folder.clone()) });
     Recorder::resume(&first.folder, 1).unwrap().finish("done").unwrap();
-    assert_eq!(claim_folder(results.path(), 42).unwrap().unfinished, None);
-    assert_eq!(claim_folder(results.path(), 7).unwrap().folder, results.path().join("7"));
+    assert_eq!(claim_folder(results.path(), "42").unwrap().unfinished, None);
+    assert_eq!(claim_folder(results.path(), "7").unwrap().folder, results.path().join("7"));
 }
 
 #[test]

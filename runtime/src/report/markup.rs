@@ -50,6 +50,11 @@ impl Markup {
         escape(text, &mut self.text);
     }
 
+    /// A line end, where markup is to be read as a file.
+    pub(crate) fn line(&mut self) {
+        self.text.push('\n');
+    }
+
     /// The whole; every element must be closed.
     pub(crate) fn finish(self) -> String {
         assert!(self.open.is_empty(), "elements left open: {:?}", self.open);

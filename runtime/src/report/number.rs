@@ -60,6 +60,25 @@ pub(crate) fn bound(bound: Bound, unit: Option<&str>) -> String {
     }
 }
 
+/// A bound with all its digits, for whoever compares a value with it: what is expected may be exact to the last bit.
+pub(crate) fn exact_bound(bound: Bound, unit: Option<&str>) -> String {
+    let (sign, number) = match bound {
+        Bound::AtMost { value } => ("≤ ", exact(value)),
+        Bound::Below { value } => ("< ", exact(value)),
+        Bound::AtLeast { value } => ("≥ ", exact(value)),
+        Bound::Above { value } => ("> ", exact(value)),
+        Bound::Equal { value } => ("= ", exact(value)),
+        Bound::Within { low, high } => ("", format!("{}…{}", exact(low), exact(high))),
+    };
+    with_unit(format!("{sign}{number}"), unit)
+}
+
+/// A number with all the digits that tell it from every other; a zero has no sign.
+pub(crate) fn exact(x: f64) -> String {
+    let magnitude = x.abs();
+    if x == 0.0 || (1e-6..1e15).contains(&magnitude) { format!("{}", x + 0.0) } else { format!("{x:e}") }
+}
+
 fn range(low: f64, high: f64) -> String {
     let decimals = decimals([low, high]);
     format!("{}…{}", fixed(low, decimals), fixed(high, decimals))
@@ -122,6 +141,16 @@ mod tests {
         assert_eq!(number(1.5e12), "1.50e12");
         assert_eq!(quantity(49.238, Some("s")), "49.24 s");
         assert_eq!(bound(Bound::Within { low: 1.0, high: 40.0 }, None), "1…40");
+    }
+
+    #[test]
+    fn exact_numbers_are_told_from_all_others() {
+        assert_eq!(
+            [18.0, -0.0, 0.1 + 0.2, 1e-7, 1e300].map(exact),
+            ["18", "0", "0.30000000000000004", "1e-7", "1e300"]
+        );
+        assert_eq!(exact_bound(Bound::Equal { value: 49.238_12f64.next_up() }, Some("s")), "= 49.23812000000001 s");
+        assert_eq!(exact_bound(Bound::Within { low: 1.0, high: 40.0 }, None), "1…40");
     }
 
     #[test]

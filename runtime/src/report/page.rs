@@ -14,7 +14,8 @@ use crate::report::scatter::{Detail, Dimension, Kind, Point, scatter};
 use crate::report::show::{TestReport, report_on};
 use crate::report::summary::{Objective, RequirementSummary, Summary, summarise, value_text};
 use crate::report::text::{
-    choices_text, counts_sentence, effect_text, headline, objective_columns, outcome_sentence, spans_text,
+    came_out, choices_text, counts_sentence, effect_text, expectation_value, headline, objective_columns,
+    outcome_sentence, rate_text, spans_text,
 };
 use crate::report::timeline::timeline;
 
@@ -23,12 +24,14 @@ const TIMELINES: usize = 24;
 
 /// Writes the page beside the results, or wherever it is wanted.
 pub fn write_page(repository: &Repository, path: &Path) -> Result<(), RecordError> {
-    let html = page(repository)?;
-    // Written aside and renamed, so that a browser never sees half of it.
-    let aside = path.with_extension("html.tmp");
-    std::fs::write(&aside, html)
-        .and_then(|()| std::fs::rename(&aside, path))
-        .map_err(|e| RecordError::io("write the page", path, e))
+    write_aside(path, &page(repository)?).map_err(|e| RecordError::io("write the page", path, e))
+}
+
+/// Writes a file aside and renames it, so that nobody who reads it meanwhile sees half of it.
+pub(crate) fn write_aside(path: &Path, content: &str) -> std::io::Result<()> {
+    let mut aside = path.as_os_str().to_owned();
+    aside.push(".tmp");
+    std::fs::write(&aside, content).and_then(|()| std::fs::rename(&aside, path))
 }
 
 /// The page, from a campaign's results; a run may still be going on.
@@ -44,6 +47,8 @@ pub fn page(repository: &Repository) -> Result<String, RecordError> {
     body.open("main", &[]);
     requirements(&mut body, &summary, &drawn);
     front(&mut body, repository, &summary, &rows, &drawn);
+    repetition(&mut body, &summary);
+    expectations(&mut body, &summary, &drawn);
     failures(&mut body, &summary, &drawn);
     for group in groups.iter().filter(|group| !group.tests.is_empty()) {
         body.open("section", &[]);
@@ -129,12 +134,13 @@ fn header(body: &mut Markup, repository: &Repository, summary: &Summary) -> Resu
     }
     body.element("p", &[("class", "headline")], &format!("{}.", headline(summary)));
     body.element("p", &[], &format!("{}.", counts_sentence(summary)));
-    let search = match plan.campaign.search {
+    let search = match &plan.campaign.search {
         Search::Nsga2 { population, evaluations } => {
             format!("NSGA-II, population {population}, {evaluations} evaluations")
         }
         Search::Random { evaluations } => format!("random, {evaluations} evaluations"),
-        Search::Repeat { test, times } => format!("{} repeated {times} times", plan.test(test).name),
+        Search::Repeat { test, times } => format!("{} repeated {times} times", plan.test(*test).name),
+        Search::Known { tests } => plural(tests.len(), "known test", "known tests"),
     };
     let wall: f64 = sessions.iter().filter_map(|session| Some(session.ended_at? - session.started_at)).sum();
     let workers = sessions.last().map_or(0, |session| session.workers);
@@ -372,6 +378,60 @@ fn spreads(body: &mut Markup, summary: &Summary) {
         }
         body.close();
     }
+    body.close();
+    body.close();
+    body.close();
+}
+
+fn repetition(body: &mut Markup, summary: &Summary) {
+    let Some(repetition) = summary.repetition.as_ref().filter(|repetition| !repetition.requirements.is_empty()) else {
+        return;
+    };
+    body.open("section", &[]);
+    body.element("h2", &[], &format!("{} repeated", repetition.test));
+    body.element("p", &[("class", "quiet")], "How often each requirement was violated, with the 95 % Wilson interval.");
+    body.open("div", &[("class", "scroll")]);
+    body.open("table", &[]);
+    heading_row(body, &["Requirement", "Violated", "Sentence"], 0..0);
+    body.open("tbody", &[]);
+    for requirement in &repetition.requirements {
+        body.open("tr", &[]);
+        body.element("th", &[("scope", "row")], &requirement.requirement);
+        let class = if requirement.violated > 0 { "bad" } else { "words" };
+        body.element("td", &[("class", class)], &rate_text(requirement));
+        body.element("td", &[("class", "sentence")], &requirement.text);
+        body.close();
+    }
+    body.close();
+    body.close();
+    body.close();
+    body.close();
+}
+
+fn expectations(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
+    if summary.expectations.is_empty() {
+        return;
+    }
+    body.open("section", &[]);
+    body.element("h2", &[], "Known tests");
+    body.open("div", &[("class", "scroll")]);
+    body.open("table", &[]);
+    heading_row(body, &["Known test", "Test", "Metric", "Value", "Expected", "Came out"], 3..4);
+    body.open("tbody", &[]);
+    for expectation in &summary.expectations {
+        body.open("tr", &[]);
+        body.element("th", &[("scope", "row")], &expectation.known_test);
+        body.open("td", &[]);
+        test_link(body, &expectation.test, drawn);
+        body.close();
+        body.element("td", &[], &expectation.metric);
+        body.element("td", &[("class", "number")], &expectation_value(expectation));
+        body.element("td", &[], &expectation.bound);
+        let class = if expectation.verdict == Verdict::Kept { "words" } else { "bad" };
+        body.element("td", &[("class", class)], came_out(expectation.verdict));
+        body.close();
+    }
+    body.close();
     body.close();
     body.close();
     body.close();

@@ -6,6 +6,7 @@ use sesame_plan::{Bound, CampaignPlan, Direction, MetricId, Requirement};
 use crate::observation::Outcome;
 use crate::record::{EventKind, MetricValue, Origin, RecordError, Repository, TestRow, Verdict, verdict};
 use crate::report::number;
+use crate::report::repetition::{Repetition, repetition};
 
 /// What a campaign found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -30,16 +31,18 @@ pub struct Summary {
     pub expectations: Vec<ExpectationSummary>,
     /// Crashes and timeouts, by test.
     pub failures: Vec<Failure>,
+    /// What repeating says, where the campaign repeats one test.
+    pub repetition: Option<Repetition>,
     /// How far each metric went, in the plan's order; what a campaign without objectives is about.
     pub spreads: Vec<Spread>,
     /// What should be brought to the user's attention.
     pub warnings: Vec<String>,
 }
 
-/// How many tests there are of what kind. The reference run and known tests are no part of it.
+/// How many tests there are of what kind. The reference run is no part of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Counts {
-    /// Tests the search asked for and that ended.
+    /// Tests that ended, those the search asked for and known ones.
     pub evaluations: usize,
     /// Of these, exact duplicates, which were not simulated again.
     pub duplicates: usize,
@@ -124,7 +127,7 @@ pub struct ExpectationSummary {
     pub known_test: String,
     /// The metric.
     pub metric: String,
-    /// The bound in words.
+    /// The bound in words, with all digits.
     pub bound: String,
     /// The metric's value.
     pub value: Option<f64>,
@@ -202,6 +205,7 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
             .map(|requirement| summarise_requirement(plan, requirement, rows))
             .collect(),
         expectations: expectations(plan, rows),
+        repetition: repetition(plan, rows),
         failures: rows.iter().filter_map(failure).collect(),
         spreads: spreads(plan, rows),
         warnings: warnings.collect(),
@@ -213,7 +217,7 @@ fn counts(plan: &CampaignPlan, rows: &[TestRow]) -> Counts {
     let needed: Vec<MetricId> =
         plan.campaign.objectives.iter().copied().chain(plan.requirements.iter().map(|r| r.metric)).collect();
     let mut counts = Counts::default();
-    for row in rows.iter().filter(|row| row.origin == Origin::Search) {
+    for row in rows.iter().filter(|row| row.origin != Origin::Reference) {
         counts.evaluations += 1;
         counts.duplicates += usize::from(row.duplicate_of.is_some());
         match row.outcome {
@@ -336,7 +340,7 @@ fn expectations(plan: &CampaignPlan, rows: &[TestRow]) -> Vec<ExpectationSummary
                 test: format!("T{}", row.number),
                 known_test: known.name.clone(),
                 metric: metric.name.clone(),
-                bound: number::bound(expectation.bound, metric.unit.as_deref()),
+                bound: number::exact_bound(expectation.bound, metric.unit.as_deref()),
                 value: shown.value,
                 verdict: verdict(expectation.bound, &row.outcome, shown),
             });

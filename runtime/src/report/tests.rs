@@ -135,6 +135,46 @@ fn an_unfinished_run_without_any_test_has_its_reports() {
     parsed(&page(recorder.repository()).unwrap());
 }
 
+/// What a campaign shows that does so instead of searching.
+fn instead(search: sesame_plan::Search) -> (tempfile::TempDir, Repository) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut plan = sample::plan();
+    let expect = |metric, bound| sesame_plan::Expectation { metric: sesame_plan::MetricId(metric), bound };
+    plan.tests[0].expectations = vec![
+        expect(0, sesame_plan::Bound::Within { low: 1.0, high: 40.0 }),
+        expect(1, sesame_plan::Bound::Equal { value: 49.0f64.next_up() }),
+    ];
+    plan.campaign.objectives.clear();
+    plan.campaign.search = search;
+    let mut recorder = crate::record::Recorder::create(folder.path(), &plan, 1, 1).unwrap();
+    let test = plan.tests[0].test.clone();
+    let known = sesame_plan::KnownTestId(0);
+    match plan.campaign.search {
+        sesame_plan::Search::Repeat { times, .. } => {
+            for number in 1..=times {
+                recorder.commit(&sample::record(&plan, number, crate::record::Origin::Search, test.clone())).unwrap();
+            }
+        }
+        _ => recorder.commit(&sample::record(&plan, 1, crate::record::Origin::Known(known), test)).unwrap(),
+    }
+    (folder, recorder.finish("all tests were evaluated").unwrap())
+}
+
+#[test]
+fn a_repetition_says_how_often_each_requirement_was_violated() {
+    let (_folder, repository) = instead(sesame_plan::Search::Repeat { test: sesame_plan::KnownTestId(0), times: 10 });
+    insta::assert_snapshot!("repeated", summary_text(&summary(&repository).unwrap(), WIDE));
+    assert!(page(&repository).unwrap().contains("95 % Wilson interval"));
+}
+
+#[test]
+fn known_tests_are_compared_with_what_they_expect() {
+    let (_folder, repository) = instead(sesame_plan::Search::Known { tests: vec![sesame_plan::KnownTestId(0)] });
+    insta::assert_snapshot!("known", summary_text(&summary(&repository).unwrap(), WIDE));
+    let html = page(&repository).unwrap();
+    assert!(parsed(&html).descendants().any(|node| node.text() == Some("= 49.00000000000001 s")));
+}
+
 #[test]
 fn a_large_campaign_stays_a_page_of_a_few_megabytes() {
     let folder = tempfile::tempdir().unwrap();

@@ -8,8 +8,9 @@ use crate::observation::Counters;
 use crate::record::MetricValue;
 use crate::record::Verdict;
 use crate::report::number::{self, fixed, join_words, plural, with_unit};
+use crate::report::repetition::{Repetition, ViolationRate};
 use crate::report::show::{OperationReport, TestList, TestReport};
-use crate::report::summary::{Objective, Spread, Summary, value_text};
+use crate::report::summary::{ExpectationSummary, Objective, Spread, Summary, value_text};
 use crate::report::table::{Align, Table, TextOptions, visible, wrap};
 
 fn left(title: &str) -> (String, Align) {
@@ -39,6 +40,12 @@ pub fn headline(summary: &Summary) -> String {
         0 => "no requirement broken".to_owned(),
         n => format!("{} broken ({})", plural(n, "requirement", "requirements"), broken.join(", ")),
     });
+    let kept = summary.expectations.iter().filter(|expectation| expectation.verdict == Verdict::Kept).count();
+    match summary.expectations.len() {
+        0 => {}
+        all if kept == all => parts.push(plural(all, "expectation kept", "expectations kept")),
+        all => parts.push(format!("{kept} of {} kept", plural(all, "expectation", "expectations"))),
+    }
     if summary.counts.crashes > 0 {
         parts.push(plural(summary.counts.crashes, "crash", "crashes"));
     }
@@ -69,20 +76,20 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
         let mut table =
             Table::new([left("known test"), left("test"), left("value"), left("expected"), left("came out")]);
         for expectation in &summary.expectations {
-            let came_out = match expectation.verdict {
-                Verdict::Kept => "yes",
-                Verdict::Violated => "no",
-                Verdict::Unsaid => "unsaid",
-            };
             table.row([
                 expectation.known_test.clone(),
                 expectation.test.clone(),
-                format!("{} {}", expectation.metric, expectation.value.map_or("unmeasured".to_owned(), number::number)),
+                format!("{} {}", expectation.metric, expectation_value(expectation)),
                 expectation.bound.clone(),
-                came_out.to_owned(),
+                came_out(expectation.verdict).to_owned(),
             ]);
         }
         section(&mut text, "Known tests", &table, options);
+    }
+    if let Some(repetition) = &summary.repetition
+        && !repetition.requirements.is_empty()
+    {
+        section(&mut text, &format!("{} repeated", repetition.test), &repeated(repetition), options);
     }
     if !summary.failures.is_empty() {
         let mut table = Table::new([left("test"), left("outcome"), right("at"), left("cause")]);
@@ -189,6 +196,35 @@ fn requirements(summary: &Summary) -> Table {
         ]);
     }
     table
+}
+
+fn repeated(repetition: &Repetition) -> Table {
+    let mut table = Table::new([left("requirement"), left("violated"), left("sentence")]);
+    for requirement in &repetition.requirements {
+        table.row([requirement.requirement.clone(), rate_text(requirement), requirement.text.clone()]);
+    }
+    table
+}
+
+/// How often a requirement was violated, as in `7 of 10 [40 %, 89 %]`.
+pub(crate) fn rate_text(rate: &ViolationRate) -> String {
+    let Some(interval) = rate.interval else { return "no run tells".to_owned() };
+    let [low, high] = interval.map(|share| format!("{:.0} %", share * 100.0));
+    format!("{} of {} [{low}, {high}]", rate.violated, rate.said)
+}
+
+/// The value that was to be as expected, with all its digits.
+pub(crate) fn expectation_value(expectation: &ExpectationSummary) -> String {
+    expectation.value.map_or("unmeasured".to_owned(), number::exact)
+}
+
+/// Whether it came out as expected.
+pub(crate) fn came_out(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Kept => "yes",
+        Verdict::Violated => "no",
+        Verdict::Unsaid => "unsaid",
+    }
 }
 
 fn spreads(spreads: &[Spread]) -> Table {

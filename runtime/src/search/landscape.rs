@@ -290,6 +290,8 @@ mod tests {
         assert_eq!(sizes(Search::Random { evaluations: 120 }), [50, 50, 20]);
         assert_eq!(sizes(Search::Repeat { test: sesame_plan::KnownTestId(0), times: 30 }), [30]);
         assert_eq!(sizes(Search::Repeat { test: sesame_plan::KnownTestId(0), times: 0 }), [0; 0]);
+        assert_eq!(sizes(Search::Known { tests: vec![sesame_plan::KnownTestId(0)] }), [1]);
+        assert_eq!(sizes(Search::Known { tests: vec![] }), [0; 0]);
     }
 
     #[test]

@@ -33,7 +33,12 @@ impl Strategy for Random {
         let batch: Vec<Candidate> = (self.asked..end)
             .map(|index| {
                 let mut stream = Stream::derive(self.seed, "initial", &[u64::from(index)]);
-                Candidate { test: fresh_test(&self.permitted, &mut stream), parents: Vec::new(), generation }
+                Candidate {
+                    test: fresh_test(&self.permitted, &mut stream),
+                    parents: Vec::new(),
+                    generation,
+                    known: None,
+                }
             })
             .collect();
         self.asked = end;

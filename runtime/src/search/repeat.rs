@@ -26,7 +26,7 @@ impl Strategy for Repeat {
             return Vec::new();
         }
         self.awaited = Some(self.times as usize);
-        let repetition = || Candidate { test: self.test.clone(), parents: Vec::new(), generation: 0 };
+        let repetition = || Candidate { test: self.test.clone(), parents: Vec::new(), generation: 0, known: None };
         std::iter::repeat_with(repetition).take(self.times as usize).collect()
     }
 

@@ -121,7 +121,7 @@ impl<'a> Resolver<'a> {
         let found = Range { low: value, high: value };
         let all = Range { low: 0.0, high: 100.0 };
         self.inside(found, quantity.span, all, "the inclusion", "0% to 100%", None)
-            .then(|| convert(value, Some(&percent()), None))
+            .then(|| self.probability(quantity, value))
     }
 
     // ----- known tests
@@ -264,16 +264,15 @@ impl<'a> Resolver<'a> {
         let probability = matches!(self.file.operations[index].body.as_ref()?.kind, ast::OperationKind::PacketLoss(_));
         let hundred = percent();
         let unit = if probability { Some(&hundred) } else { parameter.unit.as_ref() };
-        let normal = |value: f64| if probability { convert(value, unit, None) } else { value };
         let what = format!("`{}`", parameter.name);
         let (found, chosen) = match (choice, parameter.shape) {
             (ast::Choice::Value(quantity), Shape::Value) => {
-                let value = normal(self.value(quantity, unit, &what)?);
+                let value = self.value(quantity, unit, &what)?;
+                let value = if probability { self.probability(quantity, value) } else { value };
                 (Range { low: value, high: value }, Choice::Value(value))
             }
             (ast::Choice::Range(range), Shape::Range) => {
                 let range = self.range(range, unit, &what)?;
-                let range = Range { low: normal(range.low), high: normal(range.high) };
                 (range, Choice::Range(range))
             }
             (ast::Choice::Value(quantity), Shape::Range) => {

@@ -157,12 +157,24 @@ impl Resolver<'_> {
 
     /// A range of percentages between 0 and 100, as probabilities.
     pub(super) fn probabilities(&mut self, range: &ast::Range, what: &str) -> Option<Range> {
-        let percent = percent();
-        let found = self.range(range, Some(&percent), what)?;
+        let found = self.range(range, Some(&percent()), what)?;
         let all = Range { low: 0.0, high: 100.0 };
-        let probability = |value| convert(value, Some(&percent), None);
-        self.inside(found, range.span, all, what, "0% to 100%", None)
-            .then(|| Range { low: probability(found.low), high: probability(found.high) })
+        self.inside(found, range.span, all, what, "0% to 100%", None).then(|| Range {
+            low: self.probability(&range.low, found.low),
+            high: self.probability(&range.high, found.high),
+        })
+    }
+
+    /// A quantity that is this many per cent, as a probability: the number nearest to what is written.
+    ///
+    /// A hundredth of the nearest number of per cent would be rounded twice, and a fifth of all probabilities could not
+    /// be written at all.
+    pub(super) fn probability(&self, quantity: &Quantity, percentage: f64) -> f64 {
+        let exact = match &quantity.unit {
+            Some(unit) if unit.text == "%" => hundredth(self.text(quantity.span).trim_end_matches('%').trim_end()),
+            _ => None,
+        };
+        exact.unwrap_or_else(|| convert(percentage, Some(&percent()), None))
     }
 
     /// A range of times, none negative, in seconds.
@@ -171,6 +183,13 @@ impl Resolver<'_> {
         let all = Range { low: 0.0, high: f64::INFINITY };
         self.inside(found, range.span, all, what, "0s and more", None).then_some(found)
     }
+}
+
+/// A hundredth of an unsigned number as written; `None` for anything else.
+fn hundredth(written: &str) -> Option<f64> {
+    let (digits, exponent) = written.split_once(['e', 'E']).unwrap_or((written, "0"));
+    let exponent = exponent.parse::<i64>().ok()?.checked_sub(2)?;
+    format!("{digits}e{exponent}").parse().ok().filter(|value: &f64| value.is_finite())
 }
 
 /// The unit of probabilities in the language.

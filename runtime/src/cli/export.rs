@@ -1,0 +1,39 @@
+//! `export`: a recorded test in the words of the language.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::recorded::open;
+use super::{Failure, Format, Which, print, print_json};
+use crate::report;
+
+/// Which test is written, and under which name.
+#[derive(Debug, Args)]
+pub(super) struct Options {
+    /// The test, for example `T158`
+    test: String,
+    /// Name of the block; by default made of the campaign's name and the test's
+    #[arg(long, value_name = "NAME", value_parser = name)]
+    name: Option<String>,
+    #[command(flatten)]
+    which: Which,
+}
+
+fn name(text: &str) -> Result<String, String> {
+    if report::is_name(text) {
+        Ok(text.to_owned())
+    } else {
+        Err("a name is made of letters, digits and `_`, and does not begin with a digit".to_owned())
+    }
+}
+
+pub(super) fn export(results: &Path, options: &Options) -> Result<ExitCode, Failure> {
+    let repository = open(results, options.which.results.as_deref())?;
+    let exported = report::export(&repository, &options.test, options.name.as_deref())?;
+    match options.which.format {
+        Format::Text => print(&exported.block),
+        Format::Json => print_json(&exported),
+    }
+}

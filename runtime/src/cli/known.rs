@@ -1,0 +1,93 @@
+//! `known`: the known tests against what they expect.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use sesame_plan::{CampaignPlan, KnownTestId, Search};
+
+use super::Failure;
+use super::work::{Ending, Work, begin, carry_out, refuse_unfilled};
+use crate::runner::Runner;
+
+/// Which known tests are run, and how.
+#[derive(Debug, Args)]
+pub(super) struct Options {
+    /// Names of known tests; by default all that this campaign can run
+    #[arg(value_name = "NAME")]
+    names: Vec<String>,
+    /// The seed of the simulator's randomness; by default the campaign's
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Folder in which the results get a folder `known`; by default `results` in the runner's folder
+    #[arg(long, value_name = "DIR")]
+    results: Option<PathBuf>,
+    #[command(flatten)]
+    work: Work,
+    #[command(flatten)]
+    ending: Ending,
+}
+
+pub(super) fn known(
+    runner: &Runner,
+    plan: &CampaignPlan,
+    results: &Path,
+    options: &Options,
+) -> Result<ExitCode, Failure> {
+    let mut plan = plan.clone();
+    let tests = chosen(&plan, &options.names).map_err(Failure)?;
+    plan.campaign.search = Search::Known { tests };
+    // Nothing is sought, so there is no front.
+    plan.campaign.objectives.clear();
+    refuse_unfilled(runner, &plan, true)?;
+    let seed = options.seed.unwrap_or(plan.campaign.seed);
+    let results = options.results.as_deref().unwrap_or(results);
+    let (recorder, folder) = begin(results, "known", &plan, seed, &options.work)?;
+    carry_out(&plan, recorder, &folder, seed, &options.work, &options.ending)
+}
+
+/// The known tests of these names, each once and in the space's order; all of them when no name is given.
+fn chosen(plan: &CampaignPlan, names: &[String]) -> Result<Vec<KnownTestId>, String> {
+    if plan.tests.is_empty() {
+        return Err(format!(
+            "campaign `{}` can run none of the space's known tests: it runs those whose operations are all its own and \
+             that begin before its end",
+            plan.campaign.name
+        ));
+    }
+    let known = || plan.tests.iter().map(|test| test.name.as_str());
+    if let Some(stranger) = names.iter().find(|name| !known().any(|known| known == *name)) {
+        let known: Vec<&str> = known().collect();
+        return Err(format!(
+            "campaign `{}` can run no known test `{stranger}`; it can run {}",
+            plan.campaign.name,
+            known.join(", ")
+        ));
+    }
+    let wanted = |name: &str| names.is_empty() || names.iter().any(|wanted| wanted == name);
+    Ok((0u32..).map(KnownTestId).zip(known()).filter(|(_, name)| wanted(name)).map(|(id, _)| id).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::sample;
+
+    #[test]
+    fn known_tests_are_chosen_by_name() {
+        let mut plan = sample::plan();
+        let mut second = plan.tests[0].clone();
+        second.name = "second".to_owned();
+        plan.tests.push(second);
+        let chosen = |names: &[&str]| {
+            let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
+            super::chosen(&plan, &names)
+        };
+        assert_eq!(chosen(&[]), Ok(vec![KnownTestId(0), KnownTestId(1)]));
+        assert_eq!(chosen(&["second", "second"]), Ok(vec![KnownTestId(1)]));
+        assert_eq!(chosen(&["second", "known_jitter"]), Ok(vec![KnownTestId(0), KnownTestId(1)]));
+        assert!(chosen(&["third"]).unwrap_err().ends_with("it can run known_jitter, second"));
+        plan.tests.clear();
+        assert!(super::chosen(&plan, &[]).unwrap_err().contains("none of the space's known tests"));
+    }
+}

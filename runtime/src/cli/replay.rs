@@ -1,0 +1,95 @@
+//! `replay`: a recorded test once more, just as it was.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::Args;
+use sesame_plan::CampaignPlan;
+
+use super::recorded::{open, refuse_changed};
+use super::work::{interruptible, refuse_unfilled, seconds};
+use super::{Failure, Format, NOT_AS_REQUIRED, STOPPED, Which, print, print_json, text_options};
+use crate::campaign::{AloneSettings, Ended, Job, patience, run_alone};
+use crate::observation::Outcome;
+use crate::record::{TestRecord, differences};
+use crate::report::{Replay, replay_text};
+use crate::runner::Runner;
+
+/// Which test is run once more.
+#[derive(Debug, Args)]
+pub(super) struct Options {
+    /// The test, for example `T158`
+    test: String,
+    #[command(flatten)]
+    which: Which,
+    /// Seconds of wall time after which it is stopped; by default 20 times what it took, at least 60, or what stopped it
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    timeout: Option<Duration>,
+}
+
+pub(super) fn replay(
+    runner: &Runner,
+    plan: &CampaignPlan,
+    results: &Path,
+    options: &Options,
+) -> Result<ExitCode, Failure> {
+    let repository = open(results, options.which.results.as_deref())?;
+    let record = repository.test(repository.find(&options.test)?)?;
+    refuse_changed(&repository, plan, record.number)?;
+    refuse_unfilled(runner, plan, true)?;
+    let interrupted = interruptible()?;
+    let folder = Scratch::new()?;
+    let settings = AloneSettings {
+        program: std::env::current_exe()?,
+        directory: folder.0.clone(),
+        timeout: options.timeout.unwrap_or_else(|| limit(&record)),
+    };
+    let job = Job { number: record.number, test: record.test.clone(), simulator_seed: record.simulator_seed };
+    let Some(Ended { observation: again, last_words, .. }) = run_alone(job, &settings, &interrupted)? else {
+        eprintln!("stopped; a replay leaves nothing behind");
+        return Ok(ExitCode::from(STOPPED));
+    };
+    if let Some(words) = last_words {
+        eprintln!("the worker's last words:\n{words}");
+    }
+    let differences = differences(repository.plan(), &record.test, &record.observation, &again);
+    let replay = Replay {
+        test: format!("T{}", record.number),
+        simulator_seed: record.simulator_seed,
+        same: differences.is_empty(),
+        differences,
+    };
+    match options.which.format {
+        Format::Text => print(&replay_text(&replay, text_options()))?,
+        Format::Json => print_json(&replay)?,
+    };
+    Ok(ExitCode::from(if replay.same { 0 } else { NOT_AS_REQUIRED }))
+}
+
+/// How long the test may take now.
+fn limit(record: &TestRecord) -> Duration {
+    match record.observation.outcome {
+        Outcome::Timeout { limit } => Duration::from_secs_f64(limit),
+        _ => patience(record.observation.wall.run),
+    }
+}
+
+/// A folder for the worker that goes when it is no longer needed: a replay leaves nothing behind.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new() -> Result<Self, Failure> {
+        let folder = std::env::temp_dir().join(format!("sesame-replay-{}", std::process::id()));
+        std::fs::create_dir_all(&folder)
+            .map_err(|error| Failure(format!("cannot make a folder for the worker: {error}: {}", folder.display())))?;
+        Ok(Scratch(folder))
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // What cannot be removed is left to the system, which clears its temporary files.
+        std::fs::remove_dir_all(&self.0).ok();
+    }
+}

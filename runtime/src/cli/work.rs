@@ -1,0 +1,210 @@
+//! What all commands that run tests share: how they work, and how they end.
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use serde::Serialize;
+use sesame_plan::{CampaignPlan, Search};
+
+use super::progress::{Display, wait};
+use super::{Failure, Format, NOT_AS_REQUIRED, STOPPED, print, print_json, text_options};
+use crate::campaign::{Conducted, Settings, conduct};
+use crate::metric::unimplemented_hooks;
+use crate::record::{self, Claim, Recorder, Repository, Verdict};
+use crate::report::{self, Summary};
+use crate::runner::Runner;
+
+/// How tests are run.
+#[derive(Debug, Args)]
+pub(super) struct Work {
+    /// How many worker processes; by default one per processor
+    #[arg(long, value_name = "N")]
+    workers: Option<NonZeroUsize>,
+    /// Seconds of wall time after which a test is stopped; by default 20 times the undisturbed run, at least 60
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    timeout: Option<Duration>,
+}
+
+/// How a command says what was found.
+#[derive(Debug, Args)]
+pub(super) struct Ending {
+    /// How to show what was found; as JSON there is nothing else on standard output
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+    /// Write requirements, expectations, crashes and timeouts as JUnit test cases into this file
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Exit with code 3 when a requirement or an expectation is violated
+    #[arg(long)]
+    fail_on_violation: bool,
+}
+
+/// A length of wall time from the command line.
+pub(super) fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "not a number of seconds".to_owned())?;
+    Duration::try_from_secs_f64(seconds)
+        .ok()
+        .filter(|limit| !limit.is_zero())
+        .ok_or_else(|| "must be above 0".to_owned())
+}
+
+impl Work {
+    /// The number of workers, for the record.
+    pub(super) fn workers(&self) -> u32 {
+        u32::try_from(self.processes()).unwrap_or(u32::MAX)
+    }
+
+    fn processes(&self) -> usize {
+        let processors = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        self.workers.map_or_else(processors, NonZeroUsize::get)
+    }
+}
+
+/// Names hooks that are not filled in; an objective among them ends the run before it starts.
+pub(super) fn refuse_unfilled(runner: &Runner, plan: &CampaignPlan, allowed: bool) -> Result<(), Failure> {
+    let unfilled = unimplemented_hooks(plan, runner.hooks);
+    let mut objectives = Vec::new();
+    for id in unfilled {
+        let name = &plan.metric(id).name;
+        if plan.campaign.objectives.contains(&id) && !allowed {
+            objectives.push(format!("`{name}`"));
+        } else {
+            eprintln!("warning: the hook of metric `{name}` is not filled in yet");
+        }
+    }
+    if objectives.is_empty() {
+        return Ok(());
+    }
+    let hooks = Path::new(runner.directory).join("../hooks");
+    let hooks = hooks.canonicalize().unwrap_or(hooks);
+    Err(Failure(format!(
+        "the hook of {} is not filled in yet, and the campaign is to optimise it\n  \
+         fill it in: {}\n  or pass --allow-unimplemented to see everything else work",
+        objectives.join(" and "),
+        shown(&hooks)
+    )))
+}
+
+/// Begins the results of a run in a fresh folder of this name.
+pub(super) fn begin(
+    results: &Path,
+    name: &str,
+    plan: &CampaignPlan,
+    seed: u64,
+    work: &Work,
+) -> Result<(Recorder, PathBuf), Failure> {
+    let Claim { folder, unfinished } = record::claim_folder(results, name)?;
+    if let Some(unfinished) = unfinished {
+        eprintln!("note: an earlier run is unfinished: `resume {}` goes on with it", shown(&unfinished));
+    }
+    Ok((Recorder::create(&folder, plan, seed, work.workers())?, folder))
+}
+
+/// Runs a campaign to its end and says what was found.
+pub(super) fn carry_out(
+    plan: &CampaignPlan,
+    recorder: Recorder,
+    folder: &Path,
+    seed: u64,
+    work: &Work,
+    ending: &Ending,
+) -> Result<ExitCode, Failure> {
+    let settings =
+        Settings { seed, workers: work.processes(), timeout: work.timeout, program: std::env::current_exe()? };
+    let interrupted = interruptible()?;
+    let started = Instant::now();
+    let mut display = Display::new(plan, seed);
+    let conducted = conduct(plan, recorder, &settings, &folder.join("workers"), &interrupted, &mut |progress| {
+        display.update(progress);
+    });
+    display.finish();
+    match conducted? {
+        Conducted::Finished(repository) => {
+            let code = conclude(&repository, folder, &folder.join("report.html"), ending)?;
+            let (took, tests) = (started.elapsed(), repository.tests()?.len());
+            let took =
+                if took.as_secs() < 90 { format!("{:.1} s", took.as_secs_f64()) } else { wait(took.as_secs_f64()) };
+            eprintln!("      Took {took} for {tests} runs");
+            Ok(code)
+        }
+        Conducted::Interrupted => {
+            eprintln!("stopped; what was measured is kept. `resume {}` goes on to the same results", shown(folder));
+            Ok(ExitCode::from(STOPPED))
+        }
+    }
+}
+
+/// A flag that Ctrl-C sets. The first stops in good order; who insists is obeyed.
+pub(super) fn interruptible() -> Result<Arc<AtomicBool>, Failure> {
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&interrupted);
+    ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(i32::from(STOPPED));
+        }
+    })?;
+    Ok(interrupted)
+}
+
+/// A run's results for programs.
+#[derive(Serialize)]
+struct Concluded<'a> {
+    /// Folder of the results.
+    results: &'a Path,
+    /// The page with pictures.
+    report: &'a Path,
+    digest: String,
+    #[serde(flatten)]
+    summary: &'a Summary,
+}
+
+/// Writes the page and the JUnit file and prints what was found.
+pub(super) fn conclude(
+    repository: &Repository,
+    folder: &Path,
+    page: &Path,
+    ending: &Ending,
+) -> Result<ExitCode, Failure> {
+    report::write_page(repository, page)?;
+    if let Some(junit) = &ending.junit {
+        report::write_junit(repository, junit)?;
+    }
+    let summary = report::summary(repository)?;
+    let digest = repository.digest()?;
+    match ending.format {
+        Format::Text => {
+            print(&report::summary_text(&summary, text_options()))?;
+            print(&format!("\n    Report {}\n    Digest {digest}\n", shown(page)))?;
+        }
+        Format::Json => {
+            print_json(&Concluded { results: folder, report: page, digest, summary: &summary })?;
+        }
+    }
+    let code = if as_required(&summary, repository.plan(), ending.fail_on_violation) { 0 } else { NOT_AS_REQUIRED };
+    Ok(ExitCode::from(code))
+}
+
+/// Whether what was found is what was asked for.
+///
+/// Whoever asks for no violation wants requirements and expectations kept. Whoever runs known tests asks that each
+/// comes to its end as expected; what nobody can tell is not as expected.
+fn as_required(summary: &Summary, plan: &CampaignPlan, fail_on_violation: bool) -> bool {
+    let known = matches!(plan.campaign.search, Search::Known { .. });
+    let broken = summary.requirements.iter().any(|requirement| requirement.violated > 0)
+        || summary.expectations.iter().any(|expectation| expectation.verdict == Verdict::Violated);
+    let expected = summary.failures.is_empty()
+        && summary.expectations.iter().all(|expectation| expectation.verdict == Verdict::Kept);
+    !(fail_on_violation && broken) && (!known || expected)
+}
+
+/// A path as the user would type it: relative to where they are, if it is below.
+pub(super) fn shown(path: &Path) -> String {
+    let here = std::env::current_dir().ok();
+    let relative = here.as_deref().and_then(|here| path.strip_prefix(here).ok());
+    relative.unwrap_or(path).display().to_string()
+}

@@ -1,0 +1,218 @@
+//! What a campaign found, as JUnit XML: for build servers, which show what is broken without knowing what a campaign is.
+
+use std::path::Path;
+
+use crate::record::{RecordError, Repository, Verdict};
+use crate::report::markup::Markup;
+use crate::report::number;
+use crate::report::page::write_aside;
+use crate::report::summary::{ExpectationSummary, Failure, RequirementSummary, Summary, summary};
+use crate::report::text::headline;
+
+/// Writes the JUnit file of a campaign's results.
+pub fn write_junit(repository: &Repository, path: &Path) -> Result<(), RecordError> {
+    write_aside(path, &junit(&summary(repository)?)).map_err(|e| RecordError::io("write the JUnit file", path, e))
+}
+
+/// A summary as a JUnit test suite.
+///
+/// Each requirement is a test case: it fails when a test violates it, and is skipped when no test says anything. Each
+/// expectation of a known test is one: it fails when it is violated, and is an error when nothing is known. Each crash
+/// and each timeout is an error.
+pub fn junit(summary: &Summary) -> String {
+    let class = format!("{}.{}", summary.space, summary.campaign);
+    let mut cases = Vec::new();
+    cases.extend(summary.requirements.iter().map(|requirement| requirement_case(&class, requirement)));
+    cases.extend(summary.expectations.iter().map(|expectation| expectation_case(&class, expectation)));
+    cases.extend(summary.failures.iter().map(|failure| failure_case(&class, failure)));
+    let count = |tag: &str| {
+        let of_this_kind = |case: &&Case| case.result.as_ref().is_some_and(|result| result.tag == tag);
+        cases.iter().filter(of_this_kind).count().to_string()
+    };
+    let (tests, failures, errors, skipped) =
+        (cases.len().to_string(), count("failure"), count("error"), count("skipped"));
+    let mut xml = Markup::default();
+    let totals = [("tests", tests.as_str()), ("failures", &failures), ("errors", &errors), ("skipped", &skipped)];
+    xml.open("testsuites", &totals);
+    xml.line();
+    let mut attributes = vec![("name", class.as_str())];
+    attributes.extend(totals);
+    xml.open("testsuite", &attributes);
+    xml.line();
+    xml.open("properties", &[]);
+    xml.leaf("property", &[("name", "seed"), ("value", &summary.seed.to_string())]);
+    xml.close();
+    xml.line();
+    for case in &cases {
+        xml.open("testcase", &[("classname", &case.class), ("name", &case.name)]);
+        if let Some(Outcome { tag, kind, message, text }) = &case.result {
+            let mut attributes = vec![("message", message.as_str())];
+            if let Some(kind) = kind {
+                attributes.push(("type", kind));
+            }
+            xml.element(tag, &attributes, text);
+        }
+        xml.close();
+        xml.line();
+    }
+    xml.element("system-out", &[], &headline(summary));
+    xml.line();
+    if !summary.warnings.is_empty() {
+        xml.element("system-err", &[], &summary.warnings.join("\n"));
+        xml.line();
+    }
+    xml.close();
+    xml.line();
+    xml.close();
+    format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{}\n", xml.finish())
+}
+
+struct Case {
+    class: String,
+    name: String,
+    /// `None` for one that passed.
+    result: Option<Outcome>,
+}
+
+/// What became of a case that did not pass.
+struct Outcome {
+    tag: &'static str,
+    kind: Option<&'static str>,
+    message: String,
+    text: String,
+}
+
+fn requirement_case(class: &str, requirement: &RequirementSummary) -> Case {
+    let RequirementSummary { requirement: name, text, metric, bound, kept, violated, unsaid, worst, .. } = requirement;
+    let counts = format!("{violated} violated, {kept} kept, {unsaid} unsaid");
+    let result = if *violated > 0 {
+        let tests = number::plural(*violated, "test", "tests");
+        let worst = worst.as_ref().map_or(String::new(), |worst| format!("; worst is {}: {}", worst.test, worst.text));
+        let message = format!("violated by {tests}{worst}, required is {metric} {bound}");
+        Some(Outcome { tag: "failure", kind: Some("requirement"), message, text: counts })
+    } else if *kept == 0 {
+        let message = "no test says anything about it".to_owned();
+        Some(Outcome { tag: "skipped", kind: None, message, text: counts })
+    } else {
+        None
+    };
+    Case { class: format!("{class}.requirements"), name: format!("{name}: {text}"), result }
+}
+
+fn expectation_case(class: &str, expectation: &ExpectationSummary) -> Case {
+    let ExpectationSummary { test, known_test, metric, bound, value, verdict } = expectation;
+    let value = value.map_or("no value".to_owned(), number::exact);
+    let message = format!("{metric} is {value}, expected is {bound}");
+    let text = format!("in {test}");
+    let result = match verdict {
+        Verdict::Kept => None,
+        Verdict::Violated => Some(Outcome { tag: "failure", kind: Some("expectation"), message, text }),
+        Verdict::Unsaid => {
+            let message = format!("{message}; the run does not tell");
+            Some(Outcome { tag: "error", kind: Some("unsaid"), message, text })
+        }
+    };
+    Case { class: format!("{class}.{known_test}"), name: format!("{metric} {bound}"), result }
+}
+
+fn failure_case(class: &str, failure: &Failure) -> Case {
+    let Failure { test, outcome, at, detail } = failure;
+    let kind = Some(if outcome == "timeout" { "timeout" } else { "crash" });
+    let message = format!("{outcome} at {} s", number::fixed(*at, 2));
+    Case {
+        class: format!("{class}.runs"),
+        name: format!("{test} runs to its end"),
+        result: Some(Outcome { tag: "error", kind, message, text: detail.clone() }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::sample;
+
+    fn sample_summary() -> Summary {
+        let folder = tempfile::tempdir().unwrap();
+        let mut plan = sample::plan();
+        let expect = |metric, bound| sesame_plan::Expectation { metric: sesame_plan::MetricId(metric), bound };
+        plan.tests[0].expectations = vec![
+            expect(0, sesame_plan::Bound::Within { low: 1.0, high: 40.0 }),
+            expect(3, sesame_plan::Bound::AtMost { value: 12.5 }),
+        ];
+        summary(&sample::campaign(folder.path(), &plan, 40)).unwrap()
+    }
+
+    fn parsed(xml: &str) -> roxmltree::Document<'_> {
+        roxmltree::Document::parse(xml).unwrap()
+    }
+
+    #[test]
+    fn a_build_server_sees_requirements_expectations_and_crashes() {
+        insta::assert_snapshot!(junit(&sample_summary()));
+    }
+
+    #[test]
+    fn the_counts_are_those_of_the_cases() {
+        let xml = junit(&sample_summary());
+        let document = parsed(&xml);
+        let count = |tag: &str| document.descendants().filter(|node| node.has_tag_name(tag)).count().to_string();
+        for suite in
+            document.descendants().filter(|node| node.has_tag_name("testsuite") || node.has_tag_name("testsuites"))
+        {
+            for (attribute, tag) in
+                [("tests", "testcase"), ("failures", "failure"), ("errors", "error"), ("skipped", "skipped")]
+            {
+                assert_eq!(suite.attribute(attribute), Some(count(tag).as_str()), "{attribute}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_says_nothing_is_no_pass() {
+        let mut summary = sample_summary();
+        summary.requirements.iter_mut().for_each(|requirement| {
+            (requirement.kept, requirement.violated, requirement.worst) = (0, 0, None);
+        });
+        summary.expectations.iter_mut().for_each(|expectation| expectation.verdict = Verdict::Unsaid);
+        summary.failures.clear();
+        let xml = junit(&summary);
+        let document = parsed(&xml);
+        let cases = document.descendants().filter(|node| node.has_tag_name("testcase"));
+        let results: Vec<&str> = cases.map(|case| case.first_element_child().unwrap().tag_name().name()).collect();
+        assert_eq!(results, ["skipped", "skipped", "skipped", "skipped", "error", "error"]);
+    }
+
+    #[test]
+    fn hostile_words_stay_words() {
+        let hostile = "<b a='\"'>]]>& \u{1b}\u{0}\u{FFFE}\r\n--><!--";
+        let mut summary = sample_summary();
+        for text in [&mut summary.space, &mut summary.campaign, &mut summary.failures[0].detail] {
+            *text = hostile.to_owned();
+        }
+        summary.requirements[0].text = hostile.to_owned();
+        summary.expectations[0].known_test = hostile.to_owned();
+        summary.warnings.push(hostile.to_owned());
+        let xml = junit(&summary);
+        let document = parsed(&xml);
+        let tame = "<b a='\"'>]]>& \u{FFFD}\u{FFFD}\u{FFFD}\u{FFFD}\n--><!--";
+        let error = document.descendants().find(|node| node.has_tag_name("error")).unwrap();
+        assert_eq!(error.text(), Some(tame));
+        let known = [
+            "testsuites",
+            "testsuite",
+            "properties",
+            "property",
+            "testcase",
+            "failure",
+            "error",
+            "system-out",
+            "system-err",
+        ];
+        assert!(
+            document
+                .descendants()
+                .filter(roxmltree::Node::is_element)
+                .all(|node| known.contains(&node.tag_name().name()))
+        );
+    }
+}
