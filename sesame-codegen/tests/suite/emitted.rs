@@ -1,5 +1,7 @@
 //! Generated crates really compile, and say it in our words when a hook is wrong.
 
+mod process;
+
 use std::fs;
 use std::path::Path;
 use std::process::Command;

@@ -98,6 +98,28 @@ fn a_run_goes_to_its_end_with_every_message_delivered_in_its_step() {
 }
 
 #[test]
+fn the_example_of_the_documentation_is_a_simulator() {
+    if !python() {
+        return;
+    }
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/transport/process");
+    let mut plan = plan_of("python3", &["minimal.py"]);
+    plan.topics.truncate(1);
+    plan.topics[0].paths = vec!["cart/target".to_owned()];
+    plan.topics.push(plan.topics[0].clone());
+    plan.topics[1].paths = vec!["cart/position".to_owned()];
+    plan.metrics[1].source = sesame_plan::MetricSource::Last {
+        input: sesame_plan::FieldRef { topic: sesame_plan::TopicId(1), path: vec![] },
+    };
+    let mut transport = Process::new(&plan, folder, false);
+    let first = run(&mut transport, 1);
+    assert_eq!(first.outcome, Outcome::Completed);
+    let position = (0..10).fold(0.0, |position: f64, _| position + (1.0 - position) * 0.1);
+    assert_eq!(first.metrics[1].value, Some(position));
+    assert_eq!(run(&mut transport, 1).metrics, first.metrics, "it begins anew");
+}
+
+#[test]
 fn a_simulator_that_resets_is_started_once_and_another_for_each_run() {
     let program = format!("open('starts', 'a').write('x')\n{FRAME}{STEP}");
     for (resets, starts) in [("True", 1), ("False", 3)] {
