@@ -77,6 +77,16 @@ enum Command {
     /// Serve a supervisor; started by `run`
     #[command(hide = true)]
     Worker { supervisor: SocketAddr },
+    /// Become the simulator of a worker; started by `worker`
+    #[cfg(all(feature = "process", target_os = "linux"))]
+    #[command(hide = true)]
+    Simulator {
+        /// Process id of the worker
+        worker: u32,
+        /// The simulator's program with its arguments
+        #[arg(required = true, last = true)]
+        program: Vec<std::ffi::OsString>,
+    },
 }
 
 /// Which run, and how it is shown.
@@ -153,6 +163,11 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
                 .map_err(|_| Failure("`worker` is started by `run`, not by hand".to_owned()))?;
             campaign::serve(runner, &plan, supervisor, token)?;
             Ok(ExitCode::SUCCESS)
+        }
+        #[cfg(all(feature = "process", target_os = "linux"))]
+        Some(Command::Simulator { worker, program }) => {
+            let (program, arguments) = program.split_first().expect("the program is required");
+            Ok(crate::transport::become_simulator(worker, program, arguments))
         }
     }
 }

@@ -32,11 +32,13 @@ impl Mismatch {
         Mismatch { path: Vec::new(), expected, found: value.kind() }
     }
 
-    fn missing(name: &str) -> Self {
+    /// A declared field that is not there.
+    pub(crate) fn missing(name: &str) -> Self {
         Mismatch { path: vec![name.to_owned()], expected: "a value", found: "nothing" }
     }
 
-    fn inside(mut self, name: &str) -> Self {
+    /// The same, seen from the message or list around it.
+    pub(crate) fn inside(mut self, name: &str) -> Self {
         self.path.insert(0, name.to_owned());
         self
     }

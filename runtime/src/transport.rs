@@ -5,6 +5,10 @@
 
 #[cfg(feature = "in-process")]
 mod in_process;
+#[cfg(feature = "process")]
+mod process;
+
+use std::path::PathBuf;
 
 use sesame_plan::CampaignPlan;
 
@@ -14,6 +18,10 @@ use crate::time::SimTime;
 
 #[cfg(feature = "in-process")]
 pub use in_process::in_process;
+#[cfg(all(feature = "process", feature = "campaign", target_os = "linux"))]
+pub(crate) use process::become_simulator;
+#[cfg(feature = "process")]
+pub use process::process;
 
 /// A connection to a simulator.
 pub trait Transport {
@@ -68,6 +76,42 @@ pub enum TransportError {
         /// What does not fit.
         reason: String,
     },
+    /// The simulator's program cannot be started.
+    #[error("cannot start the simulator `{command}` in {}: {reason}", folder.display())]
+    NotStarted {
+        /// The program with its arguments.
+        command: String,
+        /// The folder it was to run in.
+        folder: PathBuf,
+        /// Why not.
+        reason: String,
+    },
+    /// The simulator's program went away in the middle of a run.
+    #[error("the simulator `{command}` {how} while {awaited} was awaited{}", quoted(last_words))]
+    Gone {
+        /// The program with its arguments.
+        command: String,
+        /// How it ended, as a phrase.
+        how: String,
+        /// What it was to say next, as a phrase.
+        awaited: String,
+        /// The last lines of its standard error.
+        last_words: String,
+    },
+    /// The simulator's program said something that cannot be understood.
+    #[error("line {line} since the simulator's reset {problem}; {remedy}")]
+    Protocol {
+        /// Which line of its standard output, from 1: the answer to the last reset.
+        line: u64,
+        /// What is wrong with it, as a phrase.
+        problem: String,
+        /// What to do about it.
+        remedy: String,
+    },
+}
+
+fn quoted(last_words: &str) -> String {
+    if last_words.is_empty() { String::new() } else { format!("; its last words:\n{last_words}") }
 }
 
 fn hint(near: Option<&str>, known: &[String]) -> String {
@@ -77,14 +121,39 @@ fn hint(near: Option<&str>, known: &[String]) -> String {
     }
 }
 
+/// That the simulator lacks a topic of the space, with the most similar one of those it has.
+#[cfg(any(feature = "in-process", feature = "process"))]
+fn unknown_topic<'a>(path: &str, known: impl Iterator<Item = &'a String> + Clone) -> TransportError {
+    let near = known
+        .clone()
+        .map(|known| (strsim::normalized_levenshtein(path, known), known))
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .filter(|(similarity, _)| *similarity > 0.7)
+        .map(|(_, known)| known.clone());
+    TransportError::UnknownTopic { path: path.to_owned(), near, known: known.cloned().collect() }
+}
+
 /// Makes a connection to the simulator; generated code names the one its space declares.
 #[derive(Clone, Copy)]
-pub struct Connect(fn(&CampaignPlan) -> Box<dyn Transport>);
+pub struct Connect {
+    make: fn(&CampaignPlan, Place) -> Box<dyn Transport>,
+    place: Place,
+}
+
+/// Where a simulator lies, for transports that start one.
+#[derive(Clone, Copy)]
+#[cfg_attr(not(feature = "process"), expect(dead_code, reason = "only a simulator that is a program lies somewhere"))]
+struct Place {
+    /// Folder of the runner's crate.
+    runner: &'static str,
+    /// Folder of the `.sesame` file, as seen from there.
+    space: &'static str,
+}
 
 impl Connect {
     /// A transport as the plan describes it.
     pub fn transport(self, plan: &CampaignPlan) -> Box<dyn Transport> {
-        (self.0)(plan)
+        (self.make)(plan, self.place)
     }
 }
 

@@ -137,6 +137,9 @@ pub enum Value {
     List(Vec<Value>),
     /// Named values.
     Record(Record),
+    /// A part of a message that the space does not declare, in the words of the wire (JSON, for simulators that are
+    /// programs). Nothing reads or changes it; it is passed on as it came.
+    Undeclared(Text),
 }
 
 impl Value {
@@ -177,6 +180,7 @@ impl Value {
             Value::Point(_) => "point",
             Value::List(_) => "list",
             Value::Record(_) => "message",
+            Value::Undeclared(_) => "something undeclared",
         }
     }
 }

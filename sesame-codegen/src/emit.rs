@@ -36,6 +36,8 @@ pub struct Environment {
     pub lock: Option<String>,
     /// Options of the command line that had a say, by name.
     pub options: BTreeMap<String, String>,
+    /// The folder of the `.sesame` file, as seen from a runner's folder.
+    pub space_folder: String,
 }
 
 /// Why no crate can be generated from a plan. The language refuses all of this with a place in the `.sesame` file; it
@@ -74,6 +76,9 @@ pub enum Problem {
         /// The path.
         path: String,
     },
+    /// The simulator's program, or one of its arguments, is not one.
+    #[error("the simulator's program and arguments must be texts without NUL, the program not empty")]
+    SimulatorProgram,
 }
 
 /// The files of a space and of its campaigns: first what all runners share, then one tree for each plan.
@@ -89,10 +94,12 @@ pub fn emit(plans: &[RunnerPlan], environment: &Environment) -> Result<Vec<Tree>
     Ok(trees)
 }
 
-/// The simulator's type, part by part.
-pub fn simulator_path(transport: &Transport) -> Vec<&str> {
-    let Transport::InProcess { path, .. } = transport;
-    path.split("::").collect()
+/// The simulator's type, part by part; `None` for a simulator that is none of Rust's.
+pub fn simulator_path(transport: &Transport) -> Option<Vec<&str>> {
+    match transport {
+        Transport::InProcess { path, .. } => Some(path.split("::").collect()),
+        Transport::Process { .. } => None,
+    }
 }
 
 fn problems(plans: &[RunnerPlan], environment: &Environment) -> Vec<Problem> {
@@ -122,15 +129,19 @@ fn problems(plans: &[RunnerPlan], environment: &Environment) -> Vec<Problem> {
         }
     }
     for RunnerPlan { plan, .. } in plans {
-        let Transport::InProcess { path, .. } = &plan.simulator.transport;
-        let parts = simulator_path(&plan.simulator.transport);
-        let here = ["self", "Self", "super", "crate"];
-        if parts.len() < 2 || !parts.iter().all(|part| names::check(part) && !here.contains(part)) {
-            let problem = Problem::SimulatorPath { path: path.clone() };
-            if !problems.contains(&problem) {
-                problems.push(problem);
+        let problem = match &plan.simulator.transport {
+            Transport::InProcess { path, .. } => {
+                let here = ["self", "Self", "super", "crate"];
+                let parts: Vec<&str> = path.split("::").collect();
+                let good = parts.len() >= 2 && parts.iter().all(|part| names::check(part) && !here.contains(part));
+                (!good).then(|| Problem::SimulatorPath { path: path.clone() })
             }
-        }
+            Transport::Process { program, arguments, .. } => {
+                let nul = std::iter::once(program).chain(arguments).any(|text| text.contains('\0'));
+                (program.is_empty() || nul).then_some(Problem::SimulatorProgram)
+            }
+        };
+        problems.extend(problem.filter(|problem| !problems.contains(problem)));
     }
     for name in environment.dependencies.keys().filter(|name| !package::is_dependency(name)) {
         problems.push(Problem::Dependency { name: name.clone() });
@@ -324,7 +335,7 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Tree {
         },
     );
     tree.add("src/generated/mod.rs", Owner::Machine, modules);
-    tree.add("src/generated/campaign.rs", Owner::Machine, campaign(runner, &header));
+    tree.add("src/generated/campaign.rs", Owner::Machine, campaign(runner, environment, &header));
     let types = Messages::new(plan);
     tree.add("src/generated/messages.rs", Owner::Machine, types.file(&header));
     tree.add("src/generated/metrics.rs", Owner::Machine, metrics::traits(runner, &types, &header));
@@ -336,24 +347,46 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Tree {
 
 /// The features of the runtime that a campaign uses, so that its runner compiles nothing else.
 fn features(runner: &RunnerPlan) -> Vec<&'static str> {
-    let Transport::InProcess { .. } = runner.plan.simulator.transport;
-    vec!["campaign", "in-process"]
+    let transport = match runner.plan.simulator.transport {
+        Transport::InProcess { .. } => "in-process",
+        Transport::Process { .. } => "process",
+    };
+    vec!["campaign", transport]
 }
 
 /// `campaign.rs`: the campaign as the runtime takes it.
-fn campaign(runner: &RunnerPlan, header: &str) -> String {
+fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> String {
     let plan = &runner.plan;
-    let path: Vec<_> = simulator_path(&plan.simulator.transport).into_iter().map(names::ident).collect();
     let docs = rust::module_docs([format!("Campaign `{}`, for the runtime.", plan.campaign.name)]);
     let abi = proc_macro2::Literal::u32_unsuffixed(ABI);
+    let (simulator, connect) = match simulator_path(&plan.simulator.transport) {
+        Some(path) => {
+            let path = path.into_iter().map(names::ident);
+            let simulator = quote! {
+                /// The simulator under test.
+                type Simulator = #(::#path)*;
+            };
+            (simulator, quote! { ::sesame_runtime::transport::in_process::<Simulator>() })
+        }
+        None => {
+            let folder = &environment.space_folder;
+            let simulator = quote! {
+                /// The folder that the simulator runs in, as seen from this crate's.
+                const SPACE: &str = #folder;
+            };
+            let connect = quote! {
+                ::sesame_runtime::transport::process(::core::env!("CARGO_MANIFEST_DIR"), SPACE)
+            };
+            (simulator, connect)
+        }
+    };
     let source = rust::file(
         header,
         quote! {
             #docs
             ::sesame_runtime::assert_generator_abi!(#abi);
 
-            /// The simulator under test.
-            type Simulator = #(::#path)*;
+            #simulator
 
             /// Everything the runtime is told.
             pub fn runner() -> ::sesame_runtime::Runner {
@@ -361,7 +394,7 @@ fn campaign(runner: &RunnerPlan, header: &str) -> String {
                     plan: ::core::include_str!("../../campaign.plan.json"),
                     directory: ::core::env!("CARGO_MANIFEST_DIR"),
                     hooks: super::registry::HOOKS,
-                    connect: ::sesame_runtime::transport::in_process::<Simulator>(),
+                    connect: #connect,
                 }
             }
         },

@@ -10,6 +10,7 @@ use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
+use sesame_plan::Transport;
 use toml::{Table, Value};
 
 use crate::emit::{Environment, simulator_path};
@@ -67,6 +68,16 @@ pub enum Error {
     NoRuntime {
         /// Where.
         folder: PathBuf,
+    },
+    /// The program that the `.sesame` file gives by its path is not there.
+    #[error("{source_file} says the simulator's program is `{program}`, but there is no {}", file.display())]
+    NoProgram {
+        /// File name of the `.sesame` file.
+        source_file: String,
+        /// The program as it stands there.
+        program: String,
+        /// The file that is missing.
+        file: PathBuf,
     },
     /// A path that TOML cannot hold.
     #[error("the path {} is not UTF-8, and so cannot stand in a Cargo.toml", path.display())]
@@ -181,7 +192,8 @@ pub fn environment(
         };
         options.insert("runtime".to_owned(), text);
     }
-    Ok(Environment { dependencies, lock, options })
+    let space_folder = relative(&runner_folder, home).map_err(|error| vec![error])?;
+    Ok(Environment { dependencies, lock, options, space_folder })
 }
 
 /// The runtime as a dependency of a crate in `folder`, which need not exist yet.
@@ -227,14 +239,24 @@ fn runtime_dependency(
     Ok((Value::Table(table), Some(folder)))
 }
 
-/// The simulator's crate as a dependency; `None` when `sesame.toml` lists it.
+/// The simulator's crate as a dependency; `None` when `sesame.toml` lists it, or when it is a program.
 fn simulator_dependency(
     runner: &Path,
     home: &Path,
     plan: &RunnerPlan,
     dependencies: &BTreeMap<String, Value>,
 ) -> Result<Option<(String, Value)>, Error> {
-    let path = simulator_path(&plan.plan.simulator.transport);
+    let path = match &plan.plan.simulator.transport {
+        Transport::InProcess { .. } => simulator_path(&plan.plan.simulator.transport).unwrap_or_default(),
+        Transport::Process { program, .. } => {
+            let file = home.join(program);
+            if program.contains('/') && !file.is_file() {
+                let (source_file, program) = (plan.plan.source.clone(), program.clone());
+                return Err(Error::NoProgram { source_file, program, file });
+            }
+            return Ok(None);
+        }
+    };
     let name = path.first().copied().unwrap_or_default().to_owned();
     let listed = dependencies.keys().any(|key| key.replace('-', "_") == name);
     let Some(folder) = &plan.simulator_crate else {

@@ -22,6 +22,10 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
         model::Transport::InProcess { path, crate_folder, step_ns } => {
             (plan::Transport::InProcess { path: path.clone(), step_ns: *step_ns }, crate_folder.clone())
         }
+        model::Transport::Process { program, arguments, step_ns } => {
+            let (program, arguments) = (program.clone(), arguments.clone());
+            (plan::Transport::Process { program, arguments, step_ns: *step_ns }, None)
+        }
     };
     let plan = plan::CampaignPlan {
         schema: plan::SCHEMA,

@@ -14,7 +14,8 @@ pub struct RunnerPlan {
     /// generated, so that a hook file shared by several campaigns compiles in each of them.
     pub hooks: Vec<HookPlan>,
     /// Folder of the simulator's crate as the `.sesame` file has it (`crate "simulator"`), relative to that file.
-    /// `None` when the file names none: the crate then comes from `[dependencies]` in `sesame.toml`.
+    /// `None` when the file names none: the crate of an in-process simulator then comes from `[dependencies]` in
+    /// `sesame.toml`.
     pub simulator_crate: Option<String>,
 }
 

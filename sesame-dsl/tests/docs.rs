@@ -41,7 +41,8 @@ fn pages() -> Vec<(String, String)> {
         .map(|file| format!("docs/{}", file.file_name().and_then(|name| name.to_str()).expect("names are plain")))
         .collect();
     assert!(paths.len() >= 2, "guide and reference are there");
-    paths.extend(["README.md".to_owned(), "examples/kuka_cell/README.md".to_owned()]);
+    let others = ["README.md", "examples/kuka_cell/README.md", "examples/two_robots/README.md"];
+    paths.extend(others.map(str::to_owned));
     paths.sort();
     paths.into_iter().map(|path| (path.clone(), read(&path))).collect()
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use sesame_plan::CampaignPlan;
 
-use super::{Capabilities, Connect, Transport, TransportError};
+use super::{Capabilities, Connect, Place, Transport, TransportError, unknown_topic};
 use crate::message;
 use crate::relay::{Delivery, Exchange};
 use crate::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError, Wires};
@@ -14,15 +14,19 @@ use crate::wire::Wire;
 
 /// Reaches a simulator that is a Rust type inside the runner.
 pub const fn in_process<S: Simulator + 'static>() -> Connect {
-    Connect(|plan| {
-        let sesame_plan::Transport::InProcess { step_ns, .. } = plan.simulator.transport;
-        Box::new(InProcess::<S> {
-            simulator: None,
-            bus: Switchboard::default(),
-            plan: plan.clone(),
-            now: SimTime::ZERO,
-            step: SimTime::from_nanos(i64::try_from(step_ns).unwrap_or(i64::MAX)),
-        })
+    Connect { make: connect::<S>, place: Place { runner: "", space: "" } }
+}
+
+fn connect<S: Simulator + 'static>(plan: &CampaignPlan, _: Place) -> Box<dyn Transport> {
+    let sesame_plan::Transport::InProcess { step_ns, .. } = plan.simulator.transport else {
+        unreachable!("the generator connects each kind of simulator by its own transport")
+    };
+    Box::new(InProcess::<S> {
+        simulator: None,
+        bus: Switchboard::default(),
+        plan: plan.clone(),
+        now: SimTime::ZERO,
+        step: SimTime::from_nanos(i64::try_from(step_ns).unwrap_or(i64::MAX)),
     })
 }
 
@@ -119,15 +123,7 @@ impl Switchboard {
     fn every_wire_is_open(&self, relay: &dyn Exchange) -> Result<(), TransportError> {
         let wires = relay.wires();
         let Some(missing) = wires.iter().find(|wire| self.by_wire[wire.index()].is_none()) else { return Ok(()) };
-        let path = wires.path(missing);
-        let near = self
-            .by_path
-            .keys()
-            .map(|known| (strsim::normalized_levenshtein(path, known), known))
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .filter(|(similarity, _)| *similarity > 0.7)
-            .map(|(_, known)| known.clone());
-        Err(TransportError::UnknownTopic { path: path.to_owned(), near, known: self.by_path.keys().cloned().collect() })
+        Err(unknown_topic(wires.path(missing), self.by_path.keys()))
     }
 
     fn every_message_fits(&mut self) -> Result<(), TransportError> {

@@ -5,7 +5,7 @@ use sesame_codegen::emit::{Problem, emit};
 use sesame_codegen::files::Tree;
 use sesame_codegen::plan::RunnerPlan;
 
-use crate::plans::{awkward, environment, small};
+use crate::plans::{awkward, environment, small, with_program};
 
 /// All files of trees in one text, those that only copy data left out.
 fn shown(trees: &[Tree]) -> String {
@@ -37,6 +37,32 @@ fn a_small_space() {
 fn every_type_and_awkward_names() {
     let trees = emit(&[awkward()], &environment()).unwrap();
     insta::assert_snapshot!(shown(&trees));
+}
+
+#[test]
+fn a_simulator_that_is_a_program_needs_its_transport_and_no_crate() {
+    let mut environment = environment();
+    environment.dependencies.remove("kuka_cell_sim");
+    let trees = emit(&[with_program("c")], &environment).unwrap();
+    let file = |path: &str| trees[1].files[path].contents.as_str();
+    insta::assert_snapshot!(file("src/generated/campaign.rs"));
+    assert!(file("Cargo.toml").contains(r#"features = ["campaign", "process"]"#), "{}", file("Cargo.toml"));
+    let plan: sesame_plan::CampaignPlan = serde_json::from_str(file("campaign.plan.json")).unwrap();
+    assert_eq!(plan, with_program("c").plan);
+}
+
+#[test]
+fn a_program_that_no_system_could_start_is_refused() {
+    let mut runner = with_program("c");
+    let transport = |program: &str, argument: &str| sesame_plan::Transport::Process {
+        program: program.into(),
+        arguments: vec![argument.into()],
+        step_ns: 1,
+    };
+    for (program, argument) in [("", "a"), ("a\0", "a"), ("a", "\0")] {
+        runner.plan.simulator.transport = transport(program, argument);
+        assert_eq!(problems(runner.clone()).len(), 1, "{program:?} {argument:?}");
+    }
 }
 
 #[test]

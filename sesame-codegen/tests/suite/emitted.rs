@@ -1,5 +1,7 @@
 //! Generated crates really compile, and say it in our words when a hook is wrong.
 
+mod process;
+
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -9,7 +11,7 @@ use sesame_codegen::environment::environment;
 use sesame_codegen::output::{Mode, apply};
 use sesame_codegen::plan::RunnerPlan;
 
-use crate::plans::{awkward, small};
+use crate::plans::{awkward, small, with_program};
 
 /// A project with a simulator that does nothing, and its runners.
 fn generated(folder: &Path, plans: &[RunnerPlan]) {
@@ -59,6 +61,15 @@ fn fresh_stubs_of_every_type_and_name_compile_without_a_warning() {
         assert!(compiles, "{said}");
         assert!(!said.contains("src/generated") && !said.contains("hooks/"), "{said}");
     }
+}
+
+#[test]
+fn a_runner_for_a_program_compiles_without_a_simulator_crate() {
+    let folder = tempfile::tempdir().unwrap();
+    generated(folder.path(), &[with_program("coverage")]);
+    fs::remove_dir_all(folder.path().join("simulator")).unwrap();
+    let (compiles, said) = check(folder.path(), "coverage");
+    assert!(compiles && !said.contains("src/generated"), "{said}");
 }
 
 #[test]

@@ -114,6 +114,18 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
     runner
 }
 
+/// The same space with a simulator that is a program.
+pub(crate) fn with_program(campaign: &str) -> RunnerPlan {
+    let mut runner = small(campaign);
+    runner.simulator_crate = None;
+    runner.plan.simulator.transport = Transport::Process {
+        program: "python3".into(),
+        arguments: vec!["sim.py".into(), "a \"quoted\" {{ one }}".into()],
+        step_ns: 20_000_000,
+    };
+    runner
+}
+
 /// A plan with every type and every awkward name there is.
 pub(crate) fn awkward() -> RunnerPlan {
     let mut runner = small("type");
@@ -193,5 +205,6 @@ pub(crate) fn environment() -> Environment {
         .into(),
         lock: None,
         options: [].into(),
+        space_folder: "../..".to_owned(),
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use sesame_codegen::environment::{Error, RuntimeChoice, checkout_runtime, environment};
 use sesame_codegen::plan::RunnerPlan;
 
-use crate::plans::small;
+use crate::plans::{small, with_program};
 
 /// A project in a folder: a simulator crate, and a `sesame.toml` if it is not empty.
 fn project(folder: &Path, settings: &str) {
@@ -100,6 +100,34 @@ fn a_missing_simulator_says_where_it_was_looked_for_and_how_to_name_it() {
     let unnamed = RunnerPlan { simulator_crate: None, ..small("c") };
     let unnamed = dependencies(folder.path(), unnamed, Some("1.0.0")).unwrap_err();
     insta::assert_snapshot!(format!("{missing}\n{unnamed}"));
+}
+
+#[test]
+fn a_program_needs_no_crate_and_its_folder_is_known_as_seen_from_the_runner() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(dependencies(folder.path(), with_program("c"), Some("1.0.0")).unwrap(), "sesame-runtime = \"1.0.0\"");
+    let found = |out: &str| {
+        let space = folder.path().join("kuka_cell.sesame");
+        environment(&space, &folder.path().join(out), &[with_program("c")], None).unwrap().space_folder
+    };
+    assert_eq!(found("runners"), "../..");
+    assert_eq!(found("else/where"), "../../..");
+}
+
+#[test]
+fn a_program_that_is_given_by_its_path_must_be_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut plan = with_program("c");
+    let sesame_plan::Transport::Process { program, .. } = &mut plan.plan.simulator.transport else { unreachable!() };
+    "bin/robots".clone_into(program);
+    let missing = dependencies(folder.path(), plan.clone(), Some("1.0.0")).unwrap_err();
+    assert_eq!(
+        missing,
+        "kuka_cell.sesame says the simulator's program is `bin/robots`, but there is no PROJECT/bin/robots"
+    );
+    fs::create_dir(folder.path().join("bin")).unwrap();
+    fs::write(folder.path().join("bin/robots"), "").unwrap();
+    assert!(dependencies(folder.path(), plan, Some("1.0.0")).is_ok());
 }
 
 #[test]

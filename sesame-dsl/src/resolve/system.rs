@@ -34,20 +34,51 @@ impl<'a> Resolver<'a> {
     // ----- the simulator
 
     fn simulator(&mut self, simulator: &'a ast::Simulator) -> Option<Simulator> {
-        let in_process = simulator.transport.as_ref()?;
-        let path = self.rust_path(&in_process.path);
-        let folder = self.single(&in_process.crates, "crate");
-        let step = self.single(&in_process.steps, "step");
-        if step.is_none() && !in_process.damaged {
-            self.missing(&simulator.head.name, "the time of one step", "step 20ms");
-        }
-        let step = step.and_then(|step| self.step(step));
-        let transport = Transport::InProcess {
-            path: path?,
-            crate_folder: folder.map(|folder| folder.text.clone()),
-            step_ns: step?,
+        let name = &simulator.head.name;
+        let transport = match simulator.transport.as_ref()? {
+            ast::Transport::InProcess(in_process) => {
+                let path = self.rust_path(&in_process.path);
+                let folder = self.single(&in_process.crates, "crate");
+                let step_ns = self.step_of(name, &in_process.steps, in_process.damaged);
+                let crate_folder = folder.map(|folder| folder.text.clone());
+                Transport::InProcess { path: path?, crate_folder, step_ns: step_ns? }
+            }
+            ast::Transport::Process(process) => {
+                let program = self.program(&process.program);
+                let step_ns = self.step_of(name, &process.steps, process.damaged);
+                // Empty texts were reported where they were read.
+                let arguments = process.arguments.iter().map(|argument| argument.text.clone()).collect();
+                Transport::Process { program: program?, arguments, step_ns: step_ns? }
+            }
         };
         Some(Simulator { declaration: self.declaration(&simulator.head), transport })
+    }
+
+    fn step_of(&mut self, name: &Name, steps: &'a [(Span, ast::Quantity)], damaged: bool) -> Option<u64> {
+        let step = self.single(steps, "step");
+        if step.is_none() && !damaged {
+            self.missing(name, "the time of one step", "step 20ms");
+        }
+        self.step(step?)
+    }
+
+    /// A program is one text and each argument another. A path may hold spaces; with them it begins like `./my robots/`,
+    /// so that a whole command line in one text is found out.
+    fn program(&mut self, program: &ast::Text) -> Option<String> {
+        if program.text.trim().is_empty() {
+            return None;
+        }
+        let first = program.text.split_whitespace().next().unwrap_or_default();
+        if !program.text.contains(char::is_whitespace) || first.contains('/') {
+            return Some(program.text.clone());
+        }
+        let parts: Vec<String> = program.text.split_whitespace().map(|part| format!("\"{part}\"")).collect();
+        let title = format!("`{}` is not the name of a program", program.text);
+        let diagnostic = Diagnostic::new(Code::BAD_PATH, program.span, title)
+            .label("the program is one text, each argument another; no shell reads them")
+            .suggest("write them one by one", program.span, parts.join(" "));
+        self.report(diagnostic);
+        None
     }
 
     fn rust_path(&mut self, path: &ast::Text) -> Option<String> {

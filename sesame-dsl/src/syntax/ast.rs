@@ -50,13 +50,27 @@ pub(crate) struct System {
 pub(crate) struct Simulator {
     pub(crate) head: Head,
     /// `None` for a transport that is not supported yet.
-    pub(crate) transport: Option<InProcess>,
+    pub(crate) transport: Option<Transport>,
+}
+
+#[derive(Debug)]
+pub(crate) enum Transport {
+    InProcess(InProcess),
+    Process(Process),
 }
 
 #[derive(Debug)]
 pub(crate) struct InProcess {
     pub(crate) path: Text,
     pub(crate) crates: Vec<(Span, Text)>,
+    pub(crate) steps: Vec<(Span, Quantity)>,
+    pub(crate) damaged: bool,
+}
+
+#[derive(Debug)]
+pub(crate) struct Process {
+    pub(crate) program: Text,
+    pub(crate) arguments: Vec<Text>,
     pub(crate) steps: Vec<(Span, Quantity)>,
     pub(crate) damaged: bool,
 }

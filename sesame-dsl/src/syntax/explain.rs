@@ -21,6 +21,7 @@ pub(super) enum Place {
     File,
     System,
     Simulator,
+    Process,
     Message,
     Node,
     Hook,
@@ -36,6 +37,7 @@ impl Place {
             Place::File => Rule::error_item,
             Place::System => Rule::error_system_member,
             Place::Simulator => Rule::error_simulator_setting,
+            Place::Process => Rule::error_process_setting,
             Place::Message => Rule::error_field,
             Place::Node => Rule::error_node_member,
             Place::Hook => Rule::error_hook_member,
@@ -62,6 +64,7 @@ impl Place {
                 &[Rule::simulator, Rule::message, Rule::topic, Rule::node, Rule::unsupported_system_member]
             }
             Place::Simulator => &[Rule::setting_crate, Rule::setting_step],
+            Place::Process => &[Rule::setting_step],
             Place::Message => &[Rule::field],
             Place::Node => &[Rule::publishes, Rule::subscribes],
             Place::Hook => &[Rule::hook_on],
@@ -86,6 +89,7 @@ impl Place {
             Place::File => Rule::one_item,
             Place::System => Rule::one_system_member,
             Place::Simulator => Rule::one_simulator_setting,
+            Place::Process => Rule::one_process_setting,
             Place::Message => Rule::one_field,
             Place::Node => Rule::one_node_member,
             Place::Hook => Rule::one_hook_member,
@@ -104,6 +108,7 @@ impl Place {
             }
             Place::System => "`simulator`, `message`, `topic` or `node`",
             Place::Simulator => "`crate` or `step`",
+            Place::Process => "`step`",
             Place::Message => "a field such as `level: real[mm]`",
             Place::Node => "`publishes` or `subscribes`",
             Place::Hook => "`hook on` and topics",
@@ -120,6 +125,7 @@ impl Place {
             Place::File => &["space", "system", "metric", "requirement", "operation", "test", "campaign"],
             Place::System => &["simulator", "message", "topic", "node"],
             Place::Simulator => &["crate", "step"],
+            Place::Process => &["step"],
             Place::Message => &[],
             Place::Node => &["publishes", "subscribes"],
             Place::Hook => &["hook"],
@@ -299,7 +305,9 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::paren_close => "`)`",
         Rule::bracket_open => "`[`",
         Rule::bracket_close => "`]`",
-        Rule::open | Rule::hook_block | Rule::simulator_settings | Rule::search_settings => "`{`",
+        Rule::open | Rule::hook_block | Rule::simulator_settings | Rule::process_settings | Rule::search_settings => {
+            "`{`"
+        }
         Rule::close => "`}`",
         Rule::name | Rule::names | Rule::path | Rule::identifier => "a name",
         Rule::field_name | Rule::field => "a field such as `level: real[mm]`",
@@ -328,6 +336,7 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::default_value => "`default`",
         Rule::value_mode => "`offset` or `absolute`",
         Rule::in_process => "`in_process`",
+        Rule::process => "`process`",
         Rule::random_value => "`random`",
         Rule::packet_loss | Rule::k_packet => "`packet loss`",
         Rule::latency => "`latency`",

@@ -6,8 +6,8 @@ use sesame_grammar::{Rule, SesameParser};
 
 use super::ast::{
     Bound, Campaign, Choice, Comparison, Count, Direction, Drain, Expectation, Field, File, Head, InProcess, Message,
-    Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Range, Repeat, Requirement,
-    Search, Simulator, Strategy, System, Test, TestOperation, Topic, Type, TypeKind,
+    Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Process, Range, Repeat,
+    Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Topic, Transport, Type, TypeKind,
 };
 use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, MAX_CALLS, MAX_DEPTH, too_deep};
@@ -303,10 +303,17 @@ impl Reader<'_> {
             self.unsupported(&unsupported);
             return Simulator { head, transport: None };
         }
-        let in_process = expect_child(pair, Rule::in_process);
-        let path = self.text_of(&expect_child(&in_process, Rule::text));
+        let transport = match child(pair, Rule::process) {
+            Some(process) => Transport::Process(self.process(&process)),
+            None => Transport::InProcess(self.in_process(&expect_child(pair, Rule::in_process))),
+        };
+        Simulator { head, transport: Some(transport) }
+    }
+
+    fn in_process(&mut self, pair: &Pair<'_>) -> InProcess {
+        let path = self.text_of(&expect_child(pair, Rule::text));
         let mut transport = InProcess { path, crates: vec![], steps: vec![], damaged: false };
-        let settings = expect_child(&in_process, Rule::simulator_settings);
+        let settings = expect_child(pair, Rule::simulator_settings);
         transport.damaged = self.members(&settings, Place::Simulator, |reader, setting| {
             let span = reader.keyword_span(&setting);
             match setting.as_rule() {
@@ -316,7 +323,19 @@ impl Reader<'_> {
                 _ => transport.steps.push((span, reader.signed(&expect_child(&setting, Rule::signed)))),
             }
         });
-        Simulator { head, transport: Some(transport) }
+        transport
+    }
+
+    fn process(&mut self, pair: &Pair<'_>) -> Process {
+        let mut texts = children(pair, Rule::text).map(|text| self.text_of(&text)).collect::<Vec<_>>().into_iter();
+        let program = texts.next().expect("a process has a program");
+        let mut transport = Process { program, arguments: texts.collect(), steps: vec![], damaged: false };
+        let settings = expect_child(pair, Rule::process_settings);
+        transport.damaged = self.members(&settings, Place::Process, |reader, setting| {
+            let span = reader.keyword_span(&setting);
+            transport.steps.push((span, reader.signed(&expect_child(&setting, Rule::signed))));
+        });
+        transport
     }
 
     fn message(&mut self, pair: &Pair<'_>) -> Message {
