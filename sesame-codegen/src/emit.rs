@@ -359,26 +359,23 @@ fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> Str
     let plan = &runner.plan;
     let docs = rust::module_docs([format!("Campaign `{}`, for the runtime.", plan.campaign.name)]);
     let abi = proc_macro2::Literal::u32_unsuffixed(ABI);
-    let (simulator, connect) = match simulator_path(&plan.simulator.transport) {
-        Some(path) => {
-            let path = path.into_iter().map(names::ident);
-            let simulator = quote! {
-                /// The simulator under test.
-                type Simulator = #(::#path)*;
-            };
-            (simulator, quote! { ::sesame_runtime::transport::in_process::<Simulator>() })
-        }
-        None => {
-            let folder = &environment.space_folder;
-            let simulator = quote! {
-                /// The folder that the simulator runs in, as seen from this crate's.
-                const SPACE: &str = #folder;
-            };
-            let connect = quote! {
-                ::sesame_runtime::transport::process(::core::env!("CARGO_MANIFEST_DIR"), SPACE)
-            };
-            (simulator, connect)
-        }
+    let (simulator, connect) = if let Some(path) = simulator_path(&plan.simulator.transport) {
+        let path = path.into_iter().map(names::ident);
+        let simulator = quote! {
+            /// The simulator under test.
+            type Simulator = #(::#path)*;
+        };
+        (simulator, quote! { ::sesame_runtime::transport::in_process::<Simulator>() })
+    } else {
+        let folder = &environment.space_folder;
+        let simulator = quote! {
+            /// The folder that the simulator runs in, as seen from this crate's.
+            const SPACE: &str = #folder;
+        };
+        let connect = quote! {
+            ::sesame_runtime::transport::process(::core::env!("CARGO_MANIFEST_DIR"), SPACE)
+        };
+        (simulator, connect)
     };
     let source = rust::file(
         header,

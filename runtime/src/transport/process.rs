@@ -57,7 +57,7 @@ impl Process {
             unreachable!("the generator connects each kind of simulator by its own transport")
         };
         Process {
-            program: Program { program: program.clone(), arguments: arguments.clone(), folder, in_runner },
+            program: Program { name: program.clone(), arguments: arguments.clone(), folder, in_runner },
             connection: None,
             plan: plan.clone(),
             now: SimTime::ZERO,

@@ -23,19 +23,20 @@ const KEPT_LINES: usize = 3;
 #[derive(Debug, Clone)]
 pub(super) struct Program {
     /// A name on `PATH`, or a path relative to the folder.
-    pub(super) program: String,
+    pub(super) name: String,
     /// Its arguments.
     pub(super) arguments: Vec<String>,
     /// The folder it runs in.
     pub(super) folder: PathBuf,
     /// Whether the program of this process is a runner, which can keep watch over the simulator.
+    #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux ends a process with another"))]
     pub(super) in_runner: bool,
 }
 
 impl Program {
     /// The program with its arguments, for messages.
     pub(super) fn shown(&self) -> String {
-        self.arguments.iter().fold(self.program.clone(), |mut shown, argument| {
+        self.arguments.iter().fold(self.name.clone(), |mut shown, argument| {
             let plain = !argument.is_empty() && !argument.contains(|c: char| c.is_whitespace() || c.is_control());
             let written =
                 if plain { write!(shown, " {argument}") } else { write!(shown, " \"{}\"", argument.escape_debug()) };
@@ -79,10 +80,10 @@ impl Program {
 
     /// The program's path: what has a folder in it is relative to ours, everything else is looked up.
     fn path(&self) -> PathBuf {
-        if self.program.contains(std::path::is_separator) {
-            self.folder.join(&self.program)
+        if self.name.contains(std::path::is_separator) {
+            self.folder.join(&self.name)
         } else {
-            PathBuf::from(&self.program)
+            PathBuf::from(&self.name)
         }
     }
 

@@ -78,13 +78,12 @@ fn record(plan: &CampaignPlan, shapes: &mut Shapes, id: MessageId, text: &str) -
         fields.names().len() == entries.len()
             && fields.names().iter().zip(&entries).all(|(known, (name, _))| **known == **name)
     };
-    let fields = match shapes.0.get(&id).filter(|&fields| same(fields)) {
-        Some(fields) => Arc::clone(fields),
-        None => {
-            let fields = Fields::new(entries.iter().map(|(name, _)| name.as_ref()));
-            shapes.0.insert(id, Arc::clone(&fields));
-            fields
-        }
+    let fields = if let Some(fields) = shapes.0.get(&id).filter(|&fields| same(fields)) {
+        Arc::clone(fields)
+    } else {
+        let fields = Fields::new(entries.iter().map(|(name, _)| name.as_ref()));
+        shapes.0.insert(id, Arc::clone(&fields));
+        fields
     };
     Ok(Record::new(&fields, values))
 }

@@ -111,10 +111,8 @@ fn an_operation_stands_between_publisher_and_subscriber() {
         vec![operation(0, OperationKind::Blackhole), operation(0, latency(Distribution::Fixed, Drain::Finish))];
     let uses = vec![use_of(0, 0.1, 0.2, vec![], 1), use_of(1, 0.2, 0.3, vec![Choice::Value { value: 0.15 }], 2)];
     let publish = |x: u32| format!(r#"{{"publish":[{{"topic":"arm/command","value":{x}}}]}}"#);
-    let mut said = format!("{READY}\n");
-    for step in 1..=4 {
-        said += &format!("{}\n{{\"done\":{{}}}}\n", publish(step));
-    }
+    let steps: String = (1..=4).flat_map(|step| [publish(step), "\n{\"done\":{}}\n".to_owned()]).collect();
+    let said = format!("{READY}\n{steps}");
     let talk = talk_about(operations, &test_of(uses), 4, &said);
     let lines: Vec<&str> = talk.orders[1..].iter().map(String::as_str).collect();
     assert_eq!(
