@@ -190,6 +190,20 @@ impl Unit {
         &self.text
     }
 
+    /// Its symbols with their powers.
+    fn factors(&self) -> impl Iterator<Item = (&str, i8)> {
+        let mut rest = Some((self.text.as_str(), 1));
+        std::iter::from_fn(move || {
+            let (text, sign) = rest?;
+            let end = text.find(['*', '/']).unwrap_or(text.len());
+            rest = text.get(end + 1..).map(|after| (after, if text[end..].starts_with('/') { -1 } else { 1 }));
+            Some(match text[..end].split_once('^') {
+                Some((symbol, power)) => (symbol, power.parse::<i8>().map_or(sign, |power| power * sign)),
+                None => (&text[..end], sign),
+            })
+        })
+    }
+
     /// What it measures.
     pub fn dimension(&self) -> Dimension {
         self.dimension
@@ -210,6 +224,48 @@ pub fn convert(value: f64, from: Option<&Unit>, to: Option<&Unit>) -> f64 {
         // Beyond 38 digits the two halves are applied one after the other.
         None => to.inverse().apply(from.apply(value)),
     }
+}
+
+/// The unit of a product, or of a quotient; and how many of it the product of one of each is. Symbols that occur on both
+/// sides cancel; what is left without a dimension is a plain number. `None` when it cannot be represented.
+pub fn product(left: Option<&Unit>, right: Option<&Unit>, divide: bool) -> Option<(Option<Unit>, f64)> {
+    let mut scale = 1.0;
+    let mut powers: Vec<(&str, i8)> = Vec::new();
+    for (unit, sign) in [(left, 1), (right, if divide { -1 } else { 1 })] {
+        let Some(unit) = unit else { continue };
+        if unit.dimension == Dimension::NONE {
+            let plain = convert(1.0, Some(unit), None);
+            scale = if sign > 0 { scale * plain } else { scale / plain };
+            continue;
+        }
+        for (symbol, power) in unit.factors() {
+            let power = power.checked_mul(sign)?;
+            match powers.iter_mut().find(|(known, _)| *known == symbol) {
+                Some((_, known)) => *known = known.checked_add(power)?,
+                None => powers.push((symbol, power)),
+            }
+        }
+    }
+    powers.retain(|&(_, power)| power != 0);
+    // What is multiplied comes first: a unit does not begin with a stroke.
+    powers.sort_by_key(|&(_, power)| power < 0);
+    let mut text = String::new();
+    for (symbol, power) in powers {
+        let (sign, power) = match (text.is_empty(), power < 0) {
+            (true, _) => ("", power),
+            (false, false) => ("*", power),
+            (false, true) => ("/", power.checked_neg()?),
+        };
+        text += &if power == 1 { format!("{sign}{symbol}") } else { format!("{sign}{symbol}^{power}") };
+    }
+    if text.is_empty() {
+        return Some((None, scale));
+    }
+    let unit = Unit::parse(&text).ok()?;
+    if unit.dimension == Dimension::NONE {
+        return Some((None, scale * convert(1.0, Some(&unit), None)));
+    }
+    Some((Some(unit), scale))
 }
 
 /// What a unit measures; no unit is a plain number.
