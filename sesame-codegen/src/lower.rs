@@ -7,6 +7,8 @@
 //! - known tests: those whose operations are all in the plan and begin before the campaign's end;
 //! - metrics: its objectives, those it observes, and those of all requirements and of the expectations of these tests.
 
+mod formula;
+
 use sesame_dsl::model::{self, CampaignId, Id as _, Space};
 use sesame_dsl::units::Unit;
 use sesame_plan as plan;
@@ -170,7 +172,7 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
             line: metric.declaration.line,
             inputs: topics.iter().map(|&id| topic_id(id)).collect(),
         }),
-        model::MetricSource::FuzzingTime | model::MetricSource::Last(_) => None,
+        model::MetricSource::FuzzingTime | model::MetricSource::Last(_) | model::MetricSource::Formula(_) => None,
     });
     hooks.collect()
 }
@@ -230,9 +232,8 @@ fn metric(metric: &model::Metric) -> plan::Metric {
                 plan::MetricSource::Hook { topics: topics.iter().map(|&id| topic_id(id)).collect() }
             }
             model::MetricSource::FuzzingTime => plan::MetricSource::FuzzingTime,
-            model::MetricSource::Last(input) => plan::MetricSource::Last {
-                input: plan::FieldRef { topic: topic_id(input.topic), path: input.fields.clone() },
-            },
+            model::MetricSource::Last(input) => plan::MetricSource::Last { input: formula::field(input) },
+            model::MetricSource::Formula(of) => plan::MetricSource::Formula { formula: formula::formula(of) },
         },
         line: metric.declaration.line,
     }

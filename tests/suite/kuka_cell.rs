@@ -20,11 +20,7 @@ fn front(folder: &Path) -> Vec<(TestRow, f64)> {
     let members = repository.latest_result_set().unwrap().unwrap().members;
     let tests = repository.tests().unwrap();
     let row = |number: u32| tests.iter().find(|row| row.number == number).unwrap().clone();
-    members
-        .into_iter()
-        .map(row)
-        .map(|row| (row.clone(), row.values[collisions].value.unwrap()))
-        .collect()
+    members.into_iter().map(row).map(|row| (row.clone(), row.values[collisions].value.unwrap())).collect()
 }
 
 #[test]
