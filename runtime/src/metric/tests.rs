@@ -142,7 +142,9 @@ fn each_key_has_held_values_and_a_rate_limit_of_its_own() {
     assert_eq!(value(per(Aggregate::Count { of: close() }), &stream), Some(3.0));
     let mut greatest = per(Aggregate::Max { of: Expression::Input(0) });
     greatest.every = None;
-    assert_eq!(value(greatest, &stream), Some(4.0), "of the least levels of each key");
+    assert_eq!(value(greatest.clone(), &stream), Some(6.0), "of the least levels of each key");
+    greatest.per = None;
+    assert_eq!(value(greatest, &stream), Some(-3.0), "of the least levels of all");
     let mut last = per(Aggregate::Last { of: Expression::Input(0) });
     last.every = None;
     assert_eq!(value(last, &stream), Some(-5.0), "the least over keys");
@@ -197,7 +199,8 @@ proptest! {
         prop_assert_eq!(get(Aggregate::Min { of: difference() }), values().reduce(f64::min));
         prop_assert_eq!(get(Aggregate::Max { of: difference() }), values().reduce(f64::max));
         let mean = (!seen.is_empty()).then(|| values().sum::<f64>() / seen.len() as f64);
-        prop_assert!(close(get(Aggregate::Mean { of: difference() }), mean));
+        let found = get(Aggregate::Mean { of: difference() });
+        prop_assert!(close(found, mean), "{found:?} is not {mean:?}");
         let negative = || Condition::Compare {
             left: difference(),
             by: Comparison::Below,
@@ -207,7 +210,8 @@ proptest! {
         prop_assert_eq!(get(Aggregate::Count { of: negative() }), count);
         let held: i64 = seen.windows(2).filter(|pair| pair[0].1 < 0.0).map(|pair| pair[1].0 - pair[0].0).sum();
         let duration = (!seen.is_empty()).then(|| held as f64 / 1e3);
-        prop_assert!(close(get(Aggregate::Duration { of: negative() }), duration));
+        let found = get(Aggregate::Duration { of: negative() });
+        prop_assert!(close(found, duration), "{found:?} is not {duration:?}");
     }
 
     #[test]
