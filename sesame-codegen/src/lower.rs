@@ -410,6 +410,36 @@ mod tests {
     }
 
     #[test]
+    fn a_formula_arrives_with_its_constants_in_the_units_of_the_wire_and_needs_no_hook() {
+        let text = CELL.replace(
+            "metric seen",
+            "metric close = count(zones.level < 0.3m and link > 180deg) every 200ms per zones.name outbound metric seen",
+        );
+        let mut sources = SourceMap::new();
+        let file = sources.add("cell.sesame", text.replace("observes time", "observes time, close"));
+        let space = analyse(&sources, file).model.unwrap();
+        let lowered = lower(&space, space.campaign("again").unwrap(), "cell.sesame", "sesamec 0.0.0");
+        let metric = lowered.plan.metrics.iter().find(|metric| metric.name == "close").unwrap();
+        insta::assert_snapshot!(serde_json::to_string(&metric.source).unwrap());
+        assert!(lowered.hooks.iter().all(|hook| hook.metric != "close"));
+        let read: plan::Metric = serde_json::from_str(&serde_json::to_string(metric).unwrap()).unwrap();
+        assert_eq!(read, *metric);
+    }
+
+    #[test]
+    fn the_deepest_formula_can_be_read_again_from_the_plan() {
+        let nested = format!("{}link{}", "(-(1rad + ".repeat(8), " * 1) * 1)".repeat(8));
+        let text = CELL.replace("metric seen", &format!("metric deep = last({nested}) outbound metric seen"));
+        let mut sources = SourceMap::new();
+        let file = sources.add("cell.sesame", text.replace("observes time", "observes time, deep"));
+        let analysis = analyse(&sources, file);
+        let space = analysis.model.unwrap_or_else(|| panic!("{:#?}", analysis.diagnostics));
+        let RunnerPlan { plan, .. } = lower(&space, space.campaign("again").unwrap(), "cell.sesame", "sesamec 0.0.0");
+        let read: plan::CampaignPlan = serde_json::from_str(&serde_json::to_string(&plan).unwrap()).unwrap();
+        assert_eq!(read, plan);
+    }
+
+    #[test]
     fn the_whole_plan_is_as_blessed() {
         let plan = serde_json::to_string_pretty(&lowered("again").plan).unwrap();
         insta::assert_snapshot!(plan);

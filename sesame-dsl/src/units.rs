@@ -256,7 +256,10 @@ pub fn product(left: Option<&Unit>, right: Option<&Unit>, divide: bool) -> Optio
             (false, false) => ("*", power),
             (false, true) => ("/", power.checked_neg()?),
         };
-        text += &if power == 1 { format!("{sign}{symbol}") } else { format!("{sign}{symbol}^{power}") };
+        text.extend([sign, symbol]);
+        if power != 1 {
+            text.extend(["^", &power.to_string()]);
+        }
     }
     if text.is_empty() {
         return Some((None, scale));
@@ -426,6 +429,27 @@ mod tests {
         assert!(Unit::parse("km^9").is_ok());
     }
 
+    fn product_of(left: &str, right: &str, divide: bool) -> (Option<String>, f64) {
+        let [left, right] = [left, right].map(|text| (!text.is_empty()).then(|| unit(text)));
+        let (unit, scale) = product(left.as_ref(), right.as_ref(), divide).unwrap();
+        (unit.map(|unit| unit.text().to_owned()), scale)
+    }
+
+    #[test]
+    fn units_of_products_cancel_and_what_is_left_is_a_unit_or_a_plain_number() {
+        assert_eq!(product_of("rad", "rad", true), (None, 1.0));
+        assert_eq!(product_of("mm", "m", true), (None, 0.001));
+        assert_eq!(product_of("m", "s", true), (Some("m/s".to_owned()), 1.0));
+        assert_eq!(product_of("m/s", "s", false), (Some("m".to_owned()), 1.0));
+        assert_eq!(product_of("m/s", "s", true), (Some("m/s^2".to_owned()), 1.0));
+        assert_eq!(product_of("m", "m", false), (Some("m^2".to_owned()), 1.0));
+        assert_eq!(product_of("", "s", true), (Some("s^-1".to_owned()), 1.0));
+        assert_eq!(product_of("m", "", false), (Some("m".to_owned()), 1.0));
+        assert_eq!(product_of("m", "%", false), (Some("m".to_owned()), 0.01));
+        assert_eq!(product_of("m", "%", true), (Some("m".to_owned()), 100.0));
+        assert_eq!(product(Some(&unit("m^127")), Some(&unit("m")), false), None);
+    }
+
     /// The oracle: scales as plain floats, multiplied up from the table without any reduction.
     fn naive_scale(text: &str) -> f64 {
         let mut scale = 1.0;
@@ -438,6 +462,19 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn a_product_means_what_the_product_of_its_scales_does(
+            left in 0..UNITS.len(), right in 0..UNITS.len(), divide: bool,
+        ) {
+            let [left, right] = [left, right].map(|at| UNITS[at].0);
+            let (unit, scale) = product_of(left, right, divide);
+            let [left, right] = [left, right].map(naive_scale);
+            let naive = if divide { left / right } else { left * right };
+            // A unit's own scale is that of the parser, which other tests compare with the table.
+            let own = unit.map_or(1.0, |text| Unit::parse(&text).unwrap().scale.apply(1.0));
+            prop_assert!((own * scale / naive - 1.0).abs() < 1e-12, "{own} * {scale} is not {naive}");
+        }
+
         #[test]
         fn every_unit_converts_to_its_siblings_and_back(
             from in 0..UNITS.len(), to: prop::sample::Index, per in 0..UNITS.len(), value in -1e9..1e9f64,

@@ -139,7 +139,7 @@ pub(crate) enum Direction {
 pub(crate) enum MetricSource {
     Hook { hooks: Vec<(Span, Vec<Name>)>, damaged: bool },
     FuzzingTime,
-    Formula(Formula),
+    Formula(Box<Formula>),
 }
 
 /// What a declarative metric is computed from, with its clauses as written.

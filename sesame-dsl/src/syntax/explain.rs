@@ -333,7 +333,6 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::latency => "`latency`",
         Rule::blackhole => "`blackhole`",
         Rule::formula => "a formula such as `last(cycle)`",
-        Rule::when_then => "`when`",
         Rule::expression
         | Rule::conjunction
         | Rule::relation
@@ -347,7 +346,7 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::plus => "`+`",
         Rule::times => "`*`",
         Rule::over => "`/`",
-        Rule::formula_when => "`when`",
+        Rule::when_then | Rule::formula_when => "`when`",
         Rule::formula_every => "`every`",
         Rule::formula_per => "`per`",
         Rule::formula_outbound => "`outbound`",

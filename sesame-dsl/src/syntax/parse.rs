@@ -408,7 +408,7 @@ impl Reader<'_> {
                 });
                 Some(MetricSource::Hook { hooks, damaged })
             }
-            Rule::formula => Some(MetricSource::Formula(self.formula(&source))),
+            Rule::formula => Some(MetricSource::Formula(Box::new(self.formula(&source)))),
             Rule::fuzzing_time => Some(MetricSource::FuzzingTime),
             _ => {
                 self.unsupported(&source);
