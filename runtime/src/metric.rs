@@ -5,8 +5,12 @@ use std::collections::BTreeMap;
 use crate::time::SimTime;
 use crate::value::{Text, Value};
 
+mod aggregate;
 mod engine;
+mod expression;
 mod probe;
+#[cfg(test)]
+mod tests;
 
 pub use engine::{MetricTable, Metrics, MissingHook};
 pub use probe::unimplemented_hooks;

@@ -1,8 +1,8 @@
 //! The relay: the man in the middle, for one run of one test.
 //!
 //! Sans-IO. Messages and time go in, deliveries come out; a transport feeds it and carries out what it says. Within one
-//! event the order is: due releases, inbound metrics, activations, operations (the triggering message included), then
-//! delivery. A message on a wire that no operation of the test touches is handed on as it came.
+//! event the order is: due releases, inbound metrics, activations, operations (the triggering message included), outbound
+//! metrics, then delivery. A message on a wire that no operation of the test touches is handed on as it came.
 
 mod release;
 
@@ -55,6 +55,8 @@ pub struct Relay<'a> {
     now: SimTime,
     messages: u64,
     overflowed: bool,
+    /// The run is over: nothing is delivered any more.
+    over: bool,
 }
 
 /// One operation of the test.
@@ -122,6 +124,7 @@ impl<'a> Relay<'a> {
             now: SimTime::ZERO,
             messages: 0,
             overflowed: false,
+            over: false,
         })
     }
 
@@ -130,13 +133,14 @@ impl<'a> Relay<'a> {
         self.metrics.begin();
     }
 
-    /// Tells the metrics' hooks that the run has come to its end.
+    /// Tells the metrics that the run has come to its end.
     pub fn end(&mut self, now: SimTime) {
         self.metrics.end(now);
     }
 
     /// Closes the books at `end`, where the run ended or broke off: what is still held is lost, open intervals are closed.
     pub fn finish(mut self, end: SimTime) -> Finished {
+        self.over = true;
         self.follow_time(end, &mut Vec::new());
         let operations: Vec<OperationEffect> = self
             .operations
@@ -241,6 +245,9 @@ impl<'a> Relay<'a> {
                 }
                 return;
             }
+        }
+        if !self.over {
+            self.metrics.delivered(now, message.wire, &message.value);
         }
         deliveries.push(Delivery { wire: message.wire, value: message.value });
     }

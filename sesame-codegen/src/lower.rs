@@ -7,6 +7,8 @@
 //! - known tests: those whose operations are all in the plan and begin before the campaign's end;
 //! - metrics: its objectives, those it observes, and those of all requirements and of the expectations of these tests.
 
+mod formula;
+
 use sesame_dsl::model::{self, CampaignId, Id as _, Space};
 use sesame_dsl::units::Unit;
 use sesame_plan as plan;
@@ -174,7 +176,7 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
             line: metric.declaration.line,
             inputs: topics.iter().map(|&id| topic_id(id)).collect(),
         }),
-        model::MetricSource::FuzzingTime | model::MetricSource::Last(_) => None,
+        model::MetricSource::FuzzingTime | model::MetricSource::Last(_) | model::MetricSource::Formula(_) => None,
     });
     hooks.collect()
 }
@@ -234,9 +236,8 @@ fn metric(metric: &model::Metric) -> plan::Metric {
                 plan::MetricSource::Hook { topics: topics.iter().map(|&id| topic_id(id)).collect() }
             }
             model::MetricSource::FuzzingTime => plan::MetricSource::FuzzingTime,
-            model::MetricSource::Last(input) => plan::MetricSource::Last {
-                input: plan::FieldRef { topic: topic_id(input.topic), path: input.fields.clone() },
-            },
+            model::MetricSource::Last(input) => plan::MetricSource::Last { input: formula::field(input) },
+            model::MetricSource::Formula(of) => plan::MetricSource::Formula { formula: formula::formula(of) },
         },
         line: metric.declaration.line,
     }
@@ -410,6 +411,36 @@ mod tests {
         assert_eq!(swing.within, plan::Span { start: 0.0, end: 60.0 });
         assert_eq!(plan.operations[1].inclusion, 0.4);
         assert!(plan.operations[1].parameters[0].integer);
+    }
+
+    #[test]
+    fn a_formula_arrives_with_its_constants_in_the_units_of_the_wire_and_needs_no_hook() {
+        let text = CELL.replace(
+            "metric seen",
+            "metric close = count(zones.level < 0.3m and link > 180deg) every 200ms per zones.name outbound metric seen",
+        );
+        let mut sources = SourceMap::new();
+        let file = sources.add("cell.sesame", text.replace("observes time", "observes time, close"));
+        let space = analyse(&sources, file).model.unwrap();
+        let lowered = lower(&space, space.campaign("again").unwrap(), "cell.sesame", "sesamec 0.0.0");
+        let metric = lowered.plan.metrics.iter().find(|metric| metric.name == "close").unwrap();
+        insta::assert_snapshot!(serde_json::to_string(&metric.source).unwrap());
+        assert!(lowered.hooks.iter().all(|hook| hook.metric != "close"));
+        let read: plan::Metric = serde_json::from_str(&serde_json::to_string(metric).unwrap()).unwrap();
+        assert_eq!(read, *metric);
+    }
+
+    #[test]
+    fn the_deepest_formula_can_be_read_again_from_the_plan() {
+        let nested = format!("{}link{}", "(-(1rad + ".repeat(8), " * 1) * 1)".repeat(8));
+        let text = CELL.replace("metric seen", &format!("metric deep = last({nested}) outbound metric seen"));
+        let mut sources = SourceMap::new();
+        let file = sources.add("cell.sesame", text.replace("observes time", "observes time, deep"));
+        let analysis = analyse(&sources, file);
+        let space = analysis.model.unwrap_or_else(|| panic!("{:#?}", analysis.diagnostics));
+        let RunnerPlan { plan, .. } = lower(&space, space.campaign("again").unwrap(), "cell.sesame", "sesamec 0.0.0");
+        let read: plan::CampaignPlan = serde_json::from_str(&serde_json::to_string(&plan).unwrap()).unwrap();
+        assert_eq!(read, plan);
     }
 
     #[test]

@@ -190,6 +190,20 @@ impl Unit {
         &self.text
     }
 
+    /// Its symbols with their powers.
+    fn factors(&self) -> impl Iterator<Item = (&str, i8)> {
+        let mut rest = Some((self.text.as_str(), 1));
+        std::iter::from_fn(move || {
+            let (text, sign) = rest?;
+            let end = text.find(['*', '/']).unwrap_or(text.len());
+            rest = text.get(end + 1..).map(|after| (after, if text[end..].starts_with('/') { -1 } else { 1 }));
+            Some(match text[..end].split_once('^') {
+                Some((symbol, power)) => (symbol, power.parse::<i8>().map_or(sign, |power| power * sign)),
+                None => (&text[..end], sign),
+            })
+        })
+    }
+
     /// What it measures.
     pub fn dimension(&self) -> Dimension {
         self.dimension
@@ -212,6 +226,51 @@ pub fn convert(value: f64, from: Option<&Unit>, to: Option<&Unit>) -> f64 {
         // Beyond 38 digits the two halves are applied one after the other.
         None => to.inverse().apply(from.apply(value)),
     }
+}
+
+/// The unit of a product, or of a quotient; and how many of it the product of one of each is. Symbols that occur on both
+/// sides cancel; what is left without a dimension is a plain number. `None` when it cannot be represented.
+pub fn product(left: Option<&Unit>, right: Option<&Unit>, divide: bool) -> Option<(Option<Unit>, f64)> {
+    let mut scale = 1.0;
+    let mut powers: Vec<(&str, i8)> = Vec::new();
+    for (unit, sign) in [(left, 1), (right, if divide { -1 } else { 1 })] {
+        let Some(unit) = unit else { continue };
+        if unit.dimension == Dimension::NONE {
+            let plain = convert(1.0, Some(unit), None);
+            scale = if sign > 0 { scale * plain } else { scale / plain };
+            continue;
+        }
+        for (symbol, power) in unit.factors() {
+            let power = power.checked_mul(sign)?;
+            match powers.iter_mut().find(|(known, _)| *known == symbol) {
+                Some((_, known)) => *known = known.checked_add(power)?,
+                None => powers.push((symbol, power)),
+            }
+        }
+    }
+    powers.retain(|&(_, power)| power != 0);
+    // What is multiplied comes first: a unit does not begin with a stroke.
+    powers.sort_by_key(|&(_, power)| power < 0);
+    let mut text = String::new();
+    for (symbol, power) in powers {
+        let (sign, power) = match (text.is_empty(), power < 0) {
+            (true, _) => ("", power),
+            (false, false) => ("*", power),
+            (false, true) => ("/", power.checked_neg()?),
+        };
+        text.extend([sign, symbol]);
+        if power != 1 {
+            text.extend(["^", &power.to_string()]);
+        }
+    }
+    if text.is_empty() {
+        return Some((None, scale));
+    }
+    let unit = Unit::parse(&text).ok()?;
+    if unit.dimension == Dimension::NONE {
+        return Some((None, scale * convert(1.0, Some(&unit), None)));
+    }
+    Some((Some(unit), scale))
 }
 
 /// What a unit measures; no unit is a plain number.
@@ -372,6 +431,27 @@ mod tests {
         assert!(Unit::parse("km^9").is_ok());
     }
 
+    fn product_of(left: &str, right: &str, divide: bool) -> (Option<String>, f64) {
+        let [left, right] = [left, right].map(|text| (!text.is_empty()).then(|| unit(text)));
+        let (unit, scale) = product(left.as_ref(), right.as_ref(), divide).unwrap();
+        (unit.map(|unit| unit.text().to_owned()), scale)
+    }
+
+    #[test]
+    fn units_of_products_cancel_and_what_is_left_is_a_unit_or_a_plain_number() {
+        assert_eq!(product_of("rad", "rad", true), (None, 1.0));
+        assert_eq!(product_of("mm", "m", true), (None, 0.001));
+        assert_eq!(product_of("m", "s", true), (Some("m/s".to_owned()), 1.0));
+        assert_eq!(product_of("m/s", "s", false), (Some("m".to_owned()), 1.0));
+        assert_eq!(product_of("m/s", "s", true), (Some("m/s^2".to_owned()), 1.0));
+        assert_eq!(product_of("m", "m", false), (Some("m^2".to_owned()), 1.0));
+        assert_eq!(product_of("", "s", true), (Some("s^-1".to_owned()), 1.0));
+        assert_eq!(product_of("m", "", false), (Some("m".to_owned()), 1.0));
+        assert_eq!(product_of("m", "%", false), (Some("m".to_owned()), 0.01));
+        assert_eq!(product_of("m", "%", true), (Some("m".to_owned()), 100.0));
+        assert_eq!(product(Some(&unit("m^127")), Some(&unit("m")), false), None);
+    }
+
     /// The oracle: scales as plain floats, multiplied up from the table without any reduction.
     fn naive_scale(text: &str) -> f64 {
         let mut scale = 1.0;
@@ -384,6 +464,19 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn a_product_means_what_the_product_of_its_scales_does(
+            left in 0..UNITS.len(), right in 0..UNITS.len(), divide: bool,
+        ) {
+            let [left, right] = [left, right].map(|at| UNITS[at].0);
+            let (unit, scale) = product_of(left, right, divide);
+            let [left, right] = [left, right].map(naive_scale);
+            let naive = if divide { left / right } else { left * right };
+            // A unit's own scale is that of the parser, which other tests compare with the table.
+            let own = unit.map_or(1.0, |text| Unit::parse(&text).unwrap().scale.apply(1.0));
+            prop_assert!((own * scale / naive - 1.0).abs() < 1e-12, "{own} * {scale} is not {naive}");
+        }
+
         #[test]
         fn every_unit_converts_to_its_siblings_and_back(
             from in 0..UNITS.len(), to: prop::sample::Index, per in 0..UNITS.len(), value in -1e9..1e9f64,

@@ -1,6 +1,7 @@
 //! Behaviour across crates, as a user meets it.
 #![cfg(test)]
 
+mod declarative;
 mod faults;
 mod first_front;
 mod interruption;

@@ -8,10 +8,12 @@
 //! seconds of simulation time; every other quantity is in the unit its field, metric or topic declares (the unit on
 //! the wire), probabilities are in `0..=1`.
 
+mod formula;
 mod model;
 pub mod stl;
 mod test;
 
+pub use formula::*;
 pub use model::*;
 pub use test::*;
 

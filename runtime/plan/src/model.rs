@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::KnownTest;
+use crate::{Formula, KnownTest};
 
 macro_rules! id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -258,6 +258,11 @@ pub enum MetricSource {
     Last {
         /// Which value of which message.
         input: FieldRef,
+    },
+    /// Computed from messages as the space says.
+    Formula {
+        /// How.
+        formula: Formula,
     },
 }
 

@@ -1,7 +1,8 @@
 //! All metrics of one run: which message goes to which, and what comes out.
 
-use sesame_plan::{CampaignPlan, MetricSource};
+use sesame_plan::{CampaignPlan, MetricSource, Side, TopicId};
 
+use super::aggregate::FormulaState;
 use super::{Context, Hook, HookEntry};
 use crate::observation::{MetricObservation, OperationEffect};
 use crate::time::SimTime;
@@ -12,9 +13,13 @@ use crate::wire::{Wire, WireTable};
 pub struct MetricTable<'p> {
     plan: &'p CampaignPlan,
     hooks: Vec<Option<HookEntry>>,
-    /// Per wire: the metrics that want its messages, with the position of its topic among their inputs.
+    /// Per wire: the metrics that want its messages as they were published, with the position of its topic among their
+    /// inputs.
     taps: Vec<Vec<(usize, usize)>>,
-    paths: Vec<Text>,
+    /// Per wire: the metrics that want its messages as they are delivered.
+    delivered: Vec<Vec<usize>>,
+    /// Per wire: its path, its topic, and the position among the topic's paths.
+    wires: Vec<(Text, TopicId, usize)>,
 }
 
 /// A hook that the plan wants and the runner does not have.
@@ -27,14 +32,22 @@ impl<'p> MetricTable<'p> {
     pub fn new(plan: &'p CampaignPlan, wires: &WireTable, hooks: &[HookEntry]) -> Result<Self, MissingHook> {
         let mut found = Vec::with_capacity(plan.metrics.len());
         let mut taps = vec![Vec::new(); wires.len()];
+        let mut delivered = vec![Vec::new(); wires.len()];
         for (at, metric) in plan.metrics.iter().enumerate() {
-            let topics = match &metric.source {
-                MetricSource::Hook { topics } => topics.as_slice(),
-                MetricSource::FuzzingTime => &[],
-                MetricSource::Last { input } => std::slice::from_ref(&input.topic),
+            let topics: Vec<TopicId> = match &metric.source {
+                MetricSource::Hook { topics } => topics.clone(),
+                MetricSource::FuzzingTime => Vec::new(),
+                MetricSource::Last { input } => vec![input.topic],
+                MetricSource::Formula { formula } => formula.inputs.iter().map(|input| input.field.topic).collect(),
             };
+            let outbound =
+                matches!(&metric.source, MetricSource::Formula { formula } if formula.side == Side::Outbound);
             for wire in wires.iter() {
                 let input = topics.iter().position(|&topic| topic == wires.topic(wire));
+                if outbound {
+                    delivered[wire.index()].extend(input.map(|_| at));
+                    continue;
+                }
                 taps[wire.index()].extend(input.map(|input| (at, input)));
             }
             found.push(match metric.source {
@@ -45,8 +58,14 @@ impl<'p> MetricTable<'p> {
                 _ => None,
             });
         }
-        let paths = wires.iter().map(|wire| Text::from(wires.path(wire))).collect();
-        Ok(MetricTable { plan, hooks: found, taps, paths })
+        let mut members = vec![0; plan.topics.len()];
+        let wires = wires.iter().map(|wire| {
+            let topic = wires.topic(wire);
+            let member = members[topic.index()];
+            members[topic.index()] += 1;
+            (Text::from(wires.path(wire)), topic, member)
+        });
+        Ok(MetricTable { plan, hooks: found, taps, delivered, wires: wires.collect() })
     }
 
     /// Fresh metrics for one run.
@@ -54,7 +73,15 @@ impl<'p> MetricTable<'p> {
         let states = self
             .hooks
             .iter()
-            .map(|hook| State { hook: hook.map(|hook| (hook.build)()), context: Context::default() })
+            .zip(&self.plan.metrics)
+            .map(|(hook, metric)| State {
+                hook: hook.map(|hook| (hook.build)()),
+                formula: match &metric.source {
+                    MetricSource::Formula { formula } => Some(FormulaState::new(formula, self.plan)),
+                    _ => None,
+                },
+                context: Context::default(),
+            })
             .collect();
         Metrics { table: self, states }
     }
@@ -63,28 +90,32 @@ impl<'p> MetricTable<'p> {
 /// The metrics of one run.
 pub struct Metrics<'p> {
     table: &'p MetricTable<'p>,
-    states: Vec<State>,
+    states: Vec<State<'p>>,
 }
 
-struct State {
+struct State<'p> {
     hook: Option<Box<dyn Hook>>,
+    formula: Option<FormulaState<'p>>,
     context: Context,
 }
 
 impl Metrics<'_> {
     /// Tells the hooks that the run begins.
     pub fn begin(&mut self) {
-        for State { hook, context } in &mut self.states {
+        for State { hook, context, .. } in &mut self.states {
             if let Some(hook) = hook {
                 hook.on_start(context);
             }
         }
     }
 
-    /// Tells the hooks that the run has come to its end. After a failure nobody does.
+    /// Tells hooks and formulas that the run has come to its end. After a failure nobody does.
     pub fn end(&mut self, now: SimTime) {
-        for State { hook, context } in &mut self.states {
+        for State { hook, formula, context } in &mut self.states {
             context.now = now;
+            if let Some(formula) = formula {
+                formula.end(context);
+            }
             if let Some(hook) = hook {
                 hook.on_end(context);
             }
@@ -94,12 +125,14 @@ impl Metrics<'_> {
     /// A message, as the simulator sent it.
     pub fn message(&mut self, now: SimTime, wire: Wire, value: &Value) {
         for &(at, input) in &self.table.taps[wire.index()] {
-            let State { hook, context } = &mut self.states[at];
+            let State { hook, formula, context } = &mut self.states[at];
+            let (path, topic, member) = &self.table.wires[wire.index()];
             context.now = now;
-            context.topic.clone_from(&self.table.paths[wire.index()]);
-            match (&self.table.plan.metrics[at].source, hook) {
-                (MetricSource::Hook { .. }, Some(hook)) => hook.on_message(input, value, context),
-                (MetricSource::Last { input }, _) => match value.number_at(&input.path) {
+            context.topic.clone_from(path);
+            match (&self.table.plan.metrics[at].source, hook, formula) {
+                (MetricSource::Hook { .. }, Some(hook), _) => hook.on_message(input, value, context),
+                (MetricSource::Formula { .. }, _, Some(formula)) => formula.message(*topic, *member, value, context),
+                (MetricSource::Last { input }, ..) => match value.number_at(&input.path) {
                     Some(number) => context.set(number),
                     None => context.note(format!(
                         "a message on `{}` has no number `{}`",
@@ -108,6 +141,19 @@ impl Metrics<'_> {
                     )),
                 },
                 _ => {}
+            }
+        }
+    }
+
+    /// A message, as it is delivered.
+    pub fn delivered(&mut self, now: SimTime, wire: Wire, value: &Value) {
+        for &at in &self.table.delivered[wire.index()] {
+            let State { formula, context, .. } = &mut self.states[at];
+            let (path, topic, member) = &self.table.wires[wire.index()];
+            context.now = now;
+            context.topic.clone_from(path);
+            if let Some(formula) = formula {
+                formula.message(*topic, *member, value, context);
             }
         }
     }

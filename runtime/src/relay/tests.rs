@@ -1,7 +1,10 @@
 //! Behaviour of the relay on small message streams, and a naive model beside the release queue.
 
 use proptest::prelude::*;
-use sesame_plan::{Choice, Distribution, Drain, Operation, OperationKind, Test, TestOperation, ValueMode};
+use sesame_plan::{
+    Aggregate, Choice, Condition, Distribution, Drain, FieldRef, Formula, Input, Members, MetricSource, Operation,
+    OperationKind, Side, Test, TestOperation, TopicId, ValueMode,
+};
 
 use super::{Delivery, Exchange, Finished, Relay};
 use crate::fixture::{latency, offset, operation, plan, test_of, use_of};
@@ -252,4 +255,35 @@ proptest! {
         prop_assert_eq!(run(seed), run(seed));
         prop_assert_ne!(run(seed), run(seed.wrapping_add(1)));
     }
+}
+
+#[test]
+fn an_outbound_metric_hears_what_operations_made_of_a_message_and_an_inbound_one_what_was_sent() {
+    let count = |side| MetricSource::Formula {
+        formula: Formula {
+            inputs: vec![Input { field: FieldRef { topic: TopicId(0), path: Vec::new() }, members: Members::Min }],
+            aggregate: Aggregate::Count { of: Condition::Constant(true) },
+            when: None,
+            every: None,
+            per: None,
+            side,
+        },
+    };
+    let mut plan =
+        plan(vec![operation(0, OperationKind::Blackhole), operation(0, latency(Distribution::Fixed, Drain::Finish))]);
+    plan.metrics[0].source = count(Side::Inbound);
+    plan.metrics[1].source = count(Side::Outbound);
+    let wires = WireTable::new(&plan);
+    let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+    // From 1 s to 2 s all is lost; what is sent from 3 s on is delayed by 5 s, and the run ends at 8 s.
+    let test = test_of(vec![use_of(0, 1.0, 2.0, vec![], 1), use_of(1, 3.0, 10.0, one(5.0), 1)]);
+    let mut relay = Relay::new(&plan, &wires, &test, metrics.start()).unwrap();
+    let command = wires.find(COMMAND).unwrap();
+    for tenth in 0..80 {
+        relay.message(SimTime::from_nanos(tenth * 100_000_000), command, Value::Real(0.0), &mut Vec::new());
+    }
+    let finished = relay.finish(SimTime::from_seconds(8.5));
+    assert_eq!(finished.metrics[0].value, Some(80.0));
+    // Ten before the loss, ten after it; nothing delayed has been delivered by the last event at 7.9 s.
+    assert_eq!(finished.metrics[1].value, Some(20.0));
 }

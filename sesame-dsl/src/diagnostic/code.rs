@@ -70,6 +70,8 @@ codes! {
     UNKNOWN_UNIT = "E0301": "No such unit.",
     WRONG_UNIT = "E0302": "A quantity measures something else, or lacks its unit.",
     WRONG_TYPE = "E0303": "A value of this type cannot be used here.",
+    NOT_A_FORMULA = "E0304": "A formula is not one number over the time of a test.",
+    IDLE_CLAUSE = "E0305": "A clause of a formula changes nothing.",
     REVERSED_RANGE = "E0401": "A range begins above its end.",
     OUT_OF_RANGE = "E0402": "A value lies outside of what is permitted.",
     WRONG_CHOICE = "E0403": "A test's choice does not fit the operation's parameter.",

@@ -1,6 +1,6 @@
 //! What is measured, and what must hold of it.
 
-use super::{Declaration, FieldPath, MetricId, TopicId};
+use super::{Declaration, FieldPath, Formula, MetricId, TopicId};
 use crate::units::Unit;
 
 /// A number computed from the messages of a test.
@@ -28,14 +28,16 @@ pub enum Direction {
 }
 
 /// Where a metric's value comes from.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum MetricSource {
     /// The user's Rust code, called with each message of these topics; at least one, each once.
     Hook(Vec<TopicId>),
     /// `fuzzing_time()`: the sum over operations of observed active time, in seconds.
     FuzzingTime,
-    /// `last(…)`: the last value received.
+    /// `last(…)` of one field of one topic, as published: the last value received.
     Last(FieldPath),
+    /// Any other formula.
+    Formula(Formula),
 }
 
 /// What must hold in every test.

@@ -5,12 +5,14 @@
 //! `0..=1`; every other number is in the unit that its field or metric declares.
 
 mod campaign;
+mod formula;
 mod fuzz;
 mod ids;
 mod measure;
 mod system;
 
 pub use campaign::*;
+pub use formula::*;
 pub use fuzz::*;
 pub use ids::*;
 pub use measure::*;

@@ -30,9 +30,9 @@ impl<'a> Resolver<'a> {
                 self.no_type(metric.ty.as_ref(), "`fuzzing_time()` is in seconds");
                 (Some(MetricSource::FuzzingTime), Some(Type::Real(Some(Unit::seconds()))))
             }
-            ast::MetricSource::Last(path) => {
-                self.no_type(metric.ty.as_ref(), "the unit of `last(…)` is that of the topic or field");
-                match self.last(path) {
+            ast::MetricSource::Formula(formula) => {
+                self.no_type(metric.ty.as_ref(), "its unit follows from those of the topics and numbers in it");
+                match self.formula(formula) {
                     Some((source, unit)) => (Some(source), Some(Type::Real(unit))),
                     None => (None, None),
                 }
@@ -83,20 +83,6 @@ impl<'a> Resolver<'a> {
             let title = "this metric's type is given by its formula";
             self.report(Diagnostic::new(Code::WRONG_TYPE, ty.span, title).label("leave it out").note(why));
         }
-    }
-
-    fn last(&mut self, path: &'a ast::Path) -> Option<(MetricSource, Option<Unit>)> {
-        let (found, unit, _) = self.number_field(path, "`last(…)`")?;
-        let members = self.system.topics[found.topic.index()].as_ref().map_or(0, |topic| topic.paths.len());
-        if members > 1 {
-            let title = "`last(…)` of a group of topics is not supported yet by this version of sesamec";
-            let diagnostic = Diagnostic::new(Code::NOT_SUPPORTED, path.span, title)
-                .label(format!("`{}` is a group of {members}", path.topic.text))
-                .note("declare the member you mean as a topic of its own");
-            self.report(diagnostic);
-            return None;
-        }
-        Some((MetricSource::Last(found), unit))
     }
 
     pub(super) fn requirements(&mut self) -> Vec<Option<model::Requirement>> {

@@ -2,7 +2,7 @@
 //!
 //! 1. [`collect`] has who is called what, doubles, and what a space cannot do without
 //! 2. [`system`] has message types (in an order in which each follows those it contains), topics, nodes, the simulator
-//! 3. [`measure`] has metrics and requirements
+//! 3. [`measure`] has metrics (their formulas in [`formula`]) and requirements
 //! 4. [`fuzz`] has operations and known tests
 //! 5. [`campaign`] has campaigns
 //!
@@ -11,6 +11,7 @@
 
 mod campaign;
 mod collect;
+mod formula;
 mod fuzz;
 mod measure;
 mod quantity;

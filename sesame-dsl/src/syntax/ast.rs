@@ -153,7 +153,59 @@ pub(crate) enum Direction {
 pub(crate) enum MetricSource {
     Hook { hooks: Vec<(Span, Vec<Name>)>, damaged: bool },
     FuzzingTime,
-    Last(Path),
+    Formula(Box<Formula>),
+}
+
+/// What a declarative metric is computed from, with its clauses as written.
+#[derive(Debug)]
+pub(crate) struct Formula {
+    pub(crate) kind: FormulaKind,
+    pub(crate) when: Vec<(Span, Expression)>,
+    pub(crate) every: Vec<(Span, Quantity)>,
+    pub(crate) per: Vec<(Span, Path)>,
+    pub(crate) outbound: Vec<Span>,
+}
+
+#[derive(Debug)]
+pub(crate) enum FormulaKind {
+    /// `when condition then value`.
+    WhenThen(Expression, Expression),
+    /// An aggregate, if it is in order.
+    Plain(Expression),
+}
+
+/// A number, a point or a condition: which, is for resolution to find out. Chains are flat, so that its depth is that of
+/// its parentheses.
+#[derive(Debug)]
+pub(crate) struct Expression {
+    pub(crate) kind: ExpressionKind,
+    pub(crate) span: Span,
+}
+
+#[derive(Debug)]
+pub(crate) enum ExpressionKind {
+    Number(Quantity),
+    Truth(bool),
+    Field(Path),
+    /// `max of zones.level`; the span is that of the word.
+    Members(Members, Span, Path),
+    Negate(Box<Expression>),
+    /// Two terms or more; true for one that is subtracted.
+    Sum(Vec<(bool, Expression)>),
+    /// Two factors or more; true for one that divides.
+    Product(Vec<(bool, Expression)>),
+    Compare(Box<Expression>, Comparison, Box<Expression>),
+    All(Vec<Expression>),
+    Any(Vec<Expression>),
+    Call(Name, Vec<Expression>),
+}
+
+/// What a group of topics is taken as, other than its minimum.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Members {
+    Max,
+    Sum,
+    Each,
 }
 
 /// A topic, and fields of its message.

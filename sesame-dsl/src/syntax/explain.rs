@@ -341,7 +341,24 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::packet_loss | Rule::k_packet => "`packet loss`",
         Rule::latency => "`latency`",
         Rule::blackhole => "`blackhole`",
-        Rule::last => "`last(…)`",
+        Rule::formula => "a formula such as `last(cycle)`",
+        Rule::expression
+        | Rule::conjunction
+        | Rule::relation
+        | Rule::sum
+        | Rule::product
+        | Rule::factor
+        | Rule::call
+        | Rule::function
+        | Rule::members
+        | Rule::truth => "a value such as `link0 - 2.5rad`",
+        Rule::plus => "`+`",
+        Rule::times => "`*`",
+        Rule::over => "`/`",
+        Rule::when_then | Rule::formula_when => "`when`",
+        Rule::formula_every => "`every`",
+        Rule::formula_per => "`per`",
+        Rule::formula_outbound => "`outbound`",
         Rule::fuzzing_time => "`fuzzing_time()`",
         Rule::minus
         | Rule::k_when

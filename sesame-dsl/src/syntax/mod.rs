@@ -2,6 +2,7 @@
 
 pub(crate) mod ast;
 mod explain;
+mod formula;
 mod limits;
 mod parse;
 mod token;

@@ -10,7 +10,7 @@ use super::ast::{
     Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Topic, Transport, Type, TypeKind,
 };
 use super::explain::{Place, explain};
-use super::limits::{MAX_BYTES, MAX_CALLS, MAX_DEPTH, too_deep};
+use super::limits::{MAX_BYTES, MAX_CALLS, too_deep};
 use super::token::{TokenKind, token_at};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::{FileId, Span};
@@ -24,9 +24,8 @@ pub(crate) fn parse(file: FileId, text: &str, diagnostics: &mut Vec<Diagnostic>)
         let span = Span { file, lo: 0, hi: 0 };
         let title = format!("the file has {} bytes, more than the {MAX_BYTES} that are read", text.len());
         reader.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, span, title));
-    } else if let Some(at) = too_deep(text) {
+    } else if let Some((at, title)) = too_deep(text) {
         let span = reader.span_of(at, at + 1);
-        let title = format!("blocks are nested more than {MAX_DEPTH} deep");
         reader.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, span, title).label("this one is too deep"));
     } else {
         // Process-wide in pest; every caller sets the same value.
@@ -74,6 +73,18 @@ fn first_of<'i>(pair: &Pair<'i>, rules: &[Rule]) -> Option<Pair<'i>> {
     pair.clone().into_inner().find(|inner| rules.contains(&inner.as_rule()))
 }
 
+/// The sign by which a bound or a relation compares, if it does.
+pub(super) fn comparison(pair: &Pair<'_>) -> Option<Comparison> {
+    pair.clone().into_inner().find_map(|inner| match inner.as_rule() {
+        Rule::at_most => Some(Comparison::AtMost),
+        Rule::at_least => Some(Comparison::AtLeast),
+        Rule::equal_to => Some(Comparison::Equal),
+        Rule::below => Some(Comparison::Below),
+        Rule::above => Some(Comparison::Above),
+        _ => None,
+    })
+}
+
 /// Where a construct's last word ends. pest's own span goes on over the blanks before an optional part that is not there.
 fn end_of(pair: &Pair<'_>) -> usize {
     let last = pair.clone().into_inner().filter(|inner| inner.as_rule() != Rule::COMMENT).last();
@@ -96,7 +107,7 @@ impl Reader<'_> {
     }
 
     /// The span of a clause's first word.
-    fn keyword_span(&self, pair: &Pair<'_>) -> Span {
+    pub(super) fn keyword_span(&self, pair: &Pair<'_>) -> Span {
         let first = pair.clone().into_inner().find(|inner| !matches!(inner.as_rule(), Rule::docs | Rule::COMMENT));
         self.span(&first.unwrap_or_else(|| pair.clone()))
     }
@@ -209,7 +220,6 @@ impl Reader<'_> {
         let word = &self.text[span.range()];
         let what = match pair.as_rule() {
             Rule::unsupported_transport => format!("simulator kind `{word}`"),
-            Rule::unsupported_formula if word == "when" => "a metric by `when … then …`".to_owned(),
             Rule::unsupported_formula => format!("a metric by `{word}(…)`"),
             Rule::unsupported_operation if word != "custom" => format!("an operation on a `{word}`"),
             Rule::unsupported_operation | Rule::unsupported_kind => format!("operation kind `{word}`"),
@@ -407,7 +417,7 @@ impl Reader<'_> {
         let defaults = children(pair, Rule::default_value)
             .map(|default| (self.keyword_span(&default), self.signed(&expect_child(&default, Rule::signed))))
             .collect();
-        let sources = [Rule::hook_block, Rule::last, Rule::fuzzing_time, Rule::unsupported_formula];
+        let sources = [Rule::hook_block, Rule::formula, Rule::fuzzing_time, Rule::unsupported_formula];
         let source = first_of(pair, &sources).expect("a metric has a source");
         let source = match source.as_rule() {
             Rule::hook_block => {
@@ -417,7 +427,7 @@ impl Reader<'_> {
                 });
                 Some(MetricSource::Hook { hooks, damaged })
             }
-            Rule::last => Some(MetricSource::Last(self.path(&expect_child(&source, Rule::path)))),
+            Rule::formula => Some(MetricSource::Formula(Box::new(self.formula(&source)))),
             Rule::fuzzing_time => Some(MetricSource::FuzzingTime),
             _ => {
                 self.unsupported(&source);
@@ -431,15 +441,7 @@ impl Reader<'_> {
         if let Some(within) = child(pair, Rule::bound_within) {
             return Bound::Within(self.range(&expect_child(&within, Rule::range)));
         }
-        let comparisons = [
-            (Rule::at_most, Comparison::AtMost),
-            (Rule::at_least, Comparison::AtLeast),
-            (Rule::equal_to, Comparison::Equal),
-            (Rule::below, Comparison::Below),
-            (Rule::above, Comparison::Above),
-        ];
-        let comparison = comparisons.into_iter().find(|&(rule, _)| child(pair, rule).is_some());
-        let (_, comparison) = comparison.expect("a bound compares or encloses");
+        let comparison = comparison(pair).expect("a bound compares or encloses");
         Bound::Compare(comparison, self.signed(&expect_child(pair, Rule::signed)))
     }
 

@@ -73,9 +73,17 @@ impl Reader<'_> {
     }
 
     pub(super) fn signed(&mut self, pair: &Pair<'_>) -> Quantity {
-        let span = self.span(pair);
-        let quantity = expect_child(pair, Rule::quantity);
-        let number = expect_child(&quantity, Rule::number);
+        let mut signed = self.quantity(&expect_child(pair, Rule::quantity));
+        signed.span = self.span(pair);
+        if child(pair, Rule::minus).is_some() && signed.value != 0.0 {
+            signed.value = -signed.value;
+        }
+        signed
+    }
+
+    pub(super) fn quantity(&mut self, quantity: &Pair<'_>) -> Quantity {
+        let span = self.span(quantity);
+        let number = expect_child(quantity, Rule::number);
         let mut value: f64 = number.as_str().parse().expect("the grammar's numbers are Rust's");
         if !value.is_finite() {
             let title = format!("`{}` is too large for a number", number.as_str());
@@ -83,10 +91,7 @@ impl Reader<'_> {
             self.report(diagnostic.label("beyond 1.8e308"));
             value = f64::NAN;
         }
-        if child(pair, Rule::minus).is_some() && value != 0.0 {
-            value = -value;
-        }
-        Quantity { value, unit: child(&quantity, Rule::unit).map(|unit| self.unit(&unit)), span }
+        Quantity { value, unit: child(quantity, Rule::unit).map(|unit| self.unit(&unit)), span }
     }
 
     pub(super) fn count(&mut self, pair: &Pair<'_>) -> Count {

@@ -1,6 +1,6 @@
 //! R3: the closest approach of the product arm to an assembly arm.
 //!
-//! Metric `closest_approach` of `kuka_cell` (kuka_cell.sesame:44). This file is yours: it is never overwritten.
+//! Metric `closest_approach` of `kuka_cell` (kuka_cell.sesame:48). This file is yours: it is never overwritten.
 
 use crate::generated::messages::SafetyZone;
 use crate::generated::metrics::ClosestApproachHook;

@@ -1,6 +1,6 @@
 //! R1: intervals of 0.2 s in which the gripper was inside a safety zone.
 //!
-//! Metric `collision_occurrence` of `kuka_cell` (kuka_cell.sesame:38). This file is yours: it is never overwritten.
+//! Metric `collision_occurrence` of `kuka_cell` (kuka_cell.sesame:42). This file is yours: it is never overwritten.
 
 use crate::generated::messages::SafetyZone;
 use crate::generated::metrics::CollisionOccurrenceHook;

@@ -1,6 +1,6 @@
 //! R2: the highest speed of any gripper.
 //!
-//! Metric `top_speed` of `kuka_cell` (kuka_cell.sesame:41). This file is yours: it is never overwritten.
+//! Metric `top_speed` of `kuka_cell` (kuka_cell.sesame:45). This file is yours: it is never overwritten.
 
 use crate::generated::metrics::TopSpeedHook;
 use sesame_runtime::metric::Context;

@@ -1,0 +1,241 @@
+//! Declarative metrics during a run: the last value of each input is held, and what the formula says becomes of the values
+//! over time is kept up with every message.
+
+use std::collections::BTreeMap;
+
+use sesame_plan::{Aggregate, CampaignPlan, Formula, Members, TopicId};
+
+use super::Context;
+use super::expression::{Held, greatest, holds, least, number};
+use crate::time::SimTime;
+use crate::value::{Text, Value};
+
+/// The most keys of one metric; messages of further ones are not heard, and the run is warned.
+const KEY_LIMIT: usize = 1_000;
+
+/// A formula in one run.
+pub(super) struct FormulaState<'p> {
+    formula: &'p Formula,
+    /// Per input: how many members its topic has.
+    members: Vec<usize>,
+    /// All there is without keys; with them, what a new key begins with.
+    common: Stream,
+    keys: BTreeMap<Key, Stream>,
+    /// What the message at hand holds, per input.
+    heard: Vec<(usize, Held)>,
+}
+
+/// A value that tells the messages of a topic apart.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+enum Key {
+    Int(i64),
+    Text(Text),
+}
+
+impl<'p> FormulaState<'p> {
+    /// Before the first message.
+    pub(super) fn new(formula: &'p Formula, plan: &CampaignPlan) -> Self {
+        let members: Vec<usize> =
+            formula.inputs.iter().map(|input| plan.topic(input.field.topic).paths.len()).collect();
+        let common = Stream {
+            members: members.iter().map(|&members| vec![None; members]).collect(),
+            inputs: vec![[0.0; 3]; members.len()],
+            known: vec![false; members.len()],
+            tally: Tally::default(),
+        };
+        FormulaState { formula, members, common, keys: BTreeMap::new(), heard: Vec::new() }
+    }
+
+    /// A message on the `member`th path of a topic, at the context's time.
+    pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) {
+        self.heard.clear();
+        for (at, input) in self.formula.inputs.iter().enumerate().filter(|(_, input)| input.field.topic == topic) {
+            match value.at(&input.field.path) {
+                Some(Value::Point(point)) => self.heard.push((at, *point)),
+                Some(Value::Real(x)) => self.heard.push((at, [*x, 0.0, 0.0])),
+                Some(Value::Int(n)) => self.heard.push((at, [*n as f64, 0.0, 0.0])),
+                Some(Value::Bool(b)) => self.heard.push((at, [f64::from(u8::from(*b)), 0.0, 0.0])),
+                _ => {
+                    context.note(format!(
+                        "a message on `{}` has no value `{}`",
+                        context.topic,
+                        input.field.path.join(".")
+                    ));
+                    return;
+                }
+            }
+        }
+        debug_assert!(self.heard.iter().all(|&(at, _)| member < self.members[at]), "a wire is a member of its topic");
+        match &self.formula.per {
+            None => {
+                self.common.hear(self.formula, &self.heard, member);
+                self.common.step(self.formula, context);
+            }
+            Some(per) if per.topic == topic => {
+                let key = match value.at(&per.path) {
+                    Some(Value::Int(n)) => Key::Int(*n),
+                    Some(Value::Text(text)) => Key::Text(text.clone()),
+                    _ => {
+                        context.note(format!("a message on `{}` has no key `{}`", context.topic, per.path.join(".")));
+                        return;
+                    }
+                };
+                if self.keys.len() >= KEY_LIMIT && !self.keys.contains_key(&key) {
+                    context.note(format!(
+                        "`per {}` has more than {KEY_LIMIT} values; further ones are not heard",
+                        per.path.join(".")
+                    ));
+                    return;
+                }
+                let stream = self.keys.entry(key).or_insert_with(|| self.common.clone());
+                stream.hear(self.formula, &self.heard, member);
+                stream.step(self.formula, context);
+            }
+            Some(_) => {
+                self.common.hear(self.formula, &self.heard, member);
+                for stream in self.keys.values_mut() {
+                    stream.hear(self.formula, &self.heard, member);
+                    stream.step(self.formula, context);
+                }
+            }
+        }
+        self.set(context);
+    }
+
+    /// The run has come to its end, at the context's time: what holds has held until now.
+    pub(super) fn end(&mut self, context: &mut Context) {
+        if !matches!(self.formula.aggregate, Aggregate::Duration { .. }) {
+            return;
+        }
+        for tally in std::iter::once(&mut self.common.tally).chain(self.keys.values_mut().map(|it| &mut it.tally)) {
+            if tally.holds_since.is_some() {
+                tally.hold(context.now, false);
+            }
+        }
+        self.set(context);
+    }
+
+    /// The value over all keys: what is counted adds up, the greatest is the greatest, and of all others it is the least.
+    fn set(&self, context: &mut Context) {
+        let join: fn(f64, f64) -> f64 = match self.formula.aggregate {
+            Aggregate::Count { .. } | Aggregate::Duration { .. } => |a, b| a + b,
+            Aggregate::Max { .. } => greatest,
+            Aggregate::Last { .. } | Aggregate::Min { .. } | Aggregate::Mean { .. } => least,
+        };
+        let streams = std::iter::once(&self.common).chain(self.keys.values());
+        if let Some(value) = streams.filter_map(|stream| stream.tally.value).reduce(join) {
+            context.set(value);
+        }
+    }
+}
+
+/// What is held of the inputs, and what has become of the values so far; one for each key.
+#[derive(Clone)]
+struct Stream {
+    /// Per input: the last value of each member.
+    members: Vec<Vec<Option<Held>>>,
+    /// Per input: what is made of them.
+    inputs: Vec<Held>,
+    /// Per input: whether there was a message at all.
+    known: Vec<bool>,
+    tally: Tally,
+}
+
+impl Stream {
+    fn hear(&mut self, formula: &Formula, heard: &[(usize, Held)], member: usize) {
+        for &(at, value) in heard {
+            self.known[at] = true;
+            let members = &mut self.members[at];
+            members[member] = Some(value);
+            let join: fn(f64, f64) -> f64 = match formula.inputs[at].members {
+                Members::Each => {
+                    self.inputs[at] = value;
+                    continue;
+                }
+                Members::Min => least,
+                Members::Max => greatest,
+                Members::Sum => |a, b| a + b,
+            };
+            // A point is never joined: it is that of a single topic.
+            let joined = members.iter().flatten().copied().reduce(|a, b| [join(a[0], b[0]), a[1], a[2]]);
+            self.inputs[at] = joined.unwrap_or(value);
+        }
+    }
+
+    /// Takes the values into account as they are now, once all are known.
+    fn step(&mut self, formula: &Formula, context: &mut Context) {
+        if self.known.contains(&false) {
+            return;
+        }
+        let now = context.now;
+        let due = |tally: &mut Tally| formula.every.is_none_or(|period| tally.due(now, SimTime::from_seconds(period)));
+        let counts = formula.when.as_ref().is_none_or(|when| holds(when, &self.inputs));
+        let of = match &formula.aggregate {
+            Aggregate::Duration { of } => {
+                return self.tally.hold(now, counts && holds(of, &self.inputs));
+            }
+            Aggregate::Count { of } => {
+                let count = self.tally.value.get_or_insert(0.0);
+                let before = *count;
+                if counts && holds(of, &self.inputs) && due(&mut self.tally) {
+                    self.tally.value = Some(before + 1.0);
+                }
+                return;
+            }
+            Aggregate::Last { of } | Aggregate::Min { of } | Aggregate::Max { of } | Aggregate::Mean { of } => of,
+        };
+        if !counts {
+            return;
+        }
+        let value = number(of, &self.inputs);
+        if !value.is_finite() {
+            context.note(format!("refused the value {value} at {now}"));
+            return;
+        }
+        if due(&mut self.tally) {
+            let tally = &mut self.tally;
+            tally.messages += 1.0;
+            tally.sum += value;
+            tally.value = Some(match (&formula.aggregate, tally.value) {
+                (Aggregate::Min { .. }, Some(before)) => least(before, value),
+                (Aggregate::Max { .. }, Some(before)) => greatest(before, value),
+                (Aggregate::Mean { .. }, _) => tally.sum / tally.messages,
+                _ => value,
+            });
+        }
+    }
+}
+
+/// What has become of a formula's values.
+#[derive(Debug, Clone, Default)]
+struct Tally {
+    value: Option<f64>,
+    /// For a mean.
+    messages: f64,
+    sum: f64,
+    /// When the last message counted.
+    counted: Option<SimTime>,
+    /// For a duration: how long it has held, and since when it does.
+    held: SimTime,
+    holds_since: Option<SimTime>,
+}
+
+impl Tally {
+    /// Whether a message counts that comes now.
+    fn due(&mut self, now: SimTime, period: SimTime) -> bool {
+        let due = self.counted.is_none_or(|counted| now - counted >= period);
+        if due {
+            self.counted = Some(now);
+        }
+        due
+    }
+
+    /// What held before has held until now; whether it does from now on.
+    fn hold(&mut self, now: SimTime, holds: bool) {
+        if let Some(since) = self.holds_since {
+            self.held = self.held + (now - since);
+        }
+        self.holds_since = holds.then_some(now);
+        self.value = Some(self.held.seconds());
+    }
+}

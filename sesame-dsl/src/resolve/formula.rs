@@ -1,0 +1,572 @@
+//! Formulas of metrics: their inputs, their units, and what becomes of their values over time.
+
+use super::{Kind, Resolver};
+use crate::diagnostic::{Code, Diagnostic, Suggestion};
+use crate::model::{Aggregate, Comparison, Condition, Expression, FieldPath, Formula, Id as _, Input, Members};
+use crate::model::{MetricSource, Type};
+use crate::similar::most_similar;
+use crate::span::Span;
+use crate::syntax::ast::{self, ExpressionKind, FormulaKind, Name, Path};
+use crate::units::{Unit, convert, dimension, product};
+
+/// What begins a formula. `last` is first: it is what a formula without any most likely means.
+const AGGREGATES: [&str; 6] = ["last", "min", "max", "mean", "count", "duration"];
+/// What stands inside of one.
+const FUNCTIONS: [&str; 4] = ["abs", "min", "max", "distance"];
+/// The deepest expression. A plan is JSON, whose readers limit its depth.
+const MAX_DEPTH: usize = 40;
+
+/// A number with its unit; `None` for a plain one.
+type Number = (Expression, Option<Unit>);
+
+impl<'a> Resolver<'a> {
+    /// A formula, with the unit of its value.
+    pub(super) fn formula(&mut self, formula: &'a ast::Formula) -> Option<(MetricSource, Option<Unit>)> {
+        let mut inputs = Vec::new();
+        let when = self.single(&formula.when, "when").map(|when| self.condition(&mut inputs, when));
+        let (aggregate, unit) = match &formula.kind {
+            FormulaKind::WhenThen(condition, value) => {
+                let condition = self.condition(&mut inputs, condition);
+                let value = self.number(&mut inputs, value);
+                let condition = match (condition?, when) {
+                    (first, None) => first,
+                    (first, Some(second)) => Condition::All(vec![first, second?]),
+                };
+                let (value, unit) = value?;
+                return self.finish(formula, inputs, Aggregate::Last(value), Some(condition), unit);
+            }
+            FormulaKind::Plain(expression) => self.aggregate(&mut inputs, expression)?,
+        };
+        let when = match when {
+            Some(when) => Some(when?),
+            None => None,
+        };
+        self.finish(formula, inputs, aggregate, when, unit)
+    }
+
+    fn finish(
+        &mut self,
+        formula: &'a ast::Formula,
+        inputs: Vec<Input>,
+        aggregate: Aggregate,
+        when: Option<Condition>,
+        unit: Option<Unit>,
+    ) -> Option<(MetricSource, Option<Unit>)> {
+        let whole = match &formula.kind {
+            FormulaKind::WhenThen(condition, value) => condition.span.to(value.span),
+            FormulaKind::Plain(expression) => expression.span,
+        };
+        let every = match self.single(&formula.every, "every") {
+            Some(every) => Some(self.every(formula.every[0].0, every, &aggregate)?),
+            None => None,
+        };
+        let per = match self.single(&formula.per, "per") {
+            Some(per) => Some(self.per(per, &inputs)?),
+            None => None,
+        };
+        self.at_most_one(&formula.outbound, "outbound");
+        let outbound = !formula.outbound.is_empty();
+        if inputs.is_empty() {
+            let title = "this formula hears no topic";
+            let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, whole, title)
+                .label("always the same")
+                .note("a metric is computed from messages, so its formula names a topic");
+            self.report(diagnostic);
+            return None;
+        }
+        if depth(&aggregate).max(when.as_ref().map_or(0, Condition::depth)) > MAX_DEPTH {
+            let title = format!("this formula is nested more than {MAX_DEPTH} deep");
+            self.report(Diagnostic::new(Code::TOO_LARGE, whole, title).label("too deep"));
+            return None;
+        }
+        if let (Aggregate::Last(Expression::Input(0)), None, None, None, false) =
+            (&aggregate, &when, every, &per, outbound)
+            && self.members_of(&inputs[0].field) == 1
+        {
+            return Some((MetricSource::Last(inputs[0].field.clone()), unit));
+        }
+        Some((MetricSource::Formula(Formula { inputs, aggregate, when, every, per, outbound }), unit))
+    }
+
+    /// How many topics on the wire a field is that of.
+    fn members_of(&self, field: &FieldPath) -> usize {
+        self.system.topics[field.topic.index()].as_ref().map_or(0, |topic| topic.paths.len())
+    }
+
+    // ----- what becomes of values over time
+
+    fn aggregate(
+        &mut self,
+        inputs: &mut Vec<Input>,
+        expression: &'a ast::Expression,
+    ) -> Option<(Aggregate, Option<Unit>)> {
+        let (name, arguments) = match &expression.kind {
+            ExpressionKind::Call(name, arguments) if AGGREGATES.contains(&name.text.as_str()) => (name, arguments),
+            ExpressionKind::Call(name, _) if !FUNCTIONS.contains(&name.text.as_str()) => {
+                self.unknown_function(name, &AGGREGATES);
+                return None;
+            }
+            _ => {
+                self.no_aggregate(expression);
+                return None;
+            }
+        };
+        let [argument] = arguments.as_slice() else {
+            if matches!(name.text.as_str(), "min" | "max") && arguments.len() > 1 {
+                self.no_aggregate(expression);
+                return None;
+            }
+            let title = format!("`{}(…)` takes one value, not {}", name.text, arguments.len());
+            let label = "what it is of stands between its parentheses";
+            self.report(Diagnostic::new(Code::NOT_A_FORMULA, expression.span, title).label(label));
+            return None;
+        };
+        Some(match name.text.as_str() {
+            "count" => (Aggregate::Count(self.condition(inputs, argument)?), None),
+            "duration" => (Aggregate::Duration(self.condition(inputs, argument)?), Some(Unit::seconds())),
+            word => {
+                let (value, unit) = self.number(inputs, argument)?;
+                let aggregate = match word {
+                    "min" => Aggregate::Min(value),
+                    "max" => Aggregate::Max(value),
+                    "mean" => Aggregate::Mean(value),
+                    _ => Aggregate::Last(value),
+                };
+                (aggregate, unit)
+            }
+        })
+    }
+
+    fn no_aggregate(&mut self, expression: &'a ast::Expression) {
+        let span = expression.span;
+        let condition = self.is_condition(expression);
+        let word = if condition { "count" } else { "last" };
+        let title = format!("`{}` changes during a test, and a metric is one number", self.text(span));
+        let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, span, title).label(if condition {
+            "how often did it hold, or how long?"
+        } else {
+            "its last value, its least, its greatest, its mean?"
+        });
+        diagnostic.suggestions.push(Suggestion {
+            message: format!("take {}", if condition { "the number of messages" } else { "the last value" }),
+            edits: vec![(Span { hi: span.lo, ..span }, format!("{word}(")), (span.end(), ")".to_owned())],
+        });
+        self.report(diagnostic);
+    }
+
+    fn every(&mut self, word: Span, every: &ast::Quantity, aggregate: &Aggregate) -> Option<f64> {
+        let seconds = self.value(every, Some(&Unit::seconds()), "`every`")?;
+        let name = match aggregate {
+            Aggregate::Min(_) => "min",
+            Aggregate::Max(_) => "max",
+            Aggregate::Duration(_) => "duration",
+            Aggregate::Last(_) | Aggregate::Mean(_) | Aggregate::Count(_) => {
+                if seconds <= 0.0 {
+                    let title = format!("`every {}` is no limit", self.text(every.span));
+                    self.report(Diagnostic::new(Code::OUT_OF_RANGE, every.span, title).label("expected more than 0s"));
+                    return None;
+                }
+                return Some(seconds);
+            }
+        };
+        let diagnostic =
+            Diagnostic::new(Code::IDLE_CLAUSE, word.to(every.span), format!("`every` limits no `{name}(…)`"))
+                .label("leave it out")
+                .note("only `count`, `mean`, `last` and `when … then …` depend on how often messages come");
+        self.report(diagnostic);
+        None
+    }
+
+    fn per(&mut self, path: &'a Path, inputs: &[Input]) -> Option<FieldPath> {
+        let (field, ty) = self.field(path)?;
+        if !matches!(ty, Type::Text | Type::Int(_)) {
+            let title = format!("`{}` tells nothing apart", self.text(path.span));
+            let label = format!("expected a text or a whole number, not {}", super::system::type_in_words(&ty));
+            self.report(Diagnostic::new(Code::WRONG_TYPE, path.span, title).label(label));
+            return None;
+        }
+        if !inputs.iter().any(|input| input.field.topic == field.topic) {
+            let title = format!("the formula does not hear `{}`", path.topic.text);
+            let diagnostic = Diagnostic::new(Code::IDLE_CLAUSE, path.span, title)
+                .label("expected a field of a topic that stands in the formula");
+            self.report(diagnostic);
+            return None;
+        }
+        Some(field)
+    }
+
+    // ----- numbers
+
+    fn number(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<Number> {
+        match &expression.kind {
+            ExpressionKind::Number(quantity) => {
+                let unit = self.unit_in_formula(quantity)?;
+                (!quantity.value.is_nan()).then_some((Expression::Constant(quantity.value), unit))
+            }
+            ExpressionKind::Field(path) => self.numeric_input(inputs, path, None),
+            ExpressionKind::Members(members, word, path) => self.numeric_input(inputs, path, Some((*members, *word))),
+            ExpressionKind::Negate(of) => {
+                let (of, unit) = self.number(inputs, of)?;
+                Some((Expression::Negate(Box::new(of)), unit))
+            }
+            ExpressionKind::Sum(terms) => {
+                let parts: Vec<&ast::Expression> = terms.iter().map(|(_, term)| term).collect();
+                let (parts, unit) = self.common(inputs, &parts)?;
+                let terms = terms.iter().zip(parts);
+                let terms =
+                    terms.map(|((minus, _), part)| if *minus { Expression::Negate(Box::new(part)) } else { part });
+                Some((Expression::Sum(terms.collect()), unit))
+            }
+            ExpressionKind::Product(factors) => self.product(inputs, factors),
+            ExpressionKind::Call(name, arguments) => self.call(inputs, expression, name, arguments),
+            ExpressionKind::Truth(_)
+            | ExpressionKind::Compare(..)
+            | ExpressionKind::All(_)
+            | ExpressionKind::Any(_) => {
+                let title = format!("`{}` holds or does not, but a number is needed", self.text(expression.span));
+                self.report(Diagnostic::new(Code::WRONG_TYPE, expression.span, title).label("expected a number"));
+                None
+            }
+        }
+    }
+
+    /// The unit of a number inside of a formula, where `2rad*link0` is a likely slip.
+    #[expect(clippy::option_option, reason = "the outer says whether it was in order, the inner is the number's")]
+    fn unit_in_formula(&mut self, quantity: &ast::Quantity) -> Option<Option<Unit>> {
+        let Some(name) = &quantity.unit else { return Some(None) };
+        let unit = self.unit(name);
+        if unit.is_none()
+            && name.text.contains(['*', '/'])
+            && let Some(diagnostic) = self.diagnostics.last_mut()
+        {
+            diagnostic.notes.push("to calculate, put a blank before `*` and `/`".to_owned());
+        }
+        Some(Some(unit?))
+    }
+
+    fn numeric_input(
+        &mut self,
+        inputs: &mut Vec<Input>,
+        path: &'a Path,
+        members: Option<(ast::Members, Span)>,
+    ) -> Option<Number> {
+        let (field, unit, _) = self.number_field(path, "a formula")?;
+        let at = self.input(inputs, path, field, members)?;
+        Some((Expression::Input(at), unit))
+    }
+
+    /// The position of an input, which is added if it is new.
+    fn input(
+        &mut self,
+        inputs: &mut Vec<Input>,
+        path: &'a Path,
+        field: FieldPath,
+        members: Option<(ast::Members, Span)>,
+    ) -> Option<usize> {
+        if let Some((_, word)) = members
+            && self.members_of(&field) == 1
+        {
+            let title = format!("`{}` is one topic, not a group", path.topic.text);
+            let span = word.to(path.span);
+            let diagnostic = Diagnostic::new(Code::IDLE_CLAUSE, span, title)
+                .label(format!("`{} of` chooses among the members of a group", self.text(word)));
+            self.report(diagnostic.suggest("leave it out", Span { hi: path.span.lo, ..word }, ""));
+            return None;
+        }
+        let members = match members {
+            None => Members::Min,
+            Some((ast::Members::Max, _)) => Members::Max,
+            Some((ast::Members::Sum, _)) => Members::Sum,
+            Some((ast::Members::Each, _)) => Members::Each,
+        };
+        let input = Input { field, members };
+        Some(inputs.iter().position(|known| *known == input).unwrap_or_else(|| {
+            inputs.push(input);
+            inputs.len() - 1
+        }))
+    }
+
+    fn product(&mut self, inputs: &mut Vec<Input>, factors: &'a [(bool, ast::Expression)]) -> Option<Number> {
+        // All are looked at, so that a mistake in one does not hide one in another.
+        let numbers: Vec<_> = factors.iter().map(|(_, factor)| self.number(inputs, factor)).collect();
+        let mut whole: Option<Number> = None;
+        for ((divides, factor), number) in factors.iter().zip(numbers) {
+            let (number, unit) = number?;
+            let Some((left, left_unit)) = whole.take() else {
+                whole = Some((number, unit));
+                continue;
+            };
+            let Some((unit, scale)) = product(left_unit.as_ref(), unit.as_ref(), *divides) else {
+                let title = "the unit of this product is too large or too small";
+                let label = "its scale cannot be represented";
+                self.report(Diagnostic::new(Code::UNKNOWN_UNIT, factor.span, title).label(label));
+                return None;
+            };
+            let value = match (left, *divides) {
+                (left, true) => Expression::Divide(Box::new(left), Box::new(number)),
+                (Expression::Product(mut before), false) => {
+                    before.push(number);
+                    Expression::Product(before)
+                }
+                (left, false) => Expression::Product(vec![left, number]),
+            };
+            whole = Some((scaled(value, scale), unit));
+        }
+        whole
+    }
+
+    /// Numbers that are added, compared or chosen from, all in one unit: that of the first that is no constant.
+    fn common(
+        &mut self,
+        inputs: &mut Vec<Input>,
+        parts: &[&'a ast::Expression],
+    ) -> Option<(Vec<Expression>, Option<Unit>)> {
+        let literal = |part: &&'a ast::Expression| match &part.kind {
+            ExpressionKind::Number(quantity) => Some(quantity),
+            _ => None,
+        };
+        let leading = parts.iter().position(|part| literal(part).is_none()).unwrap_or(0);
+        let first = self.number(inputs, parts[leading]);
+        let Some((first, unit)) = first else {
+            // The others may hold mistakes of their own.
+            for (_, part) in parts.iter().enumerate().filter(|(at, part)| *at != leading && literal(part).is_none()) {
+                self.number(inputs, part);
+            }
+            return None;
+        };
+        let name = format!("`{}`", self.text(parts[leading].span));
+        let mut first = Some(first);
+        let mut numbers = Vec::with_capacity(parts.len());
+        for (at, part) in parts.iter().enumerate() {
+            let number = if at == leading {
+                first.take()
+            } else if let Some(quantity) = literal(part) {
+                self.value(quantity, unit.as_ref(), &name).map(Expression::Constant)
+            } else {
+                self.converted(inputs, part, unit.as_ref(), &name)
+            };
+            numbers.push(number);
+        }
+        Some((numbers.into_iter().collect::<Option<_>>()?, unit))
+    }
+
+    fn converted(
+        &mut self,
+        inputs: &mut Vec<Input>,
+        part: &'a ast::Expression,
+        unit: Option<&Unit>,
+        name: &str,
+    ) -> Option<Expression> {
+        let (number, own) = self.number(inputs, part)?;
+        let [found, wanted] = [dimension(own.as_ref()), dimension(unit)];
+        if found == wanted {
+            return Some(scaled(number, convert(1.0, own.as_ref(), unit)));
+        }
+        let title = format!("`{}` is {}, but {name} is {}", self.text(part.span), found.name(), wanted.name());
+        let label = format!("expected {}", wanted.name());
+        self.report(Diagnostic::new(Code::WRONG_UNIT, part.span, title).label(label));
+        None
+    }
+
+    fn call(
+        &mut self,
+        inputs: &mut Vec<Input>,
+        call: &'a ast::Expression,
+        name: &'a Name,
+        arguments: &'a [ast::Expression],
+    ) -> Option<Number> {
+        let all: Vec<&ast::Expression> = arguments.iter().collect();
+        let takes = match (name.text.as_str(), arguments) {
+            ("abs", [of]) => {
+                let (of, unit) = self.number(inputs, of)?;
+                return Some((Expression::Absolute(Box::new(of)), unit));
+            }
+            ("distance", [from, to]) => return self.distance(inputs, from, to),
+            ("min", [_, _, ..]) => {
+                return self.common(inputs, &all).map(|(of, unit)| (Expression::Min(of), unit));
+            }
+            ("max", [_, _, ..]) => {
+                return self.common(inputs, &all).map(|(of, unit)| (Expression::Max(of), unit));
+            }
+            ("abs", _) => "one value",
+            ("distance", _) => "two points",
+            ("min" | "max", [_]) | ("last" | "mean" | "count" | "duration", _) => {
+                let title = format!("`{}(…)` over time cannot stand inside a formula", name.text);
+                let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, call.span, title)
+                    .label("it begins a formula, or is none")
+                    .note("inside of a formula, the name of a topic is its last value");
+                if name.text == "min" || name.text == "max" {
+                    diagnostic = diagnostic.note(format!("of several values it is `{}(a, b)`", name.text));
+                }
+                self.report(diagnostic);
+                return None;
+            }
+            ("min" | "max", _) => "two values or more",
+            _ => {
+                self.unknown_function(name, &FUNCTIONS);
+                return None;
+            }
+        };
+        let title = format!("`{}(…)` takes {takes}, not {}", name.text, arguments.len());
+        self.report(Diagnostic::new(Code::NOT_A_FORMULA, call.span, title).label(format!("expected {takes}")));
+        None
+    }
+
+    fn unknown_function(&mut self, name: &Name, known: &[&'static str]) {
+        let title = format!("no function named `{}`", name.text);
+        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("not a function");
+        diagnostic = match most_similar(&name.text, known.iter().copied()) {
+            Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
+            None => diagnostic.note(format!("there are {}", super::list(known))),
+        };
+        self.report(diagnostic);
+    }
+
+    fn distance(
+        &mut self,
+        inputs: &mut Vec<Input>,
+        from: &'a ast::Expression,
+        to: &'a ast::Expression,
+    ) -> Option<Number> {
+        let from_point = self.point(inputs, from);
+        let (to_at, to_unit) = self.point(inputs, to)?;
+        let (from_at, unit) = from_point?;
+        let [found, wanted] = [dimension(to_unit.as_ref()), dimension(unit.as_ref())];
+        if found != wanted {
+            let [from_name, to_name] = [from, to].map(|side| self.text(side.span));
+            let title = format!("`{to_name}` is {}, but `{from_name}` is {}", found.name(), wanted.name());
+            let label = format!("expected {}", wanted.name());
+            self.report(Diagnostic::new(Code::WRONG_UNIT, to.span, title).label(label));
+            return None;
+        }
+        Some((Expression::Distance(from_at, to_at, convert(1.0, to_unit.as_ref(), unit.as_ref())), unit))
+    }
+
+    fn point(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<(usize, Option<Unit>)> {
+        let (path, members) = match &expression.kind {
+            ExpressionKind::Field(path) => (path, None),
+            ExpressionKind::Members(members, word, path) => (path, Some((*members, *word))),
+            _ => {
+                let title = format!("`{}` is no point", self.text(expression.span));
+                let diagnostic = Diagnostic::new(Code::WRONG_TYPE, expression.span, title);
+                self.report(diagnostic.label("expected a topic or field of type `point`"));
+                return None;
+            }
+        };
+        let (field, ty) = self.field(path)?;
+        let Type::Point(unit) = ty else {
+            let title = format!("`{}` is no point", self.text(path.span));
+            let label = format!("it is {}", super::system::type_in_words(&ty));
+            self.report(Diagnostic::new(Code::WRONG_TYPE, path.span, title).label(label));
+            return None;
+        };
+        if self.members_of(&field) > 1 && !matches!(members, Some((ast::Members::Each, _))) {
+            let title = format!("`{}` is a group, and no point of several is the least", path.topic.text);
+            let diagnostic = Diagnostic::new(Code::WRONG_TYPE, expression.span, title)
+                .label("expected one point")
+                .suggest("take each of them", expression.span, format!("each of {}", self.text(path.span)));
+            self.report(diagnostic);
+            return None;
+        }
+        Some((self.input(inputs, path, field, members)?, unit))
+    }
+
+    // ----- conditions
+
+    fn condition(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<Condition> {
+        match &expression.kind {
+            ExpressionKind::Truth(value) => Some(Condition::Constant(*value)),
+            ExpressionKind::All(parts) => self.conditions(inputs, parts).map(Condition::All),
+            ExpressionKind::Any(parts) => self.conditions(inputs, parts).map(Condition::Any),
+            ExpressionKind::Compare(left, comparison, right) => {
+                if matches!(comparison, ast::Comparison::Equal) && self.is_condition(left) && self.is_condition(right) {
+                    let left = self.condition(inputs, left);
+                    let right = self.condition(inputs, right);
+                    return Some(Condition::Same(Box::new(left?), Box::new(right?)));
+                }
+                let (sides, _) = self.common(inputs, &[left, right])?;
+                let [left, right] = <[Expression; 2]>::try_from(sides).expect("two parts give two numbers");
+                let comparison = match comparison {
+                    ast::Comparison::AtMost => Comparison::AtMost,
+                    ast::Comparison::Below => Comparison::Below,
+                    ast::Comparison::AtLeast => Comparison::AtLeast,
+                    ast::Comparison::Above => Comparison::Above,
+                    ast::Comparison::Equal => Comparison::Equal,
+                };
+                Some(Condition::Compare(left, comparison, right))
+            }
+            ExpressionKind::Field(path) if self.is_condition(expression) => {
+                let (field, _) = self.field(path)?;
+                self.input(inputs, path, field, None).map(Condition::Input)
+            }
+            ExpressionKind::Members(members, word, path) if self.is_condition(expression) => {
+                let (field, _) = self.field(path)?;
+                if matches!(members, ast::Members::Sum) {
+                    let title = format!("`{}` is true or false, which have no sum", self.text(path.span));
+                    let label = "expected a number after `sum of`";
+                    self.report(Diagnostic::new(Code::WRONG_TYPE, expression.span, title).label(label));
+                    return None;
+                }
+                self.input(inputs, path, field, Some((*members, *word))).map(Condition::Input)
+            }
+            _ => {
+                // What is wrong with the number itself comes first.
+                let before = self.diagnostics.len();
+                self.number(inputs, expression);
+                if self.diagnostics.len() == before {
+                    let title = format!("`{}` is a number, but a condition is needed", self.text(expression.span));
+                    let diagnostic = Diagnostic::new(Code::WRONG_TYPE, expression.span, title);
+                    self.report(diagnostic.label("expected a comparison such as `link0 > 2.5rad`"));
+                }
+                None
+            }
+        }
+    }
+
+    fn conditions(&mut self, inputs: &mut Vec<Input>, parts: &'a [ast::Expression]) -> Option<Vec<Condition>> {
+        let conditions: Vec<_> = parts.iter().map(|part| self.condition(inputs, part)).collect();
+        conditions.into_iter().collect()
+    }
+
+    /// Whether an expression holds or does not, rather than being a number. Reports nothing.
+    fn is_condition(&self, expression: &ast::Expression) -> bool {
+        match &expression.kind {
+            ExpressionKind::Truth(_)
+            | ExpressionKind::Compare(..)
+            | ExpressionKind::All(_)
+            | ExpressionKind::Any(_) => true,
+            ExpressionKind::Field(path) | ExpressionKind::Members(_, _, path) => {
+                self.type_at(path).is_some_and(|ty| *ty == Type::Bool)
+            }
+            _ => false,
+        }
+    }
+
+    fn type_at(&self, path: &Path) -> Option<&Type> {
+        let definition = self.names.get(path.topic.text.as_str()).filter(|found| found.kind == Kind::Topic)?;
+        let topic = self.system.topics.get(definition.index)?.as_ref()?;
+        path.fields.iter().try_fold(&topic.ty, |ty, name| {
+            let Type::Message(id) = ty else { return None };
+            let message = self.system.messages.get(id.index())?.as_ref()?;
+            message.fields.iter().find(|field| field.declaration.name == name.text).map(|field| &field.ty)
+        })
+    }
+}
+
+/// A number times a constant, unless that is one.
+fn scaled(value: Expression, scale: f64) -> Expression {
+    match value {
+        value if scale == 1.0 => value,
+        Expression::Constant(constant) => Expression::Constant(constant * scale),
+        value => Expression::Product(vec![value, Expression::Constant(scale)]),
+    }
+}
+
+fn depth(aggregate: &Aggregate) -> usize {
+    match aggregate {
+        Aggregate::Last(value) | Aggregate::Min(value) | Aggregate::Max(value) | Aggregate::Mean(value) => {
+            value.depth()
+        }
+        Aggregate::Count(condition) | Aggregate::Duration(condition) => condition.depth(),
+    }
+}

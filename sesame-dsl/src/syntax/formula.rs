@@ -1,0 +1,130 @@
+//! Formulas of metrics: from the grammar's pairs to flat chains.
+
+use sesame_grammar::Rule;
+
+use super::ast::{Expression, ExpressionKind, Formula, FormulaKind, Members, Name};
+use super::parse::{Pair, Reader, child, children, comparison, expect_child};
+
+impl Reader<'_> {
+    pub(super) fn formula(&mut self, pair: &Pair<'_>) -> Formula {
+        let kind = match child(pair, Rule::when_then) {
+            Some(when_then) => {
+                let mut parts = children(&when_then, Rule::expression).map(|part| self.expression(&part));
+                let condition = parts.next().expect("`when` has a condition");
+                FormulaKind::WhenThen(condition, parts.next().expect("`then` has a value"))
+            }
+            None => FormulaKind::Plain(self.expression(&expect_child(pair, Rule::expression))),
+        };
+        let when = children(pair, Rule::formula_when)
+            .map(|when| (self.keyword_span(&when), self.expression(&expect_child(&when, Rule::expression))))
+            .collect();
+        let every = children(pair, Rule::formula_every)
+            .map(|every| (self.keyword_span(&every), self.signed(&expect_child(&every, Rule::signed))))
+            .collect();
+        let per = children(pair, Rule::formula_per)
+            .map(|per| (self.keyword_span(&per), self.path(&expect_child(&per, Rule::path))))
+            .collect();
+        let outbound = children(pair, Rule::formula_outbound).map(|outbound| self.span(&outbound)).collect();
+        Formula { kind, when, every, per, outbound }
+    }
+
+    fn expression(&mut self, pair: &Pair<'_>) -> Expression {
+        self.joined(pair, Rule::conjunction, Self::conjunction, ExpressionKind::Any)
+    }
+
+    fn conjunction(&mut self, pair: &Pair<'_>) -> Expression {
+        self.joined(pair, Rule::relation, Self::relation, ExpressionKind::All)
+    }
+
+    fn joined(
+        &mut self,
+        pair: &Pair<'_>,
+        rule: Rule,
+        read: fn(&mut Self, &Pair<'_>) -> Expression,
+        join: fn(Vec<Expression>) -> ExpressionKind,
+    ) -> Expression {
+        let mut parts: Vec<Expression> = children(pair, rule).map(|part| read(self, &part)).collect();
+        if parts.len() == 1 {
+            return parts.remove(0);
+        }
+        Expression { kind: join(parts), span: self.span(pair) }
+    }
+
+    fn relation(&mut self, pair: &Pair<'_>) -> Expression {
+        let mut sides: Vec<Expression> =
+            children(pair, Rule::sum).map(|side| self.chain(&side, Rule::product, Rule::minus)).collect();
+        let right = sides.pop().expect("a relation has a side");
+        match (sides.pop(), comparison(pair)) {
+            (Some(left), Some(comparison)) => Expression {
+                kind: ExpressionKind::Compare(Box::new(left), comparison, Box::new(right)),
+                span: self.span(pair),
+            },
+            _ => right,
+        }
+    }
+
+    /// A sum of products or a product of factors; `inverse` is the sign before what is subtracted or divides.
+    fn chain(&mut self, pair: &Pair<'_>, link: Rule, inverse: Rule) -> Expression {
+        let mut links = Vec::new();
+        let mut inverted = false;
+        for part in pair.clone().into_inner() {
+            if part.as_rule() == link {
+                let read = match link {
+                    Rule::product => self.chain(&part, Rule::factor, Rule::over),
+                    _ => self.factor(&part),
+                };
+                links.push((inverted, read));
+            } else if part.as_rule() != Rule::COMMENT {
+                inverted = part.as_rule() == inverse;
+            }
+        }
+        if links.len() == 1 {
+            return links.remove(0).1;
+        }
+        let kind = if link == Rule::product { ExpressionKind::Sum(links) } else { ExpressionKind::Product(links) };
+        Expression { kind, span: self.span(pair) }
+    }
+
+    fn factor(&mut self, pair: &Pair<'_>) -> Expression {
+        let span = self.span(pair);
+        let negative = children(pair, Rule::minus).count() % 2 == 1;
+        let operand = pair
+            .clone()
+            .into_inner()
+            .find(|it| !matches!(it.as_rule(), Rule::minus | Rule::paren_open | Rule::COMMENT))
+            .expect("a factor has an operand");
+        let kind = match operand.as_rule() {
+            Rule::quantity => ExpressionKind::Number(self.quantity(&operand)),
+            Rule::truth => ExpressionKind::Truth(child(&operand, Rule::k_true).is_some()),
+            Rule::members => {
+                let word = operand.clone().into_inner().next().expect("a choice of members begins with its word");
+                let members = match word.as_rule() {
+                    Rule::k_max => Members::Max,
+                    Rule::k_sum => Members::Sum,
+                    _ => Members::Each,
+                };
+                ExpressionKind::Members(members, self.span(&word), self.path(&expect_child(&operand, Rule::path)))
+            }
+            Rule::call => {
+                let function = expect_child(&operand, Rule::function);
+                let name = Name { text: function.as_str().to_owned(), span: self.span(&function) };
+                let arguments = children(&operand, Rule::expression).map(|it| self.expression(&it)).collect();
+                ExpressionKind::Call(name, arguments)
+            }
+            Rule::path => ExpressionKind::Field(self.path(&operand)),
+            _ => self.expression(&operand).kind,
+        };
+        if !negative {
+            return Expression { kind, span };
+        }
+        // A sign before a number is part of it, as everywhere in the language.
+        match kind {
+            ExpressionKind::Number(mut quantity) => {
+                quantity.value = if quantity.value == 0.0 { 0.0 } else { -quantity.value };
+                quantity.span = span;
+                Expression { kind: ExpressionKind::Number(quantity), span }
+            }
+            kind => Expression { kind: ExpressionKind::Negate(Box::new(Expression { kind, span })), span },
+        }
+    }
+}
