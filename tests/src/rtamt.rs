@@ -1,5 +1,6 @@
 //! The Python package rtamt, whose robustness of signal temporal logic ours is compared with.
 
+use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
@@ -41,7 +42,7 @@ pub fn answers(cases: &[Case]) -> Option<Vec<Answer>> {
     let mut asked = String::new();
     for Case { formula, x, y } in cases {
         // Both print finite numbers so that reading gives the very same ones.
-        asked.push_str(&format!("{{\"formula\": {formula:?}, \"x\": {x:?}, \"y\": {y:?}}}\n"));
+        writeln!(asked, "{{\"formula\": {formula:?}, \"x\": {x:?}, \"y\": {y:?}}}").expect("a String takes all text");
     }
     let mut input = child.stdin.take().expect("it is piped");
     let asking = std::thread::spawn(move || input.write_all(asked.as_bytes()));

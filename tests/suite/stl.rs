@@ -68,7 +68,7 @@ fn words(formula: &Formula, samples: usize) -> String {
     let of = |formula: &Formula| words(formula, samples);
     let interval = |interval: &Interval| match (interval.from, interval.to) {
         (0.0, None) => String::new(),
-        (from, None) => format!("[{from}:{}]", samples.max(from as usize)),
+        (from, None) => format!("[{from}:{}]", (samples as f64).max(from)),
         (from, Some(to)) => format!("[{from}:{to}]"),
     };
     match formula {

@@ -195,7 +195,7 @@ proptest! {
             (a, b) => a == b,
         };
         let get = |aggregate| value(formula(inputs(), aggregate), &stream);
-        prop_assert_eq!(get(Aggregate::Last { of: difference() }), values().last());
+        prop_assert_eq!(get(Aggregate::Last { of: difference() }), values().next_back());
         prop_assert_eq!(get(Aggregate::Min { of: difference() }), values().reduce(f64::min));
         prop_assert_eq!(get(Aggregate::Max { of: difference() }), values().reduce(f64::max));
         let mean = (!seen.is_empty()).then(|| values().sum::<f64>() / seen.len() as f64);

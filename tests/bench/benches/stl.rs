@@ -13,13 +13,13 @@ use sesame_tests::rtamt::{Case, answers};
 
 const WINDOWS: [u32; 4] = [20, 200, 2_000, 20_000];
 
-fn above(signal: u32) -> Box<Formula> {
-    Box::new(Formula::Predicate { signal, comparison: Comparison::Above, constant: 0.0 })
+fn above(signal: u32) -> Formula {
+    Formula::Predicate { signal, comparison: Comparison::Above, constant: 0.0 }
 }
 
 /// Two signals of uniform noise, one sample each per second.
 fn noise(samples: u32) -> Case {
-    let mut stream = Stream::new(1, &[]);
+    let mut stream = Stream::derive(1, "noise", &[]);
     let mut signal = || (0..samples).map(|_| stream.uniform(-1.0, 1.0)).collect();
     Case { formula: String::new(), x: signal(), y: signal() }
 }
@@ -34,20 +34,20 @@ fn formulas(window: u32) -> [(&'static str, Formula, String, bool); 3] {
             "always",
             Formula::Eventually {
                 interval: Interval::UNBOUNDED,
-                of: Box::new(Formula::Always { interval, of: above(0) }),
+                of: Box::new(Formula::Always { interval, of: Box::new(above(0)) }),
             },
             format!("eventually (always[0:{window}] (x > 0))"),
             true,
         ),
         (
             "eventually",
-            throughout(Formula::Eventually { interval, of: above(0) }),
+            throughout(Formula::Eventually { interval, of: Box::new(above(0)) }),
             format!("always (eventually[0:{window}] (x > 0))"),
             true,
         ),
         (
             "until",
-            throughout(Formula::Until { interval, left: above(0), right: above(1) }),
+            throughout(Formula::Until { interval, left: Box::new(above(0)), right: Box::new(above(1)) }),
             format!("always ((x > 0) until[0:{window}] ((x > 0) and (y > 0)))"),
             window <= 200,
         ),
@@ -94,7 +94,7 @@ fn beside_rtamt(_: &mut Criterion) {
     println!("|---|---:|---:|---:|---:|---:|");
     for window in WINDOWS {
         for (name, formula, words, feasible) in formulas(window) {
-            // Twice the window at least, so that half of the windows are whole; rtamt's `until` would take minutes.
+            // Twice the window at least, so that half of the windows are whole.
             let samples = if name == "until" { 2 * window.max(500) } else { 2 * window.max(5_000) };
             let case = Case { formula: words, ..noise(samples) };
             if !feasible {
