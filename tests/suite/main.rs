@@ -1,6 +1,8 @@
 //! Behaviour across crates, as a user meets it.
 #![cfg(test)]
 
+mod commands;
+mod exported;
 mod faults;
 mod first_front;
 mod interruption;
