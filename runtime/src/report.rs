@@ -21,7 +21,7 @@ mod timeline;
 
 #[cfg(feature = "campaign")]
 pub(crate) use export::is_name;
-pub use export::{Exported, export};
+pub use export::{ExportError, Exported, export};
 pub use junit::{junit, write_junit};
 pub use page::{page, write_page};
 pub use repetition::{Repetition, ViolationRate};

@@ -135,6 +135,17 @@ impl Project {
         Project { space: example.join("kuka_cell.sesame"), runners, folder }
     }
 
+    /// The example's cell with this written below its space, in a file of the project's own.
+    pub fn kuka_cell_with(name: &str, more: &str) -> Project {
+        let project = Project::kuka_cell(name);
+        let text = fs::read_to_string(&project.space).expect("the example can be read");
+        let simulator = format!("crate \"{}\"", workspace().join("examples/kuka_cell/simulator").display());
+        let space = project.folder.join("kuka_cell.sesame");
+        let text = text.replace("crate \"simulator\"", &simulator);
+        fs::write(&space, format!("{text}\n{more}")).expect("a space can be written");
+        Project { space, ..project }
+    }
+
     /// A space of these words, with a simulator out of `tests/simulators`.
     pub fn new(name: &str, space: &str, simulator: &str) -> Project {
         let folder = fresh_folder(name);

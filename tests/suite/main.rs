@@ -1,7 +1,9 @@
 //! Behaviour across crates, as a user meets it.
 #![cfg(test)]
 
+mod commands;
 mod declarative;
+mod exported;
 mod faults;
 mod first_front;
 mod interruption;

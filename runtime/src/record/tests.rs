@@ -208,6 +208,19 @@ fn a_taken_folder_gets_the_next_number_and_an_unfinished_one_is_named() {
 }
 
 #[test]
+fn the_latest_run_is_one_of_the_campaign_not_what_was_run_on_the_side() {
+    let results = folder();
+    assert_eq!(latest_folder(results.path()).unwrap(), None);
+    let run = claim_folder(results.path(), "42").unwrap().folder;
+    commit_all(&run, &[]).finish("done").unwrap();
+    for aside in ["known", "repeat-T5"] {
+        let folder = claim_folder(results.path(), aside).unwrap().folder;
+        commit_all(&folder, &[]).finish("done").unwrap();
+    }
+    assert_eq!(latest_folder(results.path()).unwrap(), Some(run));
+}
+
+#[test]
 fn the_views_answer_in_the_names_of_the_space() {
     let folder = folder();
     let plan = sample::plan();

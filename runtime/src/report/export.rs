@@ -22,12 +22,27 @@ pub struct Exported {
     pub block: String,
 }
 
+/// Why a test cannot be written in the language.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// It disturbs nothing, and a `test` block disturbs something.
+    #[error("T{0} disturbs nothing, so there is no `test` to write; every run of a campaign begins with it")]
+    Undisturbed(u32),
+}
+
 /// The test that a user calls `T158`, `158`, or by the name of a known test, as a block of the language.
 ///
 /// The block has a `name` of its own, by default one that the space does not use yet. It expects of each objective the
 /// value that was measured; in a campaign without objectives, of each metric that a requirement bounds.
-pub fn export(repository: &Repository, test: &str, name: Option<&str>) -> Result<Exported, RecordError> {
+pub fn export(repository: &Repository, test: &str, name: Option<&str>) -> Result<Exported, ExportError> {
     let record = repository.test(repository.find(test)?)?;
+    if record.test.operations.is_empty() {
+        return Err(ExportError::Undisturbed(record.number));
+    }
     let plan = repository.plan();
     let name = name.map_or_else(|| free_name(plan, record.number), str::to_owned);
     let block = block(plan, repository.campaign().seed, &record, &name);
@@ -161,6 +176,8 @@ mod tests {
         insta::assert_snapshot!(blocks.join("\n"));
         let named = export(&repository, "T9", Some("worst")).unwrap();
         assert!(named.block.contains("\ntest worst {\n"), "{}", named.block);
+        let refused = export(&repository, "reference", None).unwrap_err();
+        assert!(refused.to_string().starts_with("T0 disturbs nothing"), "{refused}");
     }
 
     #[test]

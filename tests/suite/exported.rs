@@ -1,0 +1,161 @@
+//! A test that was found, written as a block of the language and read back, is the same test bit for bit.
+
+use proptest::prelude::*;
+use sesame_dsl::analyse;
+use sesame_dsl::source::SourceMap;
+use sesame_plan::{Activation, Bound, CampaignPlan, Choice, OperationId, Test, TestOperation};
+use sesame_runtime::observation::{MetricObservation, Observation, Outcome, WallTime};
+use sesame_runtime::record::{Origin, Recorder, TestRecord};
+use sesame_runtime::report::export;
+use sesame_runtime::search;
+
+/// Every kind of parameter in units that are awkward to write.
+const SPACE: &str = r#"
+    space cell
+    system {
+      simulator sim = in_process "cell_sim::Cell" { crate "simulator"  step 20ms }
+      message Zone { level: real[mm]  share: real[%] }
+      topic link = "link" : real[deg]
+      topic speed = "speed" : real[km/h]
+      topic count = "count" : int
+      topic plain = "plain" : real
+      topic zone = "zone" : Zone
+    }
+    metric collisions maximise default 0 { hook on zone }
+    metric distance: real[mm] minimise { hook on zone }
+    metric share minimise = last(zone.share)
+    metric fastest maximise = last(speed)
+    metric time minimise = fuzzing_time()
+    operation swing on link = random offset [-0.3rad, 0.3rad] within [0s, 65s]
+    operation rush on speed = random absolute [-1m/s, 30m/s]
+    operation recount on count = random absolute [-3, 4000000000]
+    operation shift on plain = random offset [-1e-12, 1e30]
+    operation level on zone.level = random absolute [0m, 1m] within [1ms, 1min]
+    operation fill on zone.share = random absolute [0%, 12.3%]
+    operation lose on link = packet loss [0%, 100%]
+    operation lose_some on speed = packet loss [1.7%, 12.3%]
+    operation lag on link = latency [0ms, 500ms]
+    operation wobble on speed = latency [0ms, 500ms] uniform
+    operation cut on plain = blackhole
+    campaign look {
+      objectives time, collisions, distance, share, fastest
+      operations swing, rush, recount, shift, level, fill, lose, lose_some, lag, wobble, cut   1..11 per test
+      activate by time
+      search random { evaluations 100 }
+      end after 70s
+    }
+"#;
+
+/// The plan of the campaign in this text.
+fn plan(text: &str) -> CampaignPlan {
+    let mut sources = SourceMap::new();
+    let file = sources.add("cell.sesame", text);
+    let analysis = analyse(&sources, file);
+    let space = analysis.model.unwrap_or_else(|| panic!("{text}\n{:#?}", analysis.diagnostics));
+    sesame_codegen::lower::lower(&space, space.campaign("look").unwrap(), "cell.sesame", "sesamec").plan
+}
+
+/// Records tests, exports each, and reads it back below the space.
+fn check(plan: &CampaignPlan, tests: Vec<(Test, f64)>) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut recorder = Recorder::create(folder.path(), plan, 42, 1).unwrap();
+    let metric = |value| MetricObservation { value: Some(value), set: true, series: Vec::new() };
+    for (number, (test, value)) in (1..).zip(&tests) {
+        let observation = Observation {
+            outcome: Outcome::Completed,
+            end: 70.0,
+            operations: Vec::new(),
+            metrics: vec![metric(*value); plan.metrics.len()],
+            messages: 0,
+            warnings: Vec::new(),
+            wall: WallTime::default(),
+        };
+        let record = TestRecord {
+            number,
+            origin: Origin::Search,
+            generation: Some(0),
+            parents: Vec::new(),
+            test: test.clone(),
+            simulator_seed: 1,
+            duplicate_of: None,
+            observation,
+        };
+        recorder.commit(&record).unwrap();
+    }
+    let repository = recorder.finish("done").unwrap();
+    let blocks = (1..=tests.len()).map(|number| export(&repository, &format!("T{number}"), None).unwrap().block);
+    let again = self::plan(&format!("{SPACE}\n{}", blocks.collect::<String>()));
+    assert_eq!(again.tests.len(), tests.len());
+    for (known, (test, value)) in again.tests.iter().zip(&tests) {
+        assert_eq!(&known.test, test);
+        let expected: Vec<_> = known.expectations.iter().map(|expected| (expected.metric, expected.bound)).collect();
+        let objectives = plan.campaign.objectives.iter().map(|&id| (id, Bound::Equal { value: *value }));
+        assert_eq!(expected, objectives.collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn every_test_that_a_search_finds_reads_back_as_it_was() {
+    let plan = plan(SPACE);
+    for seed in 0..10 {
+        let mut strategy = search::strategy(&plan, seed).unwrap();
+        let asked = strategy.ask();
+        assert!(asked.len() >= 50);
+        let values = asked.iter().map(|candidate| candidate.test.operations[0].draw_seed as f64 / 1e13);
+        check(&plan, asked.iter().map(|candidate| candidate.test.clone()).zip(values).collect());
+    }
+}
+
+#[test]
+fn the_ends_of_what_is_permitted_read_back_as_they_are() {
+    let plan = plan(SPACE);
+    let at = |share: f64| {
+        let operations = (0u32..).map(OperationId).zip(&plan.operations).map(|(id, operation)| TestOperation {
+            operation: id,
+            activation: Activation::Time { start: operation.within.start, end: operation.within.end },
+            parameters: operation
+                .parameters
+                .iter()
+                .map(|parameter| {
+                    let end = if share == 0.0 { parameter.low } else { parameter.high };
+                    match parameter.shape {
+                        sesame_plan::Shape::Value => Choice::Value { value: end },
+                        sesame_plan::Shape::Range => Choice::Range { low: end, high: end },
+                    }
+                })
+                .collect(),
+            draw_seed: if share == 0.0 { 0 } else { u64::MAX },
+        });
+        Test { operations: operations.collect() }
+    };
+    check(&plan, vec![(at(0.0), f64::MAX), (at(1.0), f64::MIN_POSITIVE), (at(1.0), -5e-324)]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
+
+    #[test]
+    fn every_loss_delay_seed_and_value_reads_back_as_it_was(
+        rows in prop::collection::vec(
+            (0.0..=1.0f64, 0.0..=0.5f64, any::<u64>(), prop::num::f64::NORMAL | prop::num::f64::ZERO, 0.0..69.0f64),
+            20,
+        ),
+    ) {
+        let plan = plan(SPACE);
+        let id = |name: &str| {
+            let position = plan.operations.iter().position(|operation| operation.name == name).unwrap();
+            OperationId(u32::try_from(position).unwrap())
+        };
+        let tests = rows.into_iter().map(|(loss, delay, draw_seed, value, start)| {
+            let operation = |name: &str, choice: f64| TestOperation {
+                operation: id(name),
+                activation: Activation::Time { start, end: start.next_up() },
+                parameters: vec![Choice::Value { value: choice }],
+                draw_seed,
+            };
+            // SQLite keeps no sign of zero, and the language has none either.
+            (Test { operations: vec![operation("lose", loss), operation("lag", delay)] }, value + 0.0)
+        });
+        check(&plan, tests.collect());
+    }
+}
