@@ -56,11 +56,11 @@ fn plan(text: &str) -> CampaignPlan {
 }
 
 /// Records tests, exports each, and reads it back below the space.
-fn check(plan: &CampaignPlan, tests: Vec<(Test, f64)>) {
+fn check(plan: &CampaignPlan, tests: &[(Test, f64)]) {
     let folder = tempfile::tempdir().unwrap();
     let mut recorder = Recorder::create(folder.path(), plan, 42, 1).unwrap();
     let metric = |value| MetricObservation { value: Some(value), set: true, series: Vec::new() };
-    for (number, (test, value)) in (1..).zip(&tests) {
+    for (number, (test, value)) in (1..).zip(tests) {
         let observation = Observation {
             outcome: Outcome::Completed,
             end: 70.0,
@@ -86,7 +86,7 @@ fn check(plan: &CampaignPlan, tests: Vec<(Test, f64)>) {
     let blocks = (1..=tests.len()).map(|number| export(&repository, &format!("T{number}"), None).unwrap().block);
     let again = self::plan(&format!("{SPACE}\n{}", blocks.collect::<String>()));
     assert_eq!(again.tests.len(), tests.len());
-    for (known, (test, value)) in again.tests.iter().zip(&tests) {
+    for (known, (test, value)) in again.tests.iter().zip(tests) {
         assert_eq!(&known.test, test);
         let expected: Vec<_> = known.expectations.iter().map(|expected| (expected.metric, expected.bound)).collect();
         let objectives = plan.campaign.objectives.iter().map(|&id| (id, Bound::Equal { value: *value }));
@@ -102,7 +102,7 @@ fn every_test_that_a_search_finds_reads_back_as_it_was() {
         let asked = strategy.ask();
         assert!(asked.len() >= 50);
         let values = asked.iter().map(|candidate| candidate.test.operations[0].draw_seed as f64 / 1e13);
-        check(&plan, asked.iter().map(|candidate| candidate.test.clone()).zip(values).collect());
+        check(&plan, &asked.iter().map(|candidate| candidate.test.clone()).zip(values).collect::<Vec<_>>());
     }
 }
 
@@ -128,7 +128,7 @@ fn the_ends_of_what_is_permitted_read_back_as_they_are() {
         });
         Test { operations: operations.collect() }
     };
-    check(&plan, vec![(at(0.0), f64::MAX), (at(1.0), f64::MIN_POSITIVE), (at(1.0), -5e-324)]);
+    check(&plan, &[(at(0.0), f64::MAX), (at(1.0), f64::MIN_POSITIVE), (at(1.0), -5e-324)]);
 }
 
 proptest! {
@@ -156,6 +156,6 @@ proptest! {
             // SQLite keeps no sign of zero, and the language has none either.
             (Test { operations: vec![operation("lose", loss), operation("lag", delay)] }, value + 0.0)
         });
-        check(&plan, tests.collect());
+        check(&plan, &tests.collect::<Vec<_>>());
     }
 }
