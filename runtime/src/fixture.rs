@@ -60,6 +60,7 @@ pub(crate) fn plan(operations: Vec<Operation>) -> CampaignPlan {
             count: Count { min: 1, max: 5 },
             activation: ActivationMode::Time,
             search: Search::Random { evaluations: 1 },
+            coverage: None,
             seed: 1,
             end_after: 10.0,
         },

@@ -9,6 +9,7 @@ pub mod activation;
 pub mod campaign;
 #[cfg(feature = "campaign")]
 mod cli;
+pub mod coverage;
 pub mod evaluate;
 #[cfg(test)]
 mod fixture;
@@ -27,6 +28,7 @@ pub mod rng;
 mod runner;
 pub mod search;
 pub mod simulator;
+pub mod sspr;
 pub mod stl;
 pub mod time;
 pub mod transport;

@@ -24,7 +24,7 @@ mod random;
 mod repeat;
 
 #[cfg(test)]
-mod landscape;
+pub(crate) mod landscape;
 
 use sesame_plan::{CampaignPlan, Direction, KnownTestId, Search, Test};
 

@@ -8,11 +8,13 @@
 //! seconds of simulation time; every other quantity is in the unit its field, metric or topic declares (the unit on
 //! the wire), probabilities are in `0..=1`.
 
+mod coverage;
 mod formula;
 mod model;
 pub mod stl;
 mod test;
 
+pub use coverage::*;
 pub use formula::*;
 pub use model::*;
 pub use test::*;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Formula, KnownTest};
+use crate::{CoverageGoal, Formula, KnownTest};
 
 macro_rules! id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -494,6 +494,9 @@ pub struct Campaign {
     pub activation: ActivationMode,
     /// How tests are found.
     pub search: Search,
+    /// How coverage of the space is counted; `None` for a campaign that does not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coverage: Option<CoverageGoal>,
     /// The one seed that decides everything; `run --seed` overrides it.
     pub seed: u64,
     /// Simulation time at which a test ends, in seconds.

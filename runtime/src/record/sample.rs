@@ -117,6 +117,7 @@ pub(crate) fn plan() -> CampaignPlan {
             count: Count { min: 1, max: 5 },
             activation: ActivationMode::Time,
             search: Search::Nsga2 { population: 10, evaluations: 210 },
+            coverage: None,
             seed: 42,
             end_after: 70.0,
         },

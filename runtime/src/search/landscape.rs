@@ -122,6 +122,7 @@ impl Landscape {
                 count: Count { min: 1, max: 5 },
                 activation: ActivationMode::Time,
                 search,
+                coverage: None,
                 seed: 0,
                 end_after: 70.0,
             },

@@ -96,6 +96,7 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 count: Count { min: 1, max: 5 },
                 activation: ActivationMode::Time,
                 search: Search::Random { evaluations: 10 },
+                coverage: None,
                 seed: 42,
                 end_after: 70.0,
             },
