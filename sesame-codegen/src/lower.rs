@@ -124,14 +124,17 @@ impl Selection {
     }
 
     fn campaign(&self, space: &Space, campaign: &model::Campaign) -> plan::Campaign {
+        // A search that is to stop at a coverage goes on until then or until its failsafe.
+        let failsafe = campaign.coverage.as_ref().and_then(|coverage| coverage.failsafe);
+        let limit = |evaluations: u32| failsafe.unwrap_or(evaluations);
         let (search, operations, count) = match &campaign.search {
             model::Search::Nsga2 { content, population, evaluations } => (
-                plan::Search::Nsga2 { population: *population, evaluations: *evaluations },
+                plan::Search::Nsga2 { population: *population, evaluations: limit(*evaluations) },
                 &content.operations,
                 plan::Count { min: content.min, max: content.max },
             ),
             model::Search::Random { content, evaluations } => (
-                plan::Search::Random { evaluations: *evaluations },
+                plan::Search::Random { evaluations: limit(*evaluations) },
                 &content.operations,
                 plan::Count { min: content.min, max: content.max },
             ),
@@ -154,6 +157,7 @@ impl Selection {
             // The language has no other activation yet, and a repeated test brings its own.
             activation: plan::ActivationMode::Time,
             search,
+            coverage: campaign.coverage.as_ref().map(coverage),
             seed: campaign.seed,
             end_after: campaign.end_after,
         }
@@ -290,6 +294,30 @@ fn operation(operation: &model::Operation, end_after: f64) -> plan::Operation {
     }
 }
 
+fn coverage(coverage: &model::Coverage) -> plan::CoverageGoal {
+    let axes = coverage.axes.iter().map(|axis| plan::GridAxis {
+        dimension: dimension(axis.dimension),
+        low: axis.range.low,
+        high: axis.range.high,
+        cells: axis.cells,
+    });
+    plan::CoverageGoal { axes: axes.collect(), hits: coverage.hits, stop_at: coverage.stop_at }
+}
+
+fn dimension(dimension: model::CoverageDimension) -> plan::Dimension {
+    match dimension {
+        model::CoverageDimension::T1 => plan::Dimension::T1,
+        model::CoverageDimension::T2 => plan::Dimension::T2,
+        model::CoverageDimension::T3 => plan::Dimension::T3,
+        model::CoverageDimension::P1 => plan::Dimension::P1,
+        model::CoverageDimension::P2 => plan::Dimension::P2,
+        model::CoverageDimension::O0 => plan::Dimension::O0,
+        model::CoverageDimension::O1 => plan::Dimension::O1,
+        model::CoverageDimension::O2 => plan::Dimension::O2,
+        model::CoverageDimension::O3 => plan::Dimension::O3,
+    }
+}
+
 /// The window of an operation; one without `within` may be active during the whole test.
 fn within(operation: &model::Operation, end_after: f64) -> plan::Span {
     match operation.within {
@@ -364,6 +392,10 @@ mod tests {
         test late { lose loss 25% from 20s to 21s }
         campaign look { objectives time, collisions  operations recount, swing 1..3 per test
                         search nsga2 { population 4  evaluations 8 }  end after 10s }
+        campaign cover { objectives time  operations recount, swing 1..3 per test
+                         search nsga2 { population 4  evaluations 8 }
+                         coverage { T1 [0, 1] cells 6  O0 [0.5, 3.5] cells 3  hits 2  stop at 50%  failsafe 30 }
+                         end after 10s }
         campaign again { repeat early 3 times { seed 9 }  observes time  end after 10s }
     "#;
 
@@ -373,6 +405,16 @@ mod tests {
         let analysis = analyse(&sources, file);
         let space = analysis.model.unwrap_or_else(|| panic!("{:#?}", analysis.diagnostics));
         lower(&space, space.campaign(campaign).unwrap(), "cell.sesame", "sesamec 0.0.0")
+    }
+
+    #[test]
+    fn coverage_is_counted_over_a_grid_and_its_failsafe_bounds_the_search() {
+        let campaign = lowered("cover").plan.campaign;
+        let axis = |dimension, low, high, cells| plan::GridAxis { dimension, low, high, cells };
+        let axes = vec![axis(plan::Dimension::T1, 0.0, 1.0, 6), axis(plan::Dimension::O0, 0.5, 3.5, 3)];
+        assert_eq!(campaign.coverage, Some(plan::CoverageGoal { axes, hits: 2, stop_at: Some(0.5) }));
+        assert_eq!(campaign.search, plan::Search::Nsga2 { population: 4, evaluations: 30 });
+        assert_eq!(lowered("look").plan.campaign.coverage, None);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Campaigns: how tests are found and run.
 
-use super::{Declaration, MetricId, OperationId, TestId};
+use super::{Declaration, MetricId, OperationId, Range, TestId};
 
 /// A campaign.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +13,8 @@ pub struct Campaign {
     pub observed: Vec<MetricId>,
     /// How its tests are found.
     pub search: Search,
+    /// How coverage is counted; `None` where the campaign does not say.
+    pub coverage: Option<Coverage>,
     /// The one seed that decides everything. Default 1.
     pub seed: u64,
     /// Simulation time at which a test ends, in seconds; positive.
@@ -45,6 +47,69 @@ pub enum Search {
         /// How often: at least 1.
         times: u32,
     },
+}
+
+/// How a search's coverage of the reduced parameter space is counted, and when it suffices.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coverage {
+    /// The grid, in written order: at least one axis, each of another dimension, at most 100,000 cells together.
+    pub axes: Vec<CoverageAxis>,
+    /// Tests that a cell must have seen to be covered: 1 or more. Default 1.
+    pub hits: u32,
+    /// The share of all cells, in `0..=1` and above 0, at which the search stops.
+    pub stop_at: Option<f64>,
+    /// Tests in total after which a search that stops at a share gives up: at least its evaluations, in whose place it
+    /// stands. Only with `stop_at`.
+    pub failsafe: Option<u32>,
+}
+
+/// A dimension divided into cells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CoverageAxis {
+    /// Which.
+    pub dimension: CoverageDimension,
+    /// From the beginning of the first cell to the end of the last, not empty.
+    pub range: Range,
+    /// How many cells: 1 or more.
+    pub cells: u32,
+}
+
+/// A dimension of the reduced parameter space.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CoverageDimension {
+    /// Mean of midpoints.
+    T1,
+    /// Mean of lengths.
+    T2,
+    /// Spread of midpoints.
+    T3,
+    /// Mean of normalised parameters.
+    P1,
+    /// Spread of normalised parameters.
+    P2,
+    /// Operations.
+    O0,
+    /// Operations that change values.
+    O1,
+    /// Operations that lose messages.
+    O2,
+    /// Operations that delay messages.
+    O3,
+}
+
+impl CoverageDimension {
+    /// All of them with their names.
+    pub const ALL: [(&'static str, CoverageDimension); 9] = [
+        ("T1", CoverageDimension::T1),
+        ("T2", CoverageDimension::T2),
+        ("T3", CoverageDimension::T3),
+        ("P1", CoverageDimension::P1),
+        ("P2", CoverageDimension::P2),
+        ("O0", CoverageDimension::O0),
+        ("O1", CoverageDimension::O1),
+        ("O2", CoverageDimension::O2),
+        ("O3", CoverageDimension::O3),
+    ];
 }
 
 /// What a searched test holds.

@@ -29,6 +29,7 @@ impl<'a> Resolver<'a> {
         let repeats: Vec<Span> = campaign.repeats.iter().map(|repeat| repeat.span).collect();
         self.at_most_one(&repeats, "repeat");
         let content = self.content(campaign, end_after);
+        let coverage = self.coverage(campaign);
         let (search, seed) = match (campaign.searches.first(), campaign.repeats.first()) {
             (_, Some(repeat)) => {
                 self.only_repeats(campaign, repeat);
@@ -53,6 +54,7 @@ impl<'a> Resolver<'a> {
             objectives: metric_ids(objectives?),
             observed: metric_ids(observed?),
             search: search?,
+            coverage: coverage?,
             seed: seed?,
             end_after: end_after?,
         })
@@ -254,6 +256,7 @@ impl<'a> Resolver<'a> {
             (campaign.searches.first().map(|search| search.span), "search"),
             (campaign.operations.first().map(|operations| operations.span), "operations"),
             (campaign.objectives.first().map(|(span, _)| *span), "objectives"),
+            (campaign.coverages.first().map(|coverage| coverage.span), "coverage"),
         ];
         for (span, word) in clauses {
             let Some(span) = span else { continue };
@@ -276,7 +279,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// A count of at least `min`. `what` begins a sentence, for example "a test holds".
-    fn count(&mut self, count: Count, min: u32, what: &str) -> Option<u32> {
+    pub(super) fn count(&mut self, count: Count, min: u32, what: &str) -> Option<u32> {
         let value = count.value?;
         match u32::try_from(value) {
             Ok(found) if found >= min => Some(found),

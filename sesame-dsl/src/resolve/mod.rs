@@ -11,6 +11,7 @@
 
 mod campaign;
 mod collect;
+mod coverage;
 mod formula;
 mod fuzz;
 mod measure;

@@ -340,6 +340,7 @@ pub(crate) struct Campaign {
     pub(crate) operations: Vec<Operations>,
     pub(crate) activates: Vec<Span>,
     pub(crate) searches: Vec<Search>,
+    pub(crate) coverages: Vec<Coverage>,
     pub(crate) repeats: Vec<Repeat>,
     pub(crate) ends: Vec<(Span, Quantity)>,
     /// Something of it could not be read or is not supported: what is missing may be there.
@@ -369,6 +370,23 @@ pub(crate) struct Search {
 pub(crate) enum Strategy {
     Nsga2,
     Random,
+}
+
+#[derive(Debug)]
+pub(crate) struct Coverage {
+    pub(crate) span: Span,
+    pub(crate) axes: Vec<CoverageAxis>,
+    pub(crate) hits: Vec<(Span, Count)>,
+    pub(crate) stops: Vec<(Span, Quantity)>,
+    pub(crate) failsafes: Vec<(Span, Count)>,
+    pub(crate) damaged: bool,
+}
+
+#[derive(Debug)]
+pub(crate) struct CoverageAxis {
+    pub(crate) dimension: Name,
+    pub(crate) range: Range,
+    pub(crate) cells: Count,
 }
 
 #[derive(Debug)]

@@ -28,6 +28,7 @@ pub(super) enum Place {
     Test,
     Campaign,
     Search,
+    Coverage,
     Repeat,
 }
 
@@ -44,6 +45,7 @@ impl Place {
             Place::Test => Rule::error_test_member,
             Place::Campaign => Rule::error_campaign_member,
             Place::Search => Rule::error_search_setting,
+            Place::Coverage => Rule::error_coverage_member,
             Place::Repeat => Rule::error_repeat_setting,
         }
     }
@@ -75,11 +77,15 @@ impl Place {
                 Rule::observes,
                 Rule::activate,
                 Rule::search,
+                Rule::coverage,
                 Rule::end,
                 Rule::repeat,
                 Rule::unsupported_campaign_member,
             ],
             Place::Search => &[Rule::setting_population, Rule::setting_evaluations, Rule::setting_seed],
+            Place::Coverage => {
+                &[Rule::coverage_axis, Rule::coverage_hits, Rule::coverage_stop, Rule::coverage_failsafe]
+            }
             Place::Repeat => &[Rule::setting_seed],
         }
     }
@@ -96,6 +102,7 @@ impl Place {
             Place::Test => Rule::one_test_member,
             Place::Campaign => Rule::one_campaign_member,
             Place::Search => Rule::one_search_setting,
+            Place::Coverage => Rule::one_coverage_member,
             Place::Repeat => Rule::one_repeat_setting,
         }
     }
@@ -113,8 +120,11 @@ impl Place {
             Place::Node => "`publishes` or `subscribes`",
             Place::Hook => "`hook on` and topics",
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
-            Place::Campaign => "`objectives`, `operations`, `observes`, `activate`, `search`, `repeat` or `end after`",
+            Place::Campaign => {
+                "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `repeat` or `end after`"
+            },
             Place::Search => "`population`, `evaluations` or `seed`",
+            Place::Coverage => "a dimension such as `T1 [0, 1] cells 6`, `hits`, `stop at` or `failsafe`",
             Place::Repeat => "`seed`",
         }
     }
@@ -130,8 +140,11 @@ impl Place {
             Place::Node => &["publishes", "subscribes"],
             Place::Hook => &["hook"],
             Place::Test => &["expect"],
-            Place::Campaign => &["objectives", "operations", "observes", "activate", "search", "repeat", "end"],
+            Place::Campaign => {
+                &["objectives", "operations", "observes", "activate", "search", "coverage", "repeat", "end"]
+            },
             Place::Search => &["population", "evaluations", "seed"],
+            Place::Coverage => &["hits", "stop", "failsafe"],
             Place::Repeat => &["seed"],
         }
     }
@@ -177,7 +190,7 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
         return Diagnostic::new(Code::NOT_CLOSED, span_of(first), title).label("no block is open here");
     }
 
-    let begins = place.starters().contains(&first.text) || matches!(place, Place::Message | Place::Test);
+    let begins = place.starters().contains(&first.text) || matches!(place, Place::Message | Place::Test | Place::Coverage);
     let continued = previous
         .and_then(|previous| read(text, previous.lo as usize, hi, place.one_rule()))
         .filter(|failure| token_at(text, failure.at).lo >= first.lo);
@@ -328,6 +341,10 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::parameter_name | Rule::choice => "a parameter such as `offset`, `value`, `loss` or `delay`",
         Rule::window | Rule::test_window => "`from`",
         Rule::draw_seed | Rule::setting_seed => "`seed`",
+        Rule::dimension | Rule::coverage_axis => "a dimension such as `T1 [0, 1] cells 6`",
+        Rule::coverage_hits => "`hits`",
+        Rule::coverage_stop => "`stop at`",
+        Rule::coverage_failsafe => "`failsafe`",
         Rule::within => "`within`",
         Rule::priority => "`priority`",
         Rule::inclusion => "`inclusion`",
@@ -369,7 +386,6 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::k_launch
         | Rule::k_terminate
         | Rule::k_relay
-        | Rule::k_coverage
         | Rule::k_boost
         | Rule::k_record
         | Rule::k_custom

@@ -5,7 +5,7 @@ use pest::iterators::Pair as PestPair;
 use sesame_grammar::{Rule, SesameParser};
 
 use super::ast::{
-    Bound, Campaign, Choice, Comparison, Count, Direction, Drain, Expectation, Field, File, Head, InProcess, Message,
+    Bound, Campaign, Choice, Comparison, Count, Coverage, CoverageAxis, Direction, Drain, Expectation, Field, File, Head, InProcess, Message,
     Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Process, Range, Repeat,
     Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Topic, Transport, Type, TypeKind,
 };
@@ -541,6 +541,7 @@ impl Reader<'_> {
             operations: vec![],
             activates: vec![],
             searches: vec![],
+            coverages: vec![],
             repeats: vec![],
             ends: vec![],
             damaged: false,
@@ -568,6 +569,7 @@ impl Reader<'_> {
                     }
                 }
                 Rule::search => campaign.searches.push(reader.search(&member, span)),
+                Rule::coverage => campaign.coverages.push(reader.coverage(&member, span)),
                 Rule::end => campaign.ends.push((span, reader.signed(&expect_child(&member, Rule::signed)))),
                 Rule::repeat => {
                     let mut seed = Vec::new();
@@ -592,6 +594,32 @@ impl Reader<'_> {
         // A `from` brings clauses that are not written here; the other unsupported ones replace none.
         campaign.damaged = damaged || from.is_some();
         campaign
+    }
+
+    fn coverage(&mut self, pair: &Pair<'_>, span: Span) -> Coverage {
+        let mut coverage =
+            Coverage { span, axes: vec![], hits: vec![], stops: vec![], failsafes: vec![], damaged: false };
+        coverage.damaged = self.members(pair, Place::Coverage, |reader, member| {
+            let span = reader.keyword_span(&member);
+            match member.as_rule() {
+                Rule::coverage_axis => {
+                    let dimension = expect_child(&member, Rule::dimension);
+                    coverage.axes.push(CoverageAxis {
+                        dimension: Name { text: dimension.as_str().to_owned(), span: reader.span(&dimension) },
+                        range: reader.range(&expect_child(&member, Rule::range)),
+                        cells: reader.count(&expect_child(&member, Rule::number)),
+                    });
+                }
+                Rule::coverage_stop => {
+                    coverage.stops.push((span, reader.signed(&expect_child(&member, Rule::signed))));
+                }
+                rule => {
+                    let count = (span, reader.count(&expect_child(&member, Rule::number)));
+                    if rule == Rule::coverage_hits { &mut coverage.hits } else { &mut coverage.failsafes }.push(count);
+                }
+            }
+        });
+        coverage
     }
 
     fn search(&mut self, pair: &Pair<'_>, span: Span) -> Search {
