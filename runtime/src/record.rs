@@ -15,6 +15,7 @@ mod recorder;
 mod repository;
 #[cfg(test)]
 pub(crate) mod sample;
+mod scan;
 mod schema;
 #[cfg(test)]
 mod tests;
@@ -31,6 +32,7 @@ pub use error::RecordError;
 pub use folder::{Claim, DATABASE, LOCK, claim_folder, latest_folder};
 pub use recorder::Recorder;
 pub use repository::{CampaignFacts, Repository};
+pub use scan::{ScannedOperation, ScannedTest};
 pub use schema::SCHEMA;
 pub(crate) use verdict::ends;
 pub use verdict::{Verdict, verdict, violation_spans};
@@ -146,6 +148,21 @@ pub struct ResultSet {
     pub status: Status,
     /// Numbers of its tests, in its order.
     pub members: Vec<u32>,
+}
+
+/// How much of the space was looked at after a generation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct GenerationCoverage {
+    /// The generation.
+    pub generation: u32,
+    /// Tests evaluated by then.
+    pub evaluations: u32,
+    /// Cells that enough tests have hit.
+    pub covered: usize,
+    /// Cells there are.
+    pub cells: usize,
+    /// Cells that a test can reach, as far as known, or has hit.
+    pub feasible: usize,
 }
 
 /// Whether an event belongs to what the campaign found or to one way of getting there.

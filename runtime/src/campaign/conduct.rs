@@ -6,16 +6,18 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use sesame_plan::{CampaignPlan, Search, Test};
+use sesame_plan::{CampaignPlan, CoverageGoal, Search, Test};
 
 use super::pool::{Ended, Job, Pool, PoolError, PoolSettings};
+use crate::coverage::{self, Coverage, Feasible, Grid, GridError};
 use crate::observation::{Observation, Outcome};
 use crate::record::{
-    Difference, Event, EventKind, MetricValue, Origin, RecordError, Recorder, Repository, ResultSet, Status,
-    TestRecord, Verdict, differences, verdict,
+    Difference, Event, EventKind, GenerationCoverage, MetricValue, Origin, RecordError, Recorder, Repository,
+    ResultSet, Status, TestRecord, Verdict, differences, verdict,
 };
 use crate::rng::derive_seed;
 use crate::search::{self, Candidate, Evaluated, Front, SearchError};
+use crate::sspr;
 
 /// A test that runs this many times as long as the undisturbed run is taken to hang.
 const PATIENCE: f64 = 20.0;
@@ -53,12 +55,14 @@ pub struct Progress<'a> {
     pub latest: Option<&'a TestRecord>,
     /// The front so far.
     pub front: &'a Front,
+    /// The cells covered so far, where the campaign counts them.
+    pub coverage: Option<&'a Coverage>,
 }
 
 /// How a campaign ended.
 #[derive(Debug)]
 pub enum Conducted {
-    /// All tests were evaluated.
+    /// All tests were evaluated, or its coverage sufficed.
     Finished(Box<Repository>),
     /// The user stopped it; `resume` goes on.
     Interrupted,
@@ -71,6 +75,9 @@ pub enum CampaignError {
     /// The plan leaves nothing to search.
     #[error(transparent)]
     Search(#[from] SearchError),
+    /// The plan's cells are no grid.
+    #[error("the campaign's coverage cannot be counted: {0}")]
+    Grid(#[from] GridError),
     /// No worker.
     #[error(transparent)]
     Pool(#[from] PoolError),
@@ -99,6 +106,7 @@ pub fn conduct(
     progress: &mut dyn FnMut(Progress<'_>),
 ) -> Result<Conducted, CampaignError> {
     let mut strategy = search::strategy(plan, settings.seed)?;
+    let mut tracking = plan.campaign.coverage.as_ref().map(|goal| Tracking::of(plan, goal)).transpose()?;
     let recorded = recorder.repository().tests()?.iter().map(|row| row.number).collect();
     let pool = Pool::start(&PoolSettings {
         workers: settings.workers,
@@ -126,13 +134,18 @@ pub fn conduct(
         desk.pool.set_timeout(patience(reference.wall.run));
     }
 
+    if let Some(text) = tracking.as_ref().and_then(Tracking::out_of_reach) {
+        desk.recorder.put_event(&Event { kind: EventKind::Warning, test: None, text })?;
+    }
+
     let total = plan.campaign.search.evaluations();
     let repeats = matches!(plan.campaign.search, Search::Repeat { .. });
     let mut front = Front::default();
     let mut earlier = Earlier::default();
     let mut numbered = 0;
     let mut done = 0;
-    progress(Progress { done, total, latest: None, front: &front });
+    let mut stop = "all tests were evaluated".to_owned();
+    progress(Progress { done, total, latest: None, front: &front, coverage: tracking.as_ref().map(|it| &it.coverage) });
     loop {
         let candidates = strategy.ask();
         let Some(generation) = candidates.first().map(|candidate| candidate.generation) else { break };
@@ -155,7 +168,11 @@ pub fn conduct(
             done += 1;
             front.add(record.number, &fitness);
             told.push(Evaluated { number: record.number, test: record.test.clone(), fitness });
-            progress(Progress { done, total, latest: Some(record), front: &front });
+            if let Some(tracking) = &mut tracking {
+                tracking.add(plan, record);
+            }
+            let coverage = tracking.as_ref().map(|it| &it.coverage);
+            progress(Progress { done, total, latest: Some(record), front: &front, coverage });
         })?;
         if !complete {
             return interrupt(recorder);
@@ -169,6 +186,13 @@ pub fn conduct(
                 status: Status::Intermediate,
                 members: front.numbers(),
             })?;
+        }
+        if let Some(tracking) = &tracking {
+            desk.recorder.put_coverage(&tracking.after(generation, done))?;
+            if let Some(reached) = tracking.reached() {
+                stop = reached;
+                break;
+            }
         }
     }
 
@@ -194,7 +218,7 @@ pub fn conduct(
             members: front.numbers(),
         })?;
     }
-    Ok(Conducted::Finished(Box::new(recorder.finish("all tests were evaluated")?)))
+    Ok(Conducted::Finished(Box::new(recorder.finish(&stop)?)))
 }
 
 fn interrupt(recorder: Recorder) -> Result<Conducted, CampaignError> {
@@ -205,6 +229,59 @@ fn interrupt(recorder: Recorder) -> Result<Conducted, CampaignError> {
 /// The simulator's seed: one for the whole campaign, and one for each run where a test is repeated.
 fn simulator_seed(seed: u64, repetition: u32) -> u64 {
     derive_seed(seed, "simulator", &[u64::from(repetition)])
+}
+
+/// Counting cells while a campaign runs. Hits add up in any order, so that what is covered after a generation does not
+/// depend on the order in which its tests ended.
+struct Tracking {
+    coverage: Coverage,
+    feasible: Feasible,
+    stop_at: Option<f64>,
+}
+
+impl Tracking {
+    fn of(plan: &CampaignPlan, goal: &CoverageGoal) -> Result<Tracking, GridError> {
+        let grid = Grid::new(goal.axes.clone())?;
+        let feasible = Feasible::of(plan, &grid);
+        Ok(Tracking { coverage: Coverage::new(grid, goal.hits), feasible, stop_at: goal.stop_at })
+    }
+
+    fn add(&mut self, plan: &CampaignPlan, record: &TestRecord) {
+        if coverage::counts(&record.observation.outcome, record.duplicate_of.is_some())
+            && let Some(point) = sspr::observed_point(plan, &record.test, &record.observation)
+        {
+            self.coverage.add(&point);
+        }
+    }
+
+    fn after(&self, generation: u32, evaluations: u32) -> GenerationCoverage {
+        GenerationCoverage {
+            generation,
+            evaluations,
+            covered: self.coverage.covered(),
+            cells: self.coverage.grid().len(),
+            feasible: self.coverage.feasible(&self.feasible),
+        }
+    }
+
+    /// Why the search stops, if it has covered enough.
+    fn reached(&self) -> Option<String> {
+        let (covered, cells) = (self.coverage.covered(), self.coverage.grid().len());
+        self.stop_at
+            .filter(|&share| self.coverage.share() >= share)
+            .map(|_| format!("its coverage was reached: {covered} of {cells} cells"))
+    }
+
+    /// What is to be said of a coverage that no search can reach.
+    fn out_of_reach(&self) -> Option<String> {
+        let (feasible, cells) = (self.feasible.count(), self.coverage.grid().len());
+        self.stop_at.filter(|&share| (feasible as f64) < share * cells as f64).map(|share| {
+            format!(
+                "the search cannot stop at {} % of all cells: its tests can reach {feasible} of {cells}",
+                100.0 * share
+            )
+        })
+    }
 }
 
 /// A test that has its number and waits for its run.

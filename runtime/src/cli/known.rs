@@ -39,6 +39,7 @@ pub(super) fn known(
     plan.campaign.search = Search::Known { tests };
     // Nothing is sought, so there is no front.
     plan.campaign.objectives.clear();
+    plan.campaign.coverage = None;
     refuse_unfilled(runner, &plan, true)?;
     let seed = options.seed.unwrap_or(plan.campaign.seed);
     let results = options.results.as_deref().unwrap_or(results);

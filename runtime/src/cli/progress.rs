@@ -75,6 +75,9 @@ impl<'a> Display<'a> {
         if !self.plan.campaign.objectives.is_empty() {
             parts.push(format!("front of {}", progress.front.numbers().len()));
         }
+        if let Some(coverage) = progress.coverage {
+            parts.push(format!("coverage {:.0} %", 100.0 * coverage.share()));
+        }
         for (worst, &id) in self.worst.iter().zip(&self.plan.campaign.objectives) {
             let metric = self.plan.metric(id);
             // The least fuzzing time is no news.

@@ -37,6 +37,7 @@ pub(super) fn same_model(recorded: &CampaignPlan, plan: &CampaignPlan) -> bool {
     comparable.tests.clone_from(&plan.tests);
     comparable.campaign.search = plan.campaign.search.clone();
     comparable.campaign.objectives.clone_from(&plan.campaign.objectives);
+    comparable.campaign.coverage.clone_from(&plan.campaign.coverage);
     comparable.campaign.seed = plan.campaign.seed;
     comparable.campaign.doc.clone_from(&plan.campaign.doc);
     for (metric, today) in comparable.metrics.iter_mut().zip(&plan.metrics) {
@@ -48,7 +49,7 @@ pub(super) fn same_model(recorded: &CampaignPlan, plan: &CampaignPlan) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use sesame_plan::{KnownTestId, Search};
+    use sesame_plan::{CoverageGoal, Dimension, GridAxis, KnownTestId, Search};
 
     use super::*;
     use crate::record::sample;
@@ -65,6 +66,13 @@ mod tests {
         assert!(changed(|plan| plan.campaign.objectives.clear()));
         assert!(changed(|plan| plan.campaign.search = Search::Known { tests: vec![KnownTestId(0)] }));
         assert!(changed(|plan| plan.metrics[0].line += 7));
+        let axes = || vec![GridAxis { dimension: Dimension::T1, low: 0.0, high: 1.0, cells: 6 }];
+        let goal = || CoverageGoal { axes: axes(), hits: 1, stop_at: None };
+        assert!(same_model(&plan, &{
+            let mut counting = plan.clone();
+            counting.campaign.coverage = Some(goal());
+            counting
+        }));
         assert!(changed(|plan| plan.campaign.seed += 1));
         assert!(!changed(|plan| plan.metrics[0].default = None));
         assert!(!changed(|plan| plan.operations[0].within.end += 1.0));

@@ -96,6 +96,7 @@ fn repeating(plan: &mut CampaignPlan, name: &str, test: Test, times: u32) {
     plan.campaign.search = Search::Repeat { test, times };
     // Nothing is sought, so there is no front.
     plan.campaign.objectives.clear();
+    plan.campaign.coverage = None;
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use sesame_plan::{Activation, CampaignPlan, Choice};
 use crate::observation::{Observation, Outcome};
 use crate::record::folder::{DATABASE, Lock};
 use crate::record::schema::{self, index};
-use crate::record::{Event, EventKind, Origin, RecordError, Repository, ResultSet, TestRecord};
+use crate::record::{Event, EventKind, GenerationCoverage, Origin, RecordError, Repository, ResultSet, TestRecord};
 
 /// Writes the results of one campaign run. There is one per folder: it holds the folder's lock.
 ///
@@ -109,6 +109,20 @@ impl Recorder {
             transaction.commit()
         });
         written.map_err(|e| RecordError::database("record a set of results", &self.repository.path, e))
+    }
+
+    /// Records how much is covered after a generation; what was recorded for it before is replaced.
+    pub fn put_coverage(&mut self, coverage: &GenerationCoverage) -> Result<(), RecordError> {
+        let GenerationCoverage { generation, evaluations, covered, cells, feasible } = *coverage;
+        self.repository
+            .connection
+            .execute(
+                "INSERT OR REPLACE INTO coverage (generation, evaluations, covered, cells, feasible) \
+                 VALUES (?1, ?2, ?3, ?4, ?5)",
+                params![generation, evaluations, index(covered), index(cells), index(feasible)],
+            )
+            .map(drop)
+            .map_err(|e| RecordError::database("record the coverage", &self.repository.path, e))
     }
 
     /// Records an event. A warning said before is kept once, so that a resumed run may say it again.

@@ -10,7 +10,8 @@ use sesame_plan::{Activation, CampaignPlan, Choice, KnownTestId, OperationId, Sp
 use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
 use crate::record::folder::DATABASE;
 use crate::record::{
-    Event, EventKind, MetricValue, Origin, RecordError, ResultSet, Session, Status, TestRecord, TestRow, digest, schema,
+    Event, EventKind, GenerationCoverage, MetricValue, Origin, RecordError, ResultSet, Session, Status, TestRecord,
+    TestRow, digest, schema,
 };
 
 /// The results of one campaign run, to be read.
@@ -184,6 +185,23 @@ impl Repository {
         Ok(self.result_sets()?.pop())
     }
 
+    /// How much was covered after each generation; empty for a campaign that does not count it.
+    pub fn coverage(&self) -> Result<Vec<GenerationCoverage>, RecordError> {
+        self.read(
+            "SELECT generation, evaluations, covered, cells, feasible FROM coverage ORDER BY generation",
+            [],
+            |row| {
+                Ok(GenerationCoverage {
+                    generation: row.get(0)?,
+                    evaluations: row.get(1)?,
+                    covered: position(row, 2)?,
+                    cells: position(row, 3)?,
+                    feasible: position(row, 4)?,
+                })
+            },
+        )
+    }
+
     /// Everything that happened that a user should know, warnings of tests included: first those of the campaign, then
     /// by test.
     pub fn events(&self) -> Result<Vec<Event>, RecordError> {
@@ -329,7 +347,7 @@ impl Repository {
         Ok(effects)
     }
 
-    fn origin(&self, origin: &str, known: Option<&str>) -> Result<Origin, RecordError> {
+    pub(super) fn origin(&self, origin: &str, known: Option<&str>) -> Result<Origin, RecordError> {
         match (origin, known) {
             ("reference", None) => Ok(Origin::Reference),
             ("search", None) => Ok(Origin::Search),
@@ -342,7 +360,12 @@ impl Repository {
         }
     }
 
-    fn outcome(&self, word: &str, detail: Option<String>, limit: Option<f64>) -> Result<Outcome, RecordError> {
+    pub(super) fn outcome(
+        &self,
+        word: &str,
+        detail: Option<String>,
+        limit: Option<f64>,
+    ) -> Result<Outcome, RecordError> {
         match (word, detail, limit) {
             ("completed", None, None) => Ok(Outcome::Completed),
             ("void", None, None) => Ok(Outcome::Void),
@@ -379,7 +402,7 @@ fn unsigned(row: &Row<'_>, column: usize) -> rusqlite::Result<u64> {
 }
 
 /// A position in a list.
-fn position(row: &Row<'_>, column: usize) -> rusqlite::Result<usize> {
+pub(super) fn position(row: &Row<'_>, column: usize) -> rusqlite::Result<usize> {
     let count = unsigned(row, column)?;
     usize::try_from(count).map_err(|_| rusqlite::Error::IntegralValueOutOfRange(column, i64::MAX))
 }

@@ -136,6 +136,15 @@ CREATE TABLE result_set_members (
     PRIMARY KEY (result_set, position)
 ) STRICT, WITHOUT ROWID;
 
+-- How much of the space was looked at, after each generation of a campaign that counts it.
+CREATE TABLE coverage (
+    generation      INTEGER PRIMARY KEY,
+    evaluations     INTEGER NOT NULL, -- tests evaluated by then
+    covered         INTEGER NOT NULL, -- cells that enough tests have hit
+    cells           INTEGER NOT NULL,
+    feasible        INTEGER NOT NULL  -- cells that a test can reach, as far as known, or has hit
+) STRICT;
+
 -- What happened that a user should know. A warning belongs to the content; a session note (interrupted, resumed, a
 -- worker restarted) to one way of getting there.
 CREATE TABLE events (

@@ -1,0 +1,227 @@
+//! Going through all tests of a run, one after the other, without holding them all: what analyses do.
+
+use std::collections::BTreeMap;
+
+use rusqlite::{Row, Rows};
+use sesame_plan::{CampaignPlan, Choice, OperationId, Span};
+
+use crate::coverage;
+use crate::observation::Outcome;
+use crate::record::repository::position;
+use crate::record::{MetricValue, Origin, RecordError, Repository};
+use crate::sspr::{Convention, Disturbance, Point, disturbance};
+
+/// One test as analyses see it: what it disturbed, when, and what came out; no time series.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScannedTest {
+    /// Its number in the campaign.
+    pub number: u32,
+    /// Where it comes from.
+    pub origin: Origin,
+    /// The generation of the search it belongs to.
+    pub generation: Option<u32>,
+    /// How its run ended.
+    pub outcome: Outcome,
+    /// The equal test whose result stands for this one.
+    pub duplicate_of: Option<u32>,
+    /// What it disturbed, in its order.
+    pub operations: Vec<ScannedOperation>,
+    /// Per metric of the plan, in its order; empty after a crash of the worker.
+    pub values: Vec<MetricValue>,
+}
+
+/// One operation of a scanned test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScannedOperation {
+    /// Which.
+    pub operation: OperationId,
+    /// What was chosen for its parameters.
+    pub choices: Vec<Choice>,
+    /// When it was seen to be active.
+    pub intervals: Vec<Span>,
+}
+
+impl ScannedTest {
+    /// The value of the plan's metric at this position; unmeasured when the run reported none.
+    pub fn value(&self, metric: sesame_plan::MetricId) -> MetricValue {
+        self.values.get(metric.index()).copied().unwrap_or_default()
+    }
+
+    /// Where it lies in the reduced parameter space; `None` where no operation was active.
+    pub fn point(&self, plan: &CampaignPlan, convention: Convention) -> Option<Point> {
+        let disturbances: Vec<Disturbance> = self
+            .operations
+            .iter()
+            .map(|it| disturbance(plan, it.operation, &it.choices, it.intervals.clone()))
+            .collect();
+        Point::of(&disturbances, convention)
+    }
+
+    /// Its point, if it counts for coverage: it had an effect, and is no duplicate.
+    pub fn covering_point(&self, plan: &CampaignPlan, convention: Convention) -> Option<Point> {
+        coverage::counts(&self.outcome, self.duplicate_of.is_some()).then(|| self.point(plan, convention)).flatten()
+    }
+}
+
+/// Rows of a table that are in the order of tests, taken test by test.
+struct Cursor<'s, T> {
+    rows: Rows<'s>,
+    read: fn(&Row<'_>) -> rusqlite::Result<T>,
+    next: Option<(u32, T)>,
+}
+
+impl<'s, T> Cursor<'s, T> {
+    /// The first column of each row is its test.
+    fn over(rows: Rows<'s>, read: fn(&Row<'_>) -> rusqlite::Result<T>) -> rusqlite::Result<Self> {
+        let mut cursor = Cursor { rows, read, next: None };
+        cursor.step()?;
+        Ok(cursor)
+    }
+
+    fn step(&mut self) -> rusqlite::Result<()> {
+        self.next = match self.rows.next()? {
+            Some(row) => Some((row.get(0)?, (self.read)(row)?)),
+            None => None,
+        };
+        Ok(())
+    }
+
+    /// The rows of a test; tests are asked for in ascending order.
+    fn of(&mut self, test: u32) -> rusqlite::Result<Vec<T>> {
+        let mut found = Vec::new();
+        while let Some((owner, item)) = self.next.take() {
+            if owner > test {
+                self.next = Some((owner, item));
+                break;
+            }
+            if owner == test {
+                found.push(item);
+            }
+            self.step()?;
+        }
+        Ok(found)
+    }
+}
+
+/// A row of `choices`: the position of its operation, and the choice; `None` where it is neither value nor range.
+type ChoiceRow = (usize, Option<Choice>);
+
+impl Repository {
+    /// Shows every test to `each`, by number. Each table is read once from its beginning to its end, so that a large
+    /// file takes as long as reading it, and memory for one test.
+    pub fn scan(&self, each: &mut dyn FnMut(ScannedTest)) -> Result<(), RecordError> {
+        let failed = |e| RecordError::database("read the results", &self.path, e);
+        let damaged = |text: String| RecordError::damaged(&self.path, text);
+        let prepare = |sql: &str| self.connection.prepare(sql).map_err(failed);
+        // One read transaction, so that a run writing meanwhile is seen at one point.
+        let _transaction = self.connection.unchecked_transaction().map_err(failed)?;
+
+        let mut operations = prepare("SELECT test, operation FROM operations ORDER BY test, position")?;
+        let mut choices =
+            prepare("SELECT test, operation, value, low, high FROM choices ORDER BY test, operation, position")?;
+        let mut intervals =
+            prepare("SELECT test, operation, start_s, end_s FROM intervals ORDER BY test, operation, position")?;
+        let mut values = prepare("SELECT test, value, is_set FROM metric_values ORDER BY test, metric")?;
+        let mut tests = prepare(
+            "SELECT number, origin, known_test, generation, outcome, outcome_detail, time_limit_s, duplicate_of \
+             FROM tests ORDER BY number",
+        )?;
+        let mut operations =
+            Cursor::over(operations.query([]).map_err(failed)?, |row| row.get::<_, String>(1)).map_err(failed)?;
+        let mut choices = Cursor::over(choices.query([]).map_err(failed)?, |row| -> rusqlite::Result<ChoiceRow> {
+            let choice = match (row.get(2)?, row.get(3)?, row.get(4)?) {
+                (Some(value), None, None) => Some(Choice::Value { value }),
+                (None, Some(low), Some(high)) => Some(Choice::Range { low, high }),
+                _ => None,
+            };
+            Ok((position(row, 1)?, choice))
+        })
+        .map_err(failed)?;
+        let mut intervals = Cursor::over(intervals.query([]).map_err(failed)?, |row| {
+            Ok((position(row, 1)?, Span { start: row.get(2)?, end: row.get(3)? }))
+        })
+        .map_err(failed)?;
+        let mut values = Cursor::over(values.query([]).map_err(failed)?, |row| {
+            Ok(MetricValue { value: row.get(1)?, set: row.get(2)? })
+        })
+        .map_err(failed)?;
+
+        let ids: BTreeMap<&str, OperationId> = (0u32..)
+            .zip(&self.plan().operations)
+            .map(|(id, operation)| (operation.name.as_str(), OperationId(id)))
+            .collect();
+        let mut rows = tests.query([]).map_err(failed)?;
+        while let Some(row) = rows.next().map_err(failed)? {
+            let number: u32 = row.get(0).map_err(failed)?;
+            let head = || -> rusqlite::Result<_> {
+                let origin: (String, Option<String>) = (row.get(1)?, row.get(2)?);
+                let outcome: (String, Option<String>, Option<f64>) = (row.get(4)?, row.get(5)?, row.get(6)?);
+                Ok((origin, row.get(3)?, outcome, row.get(7)?))
+            };
+            let ((origin, known), generation, (outcome, detail, limit), duplicate_of) = head().map_err(failed)?;
+            let mut test = ScannedTest {
+                number,
+                origin: self.origin(&origin, known.as_deref())?,
+                generation,
+                outcome: self.outcome(&outcome, detail, limit)?,
+                duplicate_of,
+                operations: Vec::new(),
+                values: values.of(number).map_err(failed)?,
+            };
+            for name in operations.of(number).map_err(failed)? {
+                let operation = *ids
+                    .get(name.as_str())
+                    .ok_or_else(|| damaged(format!("T{number} has an operation `{name}` that the plan lacks")))?;
+                test.operations.push(ScannedOperation { operation, choices: Vec::new(), intervals: Vec::new() });
+            }
+            let stray = |what: &str| damaged(format!("T{number} has {what} without an operation"));
+            for (at, choice) in choices.of(number).map_err(failed)? {
+                let choice =
+                    choice.ok_or_else(|| damaged(format!("T{number} has a choice that is neither value nor range")))?;
+                test.operations.get_mut(at).ok_or_else(|| stray("a choice"))?.choices.push(choice);
+            }
+            for (at, span) in intervals.of(number).map_err(failed)? {
+                test.operations.get_mut(at).ok_or_else(|| stray("an interval"))?.intervals.push(span);
+            }
+            each(test);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::sample;
+
+    #[test]
+    fn a_scan_sees_what_reading_each_test_sees() {
+        let folder = tempfile::tempdir().unwrap();
+        let repository = sample::campaign(folder.path(), &sample::plan(), 150);
+        let mut scanned = Vec::new();
+        repository.scan(&mut |test| scanned.push(test)).unwrap();
+        let rows = repository.tests().unwrap();
+        assert_eq!(scanned.len(), rows.len());
+        assert!(rows.len() > 100);
+        for (test, row) in scanned.iter().zip(&rows) {
+            let record = repository.test(row.number).unwrap();
+            assert_eq!((test.number, test.origin, test.generation), (row.number, row.origin, row.generation));
+            assert_eq!((&test.outcome, test.duplicate_of), (&row.outcome, row.duplicate_of));
+            assert_eq!(test.values, row.values);
+            let operations: Vec<ScannedOperation> = record
+                .test
+                .operations
+                .iter()
+                .enumerate()
+                .map(|(at, it)| ScannedOperation {
+                    operation: it.operation,
+                    choices: it.parameters.clone(),
+                    intervals: record.observation.operations.get(at).map_or(Vec::new(), |it| it.intervals.clone()),
+                })
+                .collect();
+            assert_eq!(test.operations, operations);
+            let point = crate::sspr::observed_point(repository.plan(), &record.test, &record.observation);
+            assert_eq!(test.point(repository.plan(), Convention::Ours), point);
+        }
+    }
+}
