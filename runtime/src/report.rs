@@ -5,6 +5,8 @@
 //! lay them out, [`page()`] draws them.
 
 mod axis;
+mod cells;
+mod coverage;
 mod export;
 mod junit;
 mod markup;
@@ -19,6 +21,7 @@ mod table;
 mod text;
 mod timeline;
 
+pub use coverage::CoverageSummary;
 #[cfg(feature = "campaign")]
 pub(crate) use export::is_name;
 pub use export::{ExportError, Exported, export};

@@ -8,6 +8,7 @@ use sesame_plan::Search;
 use crate::observation::Outcome;
 use crate::record::MetricValue;
 use crate::record::{Origin, RecordError, Repository, TestRow, Verdict};
+use crate::report::cells;
 use crate::report::markup::{Markup, coordinate, fill};
 use crate::report::number::{self, plural, with_unit};
 use crate::report::scatter::{Detail, Dimension, Kind, Point, scatter};
@@ -47,6 +48,9 @@ pub fn page(repository: &Repository) -> Result<String, RecordError> {
     body.open("main", &[]);
     requirements(&mut body, &summary, &drawn);
     front(&mut body, repository, &summary, &rows, &drawn);
+    if let Some(coverage) = &summary.coverage {
+        cells::coverage(&mut body, coverage);
+    }
     repetition(&mut body, &summary);
     expectations(&mut body, &summary, &drawn);
     failures(&mut body, &summary, &drawn);

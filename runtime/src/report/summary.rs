@@ -5,6 +5,7 @@ use sesame_plan::{Bound, CampaignPlan, Direction, MetricId, Requirement};
 
 use crate::observation::Outcome;
 use crate::record::{EventKind, MetricValue, Origin, RecordError, Repository, TestRow, Verdict, verdict};
+use crate::report::coverage::{CoverageSummary, coverage};
 use crate::report::number;
 use crate::report::repetition::{Repetition, repetition};
 
@@ -35,6 +36,9 @@ pub struct Summary {
     pub repetition: Option<Repetition>,
     /// How far each metric went, in the plan's order; what a campaign without objectives is about.
     pub spreads: Vec<Spread>,
+    /// How much of the space was looked at, where the campaign counts it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coverage: Option<CoverageSummary>,
     /// What should be brought to the user's attention.
     pub warnings: Vec<String>,
 }
@@ -208,6 +212,7 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
         repetition: repetition(plan, rows),
         failures: rows.iter().filter_map(failure).collect(),
         spreads: spreads(plan, rows),
+        coverage: coverage(repository)?,
         warnings: warnings.collect(),
         objectives,
     })

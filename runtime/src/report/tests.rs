@@ -135,6 +135,75 @@ fn an_unfinished_run_without_any_test_has_its_reports() {
     parsed(&page(recorder.repository()).unwrap());
 }
 
+/// The paper's grid, with half of the cells as the target.
+fn counting() -> sesame_plan::CampaignPlan {
+    let axis = |dimension, high, cells| sesame_plan::GridAxis { dimension, low: 0.0, high, cells };
+    let mut plan = sample::plan();
+    plan.campaign.coverage = Some(sesame_plan::CoverageGoal {
+        axes: vec![
+            axis(sesame_plan::Dimension::T1, 1.0, 6),
+            axis(sesame_plan::Dimension::T2, 0.5, 6),
+            axis(sesame_plan::Dimension::P1, 1.0, 3),
+        ],
+        hits: 1,
+        stop_at: Some(0.5),
+    });
+    plan
+}
+
+#[test]
+fn coverage_is_told_in_words_as_data_and_as_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let repository = sample::campaign(folder.path(), &counting(), 60);
+    let summary = summary(&repository).unwrap();
+    let text = summary_text(&summary, WIDE);
+    let sentence = text.lines().find(|line| line.contains("cells covered")).unwrap();
+    insta::assert_snapshot!("coverage", sentence);
+
+    let coverage = summary.coverage.as_ref().unwrap();
+    let data = serde_json::to_value(coverage).unwrap();
+    assert_eq!(data["covered"], coverage.covered);
+    assert_eq!(data["axes"][1]["dimension"], "T2");
+    let curve = data["curve"].as_array().unwrap();
+    let evaluations = summary.counts.evaluations;
+    assert_eq!(
+        curve.last().unwrap(),
+        &serde_json::json!({
+            "evaluations": evaluations, "covered": coverage.covered, "coverage": coverage.coverage
+        })
+    );
+    assert!(curve.is_sorted_by_key(|point| point["covered"].as_u64().unwrap()));
+
+    let html = page(&repository).unwrap();
+    let document = parsed(&html);
+    let cells: Vec<_> = document
+        .descendants()
+        .filter(|node| node.attribute("class").is_some_and(|class| class.split(' ').any(|class| class == "cell")))
+        .collect();
+    assert_eq!(cells.len(), 36);
+    let said = |word: &str| {
+        let titles = cells.iter().map(|cell| cell.prev_sibling_element().unwrap().text().unwrap());
+        titles.filter(|title| title.ends_with(word)).count()
+    };
+    assert_eq!(said("no test can get there"), 4, "an interval at the edge is short");
+    insta::assert_snapshot!("coverage_cell", cells[0].prev_sibling_element().unwrap().text().unwrap());
+}
+
+#[test]
+fn a_grid_of_one_dimension_is_a_row_and_one_without_a_test_is_empty() {
+    let mut plan = counting();
+    let goal = plan.campaign.coverage.as_mut().unwrap();
+    goal.axes.truncate(1);
+    goal.stop_at = None;
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = crate::record::Recorder::create(folder.path(), &plan, 1, 1).unwrap();
+    let html = page(recorder.repository()).unwrap();
+    let document = parsed(&html);
+    let empty = document.descendants().filter(|node| node.attribute("class") == Some("cell empty"));
+    assert_eq!(empty.count(), 6);
+    assert!(summary_text(&summary(recorder.repository()).unwrap(), WIDE).contains("0 of 6 cells covered (0.0 %)"));
+}
+
 /// What a campaign shows that does so instead of searching.
 fn instead(search: sesame_plan::Search) -> (tempfile::TempDir, Repository) {
     let folder = tempfile::tempdir().unwrap();

@@ -7,6 +7,7 @@ use sesame_plan::Span;
 use crate::observation::Counters;
 use crate::record::MetricValue;
 use crate::record::Verdict;
+use crate::report::coverage::coverage_sentence;
 use crate::report::number::{self, fixed, join_words, plural, with_unit};
 use crate::report::repetition::{Repetition, ViolationRate};
 use crate::report::show::{OperationReport, TestList, TestReport};
@@ -100,6 +101,9 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
         section(&mut text, "Crashes and timeouts", &table, options);
     }
     text.push('\n');
+    if let Some(coverage) = &summary.coverage {
+        paragraph(&mut text, &coverage_sentence(coverage), options);
+    }
     paragraph(&mut text, &counts_sentence(summary), options);
     for warning in &summary.warnings {
         paragraph(&mut text, &format!("warning: {}", visible(warning)), options);
