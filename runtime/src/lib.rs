@@ -5,6 +5,8 @@
 //! runner gets its campaign as a [`sesame_plan::CampaignPlan`].
 
 pub mod activation;
+#[cfg(feature = "report")]
+pub mod analysis;
 #[cfg(feature = "campaign")]
 pub mod campaign;
 #[cfg(feature = "campaign")]

@@ -36,6 +36,7 @@ pub use summary::{
     Counts, ExpectationSummary, Failure, FrontTest, Objective, RequirementSummary, Spread, Summary, Worst, summary,
 };
 pub use table::TextOptions;
+pub(crate) use table::text_table;
 pub use text::{headline, list_text, summary_text, test_text};
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ mod repeat;
 #[cfg(test)]
 pub(crate) mod landscape;
 
-use sesame_plan::{CampaignPlan, Direction, KnownTestId, Search, Test};
+use sesame_plan::{CampaignPlan, Direction, KnownTestId, MetricId, Search, Test};
 
 use crate::observation::{Observation, Outcome};
 
@@ -95,14 +95,19 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
 
 /// The fitness of a run: its objective values in the campaign's order, negated where more is sought; or why it has none.
 pub fn fitness(plan: &CampaignPlan, observation: &Observation) -> Fitness {
-    match observation.outcome {
+    fitness_of(plan, &observation.outcome, |id| observation.metrics.get(id.index())?.value)
+}
+
+/// As [`fitness`], for a run of which only the outcome and the metrics' values are known.
+pub fn fitness_of(plan: &CampaignPlan, outcome: &Outcome, value: impl Fn(MetricId) -> Option<f64>) -> Fitness {
+    match outcome {
         Outcome::Completed => {}
         Outcome::Void => return Fitness::Unfit(Unfit::Void),
         Outcome::Crash { .. } => return Fitness::Unfit(Unfit::Crash),
         Outcome::Timeout { .. } => return Fitness::Unfit(Unfit::Timeout),
     }
     let oriented = plan.campaign.objectives.iter().map(|&id| {
-        let value = observation.metrics.get(id.index())?.value.filter(|value| !value.is_nan())?;
+        let value = value(id).filter(|value| !value.is_nan())?;
         // Subtracted from zero and added to it, so that no negative zero comes out.
         match plan.metric(id).direction.expect("the generator gives every objective a direction") {
             Direction::Minimise => Some(0.0 + value),
@@ -133,8 +138,6 @@ impl Strategy for Nsga2<TestVariation> {
 
 #[cfg(test)]
 mod tests {
-    use sesame_plan::MetricId;
-
     use super::*;
     use crate::observation::{MetricObservation, WallTime};
 

@@ -77,6 +77,16 @@ pub enum RecordError {
         /// The database.
         path: PathBuf,
     },
+    /// There is no such set of results.
+    #[error("no set of results `{name}`; {}: {}", known_sets(known), path.display())]
+    NoSuchSet {
+        /// What was asked for.
+        name: String,
+        /// The sets there are.
+        known: Vec<String>,
+        /// The database.
+        path: PathBuf,
+    },
     /// A number that is to be recorded does not fit: the runtime promises finite numbers and small counts.
     #[error("test T{test}: {what} cannot be recorded: {}", path.display())]
     Unrecordable {
@@ -127,6 +137,17 @@ impl RecordError {
 
     pub(crate) fn damaged(path: &Path, problem: impl Into<String>) -> Self {
         RecordError::Damaged { problem: problem.into(), path: path.to_owned() }
+    }
+}
+
+/// The sets there are, in words; of many the first and the last.
+fn known_sets(known: &[String]) -> String {
+    let quoted: Vec<String> = known.iter().map(|name| format!("`{name}`")).collect();
+    match quoted.as_slice() {
+        [] => "there are none".to_owned(),
+        [only] => format!("there is {only}"),
+        [first, second, .., last] if quoted.len() > 6 => format!("there are {first}, {second}, … and {last}"),
+        [most @ .., last] => format!("there are {} and {last}", most.join(", ")),
     }
 }
 

@@ -2,6 +2,9 @@
 
 use unicode_width::UnicodeWidthStr as _;
 
+use crate::analysis::{Dataset, Datum};
+use crate::report::number;
+
 /// How text is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TextOptions {
@@ -99,6 +102,35 @@ impl Table {
             })
             .collect()
     }
+}
+
+/// A data set as a table for a terminal: the numbers of a column with the same decimals.
+pub(crate) fn text_table(dataset: &Dataset, options: TextOptions) -> String {
+    let column = |at: usize| dataset.rows().iter().map(move |row| &row[at]);
+    let mut aligned = Vec::new();
+    let mut decimals = Vec::new();
+    for (at, title) in dataset.columns().iter().enumerate() {
+        let numbers = || {
+            column(at).filter_map(|datum| match datum {
+                Datum::Real(value) => Some(*value),
+                _ => None,
+            })
+        };
+        let numeric = column(at).any(|datum| matches!(datum, Datum::Real(_) | Datum::Whole(_)));
+        aligned.push((title.clone(), if numeric { Align::Right } else { Align::Left }));
+        decimals.push(number::decimals(numbers()));
+    }
+    let mut table = Table::new(aligned);
+    for row in dataset.rows() {
+        table.row(row.iter().zip(&decimals).map(|(datum, &decimals)| match datum {
+            Datum::Missing => "–".to_owned(),
+            Datum::Text(text) => text.clone(),
+            Datum::Whole(number) => number.to_string(),
+            Datum::Real(value) => number::fixed(*value, decimals),
+            Datum::Truth(truth) => if *truth { "yes" } else { "no" }.to_owned(),
+        }));
+    }
+    table.render(options)
 }
 
 /// Words in lines no wider than `width`, but for words that are wider themselves.

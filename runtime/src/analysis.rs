@@ -1,0 +1,254 @@
+//! Analyses of a results file: what campaigns, tests, fronts, points and coverage there are in it, as tables.
+//!
+//! Any results file will do, whatever campaign wrote it and whether or not it is finished. Each analysis reads the file
+//! once from beginning to end, and gives a [`Dataset`], which prints as a table, as CSV and as JSON.
+
+mod dataset;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeSet;
+
+use sesame_plan::{CampaignPlan, Dimension, GridAxis, MetricId, Search};
+
+use crate::coverage::{Coverage, CurvePoint, Feasible, Grid, curve};
+use crate::record::{Origin, RecordError, Repository, ScannedTest};
+use crate::search::{Front, fitness_of};
+use crate::sspr::Convention;
+
+pub use dataset::{Dataset, Datum};
+
+/// Which tests are looked at.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Selection {
+    /// Numbers of tests; all for `None`.
+    tests: Option<BTreeSet<u32>>,
+}
+
+impl Selection {
+    /// All tests, or those of the result set of this name.
+    pub fn of(repository: &Repository, set: Option<&str>) -> Result<Selection, RecordError> {
+        let Some(name) = set else { return Ok(Selection::default()) };
+        let sets = repository.result_sets()?;
+        match sets.iter().find(|set| set.name == name) {
+            Some(set) => Ok(Selection { tests: Some(set.members.iter().copied().collect()) }),
+            None => Err(RecordError::NoSuchSet {
+                name: name.to_owned(),
+                known: sets.into_iter().map(|set| set.name).collect(),
+                path: repository.path().to_owned(),
+            }),
+        }
+    }
+
+    fn holds(&self, number: u32) -> bool {
+        self.tests.as_ref().is_none_or(|tests| tests.contains(&number))
+    }
+}
+
+/// What each file holds, one row per file, in their order.
+pub fn campaigns(repositories: &[Repository]) -> Result<Dataset, RecordError> {
+    let columns = ["file", "space", "campaign", "search", "seed", "tests", "front", "objectives", "sets", "ended"];
+    let mut dataset = Dataset::new(columns.map(str::to_owned));
+    for repository in repositories {
+        let facts = repository.campaign();
+        let plan = &facts.plan;
+        let mut tests = 0;
+        repository.scan(&mut |test| tests += i64::from(test.origin != Origin::Reference))?;
+        let sets = repository.result_sets()?;
+        let objectives: Vec<&str> = plan.campaign.objectives.iter().map(|&id| plan.metric(id).name.as_str()).collect();
+        let names: Vec<&str> = sets.iter().map(|set| set.name.as_str()).collect();
+        dataset.row([
+            Datum::Text(repository.path().display().to_string()),
+            Datum::Text(plan.space.clone()),
+            Datum::Text(plan.campaign.name.clone()),
+            Datum::Text(search_word(&plan.campaign.search).to_owned()),
+            Datum::Text(facts.seed.to_string()),
+            Datum::Whole(tests),
+            sets.last().map_or(Datum::Missing, |set| Datum::count(set.members.len())),
+            Datum::Text(objectives.join(" ")),
+            Datum::Text(names.join(" ")),
+            facts.stop.clone().map_or(Datum::Missing, Datum::Text),
+        ]);
+    }
+    Ok(dataset)
+}
+
+fn search_word(search: &Search) -> &'static str {
+    match search {
+        Search::Nsga2 { .. } => "nsga2",
+        Search::Random { .. } => "random",
+        Search::Repeat { .. } => "repeat",
+        Search::Known { .. } => "known tests",
+    }
+}
+
+/// All tests but the reference runs: where each comes from, how it ended, and the value of each metric.
+pub fn tests(repository: &Repository, selection: &Selection) -> Result<Dataset, RecordError> {
+    let plan = repository.plan();
+    let columns = ["test", "origin", "generation", "outcome", "duplicate_of", "operations"].map(str::to_owned);
+    let metrics = plan.metrics.iter().map(|metric| metric.name.clone());
+    let mut dataset = Dataset::new(columns.into_iter().chain(metrics));
+    repository.scan(&mut |test| {
+        if test.origin == Origin::Reference || !selection.holds(test.number) {
+            return;
+        }
+        let head = [
+            name(test.number),
+            Datum::Text(test.origin.word().to_owned()),
+            test.generation.map_or(Datum::Missing, |generation| Datum::Whole(i64::from(generation))),
+            Datum::Text(test.outcome.word().to_owned()),
+            test.duplicate_of.map_or(Datum::Missing, name),
+            Datum::Text(operations(plan, &test)),
+        ];
+        let values = (0u32..).map(MetricId).take(plan.metrics.len()).map(|id| Datum::real(test.value(id).value));
+        dataset.row(head.into_iter().chain(values));
+    })?;
+    Ok(dataset)
+}
+
+fn name(number: u32) -> Datum {
+    Datum::Text(format!("T{number}"))
+}
+
+/// A test's operations in its order, apart by spaces.
+fn operations(plan: &CampaignPlan, test: &ScannedTest) -> String {
+    let names: Vec<&str> = test.operations.iter().map(|it| plan.operation(it.operation).name.as_str()).collect();
+    names.join(" ")
+}
+
+/// The tests of a selection that no other of it dominates, by their recorded values. Equal tests are all there;
+/// `same_as` names the one that stands for them in the campaign's own fronts. Without a selection these are the tests of
+/// the whole file.
+pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, RecordError> {
+    let plan = repository.plan();
+    let objectives = &plan.campaign.objectives;
+    let mut front = Front::default();
+    let mut measured = Vec::new();
+    repository.scan(&mut |test| {
+        if test.origin == Origin::Reference || !selection.holds(test.number) {
+            return;
+        }
+        let fitness = fitness_of(plan, &test.outcome, |id| test.value(id).value);
+        front.add(test.number, &fitness);
+        if let Some(values) = fitness.objectives() {
+            measured.push((test.number, values.to_vec()));
+        }
+    })?;
+    let names = objectives.iter().map(|&id| plan.metric(id).name.clone());
+    let mut dataset = Dataset::new(["test".to_owned()].into_iter().chain(names).chain(["same_as".to_owned()]));
+    if objectives.is_empty() {
+        return Ok(dataset);
+    }
+    for (number, oriented) in measured {
+        let Some(member) = front.members().iter().find(|member| member.objectives == oriented) else { continue };
+        let values = objectives.iter().zip(oriented).map(|(&id, value)| {
+            let sign = if plan.metric(id).direction == Some(sesame_plan::Direction::Maximise) { -1.0 } else { 1.0 };
+            Datum::real(Some(0.0 + sign * value))
+        });
+        let same = if member.number == number { Datum::Missing } else { name(member.number) };
+        dataset.row([name(number)].into_iter().chain(values).chain([same]));
+    }
+    Ok(dataset)
+}
+
+/// The point of each test in the reduced parameter space, from what was observed. Tests in which no operation was active
+/// are left out.
+pub fn sspr(
+    repository: &Repository,
+    selection: &Selection,
+    dimensions: &[Dimension],
+    convention: Convention,
+) -> Result<Dataset, RecordError> {
+    let plan = repository.plan();
+    let names = dimensions.iter().map(|dimension| dimension.name().to_owned());
+    let mut dataset = Dataset::new(["test".to_owned()].into_iter().chain(names));
+    repository.scan(&mut |test| {
+        if test.origin == Origin::Reference || !selection.holds(test.number) {
+            return;
+        }
+        if let Some(point) = test.point(plan, convention) {
+            let coordinates = dimensions.iter().map(|&dimension| Datum::real(point.get(dimension)));
+            dataset.row([name(test.number)].into_iter().chain(coordinates));
+        }
+    })?;
+    Ok(dataset)
+}
+
+/// How much of a grid the tests of a selection cover.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoverageAnalysis {
+    coverage: Coverage,
+    feasible: Feasible,
+    curve: Vec<CurvePoint>,
+}
+
+/// Counts the cells of a grid that the tests of a selection hit, in the order of their numbers; void tests and
+/// duplicates cover nothing.
+pub fn coverage(
+    repository: &Repository,
+    selection: &Selection,
+    grid: Grid,
+    hits: u32,
+    convention: Convention,
+) -> Result<CoverageAnalysis, RecordError> {
+    let plan = repository.plan();
+    let feasible = Feasible::of(plan, &grid);
+    let mut coverage = Coverage::new(grid, hits);
+    let mut points = Vec::new();
+    repository.scan(&mut |test| {
+        if test.origin != Origin::Reference && selection.holds(test.number) {
+            points.push(test.covering_point(plan, convention));
+        }
+    })?;
+    let curve = curve(&mut coverage, points);
+    Ok(CoverageAnalysis { coverage, feasible, curve })
+}
+
+impl CoverageAnalysis {
+    /// Coverage over evaluations: a row for each test that covered a cell, and for the last one.
+    pub fn curve(&self) -> Dataset {
+        let columns = ["evaluations", "covered", "cells", "coverage", "feasible", "feasible_coverage"];
+        let mut dataset = Dataset::new(columns.map(str::to_owned));
+        let (cells, feasible) = (self.coverage.grid().len(), self.coverage.feasible(&self.feasible));
+        for point in &self.curve {
+            dataset.row([
+                Datum::Whole(i64::from(point.evaluations)),
+                Datum::count(point.covered),
+                Datum::count(cells),
+                Datum::Real(point.coverage),
+                Datum::count(feasible),
+                Datum::real((feasible > 0).then(|| point.covered as f64 / feasible as f64)),
+            ]);
+        }
+        dataset
+    }
+
+    /// Each cell: where it lies on each axis, how often it was hit, and whether a test can reach it.
+    pub fn cells(&self) -> Dataset {
+        let grid = self.coverage.grid();
+        let ends = |axis: &GridAxis| ["low", "high"].map(|end| format!("{}_{end}", axis.dimension.name()));
+        let columns = grid.axes().iter().flat_map(ends);
+        let more = ["hits", "covered", "feasible"].map(str::to_owned);
+        let mut dataset = Dataset::new(columns.chain(more));
+        for (cell, &hits) in self.coverage.hits().iter().enumerate() {
+            let place = grid.place(cell);
+            let edges = grid
+                .axes()
+                .iter()
+                .zip(place)
+                .flat_map(|(axis, at)| [at, at + 1].map(|at| Datum::Real(crate::coverage::edge(axis, at))));
+            let counted = [
+                Datum::Whole(i64::from(hits)),
+                Datum::Truth(self.coverage.is_covered(cell)),
+                Datum::Truth(self.feasible.reaches(cell)),
+            ];
+            dataset.row(edges.chain(counted));
+        }
+        dataset
+    }
+
+    /// Whether the feasible cells are exactly these; otherwise some of them perhaps cannot be reached.
+    pub fn feasible_is_exact(&self) -> bool {
+        self.feasible.is_exact()
+    }
+}
