@@ -145,8 +145,7 @@ impl Intensity {
     fn normalised(&self, class: Class, convention: Convention) -> Option<f64> {
         let ((low, high), (from, to)) = (self.permitted, self.chosen);
         let width = high - low;
-        // Written so that a NaN is no width either.
-        if !(width > 0.0) {
+        if width.is_nan() || width <= 0.0 {
             return None;
         }
         Some(match (convention, class) {

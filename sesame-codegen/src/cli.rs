@@ -2,6 +2,7 @@
 
 mod build;
 mod commands;
+mod results;
 mod shell;
 
 use std::path::PathBuf;
@@ -80,6 +81,9 @@ enum Command {
         #[arg(last = true, value_name = "RUNNER ARGUMENTS")]
         arguments: Vec<std::ffi::OsString>,
     },
+    /// Analyse the results of campaigns: what ran, fronts, points in the reduced parameter space, coverage.
+    #[command(subcommand)]
+    Results(results::Results),
     /// Explain the code of a diagnostic, for example E0203.
     Explain {
         /// The code.
@@ -123,6 +127,7 @@ pub fn run(
         Command::Check { file } => commands::check(shell, language, &file).map(|_| ExitCode::SUCCESS),
         Command::Generate { generation, check } => commands::generate(shell, language, &generation, check),
         Command::Run { generation, arguments } => commands::run(shell, language, &generation, &arguments),
+        Command::Results(asked) => results::results(shell, asked),
         Command::Explain { code } => commands::explain(language, &code),
     };
     result.unwrap_or_else(|failure| {

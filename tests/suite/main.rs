@@ -2,6 +2,7 @@
 #![cfg(test)]
 
 mod commands;
+mod coverage;
 mod declarative;
 mod exported;
 mod faults;

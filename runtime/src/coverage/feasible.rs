@@ -134,8 +134,7 @@ impl Values {
     /// `None` for a parameter that has no normalised value.
     fn of(parameter: &Parameter, range: Range, shape: Shape) -> Option<Values> {
         let width = parameter.high - parameter.low;
-        // Written so that a NaN is no width either.
-        if !(width > 0.0) {
+        if width.is_nan() || width <= 0.0 {
             return None;
         }
         if !range.integer {

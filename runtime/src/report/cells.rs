@@ -1,5 +1,7 @@
 //! Coverage as pictures: over evaluations, and as a map of cells.
 
+use std::fmt::Write as _;
+
 use sesame_plan::GridAxis;
 
 use crate::report::axis::Axis;
@@ -61,7 +63,7 @@ fn over_evaluations(markup: &mut Markup, coverage: &CoverageSummary) {
     for point in &coverage.curve {
         let x = coordinate(100.0 * across.share(f64::from(point.evaluations)));
         let y = coordinate(100.0 * (1.0 - up.share(100.0 * point.coverage)));
-        path.push_str(&format!(" H{x} V{y}"));
+        let _ = write!(path, " H{x} V{y}");
     }
     markup.open("svg", &[("viewBox", "0 0 100 100"), ("preserveAspectRatio", "none"), ("aria-hidden", "true")]);
     markup.leaf("path", &[("class", "line"), ("d", &path)]);
@@ -152,7 +154,7 @@ fn title(x: &GridAxis, y: Option<&GridAxis>, column: usize, row: usize, place: P
     };
     let mut text = span(x, column);
     if let Some(y) = y {
-        text.push_str(&format!(", {}", span(y, row)));
+        let _ = write!(text, ", {}", span(y, row));
     }
     let tests = number::plural(usize::try_from(place.hits).unwrap_or(usize::MAX), "test", "tests");
     match place {

@@ -122,7 +122,7 @@ impl Place {
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
             Place::Campaign => {
                 "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `repeat` or `end after`"
-            },
+            }
             Place::Search => "`population`, `evaluations` or `seed`",
             Place::Coverage => "a dimension such as `T1 [0, 1] cells 6`, `hits`, `stop at` or `failsafe`",
             Place::Repeat => "`seed`",
@@ -142,7 +142,7 @@ impl Place {
             Place::Test => &["expect"],
             Place::Campaign => {
                 &["objectives", "operations", "observes", "activate", "search", "coverage", "repeat", "end"]
-            },
+            }
             Place::Search => &["population", "evaluations", "seed"],
             Place::Coverage => &["hits", "stop", "failsafe"],
             Place::Repeat => &["seed"],
@@ -190,7 +190,8 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
         return Diagnostic::new(Code::NOT_CLOSED, span_of(first), title).label("no block is open here");
     }
 
-    let begins = place.starters().contains(&first.text) || matches!(place, Place::Message | Place::Test | Place::Coverage);
+    let begins =
+        place.starters().contains(&first.text) || matches!(place, Place::Message | Place::Test | Place::Coverage);
     let continued = previous
         .and_then(|previous| read(text, previous.lo as usize, hi, place.one_rule()))
         .filter(|failure| token_at(text, failure.at).lo >= first.lo);

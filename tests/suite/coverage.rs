@@ -1,0 +1,109 @@
+//! Coverage as a user meets it: a search that stops where it suffices, and the analyses of its results.
+
+use std::path::Path;
+
+use nix::sys::signal::Signal;
+use sesame_runtime::record::Repository;
+use sesame_tests::{Done, Project, Runner, command, done, sesamec};
+
+use crate::interruption::Running;
+
+/// A search over a simulator that does nothing wrong, which stops at a third of 24 cells.
+const SPACE: &str = r#"
+space covered
+system {
+  simulator faulty = in_process "faulty_sim::Faulty" { crate "simulator"  step 10ms }
+  topic level  = "faulty/level"         : real[m]
+}
+
+metric fuzzing_time minimise = fuzzing_time()
+metric highest maximise default 0m = max(level) outbound
+
+operation lift on level = random offset [0m, 3m] within [0s, 1s]
+operation cut on level = packet loss [0%, 100%] within [0s, 1s]
+
+campaign covering {
+  objectives fuzzing_time, highest
+  operations lift, cut   1..3 per test
+  search     nsga2 { population 8  evaluations 24  seed 3 }
+  coverage   { T1 [0, 1] cells 4   T2 [0, 0.9] cells 3   P1 [0, 1] cells 2   hits 1   stop at 55%   failsafe 200 }
+  end        after 1s
+}
+"#;
+
+fn results(arguments: &[&str], file: &Path) -> Done {
+    done(command(sesamec()).arg("results").args(arguments).arg(file)).expect(0)
+}
+
+fn build() -> Runner {
+    Project::new("covered", SPACE, "faulty").build("covering")
+}
+
+#[test]
+fn a_search_stops_where_its_coverage_suffices_whatever_comes_between() {
+    let runner = build();
+    let whole = runner.run(&["--results", "whole", "--workers", "2"]).expect(0);
+    let repository = Repository::open(&runner.folder.join("whole/3")).unwrap();
+    let stop = repository.campaign().stop.clone().unwrap();
+    let generations = repository.coverage().unwrap();
+    let last = generations.last().unwrap();
+    assert_eq!(stop, format!("its coverage was reached: {} of 24 cells", last.covered));
+    assert!(last.covered >= 14, "55 % of 24 cells");
+    assert!(generations[..generations.len() - 1].iter().all(|earlier| earlier.covered < 14));
+    assert!(last.evaluations > 24 && last.evaluations < 200, "{last:?}: past `evaluations`, before `failsafe`");
+    assert!(last.evaluations.is_multiple_of(8), "after whole generations");
+    // The search, and an undisturbed run before and after it.
+    assert_eq!(repository.tests().unwrap().len(), last.evaluations as usize + 2);
+    assert!(whole.out.contains(&format!("{} of 24 cells covered", last.covered)), "{}", whole.out);
+
+    // The same with one worker, and when it is stopped in the middle.
+    assert_eq!(runner.run(&["--results", "alone", "--workers", "1"]).expect(0).digest(), whole.digest());
+    let mut running = Running::start(&runner, "stopped", "2");
+    running.until_recorded(12);
+    running.signal(Signal::SIGKILL);
+    running.ended();
+    assert_eq!(runner.run(&["resume", "stopped/3"]).expect(0).digest(), whole.digest());
+}
+
+#[test]
+fn analyses_of_a_results_file_say_what_the_campaign_said() {
+    let runner = build();
+    runner.run(&["--results", "analysed", "--evaluations", "30"]).expect(0);
+    let folder = runner.folder.join("analysed/3");
+    let repository = Repository::open(&folder).unwrap();
+    let counted = *repository.coverage().unwrap().last().unwrap();
+
+    let curve = results(&["coverage", "--format", "csv"], &folder).out;
+    let last: Vec<&str> = curve.lines().last().unwrap().split(',').collect();
+    let [covered, cells, feasible] = [counted.covered, counted.cells, counted.feasible].map(|count| count.to_string());
+    assert_eq!([last[1], last[2], last[4]], [&covered, &cells, &feasible]);
+    let cells = results(&["coverage", "--cells", "--dims", "P1,T1", "--format", "json"], &folder).out;
+    let cells: serde_json::Value = serde_json::from_str(&cells).unwrap();
+    assert_eq!(cells.as_array().unwrap().len(), 8);
+
+    let front = results(&["front", "--format", "json"], &folder).out;
+    let front: serde_json::Value = serde_json::from_str(&front).unwrap();
+    let standing = front.as_array().unwrap().iter().filter(|row| row["same_as"].is_null());
+    let names: Vec<&str> = standing.map(|row| row["test"].as_str().unwrap()).collect();
+    let members = repository.latest_result_set().unwrap().unwrap().members;
+    assert_eq!(names, members.iter().map(|number| format!("T{number}")).collect::<Vec<_>>());
+
+    let few = results(&["sspr", "--set", "final", "--dims", "T1,O0", "--format", "csv"], &folder).out;
+    assert_eq!((few.lines().next().unwrap(), few.lines().count()), ("test,T1,O0", members.len() + 1));
+    let original = results(&["sspr", "--compat", "original"], &folder).out;
+    assert_ne!(original, results(&["sspr"], &folder).out);
+    assert_eq!(results(&["tests"], &folder).out.lines().count(), 31);
+    let found = results(&["campaigns", "--format", "json"], &runner.folder.join("analysed")).out;
+    let found: serde_json::Value = serde_json::from_str(&found).unwrap();
+    assert_eq!((found[0]["campaign"].as_str(), found[0]["tests"].as_u64()), (Some("covering"), Some(30)));
+
+    let refused = |arguments: &[&str]| {
+        let mut asked = command(sesamec());
+        done(asked.arg("results").args(arguments)).expect(1).err
+    };
+    let shown = folder.to_str().unwrap();
+    assert!(refused(&["sspr", "--set", "finale", shown]).contains("no set of results `finale`"));
+    assert!(refused(&["tests", "no/such/file"]).contains("no results here"));
+    assert!(refused(&["coverage", "--dims", "T3", shown]).contains("no dimension T3"));
+    assert!(refused(&["campaigns", runner.folder.join("src").to_str().unwrap()]).contains("no results in"));
+}
