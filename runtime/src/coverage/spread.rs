@@ -186,7 +186,9 @@ mod tests {
         for _ in 0..12 {
             let mut x: Vec<f64> = members.iter().map(|it| stream.uniform(-it.reach, it.reach)).collect();
             let used: f64 = x.iter().map(|x| x.abs()).sum();
-            x.iter_mut().for_each(|x| *x *= (budget / used).min(1.0));
+            for x in &mut x {
+                *x *= (budget / used).min(1.0);
+            }
             let mut now = spread(&x);
             for round in 0..4_000 {
                 let mut other = x.clone();
@@ -197,7 +199,7 @@ mod tests {
                 // Often against another one, so that the mean and the budget can be kept.
                 match stream.below(3) {
                     0 => other[j] -= step,
-                    1 => other[j] += step * other[i].signum() * other[j].signum() * -1.0,
+                    1 => other[j] -= step * other[i].signum() * other[j].signum(),
                     _ => {}
                 }
                 let then = spread(&other);

@@ -133,7 +133,7 @@ fn naive(plan: &CampaignPlan, test: &Test, dimension: Dimension) -> Option<f64> 
         let Activation::Time { start, end } = it.activation;
         let end = end.min(plan.campaign.end_after);
         let (s, e) = (operation.within.start, operation.within.end);
-        midpoints.push(((start - s) / (e - s) + (end - s) / (e - s)) / 2.0);
+        midpoints.push((start + end - 2.0 * s) / (e - s) / 2.0);
         lengths.push((end - start) / (e - s));
         counts[0] += 1.0;
         counts[match operation.kind {

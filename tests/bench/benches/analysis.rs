@@ -65,7 +65,7 @@ fn analyses(criterion: &mut Criterion) {
         let mut plan = sesame_bench::plan();
         // A third objective, as large fronts have.
         plan.metrics.push(plan.metrics[1].clone());
-        plan.metrics[2].name = "third".to_owned();
+        "third".clone_into(&mut plan.metrics[2].name);
         plan.campaign.objectives.push(sesame_plan::MetricId(2));
         let permitted = Permitted::of(&plan).expect("the space has operations");
         let mut recorder = Recorder::create(&folder, &plan, 1, 1).expect("the folder is empty");
