@@ -415,3 +415,36 @@ fn reference_warnings(plan: &CampaignPlan, reference: &Observation) -> Vec<Strin
     });
     broken.collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::{Dimension, GridAxis};
+
+    use super::*;
+    use crate::record::sample;
+
+    fn tracking(stop_at: f64) -> Tracking {
+        let axis = |dimension, high, cells| GridAxis { dimension, low: 0.0, high, cells };
+        let axes = vec![axis(Dimension::T1, 1.0, 6), axis(Dimension::T2, 0.5, 6), axis(Dimension::P1, 1.0, 3)];
+        Tracking::of(&sample::plan(), &CoverageGoal { axes, hits: 1, stop_at: Some(stop_at) }).unwrap()
+    }
+
+    #[test]
+    fn a_coverage_that_no_test_can_reach_is_told_before_anything_is_run() {
+        assert_eq!(tracking(0.8).out_of_reach(), None);
+        let said = tracking(0.9).out_of_reach();
+        assert_eq!(said.as_deref(), Some("the search cannot stop at 90 % of all cells: its tests can reach 96 of 108"));
+    }
+
+    #[test]
+    fn what_is_covered_after_a_generation_is_the_same_in_any_order_of_its_tests() {
+        let plan = sample::plan();
+        let records = sample::records(&plan, 40);
+        let (mut forth, mut back) = (tracking(0.1), tracking(0.1));
+        records.iter().for_each(|record| forth.add(&plan, record));
+        records.iter().rev().for_each(|record| back.add(&plan, record));
+        assert_eq!(forth.after(3, 40), back.after(3, 40));
+        assert!(forth.reached().is_some_and(|why| why.starts_with("its coverage was reached: ")));
+        assert_eq!(tracking(0.1).reached(), None);
+    }
+}

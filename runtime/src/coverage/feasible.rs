@@ -53,8 +53,9 @@ impl Feasible {
     }
 
     /// Whether exactly these cells are feasible. Otherwise no other cell is, but some of these may not be either: where
-    /// T3 is asked for and operations have different windows, P2 and parameters are whole numbers, conditions decide
-    /// when operations are active, or there are very many kinds of operations.
+    /// T3 is asked for and midpoints in different windows cannot meet, or those windows are many; where P2 is asked for
+    /// and only some parameters are whole numbers, or those are very many; or where there are very many kinds of
+    /// operations.
     pub fn is_exact(&self) -> bool {
         self.exact
     }

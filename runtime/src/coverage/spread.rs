@@ -19,7 +19,7 @@ pub(super) struct Spread {
 }
 
 /// Vertices tried at most for one greatest spread; beyond, a bound stands in.
-const MOST_VERTICES: usize = 4_000;
+const MOST_VERTICES: usize = 2_000;
 
 /// The extreme standard deviations of midpoints `m` with `|m - centre| <= reach` for each, the sum of those distances at
 /// most `budget`, and the mean of all in `low..=high`.

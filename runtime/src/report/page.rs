@@ -146,6 +146,10 @@ fn header(body: &mut Markup, repository: &Repository, summary: &Summary) -> Resu
         Search::Repeat { test, times } => format!("{} repeated {times} times", plan.test(*test).name),
         Search::Known { tests } => plural(tests.len(), "known test", "known tests"),
     };
+    let search = match plan.campaign.coverage.as_ref().and_then(|goal| goal.stop_at) {
+        Some(share) => format!("{search} at most, until {} % of the cells are covered", number::number(100.0 * share)),
+        None => search,
+    };
     let wall: f64 = sessions.iter().filter_map(|session| Some(session.ended_at? - session.started_at)).sum();
     let workers = sessions.last().map_or(0, |session| session.workers);
     let workers = plural(usize::try_from(workers).unwrap_or(usize::MAX), "worker", "workers");

@@ -181,6 +181,7 @@ fn coverage_is_told_in_words_as_data_and_as_pictures() {
         .filter(|node| node.attribute("class").is_some_and(|class| class.split(' ').any(|class| class == "cell")))
         .collect();
     assert_eq!(cells.len(), 36);
+    assert!(html.contains("210 evaluations at most, until 50 % of the cells are covered"));
     let said = |word: &str| {
         let titles = cells.iter().map(|cell| cell.prev_sibling_element().unwrap().text().unwrap());
         titles.filter(|title| title.ends_with(word)).count()
