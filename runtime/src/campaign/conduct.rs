@@ -441,8 +441,10 @@ mod tests {
         let plan = sample::plan();
         let records = sample::records(&plan, 40);
         let (mut forth, mut back) = (tracking(0.1), tracking(0.1));
-        records.iter().for_each(|record| forth.add(&plan, record));
-        records.iter().rev().for_each(|record| back.add(&plan, record));
+        for (first, last) in records.iter().zip(records.iter().rev()) {
+            forth.add(&plan, first);
+            back.add(&plan, last);
+        }
         assert_eq!(forth.after(3, 40), back.after(3, 40));
         assert!(forth.reached().is_some_and(|why| why.starts_with("its coverage was reached: ")));
         assert_eq!(tracking(0.1).reached(), None);
