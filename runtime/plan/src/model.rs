@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::condition::{ConditionSpace, Constraint};
 use crate::{Formula, KnownTest};
 
 macro_rules! id {
@@ -237,6 +238,8 @@ pub struct Metric {
     pub direction: Option<Direction>,
     /// The value of a test in which it was never set.
     pub default: Option<f64>,
+    /// Its value for conditions before it is first set.
+    pub initial: Option<f64>,
     /// Where its value comes from.
     pub source: MetricSource,
     /// Line of its declaration, from 1.
@@ -359,6 +362,8 @@ pub struct Operation {
     pub priority: i32,
     /// Probability that a fresh test includes it. Default 1.
     pub inclusion: f64,
+    /// What its start conditions contain where a search grows them.
+    pub constraints: Vec<Constraint>,
 }
 
 /// A stretch of simulation time in seconds, `start <= end`.
@@ -515,6 +520,11 @@ pub struct Count {
 pub enum ActivationMode {
     /// In windows of simulation time.
     Time,
+    /// By conditions grown from this space.
+    Condition {
+        /// What they are made of.
+        space: ConditionSpace,
+    },
 }
 
 /// How the tests of a campaign are found.

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::condition::Condition;
 use crate::{Bound, MetricId, OperationId};
 
 /// One test configuration: what a search evolves and a run applies. An empty list disturbs nothing.
@@ -25,7 +26,7 @@ pub struct TestOperation {
 }
 
 /// When an operation of a test is active.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Activation {
     /// For `start <= t < end`, in seconds of simulation time, inside the operation's `within`.
@@ -34,6 +35,24 @@ pub enum Activation {
         start: f64,
         /// Where it ends.
         end: f64,
+    },
+    /// From the moment at which a condition holds until the moment at which another does, inside the operation's `within`.
+    Condition {
+        /// Switches it on.
+        start: Condition,
+        /// Switches it off; never in the step that switched it on.
+        end: Condition,
+        /// How often at most in one run, from 1.
+        times: u32,
+    },
+    /// From the moment at which a condition holds, for a length of time, inside the operation's `within`.
+    ConditionFor {
+        /// Switches it on.
+        start: Condition,
+        /// For how long, in seconds of simulation time; positive.
+        length: f64,
+        /// How often at most in one run, from 1.
+        times: u32,
     },
 }
 
