@@ -1,5 +1,6 @@
 //! Campaigns: how tests are found and run.
 
+use super::condition::ConditionSpace;
 use super::{Declaration, MetricId, OperationId, TestId};
 
 /// A campaign.
@@ -20,7 +21,7 @@ pub struct Campaign {
 }
 
 /// How the tests of a campaign are found.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Search {
     /// NSGA-II over tests of these operations.
     Nsga2 {
@@ -48,7 +49,7 @@ pub enum Search {
 }
 
 /// What a searched test holds.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Content {
     /// The operations it may hold, in written order; at least one, each once.
     pub operations: Vec<OperationId>,
@@ -57,12 +58,14 @@ pub struct Content {
     /// At most so many operations: `min` or more.
     pub max: u32,
     /// How tests switch their operations on and off.
-    pub activation: Activation,
+    pub activation: ActivationMode,
 }
 
 /// How tests switch their operations on and off.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Activation {
-    /// In windows of simulation time.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ActivationMode {
+    /// In windows of simulation time. The default.
     Time,
+    /// By conditions that are grown from this.
+    Condition(ConditionSpace),
 }

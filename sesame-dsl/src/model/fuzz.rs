@@ -1,5 +1,6 @@
 //! Fuzzing operations and the known tests that apply them.
 
+use super::condition::{Condition, Constraint};
 use super::{Bound, Declaration, FieldPath, MetricId, OperationId, Range, TopicId};
 use crate::units::Unit;
 
@@ -18,6 +19,8 @@ pub struct Operation {
     pub priority: i32,
     /// Probability that a fresh test includes it. Default 1.
     pub inclusion: f64,
+    /// What its start conditions contain in campaigns that activate by condition; in written order.
+    pub constraints: Vec<Constraint>,
 }
 
 impl Operation {
@@ -160,10 +163,47 @@ pub struct TestOperation {
     pub operation: OperationId,
     /// The choice for the operation's parameter: `Some` exactly if it has one, and inside its permitted range.
     pub choice: Option<Choice>,
-    /// When it is active, in seconds: from `low` up to, not including, `high`; inside the operation's `within`, not empty.
-    pub window: Range,
+    /// When it is active.
+    pub activation: Activation,
     /// Seed of its draws: as written, else [`draw_seed`].
     pub draw_seed: u64,
+}
+
+/// When an operation of a known test is active; inside the operation's `within` only.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Activation {
+    /// In seconds from `low` up to, not including, `high`; inside the operation's `within`, not empty.
+    Window(Range),
+    /// From the moment at which a condition holds.
+    Condition {
+        /// Switches it on.
+        start: Condition,
+        /// What switches it off.
+        end: End,
+        /// How often at most in one run, at least 1. Default 1.
+        times: u32,
+    },
+}
+
+/// What ends an activation by condition.
+#[derive(Debug, Clone, PartialEq)]
+pub enum End {
+    /// The moment at which another condition holds.
+    Condition(Condition),
+    /// A length of time, in seconds; positive.
+    Length(f64),
+}
+
+impl Activation {
+    /// The conditions it depends on.
+    pub fn conditions(&self) -> impl Iterator<Item = &Condition> {
+        let (start, end) = match self {
+            Activation::Window(_) => (None, None),
+            Activation::Condition { start, end: End::Length(_), .. } => (Some(start), None),
+            Activation::Condition { start, end: End::Condition(end), .. } => (Some(start), Some(end)),
+        };
+        start.into_iter().chain(end)
+    }
 }
 
 /// What a test chose for a parameter, in the parameter's unit.

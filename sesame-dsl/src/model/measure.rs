@@ -14,6 +14,8 @@ pub struct Metric {
     pub direction: Option<Direction>,
     /// The value of a test in which it was never set, in its unit.
     pub default: Option<f64>,
+    /// Its value for conditions before it is first set, in its unit; `None` when it is unknown then.
+    pub initial: Option<f64>,
     /// Where its value comes from.
     pub source: MetricSource,
 }

@@ -5,6 +5,7 @@
 //! `0..=1`; every other number is in the unit that its field or metric declares.
 
 mod campaign;
+pub mod condition;
 mod formula;
 mod fuzz;
 mod ids;

@@ -3,7 +3,9 @@
 use super::quantity::percent;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, Choice, Distribution, Drain, Id as _, OperationId, OperationKind, Parameter, Range, Shape};
+use crate::model::{
+    self, Activation, Choice, Distribution, Drain, Id as _, OperationId, OperationKind, Parameter, Range, Shape,
+};
 use crate::span::Span;
 use crate::syntax::ast;
 use crate::units::{Unit, convert};
@@ -31,6 +33,7 @@ impl<'a> Resolver<'a> {
             Some(quantity) => self.inclusion(quantity),
             None => Some(1.0),
         };
+        let constraints = self.constraints(&body.contains);
         let (target, kind) = what?;
         Some(model::Operation {
             declaration: self.declaration(&operation.head),
@@ -39,6 +42,7 @@ impl<'a> Resolver<'a> {
             within: within?,
             priority: priority?,
             inclusion: inclusion?,
+            constraints: constraints?,
         })
     }
 
@@ -142,10 +146,10 @@ impl<'a> Resolver<'a> {
         let mut operations = Vec::new();
         for (position, operation) in test.operations.iter().enumerate() {
             match self.test_operation(operation) {
-                Some((id, choice, window)) => operations.push(model::TestOperation {
+                Some((id, choice, activation)) => operations.push(model::TestOperation {
                     operation: id,
                     choice,
-                    window,
+                    activation,
                     draw_seed: match operation.seed {
                         Some(seed) => seed.value?,
                         None => model::draw_seed(&test.head.name.text, position),
@@ -164,14 +168,18 @@ impl<'a> Resolver<'a> {
         complete.then(|| model::Test { declaration: self.declaration(&test.head), operations, expectations })
     }
 
-    fn test_operation(&mut self, test: &'a ast::TestOperation) -> Option<(OperationId, Option<Choice>, Range)> {
+    fn test_operation(&mut self, test: &'a ast::TestOperation) -> Option<(OperationId, Option<Choice>, Activation)> {
         let index = self.find(&test.operation, Kind::Operation);
-        let window = test.window.as_ref().and_then(|window| self.test_window(window));
+        let activation = match &test.activation {
+            ast::Activation::Window(window) => self.test_window(window).map(Activation::Window),
+            ast::Activation::Trigger(trigger) => self.trigger(trigger),
+        };
         let index = index?;
         let operation = self.operations[index].clone()?;
         let choice = self.choice(test, index, &operation);
-        if let (Some(window), Some(within), Some(written)) = (window, operation.within, &test.window)
-            && !within.contains(window)
+        if let (Some(Activation::Window(window)), Some(within), ast::Activation::Window(written)) =
+            (&activation, operation.within, &test.activation)
+            && !within.contains(*window)
         {
             let declared = self.file.operations[index].body.as_ref().and_then(|body| body.within.first());
             let mut diagnostic = Diagnostic::new(
@@ -186,7 +194,7 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         }
-        Some((OperationId::from_index(index), choice?, window?))
+        Some((OperationId::from_index(index), choice?, activation?))
     }
 
     fn test_window(&mut self, window: &ast::Range) -> Option<Range> {

@@ -4,13 +4,14 @@
 //! 2. [`system`] has message types (in an order in which each follows those it contains), topics, nodes, the simulator
 //! 3. [`measure`] has metrics (their formulas in [`formula`]) and requirements
 //! 4. [`fuzz`] has operations and known tests
-//! 5. [`campaign`] has campaigns
+//! 5. [`campaign`] has campaigns; [`condition`] the conditions of tests and what those of campaigns are made of
 //!
 //! Each pass reports all it finds. A declaration with a mistake is `None` from then on, and whoever mentions it says
 //! nothing: so one mistake is one diagnostic.
 
 mod campaign;
 mod collect;
+mod condition;
 mod formula;
 mod fuzz;
 mod measure;

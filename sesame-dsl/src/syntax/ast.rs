@@ -139,6 +139,7 @@ pub(crate) struct Metric {
     pub(crate) ty: Option<Type>,
     pub(crate) directions: Vec<(Span, Direction)>,
     pub(crate) defaults: Vec<(Span, Quantity)>,
+    pub(crate) initials: Vec<(Span, Quantity)>,
     /// `None` for a formula that is not supported yet.
     pub(crate) source: Option<MetricSource>,
 }
@@ -277,6 +278,15 @@ pub(crate) struct OperationBody {
     pub(crate) within: Vec<(Span, Range)>,
     pub(crate) priority: Vec<(Span, Quantity)>,
     pub(crate) inclusion: Vec<(Span, Quantity)>,
+    pub(crate) contains: Vec<(Span, Vec<Contained>)>,
+}
+
+/// What the start condition of an operation has to contain.
+#[derive(Debug)]
+pub(crate) enum Contained {
+    Variable(Name),
+    /// A whole number; the span is that of all of it.
+    Integer(Span, Range),
 }
 
 #[derive(Debug)]
@@ -306,9 +316,29 @@ pub(crate) struct Test {
 pub(crate) struct TestOperation {
     pub(crate) operation: Name,
     pub(crate) choices: Vec<(Name, Choice)>,
-    /// `None` for a window that is not supported yet.
-    pub(crate) window: Option<Range>,
+    pub(crate) activation: Activation,
     pub(crate) seed: Option<Count>,
+}
+
+/// When an operation of a test is active.
+#[derive(Debug)]
+pub(crate) enum Activation {
+    Window(Range),
+    Trigger(Trigger),
+}
+
+/// Activation by condition. What the conditions may hold, is for resolution to say.
+#[derive(Debug)]
+pub(crate) struct Trigger {
+    pub(crate) start: Expression,
+    pub(crate) end: TriggerEnd,
+    pub(crate) times: Option<Count>,
+}
+
+#[derive(Debug)]
+pub(crate) enum TriggerEnd {
+    Until(Expression),
+    For(Quantity),
 }
 
 #[derive(Debug)]
@@ -338,12 +368,31 @@ pub(crate) struct Campaign {
     pub(crate) objectives: Vec<(Span, Vec<Name>)>,
     pub(crate) observes: Vec<(Span, Vec<Name>)>,
     pub(crate) operations: Vec<Operations>,
-    pub(crate) activates: Vec<Span>,
+    pub(crate) activates: Vec<(Span, ActivationMode)>,
     pub(crate) searches: Vec<Search>,
     pub(crate) repeats: Vec<Repeat>,
     pub(crate) ends: Vec<(Span, Quantity)>,
     /// Something of it could not be read or is not supported: what is missing may be there.
     pub(crate) damaged: bool,
+}
+
+/// How the tests of a search switch operations on and off.
+#[derive(Debug)]
+pub(crate) enum ActivationMode {
+    Time,
+    Condition(ByCondition),
+}
+
+/// `condition over …`, with its settings as written.
+#[derive(Debug)]
+pub(crate) struct ByCondition {
+    /// The variables and their known ranges, as long as each other.
+    pub(crate) variables: Vec<Name>,
+    pub(crate) ranges: Vec<Option<Range>>,
+    pub(crate) depth: Vec<(Span, Count)>,
+    pub(crate) integers: Vec<(Span, Range)>,
+    pub(crate) lengths: Vec<(Span, Range)>,
+    pub(crate) times: Vec<(Span, Count)>,
 }
 
 #[derive(Debug)]

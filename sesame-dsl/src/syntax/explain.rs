@@ -27,6 +27,7 @@ pub(super) enum Place {
     Hook,
     Test,
     Campaign,
+    Condition,
     Search,
     Repeat,
 }
@@ -43,6 +44,7 @@ impl Place {
             Place::Hook => Rule::error_hook_member,
             Place::Test => Rule::error_test_member,
             Place::Campaign => Rule::error_campaign_member,
+            Place::Condition => Rule::error_condition_setting,
             Place::Search => Rule::error_search_setting,
             Place::Repeat => Rule::error_repeat_setting,
         }
@@ -79,6 +81,7 @@ impl Place {
                 Rule::repeat,
                 Rule::unsupported_campaign_member,
             ],
+            Place::Condition => &[Rule::setting_depth, Rule::setting_integers],
             Place::Search => &[Rule::setting_population, Rule::setting_evaluations, Rule::setting_seed],
             Place::Repeat => &[Rule::setting_seed],
         }
@@ -95,6 +98,7 @@ impl Place {
             Place::Hook => Rule::one_hook_member,
             Place::Test => Rule::one_test_member,
             Place::Campaign => Rule::one_campaign_member,
+            Place::Condition => Rule::one_condition_setting,
             Place::Search => Rule::one_search_setting,
             Place::Repeat => Rule::one_repeat_setting,
         }
@@ -114,6 +118,7 @@ impl Place {
             Place::Hook => "`hook on` and topics",
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
             Place::Campaign => "`objectives`, `operations`, `observes`, `activate`, `search`, `repeat` or `end after`",
+            Place::Condition => "`depth` or `integers`",
             Place::Search => "`population`, `evaluations` or `seed`",
             Place::Repeat => "`seed`",
         }
@@ -131,6 +136,7 @@ impl Place {
             Place::Hook => &["hook"],
             Place::Test => &["expect"],
             Place::Campaign => &["objectives", "operations", "observes", "activate", "search", "repeat", "end"],
+            Place::Condition => &["depth", "integers"],
             Place::Search => &["population", "evaluations", "seed"],
             Place::Repeat => &["seed"],
         }
@@ -188,7 +194,10 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
     let found = token_at(text, failure.at);
     let span = span_of(found);
     let words: BTreeSet<&'static str> = failure.expected.iter().filter_map(|&rule| keyword_of(rule)).collect();
-    let wants_name = failure.expected.iter().any(|&rule| matches!(rule, Rule::name | Rule::names | Rule::path));
+    let wants_name = failure
+        .expected
+        .iter()
+        .any(|&rule| matches!(rule, Rule::name | Rule::names | Rule::path | Rule::condition_variable));
     let expected = describe(&failure, place, found.lo == first.lo);
 
     let before = text[..found.lo].chars().next_back();
@@ -305,11 +314,14 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::paren_close => "`)`",
         Rule::bracket_open => "`[`",
         Rule::bracket_close => "`]`",
-        Rule::open | Rule::hook_block | Rule::simulator_settings | Rule::process_settings | Rule::search_settings => {
-            "`{`"
-        }
+        Rule::open
+        | Rule::hook_block
+        | Rule::simulator_settings
+        | Rule::process_settings
+        | Rule::search_settings
+        | Rule::condition_settings => "`{`",
         Rule::close => "`}`",
-        Rule::name | Rule::names | Rule::path | Rule::identifier => "a name",
+        Rule::name | Rule::names | Rule::path | Rule::identifier | Rule::condition_variable => "a name",
         Rule::field_name | Rule::field => "a field such as `level: real[mm]`",
         Rule::text => "a text in double quotes",
         Rule::number | Rule::count => "a number",
@@ -326,7 +338,15 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::above => "`>`",
         Rule::bound_within => "`in`",
         Rule::parameter_name | Rule::choice => "a parameter such as `offset`, `value`, `loss` or `delay`",
-        Rule::window | Rule::test_window => "`from`",
+        Rule::window => "`from`",
+        Rule::trigger => "`when`",
+        Rule::until_condition => "`until`",
+        Rule::for_length | Rule::for_lengths => "`for`",
+        Rule::at_most_times => "`at most`",
+        Rule::by_condition => "`condition`",
+        Rule::start_contains => "`start contains`",
+        Rule::contained_integer => "`integer`",
+        Rule::initial_value => "`initial`",
         Rule::draw_seed | Rule::setting_seed => "`seed`",
         Rule::within => "`within`",
         Rule::priority => "`priority`",
@@ -361,8 +381,6 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::formula_outbound => "`outbound`",
         Rule::fuzzing_time => "`fuzzing_time()`",
         Rule::minus
-        | Rule::k_when
-        | Rule::k_condition
         | Rule::k_import
         | Rule::k_eddi
         | Rule::k_physical

@@ -1,6 +1,7 @@
 //! From text to [`ast`]: parsing with recovery.
 
 pub(crate) mod ast;
+mod condition;
 mod explain;
 mod formula;
 mod limits;

@@ -5,9 +5,10 @@ use pest::iterators::Pair as PestPair;
 use sesame_grammar::{Rule, SesameParser};
 
 use super::ast::{
-    Bound, Campaign, Choice, Comparison, Count, Direction, Drain, Expectation, Field, File, Head, InProcess, Message,
-    Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Process, Range, Repeat,
-    Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Topic, Transport, Type, TypeKind,
+    Activation, ActivationMode, Bound, Campaign, Choice, Comparison, Count, Direction, Drain, Expectation, Field, File,
+    Head, InProcess, Message, Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations,
+    Process, Repeat, Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Topic, Transport, Type,
+    TypeKind,
 };
 use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, MAX_CALLS, too_deep};
@@ -117,7 +118,12 @@ impl Reader<'_> {
     }
 
     /// Visits the members of a block. What could not be read is explained; returns whether there was such a thing.
-    fn members<'i>(&mut self, block: &Pair<'i>, place: Place, mut visit: impl FnMut(&mut Self, Pair<'i>)) -> bool {
+    pub(super) fn members<'i>(
+        &mut self,
+        block: &Pair<'i>,
+        place: Place,
+        mut visit: impl FnMut(&mut Self, Pair<'i>),
+    ) -> bool {
         let mut damaged = false;
         let mut previous = None;
         let mut opened = None;
@@ -223,9 +229,7 @@ impl Reader<'_> {
             Rule::unsupported_formula => format!("a metric by `{word}(…)`"),
             Rule::unsupported_operation if word != "custom" => format!("an operation on a `{word}`"),
             Rule::unsupported_operation | Rule::unsupported_kind => format!("operation kind `{word}`"),
-            Rule::unsupported_window => "activation by `when`".to_owned(),
             Rule::unsupported_from => "a campaign `from` another".to_owned(),
-            Rule::unsupported_activation => "activation by `condition`".to_owned(),
             Rule::unsupported_strategy => format!("search strategy `{word}`"),
             _ => format!("`{word}`"),
         };
@@ -414,9 +418,12 @@ impl Reader<'_> {
             (self.span(&direction), value)
         });
         let directions = directions.collect();
-        let defaults = children(pair, Rule::default_value)
-            .map(|default| (self.keyword_span(&default), self.signed(&expect_child(&default, Rule::signed))))
-            .collect();
+        let mut values = |rule| {
+            let clauses = children(pair, rule);
+            clauses.map(|it| (self.keyword_span(&it), self.signed(&expect_child(&it, Rule::signed)))).collect()
+        };
+        let defaults = values(Rule::default_value);
+        let initials = values(Rule::initial_value);
         let sources = [Rule::hook_block, Rule::formula, Rule::fuzzing_time, Rule::unsupported_formula];
         let source = first_of(pair, &sources).expect("a metric has a source");
         let source = match source.as_rule() {
@@ -434,7 +441,7 @@ impl Reader<'_> {
                 None
             }
         };
-        Metric { head, ty, directions, defaults, source }
+        Metric { head, ty, directions, defaults, initials, source }
     }
 
     fn bound(&mut self, pair: &Pair<'_>) -> Bound {
@@ -489,8 +496,11 @@ impl Reader<'_> {
         let within = children(pair, Rule::within)
             .map(|within| (self.keyword_span(&within), self.range(&expect_child(&within, Rule::range))))
             .collect();
+        let contains = children(pair, Rule::start_contains)
+            .map(|clause| (self.keyword_span(&clause), self.contained(&clause)))
+            .collect();
         let target = self.path(&expect_child(pair, Rule::path));
-        Operation { head, body: Some(OperationBody { target, kind, within, priority, inclusion }) }
+        Operation { head, body: Some(OperationBody { target, kind, within, priority, inclusion, contains }) }
     }
 
     fn test(&mut self, pair: &Pair<'_>) -> Test {
@@ -518,17 +528,12 @@ impl Reader<'_> {
                 (name, value)
             })
             .collect();
-        let window = child(pair, Rule::window).map(|window| {
-            let mut ends = children(&window, Rule::signed).map(|end| self.signed(&end)).collect::<Vec<_>>();
-            let high = ends.pop().expect("a window has an end");
-            let low = ends.pop().expect("a window has a start");
-            Range { span: low.span.to(high.span), low, high }
-        });
-        if let Some(unsupported) = child(pair, Rule::unsupported_window) {
-            self.unsupported(&unsupported);
-        }
+        let activation = match child(pair, Rule::window) {
+            Some(window) => Activation::Window(self.window(&window)),
+            None => Activation::Trigger(self.trigger(&expect_child(pair, Rule::trigger))),
+        };
         let seed = child(pair, Rule::draw_seed).map(|seed| self.count(&expect_child(&seed, Rule::number)));
-        TestOperation { operation, choices, window, seed }
+        TestOperation { operation, choices, activation, seed }
     }
 
     // ----- campaigns
@@ -562,10 +567,11 @@ impl Reader<'_> {
                     campaign.operations.push(Operations { span, names: reader.names(&member), min, max });
                 }
                 Rule::activate => {
-                    campaign.activates.push(span);
-                    if let Some(activation) = child(&member, Rule::unsupported_activation) {
-                        reader.unsupported(&activation);
-                    }
+                    let mode = match child(&member, Rule::by_condition) {
+                        Some(condition) => ActivationMode::Condition(reader.by_condition(&condition)),
+                        None => ActivationMode::Time,
+                    };
+                    campaign.activates.push((span, mode));
                 }
                 Rule::search => campaign.searches.push(reader.search(&member, span)),
                 Rule::end => campaign.ends.push((span, reader.signed(&expect_child(&member, Rule::signed)))),

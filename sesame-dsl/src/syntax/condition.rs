@@ -1,0 +1,83 @@
+//! Activation: windows, conditions of known tests, and what conditions of a campaign are made of.
+
+use sesame_grammar::Rule;
+
+use super::ast::{ByCondition, Contained, Count, Range, Trigger, TriggerEnd};
+use super::explain::Place;
+use super::parse::{Pair, Reader, child, children, expect_child};
+
+impl Reader<'_> {
+    pub(super) fn window(&mut self, pair: &Pair<'_>) -> Range {
+        let mut ends = children(pair, Rule::signed).map(|end| self.signed(&end)).collect::<Vec<_>>();
+        let high = ends.pop().expect("a window has an end");
+        let low = ends.pop().expect("a window has a start");
+        Range { span: low.span.to(high.span), low, high }
+    }
+
+    pub(super) fn trigger(&mut self, pair: &Pair<'_>) -> Trigger {
+        let start = self.expression(&expect_child(pair, Rule::expression));
+        let end = match child(pair, Rule::until_condition) {
+            Some(until) => TriggerEnd::Until(self.expression(&expect_child(&until, Rule::expression))),
+            None => {
+                let length = expect_child(pair, Rule::for_length);
+                TriggerEnd::For(self.signed(&expect_child(&length, Rule::signed)))
+            }
+        };
+        let times = child(pair, Rule::at_most_times).map(|times| self.times(&times));
+        Trigger { start, end, times }
+    }
+
+    fn times(&mut self, pair: &Pair<'_>) -> Count {
+        self.count(&expect_child(pair, Rule::number))
+    }
+
+    pub(super) fn by_condition(&mut self, pair: &Pair<'_>) -> ByCondition {
+        let mut found = ByCondition {
+            variables: vec![],
+            ranges: vec![],
+            depth: vec![],
+            integers: vec![],
+            lengths: vec![],
+            times: vec![],
+        };
+        for variable in children(pair, Rule::condition_variable) {
+            found.variables.push(self.name(&expect_child(&variable, Rule::name)));
+            found.ranges.push(child(&variable, Rule::range).map(|range| self.range(&range)));
+        }
+        if let Some(settings) = child(pair, Rule::condition_settings) {
+            // Each setting has a default, so a block that is damaged lacks none.
+            self.members(&settings, Place::Condition, |reader, setting| {
+                let span = reader.keyword_span(&setting);
+                match setting.as_rule() {
+                    Rule::setting_depth => {
+                        found.depth.push((span, reader.count(&expect_child(&setting, Rule::number))));
+                    }
+                    _ => found.integers.push((span, reader.range(&expect_child(&setting, Rule::range)))),
+                }
+            });
+        }
+        for lengths in children(pair, Rule::for_lengths) {
+            found.lengths.push((self.keyword_span(&lengths), self.range(&expect_child(&lengths, Rule::range))));
+        }
+        for times in children(pair, Rule::at_most_times) {
+            found.times.push((self.keyword_span(&times), self.times(&times)));
+        }
+        found
+    }
+
+    /// What stands in one `start contains`.
+    pub(super) fn contained(&mut self, pair: &Pair<'_>) -> Vec<Contained> {
+        let mut found = Vec::new();
+        for item in pair.clone().into_inner() {
+            match item.as_rule() {
+                Rule::name => found.push(Contained::Variable(self.name(&item))),
+                Rule::contained_integer => {
+                    let range = self.range(&expect_child(&item, Rule::range));
+                    found.push(Contained::Integer(self.span(&item), range));
+                }
+                _ => {}
+            }
+        }
+        found
+    }
+}
