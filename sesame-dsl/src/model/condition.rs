@@ -132,14 +132,6 @@ impl ConditionSpace {
     pub const DEFAULT_DEPTH: u32 = 4;
     /// The whole numbers of a campaign that says nothing of them.
     pub const DEFAULT_INTEGERS: Integers = Integers { lowest: 1, highest: 20 };
-
-    /// Whether a comparison of this variable may go both ways: with one of the whole numbers or with another variable.
-    pub fn is_comparable(&self, variable: &Variable) -> bool {
-        variable.known.meets(self.integers)
-            || self.variables.iter().any(|other| {
-                other.metric != variable.metric && variable.known.outcome(Comparison::Equal, other.known).is_none()
-            })
-    }
 }
 
 /// A condition variable.

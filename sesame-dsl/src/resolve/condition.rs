@@ -56,9 +56,9 @@ impl<'a> Resolver<'a> {
     }
 
     fn condition_over_metrics(&mut self, expression: &'a ast::Expression) -> Option<Condition> {
-        let (parts, join): (_, fn(Box<Condition>, Box<Condition>) -> Condition) = match &expression.kind {
-            ExpressionKind::All(parts) => (parts, Condition::And),
-            ExpressionKind::Any(parts) => (parts, Condition::Or),
+        let (parts, all) = match &expression.kind {
+            ExpressionKind::All(parts) => (parts, true),
+            ExpressionKind::Any(parts) => (parts, false),
             ExpressionKind::Compare(left, by, right) => return self.comparison(expression, left, *by, right),
             kind => {
                 let written = self.text(expression.span);
@@ -73,6 +73,7 @@ impl<'a> Resolver<'a> {
         // All are looked at, so that a mistake in one does not hide one in another.
         let parts: Vec<_> = parts.iter().map(|part| self.condition_over_metrics(part)).collect();
         let parts: Vec<Condition> = parts.into_iter().collect::<Option<_>>()?;
+        let join = if all { Condition::And } else { Condition::Or };
         parts.into_iter().reduce(|left, right| join(Box::new(left), Box::new(right)))
     }
 
@@ -165,6 +166,12 @@ impl<'a> Resolver<'a> {
                     ExpressionKind::Field(_) | ExpressionKind::Members(..) => {
                         format!("`{written}` is no metric, and a condition compares metrics")
                     }
+                    ExpressionKind::Truth(_)
+                    | ExpressionKind::Compare(..)
+                    | ExpressionKind::All(_)
+                    | ExpressionKind::Any(_) => {
+                        format!("`{written}` holds or does not, and a condition compares metrics")
+                    }
                     _ => format!("`{written}` is calculated, and a condition compares metrics as they are"),
                 };
                 let diagnostic = Diagnostic::new(Code::NOT_A_CONDITION, side.span, title)
@@ -191,15 +198,14 @@ impl<'a> Resolver<'a> {
         let [unit, other_unit] = [unit.as_ref(), other_unit.as_ref()];
         let in_words =
             |unit: Option<&Unit>| unit.map_or("a plain number".to_owned(), |unit| format!("in `{}`", unit.text()));
-        let same_dimension = dimension(unit) == dimension(other_unit);
-        if same_dimension && convert(1.0, other_unit, unit) == 1.0 {
+        if same_unit(unit, other_unit) {
             return Some(());
         }
         let [name, other_name] = [span, other_span].map(|span| self.text(span));
         let title = format!("`{other_name}` is {}, but `{name}` is {}", in_words(other_unit), in_words(unit));
         let mut diagnostic =
             Diagnostic::new(Code::WRONG_UNIT, span.to(other_span), title).label("metrics are compared in one unit");
-        if same_dimension {
+        if dimension(unit) == dimension(other_unit) {
             diagnostic = diagnostic.note("let one of them be computed in the unit of the other");
         }
         self.report(diagnostic);
@@ -224,7 +230,7 @@ impl<'a> Resolver<'a> {
                 && known != Known::NOTHING
             {
                 let declared = &self.metric_of(id).declaration;
-                let label = format!("`{}` is {}", declared.name, in_words(known));
+                let label = format!("`{}` is {}", declared.name, in_words(known, self.metric_of(id).unit.as_ref()));
                 diagnostic = diagnostic.also(declared.span, label);
             }
         }
@@ -264,7 +270,7 @@ impl<'a> Resolver<'a> {
         found?;
         let [depth, times] = [depth?, times?];
         let space = ConditionSpace { variables: variables?, depth, integers: integers?, lengths: lengths?, times };
-        if space.variables.iter().any(|variable| space.is_comparable(variable)) {
+        if space.variables.iter().any(|variable| self.is_comparable(&space, variable)) {
             return Some(space);
         }
         let names: Vec<&str> = by.variables.iter().map(|name| name.text.as_str()).collect();
@@ -281,6 +287,17 @@ impl<'a> Resolver<'a> {
         None
     }
 
+    /// Whether a comparison of this variable may go both ways: with a whole number, or with another variable of its unit.
+    fn is_comparable(&self, space: &ConditionSpace, variable: &Variable) -> bool {
+        let unit = |variable: &Variable| self.metric_of(variable.metric).unit.as_ref();
+        variable.known.meets(space.integers)
+            || space.variables.iter().any(|other| {
+                other.metric != variable.metric
+                    && same_unit(unit(variable), unit(other))
+                    && variable.known.outcome(Comparison::Equal, other.known).is_none()
+            })
+    }
+
     fn variable(&mut self, name: &'a ast::Name, id: MetricId, range: Option<&'a ast::Range>) -> Option<Variable> {
         let metric = self.metrics[id.index()].as_ref()?;
         let own = known_of(metric);
@@ -293,7 +310,7 @@ impl<'a> Resolver<'a> {
         {
             let title = format!("`{}` begins outside of this range", name.text);
             let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, range.span, title)
-                .label(format!("expected a range that holds its `initial` {initial}"))
+                .label(format!("expected a range that holds its `initial {initial}{}`", unit_text(unit.as_ref())))
                 .also(declared, "declared here");
             self.report(diagnostic);
             return None;
@@ -302,7 +319,7 @@ impl<'a> Resolver<'a> {
         if known.low > known.high {
             let title = format!("`{}` never lies in this range", name.text);
             let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, range.span, title)
-                .label(format!("it is {}", in_words(own)))
+                .label(format!("it is {}", in_words(own, unit.as_ref())))
                 .also(declared, "declared here");
             self.report(diagnostic);
             return None;
@@ -394,7 +411,7 @@ impl<'a> Resolver<'a> {
                     let offered = space.variables.iter().find(|offered| offered.metric == *metric);
                     let wrong = match offered {
                         None => format!("`{}` is no variable of campaign `{}`", variable.text, campaign.head.name.text),
-                        Some(offered) if !space.is_comparable(offered) => {
+                        Some(offered) if !self.is_comparable(space, offered) => {
                             format!("no comparison with `{}` may go both ways", variable.text)
                         }
                         Some(_) => continue,
@@ -491,12 +508,22 @@ fn comparisons_needed(constraints: &[Constraint]) -> usize {
     numbers.len() + variables.saturating_sub(numbers.len()).div_ceil(2)
 }
 
-/// What is known of a number, for example `0 and more`.
-fn in_words(known: Known) -> String {
+/// Whether two metrics are in one unit, however it is written.
+fn same_unit(unit: Option<&Unit>, other: Option<&Unit>) -> bool {
+    dimension(unit) == dimension(other) && convert(1.0, other, unit) == 1.0
+}
+
+/// What is known of a number, for example `0s and more`.
+fn in_words(known: Known, unit: Option<&Unit>) -> String {
+    let unit = unit_text(unit);
     match (known.low.is_finite(), known.high.is_finite()) {
-        (true, true) => format!("from {} to {}", known.low, known.high),
-        (true, false) => format!("{} and more", known.low),
-        (false, true) => format!("{} and less", known.high),
+        (true, true) => format!("from {}{unit} to {}{unit}", known.low, known.high),
+        (true, false) => format!("{}{unit} and more", known.low),
+        (false, true) => format!("{}{unit} and less", known.high),
         (false, false) => "any number".to_owned(),
     }
+}
+
+fn unit_text(unit: Option<&Unit>) -> &str {
+    unit.map_or("", Unit::text)
 }

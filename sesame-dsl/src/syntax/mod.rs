@@ -1,7 +1,7 @@
 //! From text to [`ast`]: parsing with recovery.
 
+mod activation;
 pub(crate) mod ast;
-mod condition;
 mod explain;
 mod formula;
 mod limits;

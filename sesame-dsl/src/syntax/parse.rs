@@ -5,10 +5,9 @@ use pest::iterators::Pair as PestPair;
 use sesame_grammar::{Rule, SesameParser};
 
 use super::ast::{
-    Activation, ActivationMode, Bound, Campaign, Choice, Comparison, Count, Direction, Drain, Expectation, Field, File,
-    Head, InProcess, Message, Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations,
-    Process, Repeat, Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Topic, Transport, Type,
-    TypeKind,
+    ActivationMode, Bound, Campaign, Comparison, Count, Direction, Drain, Expectation, Field, File, Head, InProcess,
+    Message, Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Process, Repeat,
+    Requirement, Search, Simulator, Strategy, System, Test, Topic, Transport, Type, TypeKind,
 };
 use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, MAX_CALLS, too_deep};
@@ -513,27 +512,6 @@ impl Reader<'_> {
             _ => test.operations.push(reader.test_operation(&member)),
         });
         test
-    }
-
-    fn test_operation(&mut self, pair: &Pair<'_>) -> TestOperation {
-        let operation = self.name(&expect_child(pair, Rule::name));
-        let choices = children(pair, Rule::choice)
-            .map(|choice| {
-                let word = expect_child(&choice, Rule::parameter_name);
-                let name = Name { text: word.as_str().to_owned(), span: self.span(&word) };
-                let value = match child(&choice, Rule::range) {
-                    Some(range) => Choice::Range(self.range(&range)),
-                    None => Choice::Value(self.signed(&expect_child(&choice, Rule::signed))),
-                };
-                (name, value)
-            })
-            .collect();
-        let activation = match child(pair, Rule::window) {
-            Some(window) => Activation::Window(self.window(&window)),
-            None => Activation::Trigger(self.trigger(&expect_child(pair, Rule::trigger))),
-        };
-        let seed = child(pair, Rule::draw_seed).map(|seed| self.count(&expect_child(&seed, Rule::number)));
-        TestOperation { operation, choices, activation, seed }
     }
 
     // ----- campaigns

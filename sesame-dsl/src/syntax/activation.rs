@@ -1,27 +1,47 @@
-//! Activation: windows, conditions of known tests, and what conditions of a campaign are made of.
+//! Operations of known tests with their windows and conditions, and what the conditions of a campaign are made of.
 
 use sesame_grammar::Rule;
 
-use super::ast::{ByCondition, Contained, Count, Range, Trigger, TriggerEnd};
+use super::ast::{Activation, ByCondition, Choice, Contained, Count, Name, Range, TestOperation, Trigger, TriggerEnd};
 use super::explain::Place;
 use super::parse::{Pair, Reader, child, children, expect_child};
 
 impl Reader<'_> {
-    pub(super) fn window(&mut self, pair: &Pair<'_>) -> Range {
+    pub(super) fn test_operation(&mut self, pair: &Pair<'_>) -> TestOperation {
+        let operation = self.name(&expect_child(pair, Rule::name));
+        let choices = children(pair, Rule::choice)
+            .map(|choice| {
+                let word = expect_child(&choice, Rule::parameter_name);
+                let name = Name { text: word.as_str().to_owned(), span: self.span(&word) };
+                let value = match child(&choice, Rule::range) {
+                    Some(range) => Choice::Range(self.range(&range)),
+                    None => Choice::Value(self.signed(&expect_child(&choice, Rule::signed))),
+                };
+                (name, value)
+            })
+            .collect();
+        let activation = match child(pair, Rule::window) {
+            Some(window) => Activation::Window(self.window(&window)),
+            None => Activation::Trigger(self.trigger(&expect_child(pair, Rule::trigger))),
+        };
+        let seed = child(pair, Rule::draw_seed).map(|seed| self.count(&expect_child(&seed, Rule::number)));
+        TestOperation { operation, choices, activation, seed }
+    }
+
+    fn window(&mut self, pair: &Pair<'_>) -> Range {
         let mut ends = children(pair, Rule::signed).map(|end| self.signed(&end)).collect::<Vec<_>>();
         let high = ends.pop().expect("a window has an end");
         let low = ends.pop().expect("a window has a start");
         Range { span: low.span.to(high.span), low, high }
     }
 
-    pub(super) fn trigger(&mut self, pair: &Pair<'_>) -> Trigger {
+    fn trigger(&mut self, pair: &Pair<'_>) -> Trigger {
         let start = self.expression(&expect_child(pair, Rule::expression));
-        let end = match child(pair, Rule::until_condition) {
-            Some(until) => TriggerEnd::Until(self.expression(&expect_child(&until, Rule::expression))),
-            None => {
-                let length = expect_child(pair, Rule::for_length);
-                TriggerEnd::For(self.signed(&expect_child(&length, Rule::signed)))
-            }
+        let end = if let Some(until) = child(pair, Rule::until_condition) {
+            TriggerEnd::Until(self.expression(&expect_child(&until, Rule::expression)))
+        } else {
+            let length = expect_child(pair, Rule::for_length);
+            TriggerEnd::For(self.signed(&expect_child(&length, Rule::signed)))
         };
         let times = child(pair, Rule::at_most_times).map(|times| self.times(&times));
         Trigger { start, end, times }
