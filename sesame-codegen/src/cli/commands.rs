@@ -115,15 +115,34 @@ fn start(mut runner: Command) -> std::io::Result<ExitCode> {
     Ok(u8::try_from(code).map_or(ExitCode::FAILURE, ExitCode::from))
 }
 
-/// `sesamec explain`
-pub(super) fn explain(language: &Language, code: &str) -> anyhow::Result<ExitCode> {
-    match (language.explain)(code) {
-        Some(page) => {
-            println!("{}", page.trim_end());
-            Ok(ExitCode::SUCCESS)
-        }
-        None => bail!("there is no diagnostic `{}`; codes look like E0203", code.escape_debug()),
+/// `sesamec explain CODE`
+pub(super) fn explain_code(language: &Language, code: &str) -> anyhow::Result<ExitCode> {
+    if let Some(page) = (language.explain)(code) {
+        println!("{}", page.trim_end());
+        return Ok(ExitCode::SUCCESS);
     }
+    let shown = code.escape_debug();
+    let digits = code.strip_prefix(['E', 'e', 'W', 'w']).unwrap_or_default();
+    if !digits.is_empty() && digits.chars().all(|c| c.is_ascii_digit()) {
+        bail!("there is no diagnostic `{shown}`; codes look like E0203");
+    }
+    bail!(
+        "`{shown}` is no code like E0203; to explain a campaign, name its file: `{} explain {shown} FILE`",
+        shell::command()
+    )
+}
+
+/// `sesamec explain CAMPAIGN FILE`
+pub(super) fn explain_campaign(
+    shell: Shell,
+    language: &Language,
+    campaign: &str,
+    file: &Path,
+) -> anyhow::Result<ExitCode> {
+    let checked = check(shell, language, file)?;
+    let chosen = choose(&checked, file, Some(campaign))?;
+    print!("{}", crate::explain::campaign(&checked.plans[chosen].plan));
+    Ok(ExitCode::SUCCESS)
 }
 
 /// The campaign of a name, or the only one.

@@ -39,6 +39,7 @@ pub(crate) fn measured(runner: &mut RunnerPlan, metric: &str) {
         unit: hook.unit.clone(),
         direction: hook.direction,
         default: Some(0.0),
+        initial: None,
         source: MetricSource::Hook { topics: hook.inputs.clone() },
         line: hook.line,
     });
@@ -82,6 +83,7 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 unit: Some("s".into()),
                 direction: Some(Direction::Minimise),
                 default: None,
+                initial: None,
                 source: MetricSource::FuzzingTime,
                 line: 30,
             }],
@@ -185,6 +187,7 @@ pub(crate) fn awkward() -> RunnerPlan {
         unit: unit("mm"),
         direction: None,
         default: None,
+        initial: None,
         source: MetricSource::Last { input: FieldRef { topic: TopicId(1), path: vec!["level".into()] } },
         line: 71,
     });
