@@ -6,7 +6,9 @@
 use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
-use sesame_plan::{ActivationMode, CampaignPlan, Distribution, Drain, Operation, OperationKind, Search, ValueMode};
+use sesame_plan::{
+    ActivationMode, CampaignPlan, Distribution, Drain, MetricSource, Operation, OperationKind, Search, ValueMode,
+};
 
 /// More whole numbers than these are not written out one by one.
 const INTEGERS_SHOWN: i128 = 40;
@@ -155,7 +157,7 @@ fn grammar(plan: &CampaignPlan, space: &ConditionSpace) -> String {
     };
     let rules = [
         ("compCond", "compCond, logicOp, compCond | basicCond".to_owned()),
-        ("basicCond", "expr, binComp, var | var, binComp, expr".to_owned()),
+        ("basicCond", "expr, binComp, var".to_owned()),
         ("expr", "var | int".to_owned()),
         ("logicOp", "\"and\" | \"or\"".to_owned()),
         ("binComp", signs.join(" | ")),
@@ -180,12 +182,13 @@ fn grammar(plan: &CampaignPlan, space: &ConditionSpace) -> String {
             (None, Some(high)) => Some(format!("is {high}{unit} or less")),
             (None, None) => None,
         };
-        let compared = (!unit.is_empty()).then(|| format!("is compared in {unit}"));
-        let initial = match metric.initial {
-            Some(initial) => format!("is {initial}{unit} before it is first set"),
-            None => "is unknown before it is first set".to_owned(),
+        let compared = (!unit.is_empty()).then(|| format!("is compared with whole numbers of {unit}"));
+        let initial = match (&metric.source, metric.initial) {
+            (MetricSource::FuzzingTime, _) => None,
+            (_, Some(initial)) => Some(format!("is {initial}{unit} before it is first set")),
+            (_, None) => Some("is unknown before it is first set".to_owned()),
         };
-        let said: Vec<String> = known.into_iter().chain(compared).chain([initial]).collect();
+        let said: Vec<String> = known.into_iter().chain(compared).chain(initial).collect();
         notes.push(format!("{} {}", metric.name, said.join(", ")));
     }
     for operation in plan.operations.iter().filter(|operation| !operation.constraints.is_empty()) {
@@ -301,5 +304,23 @@ mod tests {
     #[test]
     fn a_repetition() {
         insta::assert_snapshot!(campaign(&plan(&format!("{OPERATIONS}{AGAIN}"))));
+    }
+
+    #[test]
+    fn the_reference_shows_a_grammar_as_it_is_printed() {
+        let explained = campaign(&plan(
+            "metric made = last(link)
+             operation cut on zones = blackhole  operation lose on link = packet loss [0%, 7%]
+             campaign in_bursts { objectives time  operations cut, lose 1 per test
+               activate by condition over near, made { depth 3  integers [0, 12] } for [1s, 15s] at most 3 times
+               search random { evaluations 8 }  end after 70s }",
+        ));
+        let shown: Vec<&str> = explained
+            .lines()
+            .skip_while(|line| !line.starts_with("(* the conditions"))
+            .take_while(|line| line.starts_with("(* the conditions") || line.ends_with(';'))
+            .collect();
+        assert_eq!(shown.len(), 8);
+        assert!(include_str!("../../docs/language.md").contains(&shown.join("\n")), "{explained}");
     }
 }

@@ -8,6 +8,7 @@ use sesame_dsl::{Analysis, analyse};
 
 const SAMPLES: &[&str] = &[
     include_str!("good/kuka_cell.sesame"),
+    include_str!("good/conditions.sesame"),
     include_str!("bad/ten_mistakes.sesame"),
     include_str!("bad/e0104_later_constructs.sesame"),
 ];
@@ -16,6 +17,12 @@ const SAMPLES: &[&str] = &[
 const PIECES: &[&str] = &[
     "{",
     "}",
+    "when",
+    "until",
+    "for",
+    "at most",
+    "over",
+    "start contains",
     "[",
     "]",
     "(",

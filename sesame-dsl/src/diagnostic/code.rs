@@ -71,7 +71,7 @@ codes! {
     WRONG_UNIT = "E0302": "A quantity measures something else, or lacks its unit.",
     WRONG_TYPE = "E0303": "A value of this type cannot be used here.",
     NOT_A_FORMULA = "E0304": "A formula is not one number over the time of a test.",
-    IDLE_CLAUSE = "E0305": "A clause of a formula changes nothing.",
+    IDLE_CLAUSE = "E0305": "A clause of a metric changes nothing.",
     NOT_A_CONDITION = "E0306": "A condition holds something else than comparisons of metrics.",
     CONSTANT_COMPARISON = "E0307": "A comparison always goes the same way.",
     REVERSED_RANGE = "E0401": "A range begins above its end.",

@@ -462,7 +462,8 @@ enum Side<'a> {
 /// What is certain of a metric's values before any test, its initial value included.
 fn known_of(metric: &Metric) -> Known {
     let from_zero = match &metric.source {
-        MetricSource::FuzzingTime => true,
+        // It needs no message, so it has a value from the beginning.
+        MetricSource::FuzzingTime => return Known { low: 0.0, high: f64::INFINITY },
         MetricSource::Formula(formula) => match &formula.aggregate {
             Aggregate::Count(_) | Aggregate::Duration(_) => true,
             // Over groups and keys these are the least, the greatest or the sum of values that are not negative.

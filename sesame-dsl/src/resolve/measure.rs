@@ -29,6 +29,11 @@ impl<'a> Resolver<'a> {
             }
             ast::MetricSource::FuzzingTime => {
                 self.no_type(metric.ty.as_ref(), "`fuzzing_time()` is in seconds");
+                if let Some((word, initial)) = metric.initials.first() {
+                    let title = "`initial` changes nothing: `fuzzing_time()` is 0s at the beginning";
+                    let span = word.to(initial.span);
+                    self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("leave it out"));
+                }
                 (Some(MetricSource::FuzzingTime), Some(Type::Real(Some(Unit::seconds()))))
             }
             ast::MetricSource::Formula(formula) => {
