@@ -240,7 +240,9 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
     let mut diagnostic = Diagnostic::new(Code::SYNTAX, span, title).label(format!("expected {expected}"));
     if found.kind == TokenKind::Word {
         let candidates = words.into_iter().chain(place.starters().iter().copied().filter(|_| found.lo == first.lo));
-        if let Some(similar) = crate::similar::most_similar(found.text, candidates) {
+        // A word of the language is no misspelling of another.
+        let known = Rule::all_rules().iter().any(|&rule| keyword_of(rule) == Some(found.text));
+        if let Some(similar) = crate::similar::most_similar(found.text, candidates).filter(|_| !known) {
             diagnostic = diagnostic.suggest(format!("`{similar}` is a word that fits here"), span, similar);
         }
         let number_before = before.is_some_and(char::is_whitespace)
