@@ -16,6 +16,7 @@ fn metric(name: &str, unit: Option<&str>, direction: Direction, default: Option<
         unit: unit.map(str::to_owned),
         direction: Some(direction),
         default,
+        initial: None,
         source,
         line: 1,
     }
@@ -31,6 +32,7 @@ fn operation(name: &str, topic: u32, kind: OperationKind, parameters: Vec<Parame
         within: Span { start: 0.0, end: 65.0 },
         priority: 0,
         inclusion: 1.0,
+        constraints: Vec::new(),
     }
 }
 
