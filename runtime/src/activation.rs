@@ -203,10 +203,11 @@ mod tests {
     fn weighed(activation: &Activation, moments: &[(f64, f64)]) -> (Vec<bool>, Vec<(f64, f64)>) {
         let mut activity = Activity::new(activation, WITHIN);
         let mut active = Vec::new();
-        for (step, &(t, x)) in (0..).zip(moments) {
+        // Edges before a moment are steps of their own, as the relay has them.
+        for (step, &(t, x)) in (0..).map(|n| 2 * n + 1).zip(moments) {
             let now = SimTime::from_seconds(t);
             while let Some(edge) = activity.next_edge().filter(|&edge| edge <= now) {
-                activity.follow(edge, step);
+                activity.follow(edge, if edge < now { step - 1 } else { step });
             }
             activity.weigh(now, step, &|_| Some(x));
             active.push(activity.is_active());

@@ -8,6 +8,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use sesame_plan::{Activation, CampaignPlan, Choice, MetricId, OperationKind};
 
+use crate::condition;
 use crate::decimal::{decimal, quantity};
 use crate::observation::Outcome;
 use crate::record::{RecordError, Repository, TestRecord};
@@ -68,13 +69,27 @@ fn block(plan: &CampaignPlan, seed: u64, record: &TestRecord, name: &str) -> Str
                 }
             };
         }
-        let Activation::Time { start, end } = used.activation;
-        let seconds = |time| quantity(time, Some("s"));
-        let _ = writeln!(text, " from {} to {} seed {}", seconds(start), seconds(end), used.draw_seed);
+        let _ = writeln!(text, " {} seed {}", activation(plan, &used.activation), used.draw_seed);
     }
     expectations(&mut text, plan, record);
     text.push_str("}\n");
     text
+}
+
+/// When an operation is active, in the words of the language.
+pub(super) fn activation(plan: &CampaignPlan, activation: &Activation) -> String {
+    let seconds = |time: &f64| quantity(*time, Some("s"));
+    let words = |condition| condition::text::write(condition, &plan.metrics);
+    let often = |times: &u32| if *times == 1 { String::new() } else { format!(" at most {times} times") };
+    match activation {
+        Activation::Time { start, end } => format!("from {} to {}", seconds(start), seconds(end)),
+        Activation::Condition { start, end, times } => {
+            format!("when {} until {}{}", words(start), words(end), often(times))
+        }
+        Activation::ConditionFor { start, length, times } => {
+            format!("when {} for {}{}", words(start), seconds(length), often(times))
+        }
+    }
 }
 
 fn expectations(text: &mut String, plan: &CampaignPlan, record: &TestRecord) {
@@ -145,6 +160,13 @@ mod tests {
         assert!(named.block.contains("\ntest worst {\n"), "{}", named.block);
         let refused = export(&repository, "reference", None).unwrap_err();
         assert!(refused.to_string().starts_with("T0 disturbs nothing"), "{refused}");
+    }
+
+    #[test]
+    fn a_block_says_what_switches_an_operation() {
+        let plan = sample::plan();
+        let record = sample::record(&plan, 5, crate::record::Origin::Search, sample::conditional_test());
+        insta::assert_snapshot!(block(&plan, 42, &record, "by_condition"), @"");
     }
 
     #[test]

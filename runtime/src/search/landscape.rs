@@ -169,9 +169,9 @@ impl Landscape {
             return vec![(start, end)];
         }
         let mut activity = Activity::new(&operation.activation, Span { start: 0.0, end: 65.0 });
-        for slot in 0..350 {
+        for slot in 0u32..350 {
             let now = SimTime::from_seconds(f64::from(slot) * 0.2);
-            let step = u64::from(slot.unsigned_abs());
+            let step = u64::from(slot);
             while let Some(edge) = activity.next_edge().filter(|&edge| edge <= now) {
                 activity.follow(edge, step);
             }
@@ -268,6 +268,35 @@ mod tests {
             (landscape.name, median_volume(&landscape, &NSGA2) / random)
         });
         assert!(ratios.iter().all(|(_, ratio)| *ratio > 1.1), "{ratios:?}");
+    }
+
+    #[test]
+    #[ignore = "TEMP"]
+    fn measure_rates() {
+        use crate::search::{nsga2, Nsga2, Permitted, TestVariation, vary::Rates};
+        let d = Rates::default();
+        let variants: Vec<(&str, Rates)> = vec![
+            ("default", d), ("exchange 0", Rates { exchange: 0.0, ..d }), ("exchange .5", Rates { exchange: 0.5, ..d }),
+            ("fresh 0.5", Rates { fresh: 0.5, ..d }), ("fresh 1", Rates { fresh: 1.0, ..d }), ("fresh .8", Rates { fresh: 0.8, ..d }),
+            ("window .2", Rates { window: 0.2, ..d }), ("window .8", Rates { window: 0.8, ..d }),
+            ("add 1 dup .8", Rates { add: 1.0, duplicate: 0.8, ..d }),
+            ("drop 0", Rates { drop: 0.0, ..d }),
+        ];
+        let pick = std::env::var("PICK").unwrap();
+        for end in [ConditionEnd::Condition, ConditionEnd::Length { low: 1.0, high: 15.0 }] {
+            let mean = |f: &dyn Fn(&Landscape, u64) -> f64| LANDSCAPES.iter().map(|l| (1..=20).map(|s| f(l, s)).sum::<f64>() / 20.0).collect::<Vec<_>>();
+            let random = mean(&|l, s| { let p = l.plan_by_condition(Search::Random { evaluations: 210 }, end); l.campaign(strategy(&p, s).unwrap().as_mut()).volume });
+            for (n, (name, rates)) in variants.iter().enumerate() {
+                if n % 2 != pick.parse::<usize>().unwrap() { continue; }
+                let v = mean(&|l, s| { let p = l.plan_by_condition(NSGA2, end);
+                    let var = TestVariation::new(Permitted::of(&p).unwrap(), *rates, s);
+                    let mut st = Nsga2::new(nsga2::Settings { population: 10, evaluations: 210, seed: s }, var);
+                    l.campaign(&mut st).volume });
+                let r: Vec<f64> = v.iter().zip(&random).map(|(a, b)| a / b).collect();
+                let g = r.iter().product::<f64>().powf(0.25);
+                eprintln!("RATE {name} {end:?} {g:.3} {r:.2?}");
+            }
+        }
     }
 
     #[test]
