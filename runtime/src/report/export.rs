@@ -166,7 +166,16 @@ mod tests {
     fn a_block_says_what_switches_an_operation() {
         let plan = sample::plan();
         let record = sample::record(&plan, 5, crate::record::Origin::Search, sample::conditional_test());
-        insta::assert_snapshot!(block(&plan, 42, &record, "by_condition"), @"");
+        insta::assert_snapshot!(block(&plan, 42, &record, "by_condition"), @r"
+        /// T5 of `coverage_experiment`, seed 42.
+        test by_condition {
+          jitter_link0 offset [-0.1rad, 0.2rad] when arm_distance < 450mm and (1.5m/s < top_speed or arm_distance < 450mm) until 1.5m/s < top_speed seed 11
+          jitter_link1 offset [-0.1rad, 0.2rad] from 1.5s to 20s seed 11
+          cut_link1 when 1.5m/s < top_speed for 0.30000000000000004s at most 3 times seed 11
+          expect fuzzing_time == 39.8s
+          expect collision_occurrence == 5
+        }
+        ");
     }
 
     #[test]

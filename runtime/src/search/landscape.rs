@@ -284,7 +284,7 @@ mod tests {
         ];
         let pick = std::env::var("PICK").unwrap();
         for end in [ConditionEnd::Condition, ConditionEnd::Length { low: 1.0, high: 15.0 }] {
-            let mean = |f: &dyn Fn(&Landscape, u64) -> f64| LANDSCAPES.iter().map(|l| (1..=20).map(|s| f(l, s)).sum::<f64>() / 20.0).collect::<Vec<_>>();
+            let mean = |f: &dyn Fn(&Landscape, u64) -> f64| LANDSCAPES.iter().map(|l| (1..=8).map(|s| f(l, s)).sum::<f64>() / 8.0).collect::<Vec<_>>();
             let random = mean(&|l, s| { let p = l.plan_by_condition(Search::Random { evaluations: 210 }, end); l.campaign(strategy(&p, s).unwrap().as_mut()).volume });
             for (n, (name, rates)) in variants.iter().enumerate() {
                 if n % 2 != pick.parse::<usize>().unwrap() { continue; }
