@@ -22,6 +22,7 @@ pub(crate) fn plan(operations: Vec<Operation>) -> CampaignPlan {
         unit: None,
         direction: None,
         default: None,
+        initial: None,
         source,
         line: 1,
     };
@@ -94,6 +95,7 @@ pub(crate) fn operation(topic: u32, kind: OperationKind) -> Operation {
         within: Span { start: 0.0, end: 10.0 },
         priority: 0,
         inclusion: 1.0,
+        constraints: Vec::new(),
     }
 }
 

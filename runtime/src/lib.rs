@@ -9,6 +9,8 @@ pub mod activation;
 pub mod campaign;
 #[cfg(feature = "campaign")]
 mod cli;
+pub mod condition;
+mod decimal;
 pub mod evaluate;
 #[cfg(test)]
 mod fixture;

@@ -1,8 +1,12 @@
 //! The relay: the man in the middle, for one run of one test.
 //!
 //! Sans-IO. Messages and time go in, deliveries come out; a transport feeds it and carries out what it says. Within one
-//! event the order is: due releases, inbound metrics, activations, operations (the triggering message included), outbound
+//! event the order is: due releases, inbound metrics, conditions, operations (the triggering message included), outbound
 //! metrics, then delivery. A message on a wire that no operation of the test touches is handed on as it came.
+//!
+//! Conditions are weighed once in every event, be it a message or a step of time, and at every edge and release between
+//! two events. So what an outbound metric shows of a message counts from the next event on, and no operation goes on and
+//! off in one event. A test without conditions pays nothing for them.
 
 mod release;
 
@@ -52,6 +56,12 @@ pub struct Relay<'a> {
     published: Vec<u64>,
     queue: ReleaseQueue,
     metrics: Metrics<'a>,
+    /// The operations that conditions switch.
+    conditional: Vec<usize>,
+    /// Those of them that went off in the step at hand; here so that no step has to allocate.
+    ended: Vec<usize>,
+    /// The number of the step: an event, or an edge or release between two.
+    step: u64,
     now: SimTime,
     messages: u64,
     overflowed: bool,
@@ -98,7 +108,7 @@ impl<'a> Relay<'a> {
             let operation = plan.operation(choice.operation);
             operations.push(Stage {
                 disturbance: Disturbance::new(operation, choice)?,
-                activity: Activity::new(choice.activation, operation.within),
+                activity: Activity::new(&choice.activation, operation.within),
                 draw_seed: choice.draw_seed,
                 counters: Counters::default(),
                 first_touch: None,
@@ -114,8 +124,12 @@ impl<'a> Relay<'a> {
             let touched = order.iter().filter(|&&at| plan.operation(test.operations[at].operation).topic == topic);
             pipelines[wire.index()].extend(touched.map(|&at| (at, member)));
         }
+        let conditional = (0..operations.len()).filter(|&at| operations[at].activity.is_conditional()).collect();
         Ok(Relay {
             wires,
+            conditional,
+            ended: Vec::with_capacity(operations.len()),
+            step: 0,
             operations,
             pipelines,
             published: vec![0; wires.len()],
@@ -161,7 +175,8 @@ impl<'a> Relay<'a> {
     }
 
     /// Carries out, in order of time, every activation edge and every release up to `now`; at one moment edges come
-    /// first, since an operation is active for `start <= t < end`.
+    /// first, since an operation is active for `start <= t < end`. Conditions are weighed at each moment before `now`, for
+    /// which the event at hand does it.
     fn follow_time(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
         loop {
             let release = self.queue.next_release().filter(|&time| time <= now);
@@ -169,10 +184,16 @@ impl<'a> Relay<'a> {
             match (edge.filter(|&time| time <= now), release) {
                 (Some(edge), release) if release.is_none_or(|release| edge <= release) => {
                     self.follow_activities(edge, deliveries);
+                    if edge < now {
+                        self.weigh_conditions(edge, deliveries);
+                    }
                 }
                 (_, Some(release)) => {
                     if let Some(held) = self.queue.pop() {
                         self.pass(release, held, deliveries);
+                    }
+                    if release < now {
+                        self.weigh_conditions(release, deliveries);
                     }
                 }
                 (_, None) => return,
@@ -183,23 +204,47 @@ impl<'a> Relay<'a> {
     /// Carries out the edges at one moment; messages let go by them are let go then.
     fn follow_activities(&mut self, edge: SimTime, deliveries: &mut Vec<Delivery>) {
         for at in 0..self.operations.len() {
-            let stage = &mut self.operations[at];
-            if stage.activity.follow(edge) != Edge::Ended {
-                continue;
+            if self.operations[at].activity.follow(edge, self.step) == Edge::Ended {
+                self.drain(at, edge, deliveries);
             }
-            let Disturbance::Latency(latency) = &stage.disturbance else { continue };
-            match latency.drain {
-                Drain::Finish => {}
-                Drain::Flush => {
-                    for held in self.queue.take_all(at) {
-                        self.pass(edge, held, deliveries);
-                    }
+        }
+    }
+
+    /// Weighs the conditions of all operations on the same values, and ends the step.
+    fn weigh_conditions(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
+        if self.conditional.is_empty() || self.over {
+            return;
+        }
+        let active = |sum, stage: &Stage| sum + stage.activity.active_time(now);
+        let active_time = self.operations.iter().fold(SimTime::ZERO, active).seconds();
+        for &at in &self.conditional {
+            let value = |metric| self.metrics.value(metric, active_time);
+            if self.operations[at].activity.weigh(now, self.step, &value) == Edge::Ended {
+                self.ended.push(at);
+            }
+        }
+        self.step += 1;
+        for next in 0..self.ended.len() {
+            self.drain(self.ended[next], now, deliveries);
+        }
+        self.ended.clear();
+    }
+
+    /// Does with the messages that an operation holds what is to be done when it goes off.
+    fn drain(&mut self, at: usize, now: SimTime, deliveries: &mut Vec<Delivery>) {
+        let Disturbance::Latency(latency) = &self.operations[at].disturbance else { return };
+        match latency.drain {
+            Drain::Finish => {}
+            Drain::Flush => {
+                for held in self.queue.take_all(at) {
+                    self.pass(now, held, deliveries);
                 }
-                Drain::Drop => {
-                    let lost = self.queue.take_all(at).len() as u64;
-                    stage.counters.delayed -= lost;
-                    stage.counters.dropped += lost;
-                }
+            }
+            Drain::Drop => {
+                let lost = self.queue.take_all(at).len() as u64;
+                let counters = &mut self.operations[at].counters;
+                counters.delayed -= lost;
+                counters.dropped += lost;
             }
         }
     }
@@ -265,16 +310,19 @@ impl Exchange for Relay<'_> {
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
         self.now = self.now.max(now);
         self.follow_time(self.now, deliveries);
+        self.weigh_conditions(self.now, deliveries);
     }
 
     fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>) {
         if now > self.now || self.messages == 0 {
-            self.advance(now, deliveries);
+            self.now = self.now.max(now);
+            self.follow_time(self.now, deliveries);
         }
         self.messages += 1;
         let index = self.published[wire.index()];
         self.published[wire.index()] += 1;
         self.metrics.message(self.now, wire, &value);
+        self.weigh_conditions(self.now, deliveries);
         self.pass(self.now, Held { wire, index, value, next_stage: 0 }, deliveries);
     }
 }

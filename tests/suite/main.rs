@@ -2,6 +2,7 @@
 #![cfg(test)]
 
 mod commands;
+mod conditions;
 mod declarative;
 mod exported;
 mod faults;

@@ -1,6 +1,6 @@
 //! All metrics of one run: which message goes to which, and what comes out.
 
-use sesame_plan::{CampaignPlan, MetricSource, Side, TopicId};
+use sesame_plan::{CampaignPlan, MetricId, MetricSource, Side, TopicId};
 
 use super::aggregate::FormulaState;
 use super::{Context, Hook, HookEntry};
@@ -142,6 +142,16 @@ impl Metrics<'_> {
                 },
                 _ => {}
             }
+        }
+    }
+
+    /// The value that a metric has for conditions at this moment: its last one, or its initial one before that. The active
+    /// time so far, in seconds, is what the relay knows and a metric of it shows.
+    pub fn value(&self, metric: MetricId, active_time: f64) -> Option<f64> {
+        let declared = self.table.plan.metric(metric);
+        match declared.source {
+            MetricSource::FuzzingTime => Some(active_time),
+            _ => self.states[metric.index()].context.value.or(declared.initial),
         }
     }
 

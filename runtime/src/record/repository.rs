@@ -7,6 +7,7 @@ use rusqlite::types::FromSql;
 use rusqlite::{Connection, Row, params};
 use sesame_plan::{Activation, CampaignPlan, Choice, KnownTestId, OperationId, Span, Test, TestOperation};
 
+use crate::condition;
 use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
 use crate::record::folder::DATABASE;
 use crate::record::{
@@ -36,6 +37,12 @@ pub struct CampaignFacts {
 
 /// One observed number: test, position of its operation or metric, and the value.
 type At = (i64, i64);
+
+/// Start and end of a planned window.
+type Window = (Option<f64>, Option<f64>);
+
+/// Start condition, end condition, length and times of an activation by condition.
+type Conditions = (Option<String>, Option<String>, Option<f64>, Option<u32>);
 
 impl Repository {
     /// Opens the results in a run's folder, or a results file itself, for reading only. A run may be writing them.
@@ -267,12 +274,14 @@ impl Repository {
             parameters.entry(at).or_default().push(choice);
         }
         let rows = self.read(
-            "SELECT test, position, operation, start_s, end_s, draw_seed FROM operations \
-             WHERE ?1 IS NULL OR test = ?1 ORDER BY test, position",
+            "SELECT test, position, operation, draw_seed, start_s, end_s, start_condition, end_condition, length_s, times \
+             FROM operations WHERE ?1 IS NULL OR test = ?1 ORDER BY test, position",
             params![only],
             |row| {
                 let at: At = (row.get(0)?, row.get(1)?);
-                Ok((at, row.get::<_, String>(2)?, row.get(3)?, row.get(4)?, row.get::<_, String>(5)?))
+                let window = (row.get(4)?, row.get(5)?);
+                let conditions = (row.get(6)?, row.get(7)?, row.get(8)?, row.get(9)?);
+                Ok((at, row.get::<_, String>(2)?, row.get::<_, String>(3)?, window, conditions))
             },
         )?;
         let ids: BTreeMap<&str, OperationId> = (0u32..)
@@ -280,18 +289,38 @@ impl Repository {
             .map(|(id, operation)| (operation.name.as_str(), OperationId(id)))
             .collect();
         let mut tests: BTreeMap<i64, Vec<TestOperation>> = BTreeMap::new();
-        for (at, name, start, end, draw_seed) in rows {
+        for (at, name, draw_seed, window, conditions) in rows {
             let operation = *ids.get(name.as_str()).ok_or_else(|| {
                 RecordError::damaged(&self.path, format!("T{} has an operation `{name}` that the plan lacks", at.0))
             })?;
             tests.entry(at.0).or_default().push(TestOperation {
                 operation,
-                activation: Activation::Time { start, end },
+                activation: self.activation(at.0, window, conditions)?,
                 parameters: parameters.remove(&at).unwrap_or_default(),
                 draw_seed: self.seed(&draw_seed)?,
             });
         }
         Ok(tests)
+    }
+
+    fn activation(&self, test: i64, window: Window, conditions: Conditions) -> Result<Activation, RecordError> {
+        let read = |text: String| {
+            condition::text::read(&text, &self.plan().metrics)
+                .map_err(|problem| RecordError::damaged(&self.path, format!("a condition of T{test}: {problem}")))
+        };
+        match (window, conditions) {
+            ((Some(start), Some(end)), (None, None, None, None)) => Ok(Activation::Time { start, end }),
+            ((None, None), (Some(start), Some(end), None, Some(times))) => {
+                Ok(Activation::Condition { start: read(start)?, end: read(end)?, times })
+            }
+            ((None, None), (Some(start), None, Some(length), Some(times))) => {
+                Ok(Activation::ConditionFor { start: read(start)?, length, times })
+            }
+            _ => Err(RecordError::damaged(
+                &self.path,
+                format!("T{test} has an operation that is switched neither by time nor by condition"),
+            )),
+        }
     }
 
     fn effects(&self, number: u32) -> Result<Vec<OperationEffect>, RecordError> {

@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use sesame_plan::condition::{Comparison, Condition, Operand};
 use sesame_plan::*;
 
 use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
@@ -16,6 +17,7 @@ fn metric(name: &str, unit: Option<&str>, direction: Direction, default: Option<
         unit: unit.map(str::to_owned),
         direction: Some(direction),
         default,
+        initial: None,
         source,
         line: 1,
     }
@@ -31,6 +33,7 @@ fn operation(name: &str, topic: u32, kind: OperationKind, parameters: Vec<Parame
         within: Span { start: 0.0, end: 65.0 },
         priority: 0,
         inclusion: 1.0,
+        constraints: Vec::new(),
     }
 }
 
@@ -123,12 +126,44 @@ pub(crate) fn plan() -> CampaignPlan {
     }
 }
 
+/// When an operation is active: its window, or where conditions decide it a window that they might give.
+fn window(operation: &TestOperation) -> (f64, f64) {
+    match operation.activation {
+        Activation::Time { start, end } => (start, end),
+        Activation::Condition { .. } => (12.0, 33.0),
+        Activation::ConditionFor { length, .. } => (30.0, 30.0 + length),
+    }
+}
+
+/// A test with every kind of activation in it.
+pub(crate) fn conditional_test() -> Test {
+    let compare = |left, by, right| Condition::Compare { left, by, right };
+    let (speed, distance) = (Operand::Variable(MetricId(2)), Operand::Variable(MetricId(4)));
+    let near = || compare(distance, Comparison::Below, Operand::Number(450.0));
+    let fast = || compare(Operand::Number(1.5), Comparison::Below, speed);
+    let use_of = |operation, activation, parameters| TestOperation {
+        operation: OperationId(operation),
+        activation,
+        parameters,
+        draw_seed: 11,
+    };
+    let start = Condition::And(Box::new(near()), Box::new(Condition::Or(Box::new(fast()), Box::new(near()))));
+    let offset = Choice::Range { low: -0.1, high: 0.2 };
+    Test {
+        operations: vec![
+            use_of(0, Activation::Condition { start, end: fast(), times: 1 }, vec![offset]),
+            use_of(1, Activation::Time { start: 1.5, end: 20.0 }, vec![offset]),
+            use_of(3, Activation::ConditionFor { start: fast(), length: 0.1 + 0.2, times: 3 }, vec![]),
+        ],
+    }
+}
+
 /// What a run of a test might show: collisions in three phases of the cycle when a link is disturbed enough there.
 pub(crate) fn observe(plan: &CampaignPlan, test: &Test, seed: u64) -> Observation {
     let mut stream = Stream::derive(seed, "observation", &[]);
     let (mut fuzzing, mut effects) = (0.0, Vec::new());
     for operation in &test.operations {
-        let Activation::Time { start, end } = operation.activation;
+        let (start, end) = window(operation);
         fuzzing += end - start;
         let seen = count_of((end - start) * 50.0);
         let whole = Counters { seen, ..Counters::default() };
@@ -154,7 +189,7 @@ pub(crate) fn observe(plan: &CampaignPlan, test: &Test, seed: u64) -> Observatio
             .operations
             .iter()
             .map(|operation| {
-                let Activation::Time { start, end } = operation.activation;
+                let (start, end) = window(operation);
                 if time < start || time >= end {
                     0.0
                 } else {

@@ -7,7 +7,7 @@ use crate::observation::Counters;
 use crate::record::{
     EventKind, MetricValue, Origin, RecordError, Repository, TestRecord, TestRow, Verdict, verdict, violation_spans,
 };
-use crate::report::{number, summary};
+use crate::report::{export, number, summary};
 
 /// A line in the list of all tests.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -91,8 +91,10 @@ pub struct OperationReport {
     pub kind: String,
     /// The topic it disturbs.
     pub topic: String,
-    /// When it was to be active, in seconds.
-    pub planned: Span,
+    /// When it was to be active, in seconds; `None` where conditions decide that.
+    pub planned: Option<Span>,
+    /// What switched it on and off, in the words of the language; `None` where a planned window did.
+    pub conditions: Option<String>,
     /// When it was seen to be active, in seconds; `None` where the run could not report it.
     pub observed: Option<Vec<Span>>,
     /// What the test chose.
@@ -240,12 +242,16 @@ fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> 
     let reports = record.test.operations.iter().enumerate().map(|(position, used)| {
         let operation = plan.operation(used.operation);
         let effect = record.observation.operations.get(position);
-        let Activation::Time { start, end } = used.activation;
+        let (planned, conditions) = match used.activation {
+            Activation::Time { start, end } => (Some(Span { start, end }), None),
+            _ => (None, Some(export::activation(plan, &used.activation))),
+        };
         OperationReport {
             operation: operation.name.clone(),
             kind: operation.kind.words().to_owned(),
             topic: plan.topic(operation.topic).name.clone(),
-            planned: Span { start, end },
+            planned,
+            conditions,
             observed: effect.map(|effect| effect.intervals.clone()),
             choices: operation
                 .parameters

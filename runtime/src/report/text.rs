@@ -296,7 +296,7 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
                 operation.operation.clone(),
                 operation.kind.clone(),
                 operation.topic.clone(),
-                spans_text(&[operation.planned]),
+                planned_text(operation),
                 operation.observed.as_deref().map_or("unknown".to_owned(), spans_text),
                 choices_text(operation),
                 effect_text(operation),
@@ -361,6 +361,14 @@ pub(crate) fn outcome_sentence(test: &TestReport) -> String {
         sentence.push_str(", on the front");
     }
     sentence
+}
+
+/// When an operation was to be active: its window, or the conditions that switched it.
+pub(crate) fn planned_text(operation: &OperationReport) -> String {
+    match (&operation.conditions, operation.planned) {
+        (Some(conditions), _) => conditions.clone(),
+        (None, planned) => spans_text(planned.as_slice()),
+    }
 }
 
 /// Spans in seconds, as in `8.00–57.00 s`; a dash for none.

@@ -5,13 +5,16 @@
 //! permits. If there are more kinds than places, a random choice of them stays; if there are fewer, each has its place
 //! and the other places are filled with them at random: a test may hold an operation several times, with windows and
 //! parameters of its own each time. Windows and sub-ranges are uniform over all feasible pairs of ends, values uniform
-//! over their range. The order of the list is random.
+//! over their range. The order of the list is random. Where conditions switch, start and end are grown independently, and
+//! lengths are uniform.
 
+use sesame_plan::condition::ConditionEnd;
 use sesame_plan::{Activation, Test, TestOperation};
 
 use crate::rng::Stream;
+use crate::search::condition::grown;
 use crate::search::permitted::{Permitted, PermittedOperation};
-use crate::search::range::fresh_choice;
+use crate::search::range::{Range, fresh_choice};
 
 /// A fresh test; one that the campaign permits.
 pub fn fresh_test(permitted: &Permitted, stream: &mut Stream) -> Test {
@@ -29,18 +32,32 @@ pub fn fresh_test(permitted: &Permitted, stream: &mut Stream) -> Test {
         let kind = kinds[stream.below(kinds.len())];
         places.insert(stream.below(places.len() + 1), kind);
     }
-    Test { operations: places.into_iter().map(|kind| fresh_operation(kind, stream)).collect() }
+    Test { operations: places.into_iter().map(|kind| fresh_operation(kind, permitted, stream)).collect() }
 }
 
 /// A fresh instance of an operation, with a draw seed of its own.
-pub fn fresh_operation(kind: &PermittedOperation, stream: &mut Stream) -> TestOperation {
-    let (start, end) = kind.window.interval(stream);
+pub fn fresh_operation(kind: &PermittedOperation, permitted: &Permitted, stream: &mut Stream) -> TestOperation {
+    let activation = fresh_activation(kind, permitted, stream);
     let parameters = kind.parameters.iter().map(|&(range, shape)| fresh_choice(range, shape, stream)).collect();
-    TestOperation {
-        operation: kind.operation,
-        activation: Activation::Time { start, end },
-        parameters,
-        draw_seed: stream.bits(),
+    TestOperation { operation: kind.operation, activation, parameters, draw_seed: stream.bits() }
+}
+
+/// A fresh window, or fresh conditions.
+fn fresh_activation(kind: &PermittedOperation, permitted: &Permitted, stream: &mut Stream) -> Activation {
+    let (Some(space), Some([first_start, first_end])) = (permitted.conditions(), &kind.first) else {
+        let (start, end) = kind.window.interval(stream);
+        return Activation::Time { start, end };
+    };
+    let start = grown(space, &kind.constraints, stream).unwrap_or_else(|| first_start.clone());
+    match space.end {
+        ConditionEnd::Condition => {
+            let end = grown(space, &[], stream).unwrap_or_else(|| first_end.clone());
+            Activation::Condition { start, end, times: space.times }
+        }
+        ConditionEnd::Length { low, high } => {
+            let length = Range::between(low, high).number(stream);
+            Activation::ConditionFor { start, length, times: space.times }
+        }
     }
 }
 

@@ -1,9 +1,16 @@
 //! What a campaign permits its tests: which operations, how many, when, and how strong.
 
-use sesame_plan::{CampaignPlan, Count, OperationId, Shape};
+use sesame_plan::condition::{Condition, ConditionSpace, Constraint};
+use sesame_plan::{ActivationMode, CampaignPlan, Count, OperationId, Shape};
 use thiserror::Error;
 
+use crate::rng::Stream;
+use crate::search::condition::grown;
 use crate::search::range::Range;
+
+/// How often a first condition is tried before a campaign is said to have none; so rarely does one try fail where there
+/// are any that this is certain enough.
+const FIRST_TRIES: u64 = 100;
 
 /// Why a plan cannot be searched. The generator refuses such campaigns, so a plan that is one was edited.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -32,6 +39,17 @@ pub enum SearchError {
         /// The parameter.
         parameter: String,
     },
+    /// No condition could be grown that is neither always true nor never.
+    #[error(
+        "campaign `{campaign}` has no start condition for operation `{operation}` that could be true as well as false; \
+         offer more variables, wider integers or more depth, or demand less of it"
+    )]
+    NoCondition {
+        /// The campaign.
+        campaign: String,
+        /// The operation.
+        operation: String,
+    },
     /// A population of nobody.
     #[error("campaign `{campaign}` has a population of 0; give it at least 1")]
     NoPopulation {
@@ -45,6 +63,7 @@ pub enum SearchError {
 pub struct Permitted {
     operations: Vec<PermittedOperation>,
     count: Count,
+    conditions: Option<ConditionSpace>,
 }
 
 /// One operation as far as a campaign permits it.
@@ -58,6 +77,11 @@ pub struct PermittedOperation {
     pub parameters: Vec<(Range, Shape)>,
     /// Probability that a fresh test includes it.
     pub inclusion: f64,
+    /// What its start conditions contain.
+    pub constraints: Vec<Constraint>,
+    /// A start condition and an end condition that are permitted, for when many tries give no others. Only where conditions
+    /// switch.
+    pub(crate) first: Option<[Condition; 2]>,
 }
 
 impl Permitted {
@@ -69,6 +93,10 @@ impl Permitted {
         if count.min > count.max {
             return Err(SearchError::Count { campaign: name(), min: campaign.count.min, max: campaign.count.max });
         }
+        let conditions = match &campaign.activation {
+            ActivationMode::Time => None,
+            ActivationMode::Condition { space } => Some(space.clone()),
+        };
         let mut operations = Vec::new();
         for &id in &campaign.operations {
             let operation = plan.operation(id);
@@ -89,17 +117,30 @@ impl Permitted {
                 window: Range::window(operation.within.start, end),
                 parameters,
                 inclusion: operation.inclusion,
+                constraints: operation.constraints.clone(),
+                first: match &conditions {
+                    None => None,
+                    Some(space) => {
+                        let none = || SearchError::NoCondition { campaign: name(), operation: operation.name.clone() };
+                        Some(first_conditions(space, &operation.constraints).ok_or_else(none)?)
+                    }
+                },
             });
         }
         if operations.is_empty() {
             return Err(SearchError::NoOperation { campaign: name() });
         }
-        Ok(Permitted { operations, count })
+        Ok(Permitted { operations, count, conditions })
     }
 
     /// The operations, in the campaign's order; at least one.
     pub fn operations(&self) -> &[PermittedOperation] {
         &self.operations
+    }
+
+    /// What conditions are grown from; `None` where operations are active in windows of time.
+    pub fn conditions(&self) -> Option<&ConditionSpace> {
+        self.conditions.as_ref()
     }
 
     /// The least number of operations of a test, at least 1.
@@ -118,16 +159,29 @@ impl Permitted {
     }
 }
 
+/// A start condition and an end condition that are permitted, if there are any. No seed decides them, since a campaign can
+/// be searched with every seed or with none.
+fn first_conditions(space: &ConditionSpace, constraints: &[Constraint]) -> Option<[Condition; 2]> {
+    let first = |constraints: &[Constraint]| {
+        (0..FIRST_TRIES).find_map(|at| grown(space, constraints, &mut Stream::derive(0, "first condition", &[at])))
+    };
+    Some([first(constraints)?, first(&[])?])
+}
+
 #[cfg(test)]
 pub(crate) mod tests {
     use proptest::prelude::*;
+    use sesame_plan::condition::{ConditionEnd, Integers};
     use sesame_plan::{Activation, Choice, Drain, Operation, OperationKind, Parameter, Search, Span, Test};
 
     use super::*;
+    use crate::condition::constant::has_constant_part;
+    use crate::search::condition::contains;
+    use crate::search::condition::tests::{any_constraints, any_space, wrong};
     use crate::search::landscape::LANDSCAPES;
 
     /// Plans with up to five operations of varied windows and parameters, and varied counts.
-    pub(crate) fn any_plan() -> impl Strategy<Value = CampaignPlan> {
+    fn any_timed_plan() -> impl Strategy<Value = CampaignPlan> {
         let ends = || (0.0..100.0f64, 0.0..100.0f64).prop_map(|(a, b)| (a.min(b), a.max(b)));
         let parameter =
             (ends(), any::<bool>(), any::<bool>(), any::<bool>()).prop_map(|((a, b), value, integer, fixed)| {
@@ -155,6 +209,7 @@ pub(crate) mod tests {
                 within: Span { start, end: end + 0.01 },
                 priority: 0,
                 inclusion,
+                constraints: Vec::new(),
             },
         );
         (proptest::collection::vec(operation, 1..6), 1u32..4, 0u32..6, 0.5..120.0f64).prop_map(
@@ -170,6 +225,47 @@ pub(crate) mod tests {
         )
     }
 
+    /// Such plans, by time or by condition.
+    pub(crate) fn any_plan() -> impl Strategy<Value = CampaignPlan> {
+        let conditional =
+            (any_timed_plan(), any_space(), any_constraints()).prop_map(|(mut plan, space, constraints)| {
+                plan.operations[0].constraints = constraints;
+                plan.campaign.activation = ActivationMode::Condition { space };
+                plan
+            });
+        let grows = conditional.prop_filter("conditions to grow", |plan| Permitted::of(plan).is_ok());
+        prop_oneof![any_timed_plan(), grows]
+    }
+
+    /// What of an activation by condition the plan does not permit.
+    fn broken_condition(space: &ConditionSpace, constraints: &[Constraint], activation: &Activation) -> Option<String> {
+        let (start, times) = match (activation, space.end) {
+            (Activation::Condition { start, end, times }, ConditionEnd::Condition) => {
+                if has_constant_part(end, &space.variables) {
+                    return Some("a constant end".to_owned());
+                }
+                if let Some(wrong) = wrong(end, space, space.depth) {
+                    return Some(wrong);
+                }
+                (start, times)
+            }
+            (Activation::ConditionFor { start, length, times }, ConditionEnd::Length { low, high }) => {
+                if !(low..=high).contains(length) {
+                    return Some(format!("length {length}"));
+                }
+                (start, times)
+            }
+            _ => return Some("kind of activation".to_owned()),
+        };
+        if *times != space.times || has_constant_part(start, &space.variables) {
+            return Some(format!("{times} times from {start:?}"));
+        }
+        if !constraints.iter().all(|constraint| contains(start, constraint)) {
+            return Some(format!("{start:?} lacks one of {constraints:?}"));
+        }
+        wrong(start, space, space.depth)
+    }
+
     /// What of the plan a test breaks, if anything: read off the plan itself.
     pub(crate) fn broken_rule(plan: &CampaignPlan, test: &Test) -> Option<String> {
         let count = plan.campaign.count;
@@ -178,10 +274,20 @@ pub(crate) mod tests {
         }
         for applied in &test.operations {
             let operation = plan.operation(applied.operation);
-            let Activation::Time { start, end } = applied.activation;
-            let within = operation.within;
-            if !(within.start <= start && start < end && end <= within.end && start < plan.campaign.end_after) {
-                return Some(format!("window {start} to {end}"));
+            match (&applied.activation, &plan.campaign.activation) {
+                (&Activation::Time { start, end }, ActivationMode::Time) => {
+                    let within = operation.within;
+                    if !(within.start <= start && start < end && end <= within.end && start < plan.campaign.end_after) {
+                        return Some(format!("window {start} to {end}"));
+                    }
+                }
+                (activation, ActivationMode::Condition { space }) => {
+                    let broken = broken_condition(space, &operation.constraints, activation);
+                    if broken.is_some() {
+                        return broken;
+                    }
+                }
+                _ => return Some("kind of activation".to_owned()),
             }
             if applied.parameters.len() != operation.parameters.len() {
                 return Some("number of parameters".to_owned());
@@ -218,6 +324,12 @@ pub(crate) mod tests {
         let offset = &mut no_number.operations[1].parameters[0];
         (offset.integer, offset.low, offset.high) = (true, 0.2, 0.8);
         assert!(refusal(&no_number).contains("`jitter1` permits no whole number for `offset`"));
+
+        let mut unreachable =
+            LANDSCAPES[0].plan_by_condition(Search::Random { evaluations: 10 }, ConditionEnd::Condition);
+        let bounds = Integers { lowest: 30, highest: 40 };
+        unreachable.operations[1].constraints = vec![Constraint::Integer { bounds }];
+        assert!(refusal(&unreachable).contains("has no start condition for operation `jitter1`"));
     }
 
     #[test]

@@ -37,6 +37,11 @@ impl Range {
         Range { low: start, high: end, shortest: (end - start) * SHORTEST_WINDOW, integer: false }
     }
 
+    /// All numbers between two, both included.
+    pub fn between(low: f64, high: f64) -> Self {
+        Range { low, high, shortest: 0.0, integer: false }
+    }
+
     /// The permitted range of a parameter; `None` where it must be whole and no whole number is in it.
     pub fn parameter(parameter: &Parameter) -> Option<Self> {
         let (low, high) = if parameter.integer {
