@@ -172,7 +172,7 @@ impl Selection {
             operations: operations.iter().map(|&id| self.operation(id)).collect(),
             count,
             activation: match content(campaign) {
-                Some(content) => self.activation_mode(&content.activation),
+                Some(content) => self.activation_mode(space, &content.activation),
                 // A repeated test brings its own.
                 None => plan::ActivationMode::Time,
             },

@@ -85,10 +85,12 @@ pub struct ConditionSpace {
 }
 
 /// A condition variable.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Variable {
     /// The metric it gets its values from.
     pub metric: MetricId,
+    /// That metric's unit. Variables are compared with each other only where it is the same.
+    pub unit: Option<String>,
     /// The least value it can have, if known: conditions that this makes constant are not grown.
     pub low: Option<f64>,
     /// The greatest value it can have, if known.

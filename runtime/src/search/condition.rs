@@ -19,7 +19,20 @@ const TRIES: u32 = 50;
 pub fn is_allowed(condition: &Condition, space: &ConditionSpace, constraints: &[Constraint]) -> bool {
     depth(condition) <= space.depth
         && constraints.iter().all(|constraint| contains(condition, constraint))
+        && of_one_unit(condition, space)
         && !has_constant_part(condition, &space.variables)
+}
+
+/// Whether every comparison of two variables is of variables of one unit.
+fn of_one_unit(condition: &Condition, space: &ConditionSpace) -> bool {
+    let unit = |metric| space.variables.iter().find(|variable| variable.metric == metric).map(|it| &it.unit);
+    match condition {
+        Condition::Compare { left: Operand::Variable(left), right: Operand::Variable(right), .. } => {
+            unit(*left) == unit(*right)
+        }
+        Condition::Compare { .. } => true,
+        Condition::And(a, b) | Condition::Or(a, b) => of_one_unit(a, space) && of_one_unit(b, space),
+    }
 }
 
 /// Whether a condition contains what a constraint demands.
@@ -116,7 +129,7 @@ fn tree(height: u32, space: &ConditionSpace, stream: &mut Stream) -> Condition {
     if stream.chance(0.5) { Condition::And(a.into(), b.into()) } else { Condition::Or(a.into(), b.into()) }
 }
 
-/// A comparison that is not constant, if so many tries find one.
+/// A comparison of one unit that is not constant, if so many tries find one.
 fn comparison(space: &ConditionSpace, stream: &mut Stream) -> Condition {
     let draw = |stream: &mut Stream| {
         let left = if stream.chance(0.5) { variable(space, stream) } else { integer(space.integers, stream) };
@@ -124,7 +137,7 @@ fn comparison(space: &ConditionSpace, stream: &mut Stream) -> Condition {
     };
     let mut drawn = draw(stream);
     for _ in 0..TRIES {
-        if constant(&drawn, &space.variables).is_none() {
+        if of_one_unit(&drawn, space) && constant(&drawn, &space.variables).is_none() {
             break;
         }
         drawn = draw(stream);
@@ -297,6 +310,8 @@ pub(crate) mod tests {
                     .zip(variables)
                     .map(|(n, (low, more))| Variable {
                         metric: MetricId(n),
+                        // The last of four is of a unit of its own.
+                        unit: (n == 3).then(|| "mm".to_owned()),
                         low: low.map(f64::from),
                         high: more.map(|more| f64::from(low.unwrap_or(0) + more)),
                     })
@@ -341,7 +356,9 @@ pub(crate) mod tests {
                     }
                 };
                 let variable = matches!(*right, Operand::Variable(metric) if offered(metric));
-                (!expression || !variable || left == right).then(|| format!("{condition:?}"))
+                let mixed = matches!((*left, *right), (Operand::Variable(a), Operand::Variable(b))
+                    if (a == MetricId(3)) != (b == MetricId(3)));
+                (!expression || !variable || left == right || mixed).then(|| format!("{condition:?}"))
             }
         }
     }
@@ -402,7 +419,7 @@ pub(crate) mod tests {
     }
 
     fn wide_space(depth: u32) -> ConditionSpace {
-        let variables = (0..4).map(|n| Variable { metric: MetricId(n), low: None, high: None }).collect();
+        let variables = (0..4).map(|n| Variable { metric: MetricId(n), unit: None, low: None, high: None }).collect();
         let integers = Integers { lowest: 1, highest: 20 };
         ConditionSpace { variables, depth, integers, end: ConditionEnd::Condition, times: 1 }
     }

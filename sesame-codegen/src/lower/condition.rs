@@ -61,7 +61,11 @@ impl Selection {
     }
 
     /// How the tests of a search switch operations on and off.
-    pub(super) fn activation_mode(&self, mode: &model::ActivationMode) -> plan::ActivationMode {
+    pub(super) fn activation_mode(
+        &self,
+        measured: &model::Space,
+        mode: &model::ActivationMode,
+    ) -> plan::ActivationMode {
         let space = match mode {
             model::ActivationMode::Time => return plan::ActivationMode::Time,
             model::ActivationMode::Condition(space) => space,
@@ -69,6 +73,7 @@ impl Selection {
         let bound = |bound: f64| bound.is_finite().then_some(bound);
         let variables = space.variables.iter().map(|variable| to::Variable {
             metric: self.metric(variable.metric),
+            unit: super::unit(measured.metrics[variable.metric].unit.as_ref()),
             low: bound(variable.known.low),
             high: bound(variable.known.high),
         });
