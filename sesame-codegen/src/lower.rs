@@ -8,6 +8,7 @@
 //! - metrics: its objectives, those it observes, and those of all requirements and of the expectations of these tests.
 
 mod formula;
+mod robustness;
 
 use sesame_dsl::model::{self, CampaignId, Id as _, Space};
 use sesame_dsl::units::Unit;
@@ -176,7 +177,10 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
             line: metric.declaration.line,
             inputs: topics.iter().map(|&id| topic_id(id)).collect(),
         }),
-        model::MetricSource::FuzzingTime | model::MetricSource::Last(_) | model::MetricSource::Formula(_) => None,
+        model::MetricSource::FuzzingTime
+        | model::MetricSource::Last(_)
+        | model::MetricSource::Robustness(_)
+        | model::MetricSource::Formula(_) => None,
     });
     hooks.collect()
 }
@@ -237,6 +241,9 @@ fn metric(metric: &model::Metric) -> plan::Metric {
             }
             model::MetricSource::FuzzingTime => plan::MetricSource::FuzzingTime,
             model::MetricSource::Last(input) => plan::MetricSource::Last { input: formula::field(input) },
+            model::MetricSource::Robustness(of) => {
+                plan::MetricSource::Robustness { robustness: robustness::robustness(of) }
+            }
             model::MetricSource::Formula(of) => plan::MetricSource::Formula { formula: formula::formula(of) },
         },
         line: metric.declaration.line,

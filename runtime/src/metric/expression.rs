@@ -39,6 +39,7 @@ pub(super) fn holds(of: &Condition, inputs: &[Held]) -> bool {
         Condition::Same { left, right } => holds(left, inputs) == holds(right, inputs),
         Condition::All(of) => of.iter().all(|part| holds(part, inputs)),
         Condition::Any(of) => of.iter().any(|part| holds(part, inputs)),
+        Condition::Not(of) => !holds(of, inputs),
     }
 }
 

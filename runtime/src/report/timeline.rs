@@ -113,8 +113,9 @@ fn shown_metrics(plan: &CampaignPlan, record: &TestRecord) -> Vec<usize> {
     let objectives = plan.campaign.objectives.iter().map(|id| id.index());
     let mut order: Vec<usize> = Vec::new();
     for id in bounded.chain(objectives).chain(0..plan.metrics.len()) {
-        // The time spent fuzzing is what the lanes above show.
-        let drawn = plan.metrics[id].source != MetricSource::FuzzingTime
+        // The time spent fuzzing is what the lanes above show; a robustness is known at the end only.
+        let source = &plan.metrics[id].source;
+        let drawn = !matches!(source, MetricSource::FuzzingTime | MetricSource::Robustness { .. })
             && record.observation.metrics.get(id).is_some_and(|shown| !shown.series.is_empty());
         if drawn && !order.contains(&id) {
             order.push(id);

@@ -72,6 +72,7 @@ codes! {
     WRONG_TYPE = "E0303": "A value of this type cannot be used here.",
     NOT_A_FORMULA = "E0304": "A formula is not one number over the time of a test.",
     IDLE_CLAUSE = "E0305": "A clause of a formula changes nothing.",
+    TEMPORAL_REACH = "E0306": "How far a temporal operator reaches is not said.",
     REVERSED_RANGE = "E0401": "A range begins above its end.",
     OUT_OF_RANGE = "E0402": "A value lies outside of what is permitted.",
     WRONG_CHOICE = "E0403": "A test's choice does not fit the operation's parameter.",
@@ -84,6 +85,7 @@ codes! {
     UNUSED_OPERATION = "W0002": "No campaign and no test uses the operation.",
     OBJECTIVE_WITHOUT_DEFAULT = "W0003": "An objective may stay without a value.",
     NO_CAMPAIGN = "W0004": "The space has no campaign.",
+    EQUALITY_WITHOUT_ROOM = "W0005": "An equality in a robustness is never kept by any amount.",
 }
 
 /// The page of a code, found by its text in any case, for example `e0203`.

@@ -10,6 +10,7 @@ mod fuzz;
 mod ids;
 mod measure;
 mod system;
+mod temporal;
 
 pub use campaign::*;
 pub use formula::*;
@@ -17,6 +18,7 @@ pub use fuzz::*;
 pub use ids::*;
 pub use measure::*;
 pub use system::*;
+pub use temporal::*;
 
 use crate::span::Span;
 

@@ -11,10 +11,12 @@
 
 mod campaign;
 mod collect;
+mod condition;
 mod formula;
 mod fuzz;
 mod measure;
 mod quantity;
+mod robustness;
 mod system;
 
 use std::collections::{BTreeMap, BTreeSet};

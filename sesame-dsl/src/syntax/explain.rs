@@ -322,6 +322,7 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::at_most => "`<=`",
         Rule::at_least => "`>=`",
         Rule::equal_to => "`==`",
+        Rule::not_equal => "`!=`",
         Rule::below => "`<`",
         Rule::above => "`>`",
         Rule::bound_within => "`in`",
@@ -343,8 +344,11 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::blackhole => "`blackhole`",
         Rule::formula => "a formula such as `last(cycle)`",
         Rule::expression
+        | Rule::disjunction
         | Rule::conjunction
+        | Rule::passage
         | Rule::relation
+        | Rule::prefix
         | Rule::sum
         | Rule::product
         | Rule::factor
@@ -362,6 +366,11 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::fuzzing_time => "`fuzzing_time()`",
         Rule::minus
         | Rule::k_when
+        | Rule::k_not
+        | Rule::k_always
+        | Rule::k_eventually
+        | Rule::k_until
+        | Rule::k_implies
         | Rule::k_condition
         | Rule::k_import
         | Rule::k_eddi
