@@ -188,7 +188,7 @@ impl Comparison {
             Comparison::AtLeast => left >= right,
             Comparison::Above => left > right,
             Comparison::Equal => left == right,
-            Comparison::NotEqual => left < right || left > right,
+            Comparison::NotEqual => left != right && !left.is_nan() && !right.is_nan(),
         }
     }
 }

@@ -17,7 +17,7 @@ const DECISIVE: f64 = 1e9;
 #[derive(Default)]
 struct Signals {
     inputs: Vec<Input>,
-    signals: Vec<Expression>,
+    computed: Vec<Expression>,
     /// The unit of all comparisons, and the first of them.
     unit: Option<(Option<Unit>, Span)>,
     /// Positions of the signals that are true or false.
@@ -27,9 +27,9 @@ struct Signals {
 impl Signals {
     /// The position of a signal, which is added if it is new.
     fn signal(&mut self, signal: Expression) -> usize {
-        self.signals.iter().position(|known| *known == signal).unwrap_or_else(|| {
-            self.signals.push(signal);
-            self.signals.len() - 1
+        self.computed.iter().position(|known| *known == signal).unwrap_or_else(|| {
+            self.computed.push(signal);
+            self.computed.len() - 1
         })
     }
 }
@@ -45,7 +45,7 @@ impl<'a> Resolver<'a> {
         self.at_most_one(&formula.outbound, "outbound");
         let mut parts = Signals::default();
         let resolved = self.temporal(&mut parts, of)?;
-        let Signals { inputs, mut signals, unit, truths } = parts;
+        let Signals { inputs, computed: mut signals, unit, truths } = parts;
         let amount = if unit.is_some() { DECISIVE } else { 1.0 };
         for at in truths {
             let twice = Expression::Product(vec![signals[at].clone(), Expression::Constant(2.0 * amount)]);
