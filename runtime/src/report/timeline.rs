@@ -194,6 +194,15 @@ fn series(
         markup.leaf("path", &[("class", "line bad"), ("d", &bad)]);
     }
     markup.close();
+    // A value set at the very end has no line, only a place.
+    if let Some(&(at, value)) = points.last()
+        && at >= end
+    {
+        let bad = bounds.iter().any(|(_, bound)| !bound.holds(value));
+        let (x, y) = (percent(time.share(at)), coordinate(height(value)));
+        let class = if bad { "at-end bad" } else { "at-end" };
+        markup.leaf("circle", &[("class", class), ("cx", &x), ("cy", &y), ("r", "3")]);
+    }
     // After the lines, so that none strikes a name out.
     for &(name, bound, at) in &lines {
         let y = coordinate(height(at));
