@@ -32,6 +32,7 @@ pub use folder::{Claim, DATABASE, LOCK, claim_folder, latest_folder};
 pub use recorder::Recorder;
 pub use repository::{CampaignFacts, Repository};
 pub use schema::SCHEMA;
+#[cfg(feature = "report")]
 pub(crate) use verdict::ends;
 pub use verdict::{Verdict, verdict, violation_spans};
 

@@ -10,6 +10,7 @@
 
 mod condition;
 mod formula;
+mod robustness;
 
 use sesame_dsl::model::{self, CampaignId, Id as _, Space};
 use sesame_dsl::units::Unit;
@@ -215,7 +216,10 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
             line: metric.declaration.line,
             inputs: topics.iter().map(|&id| topic_id(id)).collect(),
         }),
-        model::MetricSource::FuzzingTime | model::MetricSource::Last(_) | model::MetricSource::Formula(_) => None,
+        model::MetricSource::FuzzingTime
+        | model::MetricSource::Last(_)
+        | model::MetricSource::Robustness(_)
+        | model::MetricSource::Formula(_) => None,
     });
     hooks.collect()
 }
@@ -277,6 +281,9 @@ fn metric(metric: &model::Metric) -> plan::Metric {
             }
             model::MetricSource::FuzzingTime => plan::MetricSource::FuzzingTime,
             model::MetricSource::Last(input) => plan::MetricSource::Last { input: formula::field(input) },
+            model::MetricSource::Robustness(of) => {
+                plan::MetricSource::Robustness { robustness: robustness::robustness(of) }
+            }
             model::MetricSource::Formula(of) => plan::MetricSource::Formula { formula: formula::formula(of) },
         },
         line: metric.declaration.line,

@@ -262,6 +262,11 @@ pub enum MetricSource {
         /// Which value of which message.
         input: FieldRef,
     },
+    /// By how much a formula of signal temporal logic is kept over the whole run; known when it is over.
+    Robustness {
+        /// Of what.
+        robustness: crate::stl::Robustness,
+    },
     /// Computed from messages as the space says.
     Formula {
         /// How.

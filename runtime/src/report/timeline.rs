@@ -112,8 +112,9 @@ fn shown_metrics(plan: &CampaignPlan, record: &TestRecord) -> Vec<usize> {
     let objectives = plan.campaign.objectives.iter().map(|id| id.index());
     let mut order: Vec<usize> = Vec::new();
     for id in bounded.chain(objectives).chain(0..plan.metrics.len()) {
-        // The time spent fuzzing is what the lanes above show.
-        let drawn = plan.metrics[id].source != MetricSource::FuzzingTime
+        // The time spent fuzzing is what the lanes above show; a robustness is known at the end only.
+        let source = &plan.metrics[id].source;
+        let drawn = !matches!(source, MetricSource::FuzzingTime | MetricSource::Robustness { .. })
             && record.observation.metrics.get(id).is_some_and(|shown| !shown.series.is_empty());
         if drawn && !order.contains(&id) {
             order.push(id);
@@ -192,6 +193,15 @@ fn series(
         markup.leaf("path", &[("class", "line bad"), ("d", &bad)]);
     }
     markup.close();
+    // A value set at the very end has no line, only a place.
+    if let Some(&(at, value)) = points.last()
+        && at >= end
+    {
+        let bad = bounds.iter().any(|(_, bound)| !bound.holds(value));
+        let (x, y) = (percent(time.share(at)), coordinate(height(value)));
+        let class = if bad { "at-end bad" } else { "at-end" };
+        markup.leaf("circle", &[("class", class), ("cx", &x), ("cy", &y), ("r", "3")]);
+    }
     // After the lines, so that none strikes a name out.
     for &(name, bound, at) in &lines {
         let y = coordinate(height(at));

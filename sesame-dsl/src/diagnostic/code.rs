@@ -74,6 +74,7 @@ codes! {
     IDLE_CLAUSE = "E0305": "A clause of a metric changes nothing.",
     NOT_A_CONDITION = "E0306": "A condition holds something else than comparisons of metrics.",
     CONSTANT_COMPARISON = "E0307": "A comparison always goes the same way.",
+    TEMPORAL_REACH = "E0308": "How far a temporal operator reaches is not said.",
     REVERSED_RANGE = "E0401": "A range begins above its end.",
     OUT_OF_RANGE = "E0402": "A value lies outside of what is permitted.",
     WRONG_CHOICE = "E0403": "A test's choice does not fit the operation's parameter.",
@@ -88,6 +89,7 @@ codes! {
     UNUSED_OPERATION = "W0002": "No campaign and no test uses the operation.",
     OBJECTIVE_WITHOUT_DEFAULT = "W0003": "An objective may stay without a value.",
     NO_CAMPAIGN = "W0004": "The space has no campaign.",
+    EQUALITY_WITHOUT_ROOM = "W0005": "An equality in a robustness is never kept by any amount.",
 }
 
 /// The page of a code, found by its text in any case, for example `e0203`.

@@ -1,6 +1,6 @@
 //! What is measured, and what must hold of it.
 
-use super::{Declaration, FieldPath, Formula, MetricId, TopicId};
+use super::{Declaration, FieldPath, Formula, MetricId, Robustness, TopicId};
 use crate::units::Unit;
 
 /// A number computed from the messages of a test.
@@ -38,6 +38,8 @@ pub enum MetricSource {
     FuzzingTime,
     /// `last(…)` of one field of one topic, as published: the last value received.
     Last(FieldPath),
+    /// By how much a temporal formula is kept: its robustness over the whole test.
+    Robustness(Robustness),
     /// Any other formula.
     Formula(Formula),
 }

@@ -11,6 +11,7 @@ mod fuzz;
 mod ids;
 mod measure;
 mod system;
+mod temporal;
 
 pub use campaign::*;
 pub use formula::*;
@@ -18,6 +19,7 @@ pub use fuzz::*;
 pub use ids::*;
 pub use measure::*;
 pub use system::*;
+pub use temporal::*;
 
 use crate::span::Span;
 

@@ -5,7 +5,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::model::condition::{Comparison, Condition, ConditionSpace, Constraint, Integers, Known, Operand, Variable};
 use crate::model::{Activation, Aggregate, End, Expression, Id as _, Metric, MetricId, MetricSource, Range};
 use crate::span::Span;
-use crate::syntax::ast::{self, ByCondition, Contained, ExpressionKind, Trigger, TriggerEnd};
+use crate::syntax::ast::{self, ByCondition, Contained, ExpressionKind, Relation, Trigger, TriggerEnd};
 use crate::units::{Unit, convert, dimension};
 
 const EXAMPLE: &str = "expected a comparison such as `near_zone1 > 2`";
@@ -81,15 +81,16 @@ impl<'a> Resolver<'a> {
         &mut self,
         whole: &ast::Expression,
         left: &'a ast::Expression,
-        by: ast::Comparison,
+        by: Relation,
         right: &'a ast::Expression,
     ) -> Option<Condition> {
         let by = match by {
-            ast::Comparison::Below => Some(Comparison::Below),
-            ast::Comparison::Above => Some(Comparison::Above),
-            ast::Comparison::Equal => Some(Comparison::Equal),
-            ast::Comparison::AtMost => self.no_such_comparison(left, right, "<=", "<"),
-            ast::Comparison::AtLeast => self.no_such_comparison(left, right, ">=", ">"),
+            Relation::Comparison(ast::Comparison::Below) => Some(Comparison::Below),
+            Relation::Comparison(ast::Comparison::Above) => Some(Comparison::Above),
+            Relation::Comparison(ast::Comparison::Equal) => Some(Comparison::Equal),
+            Relation::Comparison(ast::Comparison::AtMost) => self.no_such_comparison(left, right, "<=", Some("<")),
+            Relation::Comparison(ast::Comparison::AtLeast) => self.no_such_comparison(left, right, ">=", Some(">")),
+            Relation::NotEqual => self.no_such_comparison(left, right, "!=", None),
         };
         let sides = [left, right].map(|side| self.side(side));
         let [left_side, right_side] = [sides[0]?, sides[1]?];
@@ -133,7 +134,7 @@ impl<'a> Resolver<'a> {
         left: &ast::Expression,
         right: &ast::Expression,
         sign: &str,
-        near: &str,
+        near: Option<&str>,
     ) -> Option<Comparison> {
         let gap = Span { lo: left.span.hi, hi: right.span.lo, ..left.span };
         let written = self.text(gap);
@@ -145,7 +146,7 @@ impl<'a> Resolver<'a> {
             let span = Span { lo, hi, ..gap };
             diagnostic.span = span;
             // A sign inside of a comment is not the one that is meant.
-            if written.trim() == sign {
+            if let Some(near) = near.filter(|_| written.trim() == sign) {
                 diagnostic = diagnostic.suggest(format!("compare with `{near}`"), span, near);
             }
         }
@@ -158,7 +159,10 @@ impl<'a> Resolver<'a> {
             ExpressionKind::Number(quantity) => Some(Side::Number(quantity)),
             ExpressionKind::Field(path) if path.fields.is_empty() => {
                 let index = self.find(&path.topic, Kind::Metric)?;
-                self.metrics[index].is_some().then(|| Side::Metric(MetricId::from_index(index)))
+                let id = MetricId::from_index(index);
+                self.metrics[index].is_some().then_some(())?;
+                self.known_during_a_test(id, side.span)?;
+                Some(Side::Metric(id))
             }
             kind => {
                 let written = self.text(side.span);
@@ -181,6 +185,20 @@ impl<'a> Resolver<'a> {
                 None
             }
         }
+    }
+
+    /// A robustness is known when the test is over: no condition ever sees it.
+    fn known_during_a_test(&mut self, id: MetricId, span: Span) -> Option<()> {
+        let metric = self.metric_of(id);
+        if !matches!(metric.source, MetricSource::Robustness(_)) {
+            return Some(());
+        }
+        let title = format!("`{}` has no value before the test is over", self.text(span));
+        let diagnostic = Diagnostic::new(Code::NOT_A_CONDITION, span, title)
+            .label("a robustness, known at the end")
+            .also(metric.declaration.span, "declared here");
+        self.report(diagnostic);
+        None
     }
 
     fn metric_of(&self, id: MetricId) -> &Metric {
@@ -301,6 +319,8 @@ impl<'a> Resolver<'a> {
     fn variable(&mut self, name: &'a ast::Name, id: MetricId, range: Option<&'a ast::Range>) -> Option<Variable> {
         let metric = self.metrics[id.index()].as_ref()?;
         let own = known_of(metric);
+        self.known_during_a_test(id, name.span)?;
+        let metric = self.metric_of(id);
         let (unit, initial, declared) = (metric.unit.clone(), metric.initial, metric.declaration.span);
         let Some(range) = range else { return Some(Variable { metric: id, known: own }) };
         let what = format!("metric `{}`", name.text);
@@ -469,7 +489,7 @@ fn known_of(metric: &Metric) -> Known {
             // Over groups and keys these are the least, the greatest or the sum of values that are not negative.
             Aggregate::Last(of) | Aggregate::Min(of) | Aggregate::Max(of) | Aggregate::Mean(of) => never_negative(of),
         },
-        MetricSource::Hook(_) | MetricSource::Last(_) => false,
+        MetricSource::Hook(_) | MetricSource::Last(_) | MetricSource::Robustness(_) => false,
     };
     if !from_zero {
         return Known::NOTHING;

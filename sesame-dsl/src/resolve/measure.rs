@@ -23,7 +23,7 @@ impl<'a> Resolver<'a> {
         let default = self.single(&metric.defaults, "default");
         let initial = self.single(&metric.initials, "initial");
         // Both are looked at, so that a mistake in one does not hide one in the other or in the default.
-        let (source, ty): (Option<MetricSource>, Option<Type>) = match metric.source.as_ref()? {
+        let (source, ty): (Option<MetricSource>, Option<Type>) = match &metric.source {
             ast::MetricSource::Hook { hooks, damaged } => {
                 (self.hook(name, hooks, *damaged), self.hook_type(metric.ty.as_ref()))
             }

@@ -16,7 +16,9 @@ mod formula;
 mod fuzz;
 mod measure;
 mod quantity;
+mod robustness;
 mod system;
+mod truth;
 
 use std::collections::{BTreeMap, BTreeSet};
 

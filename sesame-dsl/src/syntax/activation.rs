@@ -36,9 +36,9 @@ impl Reader<'_> {
     }
 
     fn trigger(&mut self, pair: &Pair<'_>) -> Trigger {
-        let start = self.expression(&expect_child(pair, Rule::expression));
+        let start = self.switch(&expect_child(pair, Rule::switch));
         let end = if let Some(until) = child(pair, Rule::until_condition) {
-            TriggerEnd::Until(self.expression(&expect_child(&until, Rule::expression)))
+            TriggerEnd::Until(self.switch(&expect_child(&until, Rule::switch)))
         } else {
             let length = expect_child(pair, Rule::for_length);
             TriggerEnd::For(self.signed(&expect_child(&length, Rule::signed)))

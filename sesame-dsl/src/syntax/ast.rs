@@ -140,8 +140,7 @@ pub(crate) struct Metric {
     pub(crate) directions: Vec<(Span, Direction)>,
     pub(crate) defaults: Vec<(Span, Quantity)>,
     pub(crate) initials: Vec<(Span, Quantity)>,
-    /// `None` for a formula that is not supported yet.
-    pub(crate) source: Option<MetricSource>,
+    pub(crate) source: MetricSource,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -181,6 +180,8 @@ pub(crate) enum FormulaKind {
 pub(crate) struct Expression {
     pub(crate) kind: ExpressionKind,
     pub(crate) span: Span,
+    /// Stands in parentheses, which are part of its span.
+    pub(crate) parenthesised: bool,
 }
 
 #[derive(Debug)]
@@ -195,10 +196,43 @@ pub(crate) enum ExpressionKind {
     Sum(Vec<(bool, Expression)>),
     /// Two factors or more; true for one that divides.
     Product(Vec<(bool, Expression)>),
-    Compare(Box<Expression>, Comparison, Box<Expression>),
+    Compare(Box<Expression>, Relation, Box<Expression>),
+    /// One word or more before it, the outermost first.
+    Prefixed(Vec<Prefix>, Box<Expression>),
+    Until(Box<Expression>, Until, Box<Expression>),
     All(Vec<Expression>),
     Any(Vec<Expression>),
+    Implies(Box<Expression>, Box<Expression>),
     Call(Name, Vec<Expression>),
+}
+
+/// How two values of a formula compare: as those of a bound do, or by being different.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Relation {
+    Comparison(Comparison),
+    NotEqual,
+}
+
+/// A word before a condition.
+#[derive(Debug)]
+pub(crate) struct Prefix {
+    pub(crate) word: PrefixWord,
+    pub(crate) span: Span,
+    pub(crate) interval: Option<Range>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PrefixWord {
+    Not,
+    Always,
+    Eventually,
+}
+
+/// The word between two sides, and its interval.
+#[derive(Debug)]
+pub(crate) struct Until {
+    pub(crate) span: Span,
+    pub(crate) interval: Option<Range>,
 }
 
 /// What a group of topics is taken as, other than its minimum.

@@ -336,6 +336,7 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::at_most => "`<=`",
         Rule::at_least => "`>=`",
         Rule::equal_to => "`==`",
+        Rule::not_equal => "`!=`",
         Rule::below => "`<`",
         Rule::above => "`>`",
         Rule::bound_within => "`in`",
@@ -364,8 +365,13 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::blackhole => "`blackhole`",
         Rule::formula => "a formula such as `last(cycle)`",
         Rule::expression
+        | Rule::switch
+        | Rule::switch_conjunction
+        | Rule::disjunction
         | Rule::conjunction
+        | Rule::passage
         | Rule::relation
+        | Rule::prefix
         | Rule::sum
         | Rule::product
         | Rule::factor
@@ -382,6 +388,10 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::formula_outbound => "`outbound`",
         Rule::fuzzing_time => "`fuzzing_time()`",
         Rule::minus
+        | Rule::k_not
+        | Rule::k_always
+        | Rule::k_eventually
+        | Rule::k_implies
         | Rule::k_import
         | Rule::k_eddi
         | Rule::k_physical

@@ -225,7 +225,6 @@ impl Reader<'_> {
         let word = &self.text[span.range()];
         let what = match pair.as_rule() {
             Rule::unsupported_transport => format!("simulator kind `{word}`"),
-            Rule::unsupported_formula => format!("a metric by `{word}(…)`"),
             Rule::unsupported_operation if word != "custom" => format!("an operation on a `{word}`"),
             Rule::unsupported_operation | Rule::unsupported_kind => format!("operation kind `{word}`"),
             Rule::unsupported_from => "a campaign `from` another".to_owned(),
@@ -423,7 +422,7 @@ impl Reader<'_> {
         };
         let defaults = values(Rule::default_value);
         let initials = values(Rule::initial_value);
-        let sources = [Rule::hook_block, Rule::formula, Rule::fuzzing_time, Rule::unsupported_formula];
+        let sources = [Rule::hook_block, Rule::formula, Rule::fuzzing_time];
         let source = first_of(pair, &sources).expect("a metric has a source");
         let source = match source.as_rule() {
             Rule::hook_block => {
@@ -431,14 +430,10 @@ impl Reader<'_> {
                 let damaged = self.members(&source, Place::Hook, |reader, hook| {
                     hooks.push((reader.keyword_span(&hook), reader.names(&hook)));
                 });
-                Some(MetricSource::Hook { hooks, damaged })
+                MetricSource::Hook { hooks, damaged }
             }
-            Rule::formula => Some(MetricSource::Formula(Box::new(self.formula(&source)))),
-            Rule::fuzzing_time => Some(MetricSource::FuzzingTime),
-            _ => {
-                self.unsupported(&source);
-                None
-            }
+            Rule::formula => MetricSource::Formula(Box::new(self.formula(&source))),
+            _ => MetricSource::FuzzingTime,
         };
         Metric { head, ty, directions, defaults, initials, source }
     }
