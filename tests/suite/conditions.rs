@@ -117,8 +117,14 @@ fn a_campaign_by_condition_comes_out_the_same_on_any_number_of_workers_and_when_
     let connection = rusqlite::Connection::open(folder.join(sesame_runtime::record::DATABASE)).unwrap();
     let later = "SELECT number FROM tests WHERE origin = 'search' ORDER BY number LIMIT -1 OFFSET 25";
     for (table, column) in [
-        ("parents", "test"), ("operations", "test"), ("choices", "test"), ("intervals", "test"),
-        ("metric_values", "test"), ("change_points", "test"), ("events", "test"), ("wall_times", "test"),
+        ("parents", "test"),
+        ("operations", "test"),
+        ("choices", "test"),
+        ("intervals", "test"),
+        ("metric_values", "test"),
+        ("change_points", "test"),
+        ("events", "test"),
+        ("wall_times", "test"),
         ("tests", "number"),
     ] {
         connection.execute(&format!("DELETE FROM {table} WHERE {column} IN ({later})"), []).unwrap();
@@ -163,7 +169,7 @@ fn known_tests_by_condition_are_held_to_what_they_expect_and_void_ones_said_to_b
 
 #[test]
 fn an_exported_test_by_condition_reproduces_its_values() {
-    let project = Project::kuka_cell("kuka_cell_by_condition_exported");
+    let project = Project::kuka_cell_with("kuka_cell_by_condition_exported", "");
     let campaigns = ["condition_experiment", "condition_limited_experiment", "condition_repeated_experiment"];
     let mut text = fs::read_to_string(&project.space).unwrap();
     let mut found = Vec::new();
@@ -176,7 +182,9 @@ fn an_exported_test_by_condition_reproduces_its_values() {
         let record = repository.test(worst.unwrap().number).unwrap();
         let name = format!("T{}", record.number);
         let results = format!("{campaign}/5");
-        text.push_str(&runner.run(&["export", &name, "--results", &results, "--name", campaign_test(campaign)]).expect(0).out);
+        text.push_str(
+            &runner.run(&["export", &name, "--results", &results, "--name", campaign_test(campaign)]).expect(0).out,
+        );
         found.push((campaign, record));
     }
     fs::write(&project.space, text).unwrap();
