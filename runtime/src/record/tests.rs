@@ -411,12 +411,12 @@ fn any_kind_of_change_to_a_condition_changes_the_digest() {
     let changes: [fn(&mut Activation, &mut Activation); 6] = [
         |until, _| {
             if let Activation::Condition { times, .. } = until {
-                *times += 1
+                *times += 1;
             }
         },
         |until, _| {
             if let Activation::Condition { start, end, .. } = until {
-                std::mem::swap(start, end)
+                std::mem::swap(start, end);
             }
         },
         |until, _| {
@@ -427,12 +427,12 @@ fn any_kind_of_change_to_a_condition_changes_the_digest() {
         |until, lasting| *until = lasting.clone(),
         |_, lasting| {
             if let Activation::ConditionFor { length, .. } = lasting {
-                *length = length.next_up()
+                *length = length.next_up();
             }
         },
         |_, lasting| {
             if let Activation::ConditionFor { times, .. } = lasting {
-                *times += 1
+                *times += 1;
             }
         },
     ];

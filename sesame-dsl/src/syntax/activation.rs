@@ -22,7 +22,7 @@ impl Reader<'_> {
             .collect();
         let activation = match child(pair, Rule::window) {
             Some(window) => Activation::Window(self.window(&window)),
-            None => Activation::Trigger(self.trigger(&expect_child(pair, Rule::trigger))),
+            None => Activation::Trigger(Box::new(self.trigger(&expect_child(pair, Rule::trigger)))),
         };
         let seed = child(pair, Rule::draw_seed).map(|seed| self.count(&expect_child(&seed, Rule::number)));
         TestOperation { operation, choices, activation, seed }

@@ -358,7 +358,7 @@ pub(crate) struct TestOperation {
 #[derive(Debug)]
 pub(crate) enum Activation {
     Window(Range),
-    Trigger(Trigger),
+    Trigger(Box<Trigger>),
 }
 
 /// Activation by condition. What the conditions may hold, is for resolution to say.
