@@ -5,6 +5,7 @@
 //! metrics, then delivery. A message on a wire that no operation of the test touches is handed on as it came.
 
 mod release;
+mod tap;
 
 use sesame_plan::{CampaignPlan, Drain, Test};
 
@@ -17,6 +18,7 @@ use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
 use release::{Held, ReleaseQueue};
+pub use tap::{Deed, Tap, Touched};
 
 /// A message that is to reach its subscribers now.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,6 +59,7 @@ pub struct Relay<'a> {
     overflowed: bool,
     /// The run is over: nothing is delivered any more.
     over: bool,
+    tap: Option<&'a mut dyn Tap>,
 }
 
 /// One operation of the test.
@@ -125,7 +128,19 @@ impl<'a> Relay<'a> {
             messages: 0,
             overflowed: false,
             over: false,
+            tap: None,
         })
+    }
+
+    /// The same relay, telling this tap what happens.
+    pub fn tapped(self, tap: &'a mut dyn Tap) -> Self {
+        Relay { tap: Some(tap), ..self }
+    }
+
+    fn tell(&mut self, now: SimTime, operation: usize, deed: Deed) {
+        if let Some(tap) = &mut self.tap {
+            tap.operated(now, operation, deed);
+        }
     }
 
     /// Tells the metrics' hooks that the run begins.
@@ -183,10 +198,16 @@ impl<'a> Relay<'a> {
     /// Carries out the edges at one moment; messages let go by them are let go then.
     fn follow_activities(&mut self, edge: SimTime, deliveries: &mut Vec<Delivery>) {
         for at in 0..self.operations.len() {
-            let stage = &mut self.operations[at];
-            if stage.activity.follow(edge) != Edge::Ended {
-                continue;
+            let turned = self.operations[at].activity.follow(edge);
+            match turned {
+                Edge::None => continue,
+                Edge::Started => {
+                    self.tell(edge, at, Deed::Started);
+                    continue;
+                }
+                Edge::Ended => self.tell(edge, at, Deed::Ended),
             }
+            let stage = &mut self.operations[at];
             let Disturbance::Latency(latency) = &stage.disturbance else { continue };
             match latency.drain {
                 Drain::Finish => {}
@@ -196,9 +217,12 @@ impl<'a> Relay<'a> {
                     }
                 }
                 Drain::Drop => {
-                    let lost = self.queue.take_all(at).len() as u64;
-                    stage.counters.delayed -= lost;
-                    stage.counters.dropped += lost;
+                    let lost = self.queue.take_all(at);
+                    stage.counters.delayed -= lost.len() as u64;
+                    stage.counters.dropped += lost.len() as u64;
+                    for held in lost {
+                        self.tell(edge, at, Deed::Dropped(held.touched()));
+                    }
                 }
             }
         }
@@ -227,15 +251,19 @@ impl<'a> Relay<'a> {
             if fate == Fate::Dropped {
                 stage.counters.dropped += 1;
                 stage.touch(now);
+                self.tell(now, at, Deed::Dropped(message.touched()));
                 return;
             }
             if fate == Fate::Changed {
                 stage.counters.changed += 1;
                 stage.touch(now);
+                self.tell(now, at, Deed::Changed(message.touched()));
             }
             if release > now {
+                let stage = &mut self.operations[at];
                 stage.counters.delayed += 1;
                 stage.touch(now);
+                self.tell(now, at, Deed::Delayed(message.touched(), release));
                 self.queue.push(release, at, message);
                 if self.queue.len() > HELD_LIMIT {
                     self.overflowed = true;
@@ -248,6 +276,9 @@ impl<'a> Relay<'a> {
         }
         if !self.over {
             self.metrics.delivered(now, message.wire, &message.value);
+            if let Some(tap) = &mut self.tap {
+                tap.delivered(now, message.wire, message.index, &message.value);
+            }
         }
         deliveries.push(Delivery { wire: message.wire, value: message.value });
     }
@@ -274,6 +305,9 @@ impl Exchange for Relay<'_> {
         self.messages += 1;
         let index = self.published[wire.index()];
         self.published[wire.index()] += 1;
+        if let Some(tap) = &mut self.tap {
+            tap.published(self.now, wire, index, &value);
+        }
         self.metrics.message(self.now, wire, &value);
         self.pass(self.now, Held { wire, index, value, next_stage: 0 }, deliveries);
     }

@@ -11,6 +11,7 @@ mod markup;
 mod number;
 mod page;
 mod repetition;
+mod recording;
 mod replay;
 mod scatter;
 mod show;
@@ -25,6 +26,7 @@ pub use export::{ExportError, Exported, export};
 pub use junit::{junit, write_junit};
 pub use page::{page, write_page};
 pub use repetition::{Repetition, ViolationRate};
+pub use recording::{FedMetric, RecordingReplay, Sameness, recording_text};
 pub use replay::{Replay, replay_text};
 pub use show::{
     ChoiceReport, ListedTest, MetricReport, OperationReport, TestList, TestReport, VerdictReport, list, show,

@@ -124,6 +124,7 @@ impl Landscape {
                 search,
                 seed: 0,
                 end_after: 70.0,
+                record: None,
             },
         }
     }

@@ -28,6 +28,10 @@ impl<'a> Resolver<'a> {
         self.at_most_one(&searches, "search");
         let repeats: Vec<Span> = campaign.repeats.iter().map(|repeat| repeat.span).collect();
         self.at_most_one(&repeats, "repeat");
+        let record = self.single(&campaign.records, "record").map(|record| match record {
+            ast::Record::Failing => model::Recorded::Failing,
+            ast::Record::All => model::Recorded::All,
+        });
         let content = self.content(campaign, end_after);
         let (search, seed) = match (campaign.searches.first(), campaign.repeats.first()) {
             (_, Some(repeat)) => {
@@ -55,6 +59,7 @@ impl<'a> Resolver<'a> {
             search: search?,
             seed: seed?,
             end_after: end_after?,
+            record,
         })
     }
 

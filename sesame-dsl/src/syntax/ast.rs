@@ -342,8 +342,15 @@ pub(crate) struct Campaign {
     pub(crate) searches: Vec<Search>,
     pub(crate) repeats: Vec<Repeat>,
     pub(crate) ends: Vec<(Span, Quantity)>,
+    pub(crate) records: Vec<(Span, Record)>,
     /// Something of it could not be read or is not supported: what is missing may be there.
     pub(crate) damaged: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Record {
+    Failing,
+    All,
 }
 
 #[derive(Debug)]

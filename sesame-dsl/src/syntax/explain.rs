@@ -77,6 +77,7 @@ impl Place {
                 Rule::search,
                 Rule::end,
                 Rule::repeat,
+                Rule::record,
                 Rule::unsupported_campaign_member,
             ],
             Place::Search => &[Rule::setting_population, Rule::setting_evaluations, Rule::setting_seed],
@@ -113,7 +114,9 @@ impl Place {
             Place::Node => "`publishes` or `subscribes`",
             Place::Hook => "`hook on` and topics",
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
-            Place::Campaign => "`objectives`, `operations`, `observes`, `activate`, `search`, `repeat` or `end after`",
+            Place::Campaign => {
+                "`objectives`, `operations`, `observes`, `activate`, `search`, `repeat`, `record` or `end after`"
+            }
             Place::Search => "`population`, `evaluations` or `seed`",
             Place::Repeat => "`seed`",
         }
@@ -130,7 +133,9 @@ impl Place {
             Place::Node => &["publishes", "subscribes"],
             Place::Hook => &["hook"],
             Place::Test => &["expect"],
-            Place::Campaign => &["objectives", "operations", "observes", "activate", "search", "repeat", "end"],
+            Place::Campaign => {
+                &["objectives", "operations", "observes", "activate", "search", "repeat", "record", "end"]
+            }
             Place::Search => &["population", "evaluations", "seed"],
             Place::Repeat => &["seed"],
         }
@@ -371,7 +376,6 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::k_relay
         | Rule::k_coverage
         | Rule::k_boost
-        | Rule::k_record
         | Rule::k_custom
         | Rule::k_node
         | Rule::k_parameter => return None,
