@@ -10,7 +10,13 @@ use sesame_tests::{Done, Project, Runner, workspace};
 
 /// The runner of a campaign on the faulty simulator, with its hook filled in.
 pub(crate) fn faulty(name: &str, campaign: &str) -> Runner {
+    recording(name, campaign, "")
+}
+
+/// The same, with this clause in all campaigns.
+pub(crate) fn recording(name: &str, campaign: &str, clause: &str) -> Runner {
     let space = fs::read_to_string(workspace().join("tests/simulators/faulty/space.sesame")).unwrap();
+    let space = space.replace("  end        after 1s\n", &format!("  end        after 1s\n  {clause}\n"));
     let project = Project::new(name, &space.replace("NAME", name), "faulty");
     project.sesamec("generate", &["--campaign", campaign]).expect(0);
     let hook = project.runners.join("hooks/fragile.rs");

@@ -115,7 +115,9 @@ impl<'a> TraceWriter<'a> {
             .write_metadata(&subject.metadata())
             .and_then(|()| Channels::declare(&mut writer, subject.plan, wires))
             .map_err(failed)?;
-        let sink = Sink { writer: Some(writer), waiting: true, over: false, error: None, activities: 0 };
+        // So that even a process that dies at once leaves a trace that says of which run it is.
+        writer.flush().map_err(failed)?;
+        let sink = Sink { writer: Some(writer), waiting: false, over: false, error: None, activities: 0 };
         let shared = Arc::new(Shared { sink: Mutex::new(sink), wake: Condvar::new() });
         let flusher = std::thread::Builder::new().name("trace".to_owned()).spawn({
             let shared = Arc::clone(&shared);
