@@ -10,8 +10,8 @@ mod junit;
 mod markup;
 mod number;
 mod page;
-mod repetition;
 mod recording;
+mod repetition;
 mod replay;
 mod scatter;
 mod show;
@@ -25,8 +25,8 @@ pub(crate) use export::is_name;
 pub use export::{ExportError, Exported, export};
 pub use junit::{junit, write_junit};
 pub use page::{page, write_page};
-pub use repetition::{Repetition, ViolationRate};
 pub use recording::{FedMetric, RecordingReplay, Sameness, recording_text};
+pub use repetition::{Repetition, ViolationRate};
 pub use replay::{Replay, replay_text};
 pub use show::{
     ChoiceReport, ListedTest, MetricReport, OperationReport, TestList, TestReport, VerdictReport, list, show,

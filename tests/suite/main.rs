@@ -3,6 +3,7 @@
 
 mod commands;
 mod declarative;
+mod disk;
 mod exported;
 mod faults;
 mod first_front;

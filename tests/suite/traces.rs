@@ -98,9 +98,11 @@ fn a_hook_that_is_changed_is_compared_with_what_was_recorded() {
     let project = Project::kuka_cell("kuka_cell_traced");
     let space = fs::read_to_string(&project.space).unwrap();
     let simulator = workspace().join("examples/kuka_cell/simulator");
-    let space = space
-        .replace("crate \"simulator\"", &format!("crate \"{}\"", simulator.display()))
-        .replacen("  end        after 70s\n", "  end        after 70s\n  record     mcap all\n", 1);
+    let space = space.replace("crate \"simulator\"", &format!("crate \"{}\"", simulator.display())).replacen(
+        "  end        after 70s\n",
+        "  end        after 70s\n  record     mcap all\n",
+        1,
+    );
     let project = Project { space: project.folder.join("kuka_cell.sesame"), ..project };
     fs::write(&project.space, space).unwrap();
     let runner = project.build("coverage_experiment");
@@ -120,7 +122,8 @@ fn a_hook_that_is_changed_is_compared_with_what_was_recorded() {
         let trace = runner.folder.join(format!("r/5/traces/{name}.mcap"));
         let said = runner.run(&["replay-recording", trace.to_str().unwrap(), "--format", "json"]);
         let fed: Value = serde_json::from_str(&said.out).unwrap();
-        let metric = fed["metrics"].as_array().unwrap().iter().find(|it| it["metric"] == "collision_occurrence").unwrap();
+        let metric =
+            fed["metrics"].as_array().unwrap().iter().find(|it| it["metric"] == "collision_occurrence").unwrap();
         let (now, recorded) = (metric["now"]["value"].as_f64().unwrap(), metric["recorded"].as_f64().unwrap());
         assert_eq!(now, recorded * 2.0, "{fed}");
         assert_eq!(said.code, Some(if recorded > 0.0 { 3 } else { 0 }), "{fed}");

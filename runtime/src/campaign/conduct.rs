@@ -84,7 +84,9 @@ pub enum CampaignError {
     )]
     Reference(String),
     /// A trace could not be written. The test is not recorded, so that `resume` runs it again with its trace.
-    #[error("{reason}\nT{test} is not recorded without its trace, all tests before it are: `resume` goes on once that is mended")]
+    #[error(
+        "{reason}\nT{test} is not recorded without its trace, what was recorded before is kept: `resume` goes on once that is mended"
+    )]
     Trace {
         /// The test.
         test: u32,
@@ -330,7 +332,9 @@ impl Desk<'_> {
             if self.interrupted.load(Ordering::Relaxed) {
                 return Ok(false);
             }
-            let Some(Ended { number, observation, last_words, trace_failure }) = self.pool.next(Duration::from_millis(100))? else {
+            let Some(Ended { number, observation, last_words, trace_failure }) =
+                self.pool.next(Duration::from_millis(100))?
+            else {
                 continue;
             };
             let Some(test) = waiting.remove(&number) else { continue };

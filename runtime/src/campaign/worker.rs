@@ -32,8 +32,7 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: SocketAddr, token
     let directory = std::env::current_dir()?;
     for job in jobs {
         let simulator = transport.get_or_insert_with(|| runner.connect.transport(plan));
-        let (observation, trace_failure) =
-            traced::run(plan, &wires, &metrics, simulator.as_mut(), &job, &directory);
+        let (observation, trace_failure) = traced::run(plan, &wires, &metrics, simulator.as_mut(), &job, &directory);
         if matches!(observation.outcome, Outcome::Crash { .. }) {
             transport = None;
         }

@@ -344,7 +344,8 @@ impl Feeder<'_> {
                 path: self.path.to_owned(),
             });
         }
-        let damaged = |problem: &str| RecordingError::Damaged { problem: problem.to_owned(), path: self.path.to_owned() };
+        let damaged =
+            |problem: &str| RecordingError::Damaged { problem: problem.to_owned(), path: self.path.to_owned() };
         let mut effects: Option<Vec<OperationEffect>> = None;
         let mut end = Some(self.now);
         let mut run = None;

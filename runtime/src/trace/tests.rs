@@ -64,7 +64,8 @@ fn awkward_plan() -> (CampaignPlan, Test) {
     plan.metrics[1].default = Some(0.1);
     let shift = vec![Choice::Range { low: 0.1, high: 0.2 }];
     let late = vec![Choice::Value { value: 0.35 }];
-    let test = test_of(vec![use_of(0, 1.0, 2.0, shift, 1), use_of(1, 3.0, 4.0, vec![], 2), use_of(2, 5.0, 6.0, late, 3)]);
+    let test =
+        test_of(vec![use_of(0, 1.0, 2.0, shift, 1), use_of(1, 3.0, 4.0, vec![], 2), use_of(2, 5.0, 6.0, late, 3)]);
     (plan, test)
 }
 
@@ -279,7 +280,8 @@ fn a_compressed_recording_is_refused_with_a_remedy() {
     drop(writer);
     // The chunk's header says how it is compressed, as a text after times, size and checksum: `lz4` instead of nothing.
     let bytes = bytes.into_inner();
-    let chunk = bytes.iter().enumerate().skip(8).find(|(at, byte)| **byte == 6 && bytes[at + 9 + 28..].starts_with(&[0; 4]));
+    let chunk =
+        bytes.iter().enumerate().skip(8).find(|(at, byte)| **byte == 6 && bytes[at + 9 + 28..].starts_with(&[0; 4]));
     let (at, _) = chunk.unwrap();
     let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) + 3;
     let mut made = bytes[..=at].to_vec();

@@ -207,11 +207,7 @@ fn write_out(shared: &Shared) {
 }
 
 impl Channels {
-    fn declare(
-        writer: &mut Writer<BufWriter<File>>,
-        plan: &CampaignPlan,
-        wires: &WireTable,
-    ) -> McapResult<Self> {
+    fn declare(writer: &mut Writer<BufWriter<File>>, plan: &CampaignPlan, wires: &WireTable) -> McapResult<Self> {
         let disturbed: BTreeSet<TopicId> = plan.operations.iter().map(|operation| operation.topic).collect();
         let mut channels = Channels {
             published: Vec::with_capacity(wires.len()),

@@ -6,8 +6,8 @@ use sesame_grammar::{Rule, SesameParser};
 
 use super::ast::{
     Bound, Campaign, Choice, Comparison, Count, Direction, Drain, Expectation, Field, File, Head, InProcess, Message,
-    Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Process, Range, Record, Repeat,
-    Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Topic, Transport, Type, TypeKind,
+    Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Process, Range, Record,
+    Repeat, Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Topic, Transport, Type, TypeKind,
 };
 use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, MAX_CALLS, too_deep};
