@@ -9,7 +9,7 @@ pub(super) fn of_messages(plan: &CampaignPlan, ty: &Type) -> (String, Vec<u8>) {
     let name = name(plan, ty);
     let mut schema = match ty {
         Type::Message { .. } => of_type(plan, ty),
-        _ => object([("value", of_type(plan, ty))]),
+        _ => value_alone(of_type(plan, ty)),
     };
     schema["title"] = name.clone().into();
     (name, text(&schema))
@@ -37,7 +37,7 @@ pub(super) fn of_operations() -> (String, Vec<u8>) {
 /// The schema of a metric's change points.
 pub(super) fn of_metric(unit: Option<&str>) -> (String, Vec<u8>) {
     let name = in_unit("sesame.Metric", unit);
-    let mut schema = object([("value", number(unit))]);
+    let mut schema = value_alone(number(unit));
     schema["title"] = name.clone().into();
     (name, text(&schema))
 }
@@ -46,11 +46,11 @@ fn text(schema: &Json) -> Vec<u8> {
     schema.to_string().into_bytes()
 }
 
-fn object<const N: usize>(fields: [(&str, Json); N]) -> Json {
-    let required: Vec<&str> = fields.iter().map(|(name, _)| *name).collect();
-    let properties: serde_json::Map<String, Json> =
-        fields.iter().map(|(name, schema)| ((*name).to_owned(), schema.clone())).collect();
-    json!({ "type": "object", "properties": properties, "required": required })
+/// An object with nothing but a value of this schema.
+fn value_alone(schema: Json) -> Json {
+    let mut object = json!({ "type": "object", "required": ["value"] });
+    object["properties"]["value"] = schema;
+    object
 }
 
 fn number(unit: Option<&str>) -> Json {

@@ -189,7 +189,7 @@ impl Drop for TraceWriter<'_> {
 /// Ends a file, so that whatever its buffer still holds is written where a failure is seen.
 pub(super) fn finish(mut writer: Writer<BufWriter<File>>) -> McapResult<()> {
     writer.finish()?;
-    writer.into_inner().into_inner().map_err(|error| error.into_error())?;
+    writer.into_inner().into_inner().map_err(std::io::IntoInnerError::into_error)?;
     Ok(())
 }
 
