@@ -9,7 +9,7 @@ use crate::fuzz::ChoiceError;
 use crate::last_panic;
 use crate::metric::MetricTable;
 use crate::observation::{Observation, Outcome, WallTime};
-use crate::relay::Relay;
+use crate::relay::{Relay, Tap};
 use crate::simulator::Progress;
 use crate::time::SimTime;
 use crate::transport::{Transport, TransportError};
@@ -26,8 +26,24 @@ pub fn evaluate(
     test: &Test,
     simulator_seed: u64,
 ) -> Result<Observation, ChoiceError> {
+    evaluate_tapped(plan, wires, metrics, transport, test, simulator_seed, None)
+}
+
+/// As [`evaluate`], telling a tap what happens.
+pub fn evaluate_tapped(
+    plan: &CampaignPlan,
+    wires: &WireTable,
+    metrics: &MetricTable<'_>,
+    transport: &mut dyn Transport,
+    test: &Test,
+    simulator_seed: u64,
+    tap: Option<&mut dyn Tap>,
+) -> Result<Observation, ChoiceError> {
     let started = Instant::now();
     let mut relay = Relay::new(plan, wires, test, metrics.start())?;
+    if let Some(tap) = tap {
+        relay = relay.tapped(tap);
+    }
     let until = SimTime::from_seconds(plan.campaign.end_after);
     let driven = AssertUnwindSafe(|| drive(transport, &mut relay, simulator_seed, until));
     let failure = match panic::catch_unwind(driven) {

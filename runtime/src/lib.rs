@@ -15,6 +15,8 @@ pub mod evaluate;
 #[cfg(test)]
 mod fixture;
 pub mod fuzz;
+#[cfg(any(feature = "process", feature = "mcap"))]
+mod json;
 mod last_panic;
 pub mod message;
 pub mod metric;
@@ -31,6 +33,8 @@ pub mod search;
 pub mod simulator;
 pub mod stl;
 pub mod time;
+#[cfg(feature = "mcap")]
+pub mod trace;
 pub mod transport;
 pub mod value;
 pub mod wire;

@@ -9,6 +9,7 @@
 //! off in one event. A test without conditions pays nothing for them.
 
 mod release;
+mod tap;
 
 use sesame_plan::{CampaignPlan, Drain, Test};
 
@@ -21,6 +22,7 @@ use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
 use release::{Held, ReleaseQueue};
+pub use tap::{Deed, Tap, Touched};
 
 /// A message that is to reach its subscribers now.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,6 +69,7 @@ pub struct Relay<'a> {
     overflowed: bool,
     /// The run is over: nothing is delivered any more.
     over: bool,
+    tap: Option<&'a mut dyn Tap>,
 }
 
 /// One operation of the test.
@@ -139,7 +142,19 @@ impl<'a> Relay<'a> {
             messages: 0,
             overflowed: false,
             over: false,
+            tap: None,
         })
+    }
+
+    /// The same relay, telling this tap what happens.
+    pub fn tapped(self, tap: &'a mut dyn Tap) -> Self {
+        Relay { tap: Some(tap), ..self }
+    }
+
+    fn tell(&mut self, now: SimTime, operation: usize, deed: Deed) {
+        if let Some(tap) = &mut self.tap {
+            tap.operated(now, operation, deed);
+        }
     }
 
     /// Tells the metrics' hooks that the run begins.
@@ -204,8 +219,10 @@ impl<'a> Relay<'a> {
     /// Carries out the edges at one moment; messages let go by them are let go then.
     fn follow_activities(&mut self, edge: SimTime, deliveries: &mut Vec<Delivery>) {
         for at in 0..self.operations.len() {
-            if self.operations[at].activity.follow(edge, self.step) == Edge::Ended {
-                self.drain(at, edge, deliveries);
+            match self.operations[at].activity.follow(edge, self.step) {
+                Edge::None => {}
+                Edge::Started => self.tell(edge, at, Deed::Started),
+                Edge::Ended => self.end_activity(at, edge, deliveries),
             }
         }
     }
@@ -217,21 +234,25 @@ impl<'a> Relay<'a> {
         }
         let active = |sum, stage: &Stage| sum + stage.activity.active_time(now);
         let active_time = self.operations.iter().fold(SimTime::ZERO, active).seconds();
-        for &at in &self.conditional {
+        for next in 0..self.conditional.len() {
+            let at = self.conditional[next];
             let value = |metric| self.metrics.value(metric, active_time);
-            if self.operations[at].activity.weigh(now, self.step, &value) == Edge::Ended {
-                self.ended.push(at);
+            match self.operations[at].activity.weigh(now, self.step, &value) {
+                Edge::None => {}
+                Edge::Started => self.tell(now, at, Deed::Started),
+                Edge::Ended => self.ended.push(at),
             }
         }
         self.step += 1;
         for next in 0..self.ended.len() {
-            self.drain(self.ended[next], now, deliveries);
+            self.end_activity(self.ended[next], now, deliveries);
         }
         self.ended.clear();
     }
 
-    /// Does with the messages that an operation holds what is to be done when it goes off.
-    fn drain(&mut self, at: usize, now: SimTime, deliveries: &mut Vec<Delivery>) {
+    /// What happens when an operation goes off: it is told, and the messages it holds become what they are to become.
+    fn end_activity(&mut self, at: usize, now: SimTime, deliveries: &mut Vec<Delivery>) {
+        self.tell(now, at, Deed::Ended);
         let Disturbance::Latency(latency) = &self.operations[at].disturbance else { return };
         match latency.drain {
             Drain::Finish => {}
@@ -241,10 +262,13 @@ impl<'a> Relay<'a> {
                 }
             }
             Drain::Drop => {
-                let lost = self.queue.take_all(at).len() as u64;
+                let lost = self.queue.take_all(at);
                 let counters = &mut self.operations[at].counters;
-                counters.delayed -= lost;
-                counters.dropped += lost;
+                counters.delayed -= lost.len() as u64;
+                counters.dropped += lost.len() as u64;
+                for held in lost {
+                    self.tell(now, at, Deed::Dropped(held.touched()));
+                }
             }
         }
     }
@@ -272,15 +296,19 @@ impl<'a> Relay<'a> {
             if fate == Fate::Dropped {
                 stage.counters.dropped += 1;
                 stage.touch(now);
+                self.tell(now, at, Deed::Dropped(message.touched()));
                 return;
             }
             if fate == Fate::Changed {
                 stage.counters.changed += 1;
                 stage.touch(now);
+                self.tell(now, at, Deed::Changed(message.touched()));
             }
             if release > now {
+                let stage = &mut self.operations[at];
                 stage.counters.delayed += 1;
                 stage.touch(now);
+                self.tell(now, at, Deed::Delayed(message.touched(), release));
                 self.queue.push(release, at, message);
                 if self.queue.len() > HELD_LIMIT {
                     self.overflowed = true;
@@ -293,6 +321,9 @@ impl<'a> Relay<'a> {
         }
         if !self.over {
             self.metrics.delivered(now, message.wire, &message.value);
+            if let Some(tap) = &mut self.tap {
+                tap.delivered(now, message.wire, message.index, &message.value);
+            }
         }
         deliveries.push(Delivery { wire: message.wire, value: message.value });
     }
@@ -321,6 +352,9 @@ impl Exchange for Relay<'_> {
         self.messages += 1;
         let index = self.published[wire.index()];
         self.published[wire.index()] += 1;
+        if let Some(tap) = &mut self.tap {
+            tap.published(self.now, wire, index, &value);
+        }
         self.metrics.message(self.now, wire, &value);
         self.weigh_conditions(self.now, deliveries);
         self.pass(self.now, Held { wire, index, value, next_stage: 0 }, deliveries);

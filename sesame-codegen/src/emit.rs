@@ -351,7 +351,11 @@ fn features(runner: &RunnerPlan) -> Vec<&'static str> {
         Transport::InProcess { .. } => "in-process",
         Transport::Process { .. } => "process",
     };
-    vec!["campaign", transport]
+    let mut features = vec!["campaign", transport];
+    if runner.plan.campaign.record.is_some() {
+        features.push("mcap");
+    }
+    features
 }
 
 /// `campaign.rs`: the campaign as the runtime takes it.

@@ -180,6 +180,10 @@ impl Selection {
             search,
             seed: campaign.seed,
             end_after: campaign.end_after,
+            record: campaign.record.map(|record| match record {
+                model::Recorded::Failing => plan::Recorded::Failing,
+                model::Recorded::All => plan::Recorded::All,
+            }),
         }
     }
 }

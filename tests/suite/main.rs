@@ -4,6 +4,7 @@
 mod commands;
 mod conditions;
 mod declarative;
+mod disk;
 mod exported;
 mod faults;
 mod first_front;
@@ -13,3 +14,4 @@ mod regeneration;
 mod search;
 mod stl;
 mod tampering;
+mod traces;

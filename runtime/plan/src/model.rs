@@ -508,6 +508,19 @@ pub struct Campaign {
     pub seed: u64,
     /// Simulation time at which a test ends, in seconds.
     pub end_after: f64,
+    /// Of which tests the messages and the activity of operations are recorded; `None` for none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub record: Option<Recorded>,
+}
+
+/// Of which tests the messages and the activity of operations are recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Recorded {
+    /// Of those that violate a requirement, crash or time out, and of the undisturbed runs to compare them with.
+    Failing,
+    /// Of all.
+    All,
 }
 
 /// Bounds of a count, both included.

@@ -8,7 +8,7 @@ use std::thread;
 use sesame_plan::CampaignPlan;
 
 use super::frames::{self, Hello, Job, Reply};
-use crate::evaluate::evaluate;
+use super::traced;
 use crate::last_panic;
 use crate::metric::MetricTable;
 use crate::observation::{Observation, Outcome, WallTime};
@@ -29,14 +29,14 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: SocketAddr, token
     let metrics = MetricTable::new(plan, &wires, runner.hooks).map_err(io::Error::other)?;
     let jobs = read_jobs(stream.try_clone()?);
     let mut transport = None;
-    for Job { number, test, simulator_seed } in jobs {
+    let directory = std::env::current_dir()?;
+    for job in jobs {
         let simulator = transport.get_or_insert_with(|| runner.connect.transport(plan));
-        let observation = evaluate(plan, &wires, &metrics, simulator.as_mut(), &test, simulator_seed)
-            .unwrap_or_else(|misfit| crashed(misfit.to_string()));
+        let (observation, trace_failure) = traced::run(plan, &wires, &metrics, simulator.as_mut(), &job, &directory);
         if matches!(observation.outcome, Outcome::Crash { .. }) {
             transport = None;
         }
-        frames::send(&mut stream, &Reply { number, observation })?;
+        frames::send(&mut stream, &Reply { number: job.number, observation, trace_failure })?;
     }
     Ok(())
 }

@@ -45,7 +45,8 @@ pub(super) fn replay(
         directory: folder.0.clone(),
         timeout: options.timeout.unwrap_or_else(|| limit(&record)),
     };
-    let job = Job { number: record.number, test: record.test.clone(), simulator_seed: record.simulator_seed };
+    let job =
+        Job { number: record.number, test: record.test.clone(), simulator_seed: record.simulator_seed, trace: None };
     let Some(Ended { observation: again, last_words, .. }) = run_alone(job, &settings, &interrupted)? else {
         eprintln!("stopped; a replay leaves nothing behind");
         return Ok(ExitCode::from(STOPPED));

@@ -9,7 +9,7 @@ use sesame_plan::{Activation, CampaignPlan, Choice, KnownTestId, OperationId, Sp
 
 use crate::condition;
 use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
-use crate::record::folder::DATABASE;
+use crate::record::folder::{DATABASE, trace_file};
 use crate::record::{
     Event, EventKind, MetricValue, Origin, RecordError, ResultSet, Session, Status, TestRecord, TestRow, digest, schema,
 };
@@ -70,6 +70,24 @@ impl Repository {
     /// The database's file.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// The folder of the run, in which the database lies.
+    pub fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// Makes the folder for traces, if there is none. Gives the run's folder as workers, which work elsewhere, need it.
+    #[cfg(feature = "campaign")]
+    pub(crate) fn make_trace_folder(&self) -> Result<PathBuf, RecordError> {
+        let traces = self.folder().join(crate::record::TRACES);
+        let made = std::fs::create_dir_all(&traces).and_then(|()| std::path::absolute(self.folder()));
+        made.map_err(|e| RecordError::io("make the folder for traces", &traces, e))
+    }
+
+    /// The trace of a test, or of the test whose result stands for it, if there is one.
+    pub fn trace(&self, test: u32, duplicate_of: Option<u32>) -> Option<PathBuf> {
+        Some(trace_file(self.folder(), duplicate_of.unwrap_or(test))).filter(|file| file.exists())
     }
 
     /// What is fixed for the run.

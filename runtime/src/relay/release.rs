@@ -3,6 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use super::Touched;
 use crate::time::SimTime;
 use crate::value::Value;
 use crate::wire::Wire;
@@ -16,6 +17,13 @@ pub(super) struct Held {
     pub(super) value: Value,
     /// The position in its wire's pipeline at which it goes on.
     pub(super) next_stage: usize,
+}
+
+impl Held {
+    /// Which message it is, for a tap.
+    pub(super) fn touched(&self) -> Touched {
+        Touched { wire: self.wire, index: self.index }
+    }
 }
 
 struct Entry {

@@ -1,5 +1,7 @@
 //! The tests of a campaign: a line for each, or everything on one.
 
+use std::path::PathBuf;
+
 use serde::Serialize;
 use sesame_plan::{Activation, CampaignPlan, Choice, Span};
 
@@ -80,6 +82,9 @@ pub struct TestReport {
     pub warnings: Vec<String>,
     /// What the session in which it ran left about it, such as the last words of its worker.
     pub notes: Vec<String>,
+    /// Its trace, or that of the test whose result stands for it, where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trace: Option<PathBuf>,
 }
 
 /// One operation of a test.
@@ -197,10 +202,11 @@ pub fn show(repository: &Repository, name: &str) -> Result<TestReport, RecordErr
     let notes = repository.events()?.into_iter();
     let notes = notes.filter(|event| event.kind == EventKind::Session && event.test == Some(ran));
     report.notes = notes.map(|event| event.text).collect();
+    report.trace = repository.trace(record.number, record.duplicate_of);
     Ok(report)
 }
 
-/// Everything on a test, from its record; notes are not there.
+/// Everything on a test, from its record; notes and trace are not there.
 pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, front: bool) -> TestReport {
     let observation = &record.observation;
     TestReport {
@@ -235,6 +241,7 @@ pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, front: bool) -
         requirements: verdicts(plan, record),
         warnings: observation.warnings.clone(),
         notes: Vec::new(),
+        trace: None,
     }
 }
 

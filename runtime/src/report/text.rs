@@ -337,6 +337,9 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     for line in test.notes.iter().flat_map(|note| note.lines()) {
         paragraph(&mut text, &visible(line), options);
     }
+    if let Some(trace) = &test.trace {
+        paragraph(&mut text, &format!("trace {}", visible(&trace.display().to_string())), options);
+    }
     text
 }
 

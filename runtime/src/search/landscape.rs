@@ -129,6 +129,7 @@ impl Landscape {
                 search,
                 seed: 0,
                 end_after: 70.0,
+                record: None,
             },
         }
     }

@@ -18,6 +18,17 @@ pub struct Campaign {
     pub seed: u64,
     /// Simulation time at which a test ends, in seconds; positive.
     pub end_after: f64,
+    /// Of which tests the messages are recorded. Default none.
+    pub record: Option<Recorded>,
+}
+
+/// Of which tests the messages and the activity of operations are recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Recorded {
+    /// Of those that violate a requirement, crash or time out, and of the undisturbed runs to compare them with.
+    Failing,
+    /// Of all.
+    All,
 }
 
 /// How the tests of a campaign are found.

@@ -31,6 +31,10 @@ impl<'a> Resolver<'a> {
             Some(ast::ActivationMode::Condition(by)) => self.condition_space(by).map(ActivationMode::Condition),
             Some(ast::ActivationMode::Time) | None => Some(ActivationMode::Time),
         };
+        let record = self.single(&campaign.records, "record").map(|record| match record {
+            ast::Record::Failing => model::Recorded::Failing,
+            ast::Record::All => model::Recorded::All,
+        });
         let content = self.content(campaign, end_after, activation);
         let (search, seed) = match (campaign.searches.first(), campaign.repeats.first()) {
             (_, Some(repeat)) => {
@@ -58,6 +62,7 @@ impl<'a> Resolver<'a> {
             search: search?,
             seed: seed?,
             end_after: end_after?,
+            record,
         })
     }
 

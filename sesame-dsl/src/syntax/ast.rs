@@ -406,6 +406,7 @@ pub(crate) struct Campaign {
     pub(crate) searches: Vec<Search>,
     pub(crate) repeats: Vec<Repeat>,
     pub(crate) ends: Vec<(Span, Quantity)>,
+    pub(crate) records: Vec<(Span, Record)>,
     /// Something of it could not be read or is not supported: what is missing may be there.
     pub(crate) damaged: bool,
 }
@@ -427,6 +428,12 @@ pub(crate) struct ByCondition {
     pub(crate) integers: Vec<(Span, Range)>,
     pub(crate) lengths: Vec<(Span, Range)>,
     pub(crate) times: Vec<(Span, Count)>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Record {
+    Failing,
+    All,
 }
 
 #[derive(Debug)]

@@ -79,6 +79,7 @@ impl Place {
                 Rule::search,
                 Rule::end,
                 Rule::repeat,
+                Rule::record,
                 Rule::unsupported_campaign_member,
             ],
             Place::Condition => &[Rule::setting_depth, Rule::setting_integers],
@@ -117,7 +118,9 @@ impl Place {
             Place::Node => "`publishes` or `subscribes`",
             Place::Hook => "`hook on` and topics",
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
-            Place::Campaign => "`objectives`, `operations`, `observes`, `activate`, `search`, `repeat` or `end after`",
+            Place::Campaign => {
+                "`objectives`, `operations`, `observes`, `activate`, `search`, `repeat`, `record` or `end after`"
+            }
             Place::Condition => "`depth` or `integers`",
             Place::Search => "`population`, `evaluations` or `seed`",
             Place::Repeat => "`seed`",
@@ -135,7 +138,9 @@ impl Place {
             Place::Node => &["publishes", "subscribes"],
             Place::Hook => &["hook"],
             Place::Test => &["expect"],
-            Place::Campaign => &["objectives", "operations", "observes", "activate", "search", "repeat", "end"],
+            Place::Campaign => {
+                &["objectives", "operations", "observes", "activate", "search", "repeat", "record", "end"]
+            }
             Place::Condition => &["depth", "integers"],
             Place::Search => &["population", "evaluations", "seed"],
             Place::Repeat => &["seed"],
@@ -400,7 +405,6 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::k_relay
         | Rule::k_coverage
         | Rule::k_boost
-        | Rule::k_record
         | Rule::k_custom
         | Rule::k_node
         | Rule::k_parameter => return None,

@@ -6,8 +6,8 @@ use sesame_grammar::{Rule, SesameParser};
 
 use super::ast::{
     ActivationMode, Bound, Campaign, Comparison, Count, Direction, Drain, Expectation, Field, File, Head, InProcess,
-    Message, Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Process, Repeat,
-    Requirement, Search, Simulator, Strategy, System, Test, Topic, Transport, Type, TypeKind,
+    Message, Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Process, Record,
+    Repeat, Requirement, Search, Simulator, Strategy, System, Test, Topic, Transport, Type, TypeKind,
 };
 use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, MAX_CALLS, too_deep};
@@ -521,6 +521,7 @@ impl Reader<'_> {
             searches: vec![],
             repeats: vec![],
             ends: vec![],
+            records: vec![],
             damaged: false,
         };
         let from = child(pair, Rule::unsupported_from);
@@ -548,6 +549,10 @@ impl Reader<'_> {
                 }
                 Rule::search => campaign.searches.push(reader.search(&member, span)),
                 Rule::end => campaign.ends.push((span, reader.signed(&expect_child(&member, Rule::signed)))),
+                Rule::record => {
+                    let all = child(&member, Rule::k_all).is_some();
+                    campaign.records.push((span, if all { Record::All } else { Record::Failing }));
+                }
                 Rule::repeat => {
                     let mut seed = Vec::new();
                     if let Some(settings) = child(&member, Rule::repeat_settings) {
