@@ -136,6 +136,15 @@ proptest! {
 }
 
 #[test]
+fn what_is_quoted_over_several_lines_is_said_in_one() {
+    let text =
+        "space s\noperation o on t = latency [1s,\r\n  2s]\ntest t { o delay 1s when a +\n b until c\n == 2 + 1 }";
+    has_a_sound_answer(text);
+    let (_, _, analysis) = analyse_text(text);
+    assert!(analysis.diagnostics.iter().any(|diagnostic| diagnostic.title.contains("a + b")), "{analysis:?}");
+}
+
+#[test]
 fn deep_nesting_and_long_repetition_are_refused_or_read_but_never_overflow() {
     for piece in ["{", "(", "[", "list of ", "system {", "\"{", "test t {", "message M { a: list of ", "- ", "a: "] {
         has_a_sound_answer(&piece.repeat(2_000));
