@@ -13,6 +13,7 @@ mod probe;
 mod tests;
 
 pub use engine::{MetricTable, Metrics, MissingHook};
+pub(crate) use probe::sample;
 pub use probe::unimplemented_hooks;
 
 /// A user's metric hook as the runtime calls it. Generated code implements it around the typed hook trait.

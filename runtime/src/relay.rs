@@ -6,12 +6,14 @@
 
 mod release;
 
-use sesame_plan::{CampaignPlan, Drain, Test};
+use sesame_plan::{CampaignPlan, Drain, Moment, Test};
 
 use crate::activation::{Activity, Edge};
-use crate::fuzz::{ChoiceError, Disturbance, Draws, Fate};
+use crate::changed_files::ChangedFiles;
+use crate::fuzz::{ChoiceError, Disturbance, Draws, Fate, OperationEntry, RunContext};
 use crate::metric::Metrics;
 use crate::observation::{Counters, OperationEffect};
+use crate::rng::derive_seed;
 use crate::time::SimTime;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
@@ -46,6 +48,8 @@ pub const HELD_LIMIT: usize = 100_000;
 pub struct Relay<'a> {
     wires: &'a WireTable,
     operations: Vec<Stage>,
+    /// Their positions by priority, then declaration.
+    order: Vec<usize>,
     /// Per wire: the stages a message passes, in order, with the wire's position in the operation's topic.
     pipelines: Vec<Vec<(usize, u64)>>,
     /// Per wire: messages published so far.
@@ -61,8 +65,10 @@ pub struct Relay<'a> {
 
 /// One operation of the test.
 struct Stage {
+    name: String,
     disturbance: Disturbance,
-    activity: Activity,
+    /// `None` for an operation before the start or after the end: it has no observed intervals.
+    activity: Option<Activity>,
     draw_seed: u64,
     counters: Counters,
     first_touch: Option<SimTime>,
@@ -73,6 +79,10 @@ impl Stage {
     fn touch(&mut self, now: SimTime) {
         self.first_touch.get_or_insert(now);
         self.last_touch = Some(now);
+    }
+
+    fn is_active(&self) -> bool {
+        self.activity.as_ref().is_some_and(Activity::is_active)
     }
 
     fn holds_order(&self) -> bool {
@@ -87,6 +97,7 @@ impl<'a> Relay<'a> {
         wires: &'a WireTable,
         test: &Test,
         metrics: Metrics<'a>,
+        hooks: &[OperationEntry],
     ) -> Result<Self, ChoiceError> {
         let mut order: Vec<usize> = (0..test.operations.len()).collect();
         order.sort_by_key(|&at| {
@@ -97,8 +108,10 @@ impl<'a> Relay<'a> {
         for choice in &test.operations {
             let operation = plan.operation(choice.operation);
             operations.push(Stage {
-                disturbance: Disturbance::new(operation, choice)?,
-                activity: Activity::new(choice.activation, operation.within),
+                name: operation.name.clone(),
+                disturbance: Disturbance::new(operation, choice, hooks)?,
+                activity: (!operation.kind.is_offline())
+                    .then(|| Activity::new(choice.activation, operation.within)),
                 draw_seed: choice.draw_seed,
                 counters: Counters::default(),
                 first_touch: None,
@@ -111,12 +124,13 @@ impl<'a> Relay<'a> {
             let topic = wires.topic(wire);
             let member = members[topic.index()];
             members[topic.index()] += 1;
-            let touched = order.iter().filter(|&&at| plan.operation(test.operations[at].operation).topic == topic);
+            let touched = order.iter().filter(|&&at| plan.operation(test.operations[at].operation).topic == Some(topic));
             pipelines[wire.index()].extend(touched.map(|&at| (at, member)));
         }
         Ok(Relay {
             wires,
             operations,
+            order,
             pipelines,
             published: vec![0; wires.len()],
             queue: ReleaseQueue::new(test.operations.len(), wires.len()),
@@ -146,13 +160,20 @@ impl<'a> Relay<'a> {
             .operations
             .iter()
             .map(|stage| OperationEffect {
-                intervals: stage.activity.intervals(end),
+                intervals: stage.activity.as_ref().map_or_else(Vec::new, |activity| activity.intervals(end)),
                 counters: stage.counters,
                 first_touch: stage.first_touch.map(SimTime::seconds),
                 last_touch: stage.last_touch.map(SimTime::seconds),
             })
             .collect();
         let (metrics, mut warnings) = self.metrics.finish(&operations);
+        for stage in &self.operations {
+            if let Disturbance::Custom(custom) = &stage.disturbance
+                && let Some(mismatch) = &custom.mismatch
+            {
+                warnings.push(format!("operation `{}`: {mismatch}", stage.name));
+            }
+        }
         if self.overflowed {
             warnings
                 .push(format!("more than {HELD_LIMIT} messages were held back at once; the oldest were let go early"));
@@ -165,7 +186,7 @@ impl<'a> Relay<'a> {
     fn follow_time(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
         loop {
             let release = self.queue.next_release().filter(|&time| time <= now);
-            let edge = self.operations.iter().filter_map(|stage| stage.activity.next_edge()).min();
+            let edge = self.operations.iter().filter_map(|stage| stage.activity.as_ref()?.next_edge()).min();
             match (edge.filter(|&time| time <= now), release) {
                 (Some(edge), release) if release.is_none_or(|release| edge <= release) => {
                     self.follow_activities(edge, deliveries);
@@ -184,7 +205,7 @@ impl<'a> Relay<'a> {
     fn follow_activities(&mut self, edge: SimTime, deliveries: &mut Vec<Delivery>) {
         for at in 0..self.operations.len() {
             let stage = &mut self.operations[at];
-            if stage.activity.follow(edge) != Edge::Ended {
+            if stage.activity.as_mut().is_none_or(|activity| activity.follow(edge) != Edge::Ended) {
                 continue;
             }
             let Disturbance::Latency(latency) = &stage.disturbance else { continue };
@@ -210,9 +231,12 @@ impl<'a> Relay<'a> {
             message.next_stage += 1;
             let stage = &mut self.operations[at];
             let queued_until = if stage.holds_order() { self.queue.last_release(at, message.wire) } else { None };
-            let active = stage.activity.is_active();
+            let active = stage.is_active();
             if active {
                 stage.counters.seen += 1;
+            }
+            if active && matches!(stage.disturbance, Disturbance::Custom(_)) {
+                return self.pass_custom(now, at, member, message, deliveries);
             }
             let fate = if active {
                 stage.disturbance.apply(Draws::new(stage.draw_seed, member, message.index), &mut message.value)
@@ -250,6 +274,60 @@ impl<'a> Relay<'a> {
             self.metrics.delivered(now, message.wire, &message.value);
         }
         deliveries.push(Delivery { wire: message.wire, value: message.value });
+    }
+}
+
+/// What the user's code does.
+impl Relay<'_> {
+    /// Calls the custom operations of the test before the start, or those after the end, in priority, then declaration
+    /// order. The error says which could not do what.
+    pub fn beside_run(&mut self, moment: Moment, files: &mut ChangedFiles) -> Result<(), String> {
+        for at in self.order.clone() {
+            let stage = &mut self.operations[at];
+            let Disturbance::Custom(custom) = &mut stage.disturbance else { continue };
+            if custom.moment != moment {
+                continue;
+            }
+            let mut ctx = RunContext::new(files, Draws::new(stage.draw_seed, 0, 0));
+            custom.hook.beside_run(&mut ctx);
+            stage.counters.side_effects += ctx.side_effects;
+            if let Some(failure) = ctx.failure {
+                return Err(format!("operation `{}`: {failure}", stage.name));
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes a message through a custom operation and on, then what the operation made up.
+    fn pass_custom(
+        &mut self,
+        now: SimTime,
+        at: usize,
+        member: u64,
+        mut message: Held,
+        deliveries: &mut Vec<Delivery>,
+    ) {
+        let stage = &mut self.operations[at];
+        let Disturbance::Custom(custom) = &mut stage.disturbance else {
+            unreachable!("only custom operations come here")
+        };
+        let draws = Draws::new(stage.draw_seed, member, message.index);
+        let call = custom.on_message(now, self.wires.path(message.wire), draws, &mut message.value);
+        stage.counters.injected += call.injected.len() as u64;
+        stage.counters.changed += u64::from(call.changed && !call.dropped);
+        stage.counters.dropped += u64::from(call.dropped);
+        if call.changed || call.dropped || !call.injected.is_empty() {
+            stage.touch(now);
+        }
+        let (wire, index, next_stage) = (message.wire, message.index, message.next_stage);
+        if !call.dropped {
+            self.pass(now, message, deliveries);
+        }
+        for (number, value) in (0u64..).zip(call.injected) {
+            // An index of its own, so that later operations draw for it apart from the message it came with.
+            let index = derive_seed(index, "injected", &[at as u64, number]);
+            self.pass(now, Held { wire, index, value, next_stage }, deliveries);
+        }
     }
 }
 

@@ -38,7 +38,7 @@ pub enum Activation {
 }
 
 /// What a test chose for one parameter, in the parameter's unit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Choice {
     /// One value ([`crate::Shape::Value`]).
@@ -52,6 +52,16 @@ pub enum Choice {
         low: f64,
         /// Upper end.
         high: f64,
+    },
+    /// A point ([`crate::Domain::Point`]).
+    Point {
+        /// Its x, y and z.
+        point: [f64; 3],
+    },
+    /// One of the texts, or the path of one of the files ([`crate::Domain::Texts`], [`crate::Domain::Files`]).
+    Text {
+        /// The text or path.
+        text: String,
     },
 }
 

@@ -247,13 +247,16 @@ impl Repository {
 
     fn operations(&self, only: Option<u32>) -> Result<BTreeMap<i64, Vec<TestOperation>>, RecordError> {
         let choices = self.read(
-            "SELECT test, operation, value, low, high FROM choices WHERE ?1 IS NULL OR test = ?1 \
+            "SELECT test, operation, value, low, high, x, y, z, text FROM choices WHERE ?1 IS NULL OR test = ?1 \
              ORDER BY test, operation, position",
             params![only],
             |row| {
-                let choice = match (row.get(2)?, row.get(3)?, row.get(4)?) {
-                    (Some(value), None, None) => Some(Choice::Value { value }),
-                    (None, Some(low), Some(high)) => Some(Choice::Range { low, high }),
+                let point: [Option<f64>; 3] = [row.get(5)?, row.get(6)?, row.get(7)?];
+                let choice = match (row.get(2)?, row.get(3)?, row.get(4)?, point, row.get(8)?) {
+                    (Some(value), None, None, [None, None, None], None) => Some(Choice::Value { value }),
+                    (None, Some(low), Some(high), [None, None, None], None) => Some(Choice::Range { low, high }),
+                    (None, None, None, [Some(x), Some(y), Some(z)], None) => Some(Choice::Point { point: [x, y, z] }),
+                    (None, None, None, [None, None, None], Some(text)) => Some(Choice::Text { text }),
                     _ => None,
                 };
                 Ok(((row.get(0)?, row.get(1)?), choice))
@@ -262,7 +265,7 @@ impl Repository {
         let mut parameters: BTreeMap<At, Vec<Choice>> = BTreeMap::new();
         for (at, choice) in choices {
             let choice = choice.ok_or_else(|| {
-                RecordError::damaged(&self.path, format!("T{} has a choice that is neither value nor range", at.0))
+                RecordError::damaged(&self.path, format!("T{} has a choice that is neither value, range, point nor text", at.0))
             })?;
             parameters.entry(at).or_default().push(choice);
         }

@@ -92,6 +92,10 @@ CREATE TABLE choices (
     value           REAL,
     low             REAL,
     high            REAL,
+    x               REAL,           -- a point has x, y and z
+    y               REAL,
+    z               REAL,
+    text            TEXT,           -- a text, or the path of a file
     PRIMARY KEY (test, operation, position)
 ) STRICT, WITHOUT ROWID;
 

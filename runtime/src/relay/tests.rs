@@ -33,7 +33,7 @@ fn relayed(
     let plan = plan(operations);
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-    let mut relay = Relay::new(&plan, &wires, &test_of(test.to_vec()), metrics.start()).unwrap();
+    let mut relay = Relay::new(&plan, &wires, &test_of(test.to_vec()), metrics.start(), &[]).unwrap();
     let mut delivered = Vec::new();
     let mut messages = messages.iter().peekable();
     for tick in 0..=100 {
@@ -215,7 +215,7 @@ fn choices_outside_what_is_permitted_are_refused() {
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     let test: Test = test_of(vec![use_of(0, 0.0, 1.0, one(1.5), 1)]);
-    let refused = Relay::new(&plan, &wires, &test, metrics.start()).err().map(|error| error.to_string());
+    let refused = Relay::new(&plan, &wires, &test, metrics.start(), &[]).err().map(|error| error.to_string());
     assert_eq!(refused.as_deref(), Some("operation `packet_loss` `loss` permits [0, 1], not [1.5, 1.5]"));
 }
 
@@ -277,7 +277,7 @@ fn an_outbound_metric_hears_what_operations_made_of_a_message_and_an_inbound_one
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     // From 1 s to 2 s all is lost; what is sent from 3 s on is delayed by 5 s, and the run ends at 8 s.
     let test = test_of(vec![use_of(0, 1.0, 2.0, vec![], 1), use_of(1, 3.0, 10.0, one(5.0), 1)]);
-    let mut relay = Relay::new(&plan, &wires, &test, metrics.start()).unwrap();
+    let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).unwrap();
     let command = wires.find(COMMAND).unwrap();
     for tenth in 0..80 {
         relay.message(SimTime::from_nanos(tenth * 100_000_000), command, Value::Real(0.0), &mut Vec::new());

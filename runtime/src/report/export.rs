@@ -6,7 +6,7 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use sesame_plan::{Activation, CampaignPlan, Choice, MetricId, OperationKind};
+use sesame_plan::{Activation, CampaignPlan, Choice, MetricId, Moment, OperationKind};
 
 use crate::observation::Outcome;
 use crate::record::{RecordError, Repository, TestRecord};
@@ -60,16 +60,30 @@ fn block(plan: &CampaignPlan, seed: u64, record: &TestRecord, name: &str) -> Str
                 (OperationKind::PacketLoss, _) => format!("{}%", decimal(x, 2)),
                 (_, unit) => quantity(x, unit.as_deref()),
             };
-            let _ = match *choice {
-                Choice::Value { value } => write!(text, " {} {}", parameter.name, written(value)),
+            let _ = match choice {
+                Choice::Value { value } => write!(text, " {} {}", parameter.name, written(*value)),
                 Choice::Range { low, high } => {
-                    write!(text, " {} [{}, {}]", parameter.name, written(low), written(high))
+                    write!(text, " {} [{}, {}]", parameter.name, written(*low), written(*high))
+                }
+                Choice::Point { point } => {
+                    let [x, y, z] = point.map(|coordinate| decimal(coordinate, 0));
+                    let unit = parameter.unit.as_deref().unwrap_or_default();
+                    write!(text, " {} ({x}, {y}, {z}){unit}", parameter.name)
+                }
+                Choice::Text { text: chosen } => {
+                    let escaped = chosen.replace('\\', "\\\\").replace('"', "\\\"");
+                    write!(text, " {} \"{escaped}\"", parameter.name)
                 }
             };
         }
         let Activation::Time { start, end } = used.activation;
         let seconds = |time| quantity(time, Some("s"));
-        let _ = writeln!(text, " from {} to {} seed {}", seconds(start), seconds(end), used.draw_seed);
+        let _ = match operation.kind {
+            OperationKind::Custom { moment: Moment::BeforeStart } => write!(text, " before start"),
+            OperationKind::Custom { moment: Moment::AfterEnd } => write!(text, " after end"),
+            _ => write!(text, " from {} to {}", seconds(start), seconds(end)),
+        };
+        let _ = writeln!(text, " seed {}", used.draw_seed);
     }
     expectations(&mut text, plan, record);
     text.push_str("}\n");

@@ -15,7 +15,7 @@ use crate::report::show::{TestReport, report_on};
 use crate::report::summary::{Objective, RequirementSummary, Summary, summarise, value_text};
 use crate::report::text::{
     came_out, choices_text, counts_sentence, effect_text, expectation_value, headline, objective_columns,
-    outcome_sentence, rate_text, spans_text,
+    outcome_sentence, planned_text, rate_text, spans_text,
 };
 use crate::report::timeline::timeline;
 
@@ -507,9 +507,9 @@ fn figures(body: &mut Markup, report: &TestReport) {
                 let observed = operation.observed.as_deref().map_or("unknown".to_owned(), spans_text);
                 let cells = [
                     operation.kind.clone(),
-                    operation.topic.clone(),
+                    operation.topic.clone().unwrap_or_default(),
                     choices_text(operation),
-                    spans_text(&[operation.planned]),
+                    planned_text(operation),
                     observed,
                     effect_text(operation),
                 ];

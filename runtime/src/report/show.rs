@@ -89,10 +89,10 @@ pub struct OperationReport {
     pub operation: String,
     /// Its kind in words.
     pub kind: String,
-    /// The topic it disturbs.
-    pub topic: String,
-    /// When it was to be active, in seconds.
-    pub planned: Span,
+    /// The topic it disturbs; `None` for one that acts before the start or after the end.
+    pub topic: Option<String>,
+    /// When it was to be active, in seconds; `None` for one that acts before the start or after the end.
+    pub planned: Option<Span>,
     /// When it was seen to be active, in seconds; `None` where the run could not report it.
     pub observed: Option<Vec<Span>>,
     /// What the test chose.
@@ -114,7 +114,7 @@ pub struct ChoiceReport {
     pub parameter: String,
     /// Its unit; `None` for probabilities and plain numbers.
     pub unit: Option<String>,
-    /// The value or sub-range.
+    /// The value, sub-range, point or text.
     pub choice: Choice,
     /// Both in words, as in `offset 0.27…0.29 rad`.
     pub text: String,
@@ -244,17 +244,17 @@ fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> 
         OperationReport {
             operation: operation.name.clone(),
             kind: operation.kind.words().to_owned(),
-            topic: plan.topic(operation.topic).name.clone(),
-            planned: Span { start, end },
+            topic: operation.topic.map(|topic| plan.topic(topic).name.clone()),
+            planned: (!operation.kind.is_offline()).then_some(Span { start, end }),
             observed: effect.map(|effect| effect.intervals.clone()),
             choices: operation
                 .parameters
                 .iter()
                 .zip(&used.parameters)
-                .map(|(parameter, &choice)| ChoiceReport {
+                .map(|(parameter, choice)| ChoiceReport {
                     parameter: parameter.name.clone(),
                     unit: parameter.unit.clone(),
-                    choice,
+                    choice: choice.clone(),
                     text: number::choice(&operation.kind, parameter, choice),
                 })
                 .collect(),

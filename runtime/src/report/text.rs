@@ -295,8 +295,8 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
             table.row([
                 operation.operation.clone(),
                 operation.kind.clone(),
-                operation.topic.clone(),
-                spans_text(&[operation.planned]),
+                operation.topic.clone().unwrap_or_default(),
+                planned_text(operation),
                 operation.observed.as_deref().map_or("unknown".to_owned(), spans_text),
                 choices_text(operation),
                 effect_text(operation),
@@ -371,6 +371,11 @@ pub(crate) fn spans_text(spans: &[Span]) -> String {
     let words: Vec<String> = spans.iter().take(4).map(|span| format!("{:.2}–{:.2}", span.start, span.end)).collect();
     let more = if spans.len() > 4 { format!(" and {} more", spans.len() - 4) } else { String::new() };
     format!("{} s{more}", words.join(", "))
+}
+
+/// When an operation was to be active; a dash for one that has no window.
+pub(crate) fn planned_text(operation: &OperationReport) -> String {
+    spans_text(operation.planned.as_slice())
 }
 
 /// What an operation's parameters are, in words.

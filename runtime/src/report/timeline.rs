@@ -12,7 +12,7 @@ use crate::report::axis::Axis;
 use crate::report::markup::{Markup, coordinate, percent};
 use crate::report::number;
 use crate::report::show::{OperationReport, TestReport};
-use crate::report::text::{choices_text, effect_text, spans_text};
+use crate::report::text::{choices_text, effect_text, planned_text, spans_text};
 
 /// Height of a lane of an operation, in pixels.
 const LANE: f64 = 30.0;
@@ -84,7 +84,7 @@ fn lane(markup: &mut Markup, time: &Axis, operation: &OperationReport, broke_off
     let title = format!(
         "{}: planned {}, {said}; {}",
         operation.operation,
-        spans_text(&[operation.planned]),
+        planned_text(operation),
         effect_text(operation)
     );
     let height = coordinate(LANE);
@@ -99,7 +99,9 @@ fn lane(markup: &mut Markup, time: &Axis, operation: &OperationReport, broke_off
         markup.element("title", &[], &title);
         markup.close();
     };
-    window(operation.planned, "planned", 5.0);
+    if let Some(planned) = operation.planned {
+        window(planned, "planned", 5.0);
+    }
     for &span in observed {
         window(span, if effect == Some(false) { "seen idle" } else { "seen" }, 9.0);
     }

@@ -11,7 +11,6 @@ use sesame_plan::{Activation, Test, TestOperation};
 
 use crate::rng::Stream;
 use crate::search::permitted::{Permitted, PermittedOperation};
-use crate::search::range::fresh_choice;
 
 /// A fresh test; one that the campaign permits.
 pub fn fresh_test(permitted: &Permitted, stream: &mut Stream) -> Test {
@@ -35,7 +34,7 @@ pub fn fresh_test(permitted: &Permitted, stream: &mut Stream) -> Test {
 /// A fresh instance of an operation, with a draw seed of its own.
 pub fn fresh_operation(kind: &PermittedOperation, stream: &mut Stream) -> TestOperation {
     let (start, end) = kind.window.interval(stream);
-    let parameters = kind.parameters.iter().map(|&(range, shape)| fresh_choice(range, shape, stream)).collect();
+    let parameters = kind.parameters.iter().map(|permitted| permitted.fresh(stream)).collect();
     TestOperation {
         operation: kind.operation,
         activation: Activation::Time { start, end },

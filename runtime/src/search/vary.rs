@@ -28,13 +28,13 @@
 
 use std::collections::BTreeSet;
 
-use sesame_plan::{Activation, Choice, Shape, Test, TestOperation};
+use sesame_plan::{Activation, Choice, Test, TestOperation};
 
 use crate::rng::Stream;
 use crate::search::initial::{fresh_operation, fresh_test};
 use crate::search::nsga2::{Child, Heritage, Variation};
 use crate::search::permitted::{Permitted, PermittedOperation};
-use crate::search::range::{Range, StepSizes, fresh_choice};
+use crate::search::range::StepSizes;
 
 /// How often what is varied. All are probabilities except `steps` and `tries`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -123,7 +123,7 @@ impl Variation for TestVariation {
                     break;
                 }
                 let k = stream.below(genome.operations.len());
-                change_window(&mut genome.operations[k], &self.permitted, &self.rates, &mut stream);
+                change_somehow(&mut genome.operations[k], &self.permitted, &self.rates, &mut stream);
             }
             self.made.insert(identity(&genome));
             Child { genome, heritage }
@@ -140,9 +140,14 @@ fn identity(test: &Test) -> Vec<Vec<u64>> {
             let Activation::Time { start, end } = operation.activation;
             let mut numbers = vec![u64::from(operation.operation.0), start.to_bits(), end.to_bits()];
             for choice in &operation.parameters {
-                match *choice {
+                match choice {
                     Choice::Value { value } => numbers.push(value.to_bits()),
                     Choice::Range { low, high } => numbers.extend([low.to_bits(), high.to_bits()]),
+                    Choice::Point { point } => numbers.extend(point.map(f64::to_bits)),
+                    Choice::Text { text } => {
+                        numbers.push(text.len() as u64);
+                        numbers.extend(text.bytes().map(u64::from));
+                    }
                 }
             }
             numbers
@@ -188,7 +193,7 @@ pub fn mutate(test: &mut Test, permitted: &Permitted, rates: &Rates, stream: &mu
     }
     if duplicate && operations.len() < permitted.most() {
         let mut copy = operations[stream.below(operations.len())].clone();
-        change_window(&mut copy, permitted, rates, stream);
+        change_somehow(&mut copy, permitted, rates, stream);
         operations.insert(stream.below(operations.len() + 1), copy);
     }
     if add && operations.len() < permitted.most() {
@@ -206,9 +211,13 @@ fn mutate_operation(operation: &mut TestOperation, permitted: &Permitted, rates:
         change_window(operation, permitted, rates, stream);
     }
     let kind = kind_of(operation, permitted);
-    for (choice, &(range, shape)) in operation.parameters.iter_mut().zip(&kind.parameters) {
-        if !range.is_fixed() && stream.chance(rates.parameter) {
-            *choice = changed_choice(*choice, range, shape, rates, stream);
+    for (choice, permitted) in operation.parameters.iter_mut().zip(&kind.parameters) {
+        if !permitted.is_fixed() && stream.chance(rates.parameter) {
+            *choice = if stream.chance(rates.fresh) {
+                permitted.fresh(stream)
+            } else {
+                permitted.near(choice, rates.steps, stream)
+            };
             operation.draw_seed = stream.bits();
         }
     }
@@ -221,14 +230,34 @@ fn retarget(operation: &mut TestOperation, permitted: &Permitted, stream: &mut S
     let Activation::Time { start, end } = operation.activation;
     let mut fresh = fresh_operation(kind, stream);
     let (start, end) = (start.max(kind.window.low), end.min(kind.window.high));
-    if end - start >= kind.window.shortest {
+    // The window of an operation beside the run is no choice that could be kept.
+    let chosen = permitted.find(operation.operation).is_some_and(|old| !old.window.is_one_interval());
+    if chosen && !kind.window.is_one_interval() && end - start >= kind.window.shortest {
         fresh.activation = Activation::Time { start, end };
     }
     *operation = fresh;
 }
 
+/// Changes the window, or, of an operation that has none to choose, each parameter.
+fn change_somehow(operation: &mut TestOperation, permitted: &Permitted, rates: &Rates, stream: &mut Stream) {
+    let kind = kind_of(operation, permitted);
+    if !kind.window.is_one_interval() {
+        return change_window(operation, permitted, rates, stream);
+    }
+    for (choice, permitted) in operation.parameters.iter_mut().zip(&kind.parameters) {
+        if !permitted.is_fixed() {
+            *choice = permitted.near(choice, rates.steps, stream);
+            operation.draw_seed = stream.bits();
+        }
+    }
+}
+
+/// Changes the window, if there is one to choose.
 fn change_window(operation: &mut TestOperation, permitted: &Permitted, rates: &Rates, stream: &mut Stream) {
     let window = kind_of(operation, permitted).window;
+    if window.is_one_interval() {
+        return;
+    }
     let Activation::Time { start, end } = operation.activation;
     let (start, end) = if stream.chance(rates.fresh) {
         window.interval(stream)
@@ -237,19 +266,6 @@ fn change_window(operation: &mut TestOperation, permitted: &Permitted, rates: &R
     };
     operation.activation = Activation::Time { start, end };
     operation.draw_seed = stream.bits();
-}
-
-fn changed_choice(choice: Choice, range: Range, shape: Shape, rates: &Rates, stream: &mut Stream) -> Choice {
-    if stream.chance(rates.fresh) {
-        return fresh_choice(range, shape, stream);
-    }
-    match choice {
-        Choice::Value { value } => Choice::Value { value: range.number_near(value, rates.steps, stream) },
-        Choice::Range { low, high } => {
-            let (low, high) = range.interval_near((low, high), rates.steps, stream);
-            Choice::Range { low, high }
-        }
-    }
 }
 
 fn kind_of<'a>(operation: &TestOperation, permitted: &'a Permitted) -> &'a PermittedOperation {
