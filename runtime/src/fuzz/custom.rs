@@ -17,9 +17,13 @@ use crate::value::{Text, Value};
 /// A user's operation hook as the runtime calls it. Generated code implements it around the typed hook trait.
 pub trait OperationHook {
     /// A message on the operation's topic, which may be changed in place.
-    fn on_message(&mut self, message: &mut Value, call: &mut MessageCall<'_>);
+    fn on_message(&mut self, message: &mut Value, call: &mut MessageCall<'_>) {
+        let _ = (message, call);
+    }
     /// Before the start or after the end of a run, as the operation's declaration says.
-    fn beside_run(&mut self, ctx: &mut RunContext<'_>);
+    fn beside_run(&mut self, ctx: &mut RunContext<'_>) {
+        let _ = ctx;
+    }
 }
 
 /// An operation hook that generated code registers.

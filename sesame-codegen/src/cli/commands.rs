@@ -207,8 +207,8 @@ fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode) {
     }
     for hook in &report.changed_hooks {
         let mut lines = format!(
-            "metric `{}` is given something else now; look into {}:",
-            hook.metric,
+            "{} is given something else now; look into {}:",
+            hook.of,
             out.join(&hook.path).display()
         );
         let changes = hook.gone.iter().map(|line| ('-', line)).chain(hook.new.iter().map(|line| ('+', line)));
@@ -219,8 +219,8 @@ fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode) {
     }
     for orphan in &report.orphans {
         shell.warning(match orphan {
-            Orphan::Hook { path, metric } => format!(
-                "there is no metric `{metric}` any more; its hook {} is kept but not compiled",
+            Orphan::Hook { path, of } => format!(
+                "there is no {of} any more; its hook {} is kept but not compiled",
                 out.join(path).display()
             ),
             Orphan::Edited { path } => {

@@ -232,13 +232,13 @@ impl<'a> Resolver<'a> {
         let Some(test) = self.tests[index].clone() else { return };
         let written = &self.file.tests[index].operations;
         for (operation, written) in test.operations.iter().zip(written) {
-            let Some(window) = &written.window else { continue };
+            let (Some(window), Some(active)) = (&written.window, operation.window) else { continue };
             let name = &written.operation.text;
-            let diagnostic = if operation.window.low >= end {
+            let diagnostic = if active.low >= end {
                 let title = format!("`{name}` is never active: the tests of the campaign are over by then");
                 Diagnostic::new(Code::AFTER_THE_END, window.span, title)
                     .label(format!("begins after the end at {end}s"))
-            } else if operation.window.high > end {
+            } else if active.high > end {
                 let title = format!("`{name}` goes on after the end of the campaign that repeats this test");
                 Diagnostic::new(Code::OUTLASTS_THE_END, window.span, title)
                     .label(format!("tests end at {end}s; what is later never happens"))

@@ -11,6 +11,7 @@
 
 mod campaign;
 mod collect;
+mod custom;
 mod formula;
 mod fuzz;
 mod measure;

@@ -272,7 +272,8 @@ pub(crate) struct Operation {
 
 #[derive(Debug)]
 pub(crate) struct OperationBody {
-    pub(crate) target: Path,
+    /// `None` for an operation on no topic.
+    pub(crate) target: Option<Path>,
     pub(crate) kind: OperationKind,
     pub(crate) within: Vec<(Span, Range)>,
     pub(crate) priority: Vec<(Span, Quantity)>,
@@ -285,6 +286,48 @@ pub(crate) enum OperationKind {
     PacketLoss(Range),
     Latency { range: Range, uniform: Vec<Span>, drain: Vec<(Span, Drain)> },
     Blackhole,
+    Custom(Custom),
+}
+
+/// The user's code.
+#[derive(Debug)]
+pub(crate) struct Custom {
+    /// The word `custom`.
+    pub(crate) span: Span,
+    pub(crate) moment: Option<(Span, Moment)>,
+    pub(crate) parameters: Vec<CustomParameter>,
+    pub(crate) damaged: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Moment {
+    BeforeStart,
+    AfterEnd,
+}
+
+#[derive(Debug)]
+pub(crate) struct CustomParameter {
+    pub(crate) name: Name,
+    pub(crate) doc: String,
+    pub(crate) domain: Domain,
+    /// The domain as written.
+    pub(crate) span: Span,
+}
+
+#[derive(Debug)]
+pub(crate) enum Domain {
+    Number { integer: bool, unit: Option<UnitName>, range: Range },
+    Point { unit: Option<UnitName>, low: Point, high: Point },
+    Texts(Vec<Text>),
+    Files(Vec<Text>),
+}
+
+/// Three numbers of one unit.
+#[derive(Debug)]
+pub(crate) struct Point {
+    /// Each with the point's unit.
+    pub(crate) coordinates: [Quantity; 3],
+    pub(crate) span: Span,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -306,8 +349,10 @@ pub(crate) struct Test {
 pub(crate) struct TestOperation {
     pub(crate) operation: Name,
     pub(crate) choices: Vec<(Name, Choice)>,
-    /// `None` for a window that is not supported yet.
+    /// `None` for a window that is not supported yet, and for a moment.
     pub(crate) window: Option<Range>,
+    /// In the place of a window.
+    pub(crate) moment: Option<(Span, Moment)>,
     pub(crate) seed: Option<Count>,
 }
 
@@ -315,6 +360,8 @@ pub(crate) struct TestOperation {
 pub(crate) enum Choice {
     Value(Quantity),
     Range(Range),
+    Point(Point),
+    Text(Text),
 }
 
 impl Choice {
@@ -322,6 +369,8 @@ impl Choice {
         match self {
             Choice::Value(quantity) => quantity.span,
             Choice::Range(range) => range.span,
+            Choice::Point(point) => point.span,
+            Choice::Text(text) => text.span,
         }
     }
 }

@@ -5,8 +5,8 @@ use pest::iterators::Pair as PestPair;
 use sesame_grammar::{Rule, SesameParser};
 
 use super::ast::{
-    Bound, Campaign, Choice, Comparison, Count, Direction, Drain, Expectation, Field, File, Head, InProcess, Message,
-    Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Process, Range, Repeat,
+    Bound, Campaign, Choice, Comparison, Count, Custom, CustomParameter, Direction, Domain, Drain, Expectation, Field, File, Head, InProcess, Message,
+    Metric, MetricSource, Moment, Name, Node, Operation, OperationBody, OperationKind, Operations, Process, Range, Repeat,
     Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Topic, Transport, Type, TypeKind,
 };
 use super::explain::{Place, explain};
@@ -159,6 +159,7 @@ impl Reader<'_> {
         let span = self.span_of(at.lo, at.hi());
         let what = match block.as_rule() {
             Rule::hook_block => "metric".to_owned(),
+            Rule::custom_parameters => "operation".to_owned(),
             rule => format!("{rule:?}").replace("_settings", ""),
         };
         let label = if at.text.is_empty() {
@@ -215,14 +216,14 @@ impl Reader<'_> {
 
     /// Says that a construct belongs to a later version. Its first word decides where; its rule decides what it is called.
     fn unsupported(&mut self, pair: &Pair<'_>) {
-        let words = [Rule::k_node, Rule::k_parameter, Rule::k_custom, Rule::kind_name];
+        let words = [Rule::k_node, Rule::k_parameter, Rule::kind_name];
         let span = first_of(pair, &words).map_or_else(|| self.keyword_span(pair), |word| self.span(&word));
         let word = &self.text[span.range()];
         let what = match pair.as_rule() {
             Rule::unsupported_transport => format!("simulator kind `{word}`"),
             Rule::unsupported_formula => format!("a metric by `{word}(…)`"),
-            Rule::unsupported_operation if word != "custom" => format!("an operation on a `{word}`"),
-            Rule::unsupported_operation | Rule::unsupported_kind => format!("operation kind `{word}`"),
+            Rule::unsupported_operation => format!("an operation on a `{word}`"),
+            Rule::unsupported_kind => format!("operation kind `{word}`"),
             Rule::unsupported_window => "activation by `when`".to_owned(),
             Rule::unsupported_from => "a campaign `from` another".to_owned(),
             Rule::unsupported_activation => "activation by `condition`".to_owned(),
@@ -454,7 +455,7 @@ impl Reader<'_> {
             self.unsupported(&unsupported);
             return Operation { head, body: None };
         }
-        let kinds = [Rule::random_value, Rule::packet_loss, Rule::latency, Rule::blackhole];
+        let kinds = [Rule::random_value, Rule::packet_loss, Rule::latency, Rule::blackhole, Rule::custom];
         let kind = first_of(pair, &kinds).expect("an operation has a kind");
         let kind = match kind.as_rule() {
             Rule::random_value => OperationKind::Random {
@@ -478,6 +479,7 @@ impl Reader<'_> {
                     })
                     .collect(),
             },
+            Rule::custom => OperationKind::Custom(self.custom(&kind)),
             _ => OperationKind::Blackhole,
         };
         let mut signed = |rule| {
@@ -489,8 +491,54 @@ impl Reader<'_> {
         let within = children(pair, Rule::within)
             .map(|within| (self.keyword_span(&within), self.range(&expect_child(&within, Rule::range))))
             .collect();
-        let target = self.path(&expect_child(pair, Rule::path));
+        let target = child(pair, Rule::path).map(|path| self.path(&path));
         Operation { head, body: Some(OperationBody { target, kind, within, priority, inclusion }) }
+    }
+
+    fn custom(&mut self, pair: &Pair<'_>) -> Custom {
+        let span = self.keyword_span(pair);
+        let moment = child(pair, Rule::moment).map(|moment| self.moment(&moment));
+        let mut custom = Custom { span, moment, parameters: vec![], damaged: false };
+        let block = expect_child(pair, Rule::custom_parameters);
+        custom.damaged = self.members(&block, Place::Custom, |reader, member| {
+            let word = expect_child(&member, Rule::parameter_name);
+            let domains = [Rule::number_domain, Rule::point_domain, Rule::text_domain, Rule::file_domain];
+            let domain = first_of(&member, &domains).expect("a parameter has a domain");
+            custom.parameters.push(CustomParameter {
+                name: reader.name(&word),
+                doc: Self::doc(&member),
+                span: reader.span(&domain),
+                domain: reader.domain(&domain),
+            });
+        });
+        custom
+    }
+
+    fn moment(&mut self, pair: &Pair<'_>) -> (Span, Moment) {
+        let moment = if child(pair, Rule::k_before).is_some() { Moment::BeforeStart } else { Moment::AfterEnd };
+        (self.span(pair), moment)
+    }
+
+    fn domain(&mut self, pair: &Pair<'_>) -> Domain {
+        let unit = child(pair, Rule::unit_in_brackets).map(|unit| self.unit(&expect_child(&unit, Rule::unit)));
+        match pair.as_rule() {
+            Rule::number_domain => Domain::Number {
+                integer: child(pair, Rule::k_int).is_some(),
+                unit,
+                range: self.range(&expect_child(pair, Rule::range)),
+            },
+            Rule::point_domain => {
+                let mut corners = children(pair, Rule::point).map(|point| self.point(&point)).collect::<Vec<_>>();
+                let high = corners.pop().expect("a box has two corners");
+                let low = corners.pop().expect("a box has two corners");
+                Domain::Point { unit, low, high }
+            }
+            rule => {
+                let texts = expect_child(pair, Rule::texts);
+                let texts = children(&texts, Rule::text).map(|text| self.text_of(&text)).collect();
+                if rule == Rule::file_domain { Domain::Files(texts) } else { Domain::Texts(texts) }
+            }
+        }
     }
 
     fn test(&mut self, pair: &Pair<'_>) -> Test {
@@ -511,9 +559,13 @@ impl Reader<'_> {
             .map(|choice| {
                 let word = expect_child(&choice, Rule::parameter_name);
                 let name = Name { text: word.as_str().to_owned(), span: self.span(&word) };
-                let value = match child(&choice, Rule::range) {
-                    Some(range) => Choice::Range(self.range(&range)),
-                    None => Choice::Value(self.signed(&expect_child(&choice, Rule::signed))),
+                let values = [Rule::range, Rule::signed, Rule::point, Rule::text];
+                let value = first_of(&choice, &values).expect("a choice has a value");
+                let value = match value.as_rule() {
+                    Rule::range => Choice::Range(self.range(&value)),
+                    Rule::signed => Choice::Value(self.signed(&value)),
+                    Rule::point => Choice::Point(self.point(&value)),
+                    _ => Choice::Text(self.text_of(&value)),
                 };
                 (name, value)
             })
@@ -528,7 +580,8 @@ impl Reader<'_> {
             self.unsupported(&unsupported);
         }
         let seed = child(pair, Rule::draw_seed).map(|seed| self.count(&expect_child(&seed, Rule::number)));
-        TestOperation { operation, choices, window, seed }
+        let moment = child(pair, Rule::moment).map(|moment| self.moment(&moment));
+        TestOperation { operation, choices, window, moment, seed }
     }
 
     // ----- campaigns
