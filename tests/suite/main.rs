@@ -2,6 +2,7 @@
 #![cfg(test)]
 
 mod commands;
+mod custom;
 mod declarative;
 mod exported;
 mod faults;
