@@ -1,9 +1,9 @@
 //! Small plans for the runtime's own tests.
 
 use sesame_plan::{
-    Activation, ActivationMode, Campaign, CampaignPlan, Choice, Count, Distribution, Domain, Drain, Field, FieldRef, MessageId,
-    MessageType, Metric, MetricSource, Operation, OperationId, OperationKind, Parameter, SCHEMA, Search, Shape,
-    Simulator, Span, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode,
+    Activation, ActivationMode, Campaign, CampaignPlan, Choice, Count, Distribution, Domain, Drain, Field, FieldRef,
+    MessageId, MessageType, Metric, MetricSource, Operation, OperationId, OperationKind, Parameter, SCHEMA, Search,
+    Shape, Simulator, Span, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode,
 };
 
 /// Topic `command` of reals, topic `zones` with two members of `Zone { level: real, count: int }`.

@@ -15,10 +15,10 @@ use crate::rng;
 use crate::time::SimTime;
 use crate::value::Value;
 
+pub(crate) use custom::custom_operations;
 pub use custom::{
     Custom, FromChoice, MessageCall, OperationContext, OperationEntry, OperationHook, RunContext, chosen,
 };
-pub(crate) use custom::custom_operations;
 pub use latency::Latency;
 pub use packet_loss::PacketLoss;
 pub use probe::unimplemented_operations;

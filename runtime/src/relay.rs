@@ -110,8 +110,7 @@ impl<'a> Relay<'a> {
             operations.push(Stage {
                 name: operation.name.clone(),
                 disturbance: Disturbance::new(operation, choice, hooks)?,
-                activity: (!operation.kind.is_offline())
-                    .then(|| Activity::new(choice.activation, operation.within)),
+                activity: (!operation.kind.is_offline()).then(|| Activity::new(choice.activation, operation.within)),
                 draw_seed: choice.draw_seed,
                 counters: Counters::default(),
                 first_touch: None,
@@ -124,7 +123,8 @@ impl<'a> Relay<'a> {
             let topic = wires.topic(wire);
             let member = members[topic.index()];
             members[topic.index()] += 1;
-            let touched = order.iter().filter(|&&at| plan.operation(test.operations[at].operation).topic == Some(topic));
+            let touched =
+                order.iter().filter(|&&at| plan.operation(test.operations[at].operation).topic == Some(topic));
             pipelines[wire.index()].extend(touched.map(|&at| (at, member)));
         }
         Ok(Relay {
@@ -299,14 +299,7 @@ impl Relay<'_> {
     }
 
     /// Takes a message through a custom operation and on, then what the operation made up.
-    fn pass_custom(
-        &mut self,
-        now: SimTime,
-        at: usize,
-        member: u64,
-        mut message: Held,
-        deliveries: &mut Vec<Delivery>,
-    ) {
+    fn pass_custom(&mut self, now: SimTime, at: usize, member: u64, mut message: Held, deliveries: &mut Vec<Delivery>) {
         let stage = &mut self.operations[at];
         let Disturbance::Custom(custom) = &mut stage.disturbance else {
             unreachable!("only custom operations come here")

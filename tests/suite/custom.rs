@@ -132,7 +132,8 @@ fn hooks_change_drop_and_inject_and_files_are_put_back() {
         record(&records, &repository, test).observation.metrics[at].value.unwrap()
     };
     let counters = |test: &str| record(&records, &repository, test).observation.operations[0].counters;
-    let counted = |seen, changed, dropped, injected| Counters { seen, changed, dropped, injected, ..Counters::default() };
+    let counted =
+        |seen, changed, dropped, injected| Counters { seen, changed, dropped, injected, ..Counters::default() };
 
     let undisturbed = metric("reference", "arrived");
     assert_eq!(counters("moved"), counted(3, 3, 0, 6), "active for three messages, two made up for each");
@@ -207,5 +208,9 @@ fn files_changed_when_all_was_killed_are_put_back_by_the_next_start() {
 
     fs::remove_file(project.folder.join("spare.txt")).unwrap();
     let missing = runner.run(&["known", "moved", "--results", "missing"]).expect(1);
-    assert!(missing.err.contains("operation `spoil` may choose the file `spare.txt`, which is not in"), "{}", missing.err);
+    assert!(
+        missing.err.contains("operation `spoil` may choose the file `spare.txt`, which is not in"),
+        "{}",
+        missing.err
+    );
 }

@@ -80,7 +80,10 @@ pub(super) fn refuse_unfilled(runner: &Runner, plan: &CampaignPlan, allowed: boo
         }
     }
     for id in unimplemented_operations(plan, runner.operations) {
-        eprintln!("warning: the hook of operation `{}` is not filled in yet: it disturbs nothing", plan.operation(id).name);
+        eprintln!(
+            "warning: the hook of operation `{}` is not filled in yet: it disturbs nothing",
+            plan.operation(id).name
+        );
     }
     if objectives.is_empty() {
         return Ok(());

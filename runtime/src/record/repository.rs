@@ -265,7 +265,10 @@ impl Repository {
         let mut parameters: BTreeMap<At, Vec<Choice>> = BTreeMap::new();
         for (at, choice) in choices {
             let choice = choice.ok_or_else(|| {
-                RecordError::damaged(&self.path, format!("T{} has a choice that is neither value, range, point nor text", at.0))
+                RecordError::damaged(
+                    &self.path,
+                    format!("T{} has a choice that is neither value, range, point nor text", at.0),
+                )
             })?;
             parameters.entry(at).or_default().push(choice);
         }

@@ -81,12 +81,8 @@ fn lane(markup: &mut Markup, time: &Axis, operation: &OperationReport, broke_off
         Some(spans) => format!("active {}", spans_text(spans)),
         None => "activity unknown".to_owned(),
     };
-    let title = format!(
-        "{}: planned {}, {said}; {}",
-        operation.operation,
-        planned_text(operation),
-        effect_text(operation)
-    );
+    let title =
+        format!("{}: planned {}, {said}; {}", operation.operation, planned_text(operation), effect_text(operation));
     let height = coordinate(LANE);
     markup.open("svg", &[("class", "plot"), ("height", &height), ("role", "img"), ("aria-label", &title)]);
     backdrop(markup, time, broke_off);

@@ -5,9 +5,9 @@
 //! sum over the active operations on it of the middle of their sub-range. Hits are maximised, active time minimised.
 
 use sesame_plan::{
-    Activation, ActivationMode, Campaign, CampaignPlan, Choice, Count, Direction, Domain, Metric, MetricId, MetricSource,
-    Operation, OperationId, OperationKind, Parameter, SCHEMA, Search, Shape, Simulator, Span, Test, TopicId, Transport,
-    ValueMode,
+    Activation, ActivationMode, Campaign, CampaignPlan, Choice, Count, Direction, Domain, Metric, MetricId,
+    MetricSource, Operation, OperationId, OperationKind, Parameter, SCHEMA, Search, Shape, Simulator, Span, Test,
+    TopicId, Transport, ValueMode,
 };
 
 use crate::search::hypervolume::hypervolume;

@@ -126,7 +126,9 @@ impl Permitted {
 #[cfg(test)]
 pub(crate) mod tests {
     use proptest::prelude::*;
-    use sesame_plan::{Activation, Choice, Domain, Drain, Operation, OperationKind, Parameter, Search, Shape, Span, Test};
+    use sesame_plan::{
+        Activation, Choice, Domain, Drain, Operation, OperationKind, Parameter, Search, Shape, Span, Test,
+    };
 
     use super::*;
     use crate::search::landscape::LANDSCAPES;

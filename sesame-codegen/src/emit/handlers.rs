@@ -42,7 +42,11 @@ fn parameter(plan: &CampaignPlan, topic: &Topic) -> String {
         _ => names::snake(&topic.name),
     };
     // Not the hook itself, nor its context, nor a word that would need escaping in every line the user writes.
-    if name == "ctx" || name == "parameters" || names::written(&name) != name || name.starts_with("self") { "message".to_owned() } else { name }
+    if name == "ctx" || name == "parameters" || names::written(&name) != name || name.starts_with("self") {
+        "message".to_owned()
+    } else {
+        name
+    }
 }
 
 /// What a hook is given, one line for each handler and for each field of a message it takes, messages inside messages

@@ -46,9 +46,10 @@ fn parameter_type(parameter: &Parameter, text: &str) -> String {
 /// Parameters with their names in Rust.
 fn fields(operation: &OperationPlan) -> Vec<(&Parameter, &str, String)> {
     let mut scope = Scope::default();
-    let named = operation.parameters.iter().map(|(parameter, doc)| {
-        (parameter, doc.as_str(), scope.take(names::snake(&parameter.name), "_"))
-    });
+    let named = operation
+        .parameters
+        .iter()
+        .map(|(parameter, doc)| (parameter, doc.as_str(), scope.take(names::snake(&parameter.name), "_")));
     named.collect()
 }
 
@@ -173,8 +174,7 @@ pub(super) fn registry(runner: &RunnerPlan, types: &Messages<'_>, header: &str, 
     });
     let here = |at: usize| quote::format_ident!("Hook{at}");
     let imports = used.iter().enumerate().map(|(at, operation)| {
-        let (module, user, here) =
-            (module(operation), names::ident(&names::hook_type(&operation.operation)), here(at));
+        let (module, user, here) = (module(operation), names::ident(&names::hook_type(&operation.operation)), here(at));
         quote! { use self::#module::#user as #here; }
     });
     let notes: Vec<(String, String)> = used
@@ -189,8 +189,7 @@ pub(super) fn registry(runner: &RunnerPlan, types: &Messages<'_>, header: &str, 
         quote! { ::sesame_runtime::fuzz::OperationEntry { operation: #name, build: #build::<#here> } }
     });
     let adapters = used.iter().map(|operation| adapter(runner, types, operation));
-    let docs =
-        rust::module_docs([format!("The operation hooks of `{}`, for the runtime.", runner.plan.campaign.name)]);
+    let docs = rust::module_docs([format!("The operation hooks of `{}`, for the runtime.", runner.plan.campaign.name)]);
     let source = rust::file(
         header,
         quote! {
@@ -295,8 +294,7 @@ struct StubMessage {
 
 /// The stub of a hook.
 pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPlan) -> String {
-    let (hook_type, hook_trait) =
-        (names::hook_type(&operation.operation), names::hook_trait(&operation.operation));
+    let (hook_type, hook_trait) = (names::hook_type(&operation.operation), names::hook_trait(&operation.operation));
     let parameters_type = names::parameters_type(&operation.operation);
     let Call { method, message } = call(runner, operation);
     let mut own = [names::written(&hook_trait), parameters_type.clone()];

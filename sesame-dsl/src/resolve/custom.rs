@@ -144,8 +144,9 @@ impl<'a> Resolver<'a> {
         for text in texts {
             if let Some(before) = first.insert(&text.text, text.span) {
                 let title = format!("`{}` stands twice in this list", self.text(text.span));
-                let diagnostic =
-                    Diagnostic::new(Code::LISTED_TWICE, text.span, title).label("again here").also(before, "first here");
+                let diagnostic = Diagnostic::new(Code::LISTED_TWICE, text.span, title)
+                    .label("again here")
+                    .also(before, "first here");
                 self.report(diagnostic);
                 complete = false;
             }

@@ -180,10 +180,7 @@ impl<'a> Resolver<'a> {
         complete.then(|| model::Test { declaration: self.declaration(&test.head), operations, expectations })
     }
 
-    fn test_operation(
-        &mut self,
-        test: &'a ast::TestOperation,
-    ) -> Option<(OperationId, Vec<Choice>, Option<Range>)> {
+    fn test_operation(&mut self, test: &'a ast::TestOperation) -> Option<(OperationId, Vec<Choice>, Option<Range>)> {
         let index = self.find(&test.operation, Kind::Operation);
         let window = test.window.as_ref().and_then(|window| self.test_window(window));
         let index = index?;
@@ -261,8 +258,8 @@ impl<'a> Resolver<'a> {
                     Some(word) => (word.span, format!("`{name}` has no parameter named `{}`", word.text)),
                     None => (test.operation.span, format!("no `{}` is chosen for `{name}`", parameter.name)),
                 };
-                let mut diagnostic = Diagnostic::new(Code::WRONG_CHOICE, span, title)
-                    .label(format!("expected for example `{example}`"));
+                let mut diagnostic =
+                    Diagnostic::new(Code::WRONG_CHOICE, span, title).label(format!("expected for example `{example}`"));
                 if meant.is_some() {
                     let what = if parameters.len() == 1 { "its parameter is" } else { "a parameter it has is" };
                     diagnostic = diagnostic.suggest(what, span, parameter.name.clone());

@@ -182,7 +182,8 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
         return Diagnostic::new(Code::NOT_CLOSED, span_of(first), title).label("no block is open here");
     }
 
-    let begins = place.starters().contains(&first.text) || matches!(place, Place::Message | Place::Custom | Place::Test);
+    let begins =
+        place.starters().contains(&first.text) || matches!(place, Place::Message | Place::Custom | Place::Test);
     let continued = previous
         .and_then(|previous| read(text, previous.lo as usize, hi, place.one_rule()))
         .filter(|failure| token_at(text, failure.at).lo >= first.lo);
@@ -313,9 +314,9 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::custom_parameters
         | Rule::open
         | Rule::hook_block
-        | Rule::simulator_settings | Rule::process_settings | Rule::search_settings => {
-            "`{`"
-        }
+        | Rule::simulator_settings
+        | Rule::process_settings
+        | Rule::search_settings => "`{`",
         Rule::close => "`}`",
         Rule::name | Rule::names | Rule::path | Rule::identifier => "a name",
         Rule::field_name | Rule::field => "a field such as `level: real[mm]`",

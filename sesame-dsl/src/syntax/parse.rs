@@ -5,9 +5,10 @@ use pest::iterators::Pair as PestPair;
 use sesame_grammar::{Rule, SesameParser};
 
 use super::ast::{
-    Bound, Campaign, Choice, Comparison, Count, Custom, CustomParameter, Direction, Domain, Drain, Expectation, Field, File, Head, InProcess, Message,
-    Metric, MetricSource, Moment, Name, Node, Operation, OperationBody, OperationKind, Operations, Process, Range, Repeat,
-    Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Topic, Transport, Type, TypeKind,
+    Bound, Campaign, Choice, Comparison, Count, Custom, CustomParameter, Direction, Domain, Drain, Expectation, Field,
+    File, Head, InProcess, Message, Metric, MetricSource, Moment, Name, Node, Operation, OperationBody, OperationKind,
+    Operations, Process, Range, Repeat, Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Topic,
+    Transport, Type, TypeKind,
 };
 use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, MAX_CALLS, too_deep};
