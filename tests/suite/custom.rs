@@ -11,7 +11,7 @@ use nix::unistd::Pid;
 use sesame_plan::Choice;
 use sesame_runtime::observation::Counters;
 use sesame_runtime::record::{Repository, TestRecord};
-use sesame_tests::{Project, Runner};
+use sesame_tests::{Project, Runner, workspace};
 
 const SPACE: &str = r#"
 space calibrated
@@ -36,7 +36,7 @@ operation bend on path = custom {
 operation spoil = custom before start {
   file: file one of "calibration.txt", "spare.txt"
   gain: real [1, 9]
-  then: one of "go on", "panic", "abort", "leave"
+  fate: one of "go on", "panic", "abort", "leave"
 }
 operation stick = custom before start { } inclusion 0%
 operation tidy  = custom after end { } priority -1
@@ -45,11 +45,11 @@ operation empty on gain = custom { } inclusion 0%
 test moved     { bend copies 2 shift (1.5, 0, 0)m way "move" from 0.2s to 0.5s }
 test dropped   { bend copies 0 shift (0, 0, 0)m way "drop" from 0.2s to 0.5s }
 test scattered { bend copies 1 shift (1.5, 0, 0)m way "scatter" from 0.2s to 0.5s }
-test spoilt    { spoil file "calibration.txt" gain 5 then "go on" before start }
-test panicking { spoil file "calibration.txt" gain 6 then "panic" before start }
-test aborting  { spoil file "calibration.txt" gain 7 then "abort" before start }
-test leaving   { spoil file "calibration.txt" gain 8 then "leave" before start }
-test undone    { tidy after end  spoil file "spare.txt" gain 2 then "go on" before start }
+test spoilt    { spoil file "calibration.txt" gain 5 fate "go on" before start }
+test panicking { spoil file "calibration.txt" gain 6 fate "panic" before start }
+test aborting  { spoil file "calibration.txt" gain 7 fate "abort" before start }
+test leaving   { spoil file "calibration.txt" gain 8 fate "leave" before start }
+test undone    { tidy after end  spoil file "spare.txt" gain 2 fate "go on" before start }
 test stuck     { stick before start }
 
 campaign look {
@@ -61,41 +61,16 @@ campaign look {
 }
 "#;
 
-const BEND: &str = "for _ in 0..parameters.copies {
-            ctx.inject(joint.clone());
-        }
-        match parameters.way.as_str() {
-            \"drop\" => ctx.drop_message(),
-            \"scatter\" => joint.position += ctx.draw_between(-1.0, 1.0),
-            _ => joint.position += parameters.shift[0],
-        }";
-const SPOIL: &str = "ctx.replace_file(&*parameters.file, format!(\"{}\\n\", parameters.gain));
-        match parameters.then.as_str() {
-            \"panic\" => panic!(\"spoilt too much\"),
-            \"abort\" => std::process::abort(),
-            \"leave\" => ctx.replace_file(\"../elsewhere.txt\", \"gone\"),
-            _ => {}
-        }";
-const STICK: &str = "let _ = parameters;
-        ctx.edit_file(\"calibration.txt\", |text| format!(\"9{text}\"));
-        loop {
-            std::thread::park();
-        }";
-const TIDY: &str = "let _ = parameters;
-        ctx.replace_file(\"made.txt\", \"by the operation\");
-        ctx.count_side_effect();";
-
 /// The runner with its hooks filled in, but for that of `empty`.
 fn project(name: &str) -> (Project, Runner) {
     let project = Project::new(name, &SPACE.replace("space calibrated", &format!("space {name}")), "calibrated");
     fs::write(project.folder.join("calibration.txt"), "1\n").unwrap();
     fs::write(project.folder.join("spare.txt"), "0\n").unwrap();
     project.sesamec("generate", &["--campaign", "look"]).expect(0);
-    for (operation, body) in [("bend", BEND), ("spoil", SPOIL), ("stick", STICK), ("tidy", TIDY)] {
-        let hook = project.runners.join(format!("hooks/{operation}.rs"));
-        let stub = fs::read_to_string(&hook).unwrap();
-        let (before, _) = stub.split_once("        // For example:").unwrap();
-        fs::write(&hook, format!("{before}        {body}\n    }}\n}}\n")).unwrap();
+    for operation in ["bend", "spoil", "stick", "tidy"] {
+        let file = format!("{operation}.rs");
+        let hooks = workspace().join("tests/simulators/calibrated/hooks");
+        fs::copy(hooks.join(&file), project.runners.join("hooks").join(&file)).unwrap();
     }
     let runner = project.build("look");
     (project, runner)
@@ -170,7 +145,7 @@ fn hooks_change_drop_and_inject_and_files_are_put_back() {
     let shown = runner.run(&["show", "moved", "--results", "results/known"]).expect(0).out;
     assert!(shown.contains("copies 2, shift (1.50, 0.00, 0.00) m, way move"), "{shown}");
     let exported = runner.run(&["export", "undone", "--results", "results/known"]).expect(0).out;
-    assert!(exported.contains("spoil file \"spare.txt\" gain 2 then \"go on\" before start seed "), "{exported}");
+    assert!(exported.contains("spoil file \"spare.txt\" gain 2 fate \"go on\" before start seed "), "{exported}");
     assert!(exported.contains("tidy after end seed "), "{exported}");
 
     let one = runner.run(&["--results", "one", "--workers", "1"]).expect(0);
