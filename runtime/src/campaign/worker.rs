@@ -2,13 +2,15 @@
 
 use std::io;
 use std::net::{SocketAddr, TcpStream};
+use std::path::Path;
 use std::sync::mpsc;
 use std::thread;
 
 use sesame_plan::CampaignPlan;
 
 use super::frames::{self, Hello, Job, Reply};
-use crate::evaluate::evaluate;
+use crate::changed_files::ChangedFiles;
+use crate::evaluate::{Custom, evaluate};
 use crate::last_panic;
 use crate::metric::MetricTable;
 use crate::observation::{Observation, Outcome, WallTime};
@@ -28,10 +30,14 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: SocketAddr, token
     let wires = WireTable::new(plan);
     let metrics = MetricTable::new(plan, &wires, runner.hooks).map_err(io::Error::other)?;
     let jobs = read_jobs(stream.try_clone()?);
+    let space = Path::new(runner.directory).join(runner.space);
+    let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
+    let files = if may_change { ChangedFiles::for_worker(&space) } else { Ok(ChangedFiles::unlocked(&space)) };
+    let mut custom = Custom { hooks: runner.operations, files: files.map_err(io::Error::other)? };
     let mut transport = None;
     for Job { number, test, simulator_seed } in jobs {
         let simulator = transport.get_or_insert_with(|| runner.connect.transport(plan));
-        let observation = evaluate(plan, &wires, &metrics, simulator.as_mut(), &test, simulator_seed)
+        let observation = evaluate(plan, &wires, &metrics, simulator.as_mut(), &test, simulator_seed, &mut custom)
             .unwrap_or_else(|misfit| crashed(misfit.to_string()));
         if matches!(observation.outcome, Outcome::Crash { .. }) {
             transport = None;

@@ -102,6 +102,7 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 end_after: 70.0,
             },
         },
+        operations: vec![],
         hooks: vec![
             HookPlan {
                 doc: "R1: intervals of 0.2 s in which the gripper was inside a safety zone.".into(),
