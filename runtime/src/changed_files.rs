@@ -96,9 +96,9 @@ impl ChangedFiles {
     /// What that one left changed is put back.
     pub fn for_worker(folder: &Path) -> Result<Self, FileError> {
         let mut files = ChangedFiles::unlocked(folder);
-        files._lock = Some(files.wait_for_worker()?);
+        let lock = files.wait_for_worker()?;
         files.put_back()?;
-        Ok(files)
+        Ok(ChangedFiles { _lock: Some(lock), ..files })
     }
 
     /// The files below a folder, for a runner that is about to run tests, and what an earlier one had left changed, which
@@ -117,8 +117,8 @@ impl ChangedFiles {
         let worker = files.wait_for_worker()?;
         let put_back = files.put_back()?;
         drop(worker);
-        files._lock = may_change.then_some(lock);
-        Ok((files, put_back))
+        let lock = may_change.then_some(lock);
+        Ok((ChangedFiles { _lock: lock, ..files }, put_back))
     }
 
     /// The folder of the `.sesame` file.

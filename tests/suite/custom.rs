@@ -143,7 +143,7 @@ fn hooks_change_drop_and_inject_and_files_are_put_back() {
     // The undisturbed run at the end saw what the one at the start did.
     assert!(repository.events().unwrap().iter().all(|event| !event.text.contains("does not start afresh")));
     let shown = runner.run(&["show", "moved", "--results", "results/known"]).expect(0).out;
-    assert!(shown.contains("copies 2, shift (1.50, 0.00, 0.00) m, way move"), "{shown}");
+    assert!(shown.contains("copies 2, shift (1.5, 0.0, 0.0) m, way move"), "{shown}");
     let exported = runner.run(&["export", "undone", "--results", "results/known"]).expect(0).out;
     assert!(exported.contains("spoil file \"spare.txt\" gain 2 fate \"go on\" before start seed "), "{exported}");
     assert!(exported.contains("tidy after end seed "), "{exported}");

@@ -120,32 +120,29 @@ fn hook_trait(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPl
     });
     let Call { method, message: taken } = call(runner, operation);
     let method = names::ident(&method);
-    let method = match taken {
-        Some((topic, parameter)) => {
-            let mut doc = vec![format!("A message on `{}` (\"{}\"), to be changed.", topic.name, paths(topic))];
-            doc.extend(messages::unit(&topic.ty).map(|unit| format!("In {unit}.")));
-            let docs = rust::docs(doc);
-            let parameter = names::ident(&parameter);
-            let ty = messages::tokens(&types.owned(&topic.ty, Place::WHOLE));
-            quote! {
-                #docs
-                fn #method(
-                    &mut self,
-                    #parameter: &mut #ty,
-                    parameters: &#parameters,
-                    ctx: &mut ::sesame_runtime::fuzz::OperationContext<'_, #ty>,
-                );
-            }
+    let method = if let Some((topic, parameter)) = taken {
+        let mut doc = vec![format!("A message on `{}` (\"{}\"), to be changed.", topic.name, paths(topic))];
+        doc.extend(messages::unit(&topic.ty).map(|unit| format!("In {unit}.")));
+        let docs = rust::docs(doc);
+        let parameter = names::ident(&parameter);
+        let ty = messages::tokens(&types.owned(&topic.ty, Place::WHOLE));
+        quote! {
+            #docs
+            fn #method(
+                &mut self,
+                #parameter: &mut #ty,
+                parameters: &#parameters,
+                ctx: &mut ::sesame_runtime::fuzz::OperationContext<'_, #ty>,
+            );
         }
-        None => {
-            let docs = rust::docs([match operation.moment {
-                Moment::AfterEnd => "After the last message of a run that came to its end.",
-                _ => "Before the simulator starts afresh for the run.",
-            }]);
-            quote! {
-                #docs
-                fn #method(&mut self, parameters: &#parameters, ctx: &mut ::sesame_runtime::fuzz::RunContext<'_>);
-            }
+    } else {
+        let docs = rust::docs([match operation.moment {
+            Moment::AfterEnd => "After the last message of a run that came to its end.",
+            _ => "Before the simulator starts afresh for the run.",
+        }]);
+        quote! {
+            #docs
+            fn #method(&mut self, parameters: &#parameters, ctx: &mut ::sesame_runtime::fuzz::RunContext<'_>);
         }
     };
     quote! {
@@ -223,26 +220,25 @@ fn adapter(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPlan)
     let unused = operation.parameters.is_empty().then(|| quote! { let _ = choices; });
     let Call { method, message } = call(runner, operation);
     let method = names::ident(&method);
-    let called = match message {
-        Some((topic, _)) => {
-            let ty = messages::tokens(&types.owned(&topic.ty, Place::WHOLE));
-            quote! {
-                fn on_message(
-                    &mut self,
-                    message: &mut ::sesame_runtime::value::Value,
-                    call: &mut ::sesame_runtime::fuzz::MessageCall<'_>,
-                ) {
-                    call.typed::<#ty>(message, |message, ctx| {
-                        #hook_trait::#method(&mut self.hook, message, &self.parameters, ctx);
-                    });
-                }
+    let called = if let Some((topic, _)) = message {
+        let ty = messages::tokens(&types.owned(&topic.ty, Place::WHOLE));
+        quote! {
+            fn on_message(
+                &mut self,
+                message: &mut ::sesame_runtime::value::Value,
+                call: &mut ::sesame_runtime::fuzz::MessageCall<'_>,
+            ) {
+                call.typed::<#ty>(message, |message, ctx| {
+                    #hook_trait::#method(&mut self.hook, message, &self.parameters, ctx);
+                });
             }
         }
-        None => quote! {
+    } else {
+        quote! {
             fn beside_run(&mut self, ctx: &mut ::sesame_runtime::fuzz::RunContext<'_>) {
                 #hook_trait::#method(&mut self.hook, &self.parameters, ctx);
             }
-        },
+        }
     };
     quote! {
         struct #adapter<H> {
@@ -304,9 +300,12 @@ pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, operation: &Operat
         let of = messages::named_message(&topic.ty).map(|id| types.struct_name(id).to_owned());
         // A message called like the hook or its parameters is reached through its module.
         let clash = of.as_ref().is_some_and(|of| [&hook_type, &hook_trait, &parameters_type].contains(&of));
-        imports.extend(of.map(|of| match clash {
-            true => "crate::generated::messages".to_owned(),
-            false => format!("crate::generated::messages::{}", names::written(&of)),
+        imports.extend(of.map(|of| {
+            if clash {
+                "crate::generated::messages".to_owned()
+            } else {
+                format!("crate::generated::messages::{}", names::written(&of))
+            }
         }));
         imports.push("sesame_runtime::fuzz::OperationContext".to_owned());
         if messages::holds_text(&topic.ty) {

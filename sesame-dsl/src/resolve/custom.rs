@@ -88,7 +88,8 @@ impl<'a> Resolver<'a> {
                 }
                 Some((unit, Domain::Number { range: permitted, shape: Shape::Value, integer: *integer }))
             }
-            ast::Domain::Point { unit, low, high } => {
+            ast::Domain::Point { unit, corners } => {
+                let [low, high] = &**corners;
                 let [of_low, of_high] = [low, high].map(|point| point.coordinates[0].unit.as_ref());
                 let unit = self.declared_unit([unit.as_ref(), of_low, of_high])?;
                 let from = self.coordinates(low, unit.as_ref(), what);

@@ -419,9 +419,8 @@ impl<'a> Resolver<'a> {
 fn example(parameter: &Parameter, kind: &OperationKind) -> String {
     let probability = matches!(kind, OperationKind::PacketLoss { .. });
     let unit = parameter.unit.as_ref().map_or("", Unit::text);
-    let number = |value: f64| match probability {
-        true => format!("{}%", convert(value, None, Some(&percent()))),
-        false => format!("{value}{unit}"),
+    let number = |value: f64| {
+        if probability { format!("{}%", convert(value, None, Some(&percent()))) } else { format!("{value}{unit}") }
     };
     let chosen = match &parameter.domain {
         Domain::Number { range, shape: Shape::Value, .. } => number(range.low),

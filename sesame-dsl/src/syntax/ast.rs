@@ -360,8 +360,16 @@ pub(crate) struct CustomParameter {
 
 #[derive(Debug)]
 pub(crate) enum Domain {
-    Number { integer: bool, unit: Option<UnitName>, range: Range },
-    Point { unit: Option<UnitName>, low: Point, high: Point },
+    Number {
+        integer: bool,
+        unit: Option<UnitName>,
+        range: Range,
+    },
+    /// Two opposite corners.
+    Point {
+        unit: Option<UnitName>,
+        corners: Box<[Point; 2]>,
+    },
     Texts(Vec<Text>),
     Files(Vec<Text>),
 }

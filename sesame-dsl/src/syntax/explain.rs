@@ -319,7 +319,7 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::comma => "`,`",
         Rule::dots => "`..`",
         Rule::paren_open => "`(`",
-        Rule::paren_close => "`)`",
+        Rule::paren_close | Rule::point_end => "`)`",
         Rule::bracket_open => "`[`",
         Rule::bracket_close => "`]`",
         Rule::open
@@ -332,7 +332,7 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::close => "`}`",
         Rule::name | Rule::names | Rule::path | Rule::identifier | Rule::condition_variable => "a name",
         Rule::field_name | Rule::field => "a field such as `level: real[mm]`",
-        Rule::text => "a text in double quotes",
+        Rule::text | Rule::texts => "a text in double quotes",
         Rule::number | Rule::count => "a number",
         Rule::signed | Rule::quantity => "a quantity such as `20ms`",
         Rule::range => "a range such as `[0s, 65s]`",
@@ -364,8 +364,6 @@ fn in_words(rule: Rule) -> Option<String> {
         }
         Rule::point => "a point such as `(1, 0, -0.5)m`",
         Rule::coordinate => "a number without unit",
-        Rule::point_end => "`)`",
-        Rule::texts => "a text in double quotes",
         Rule::draw_seed | Rule::setting_seed => "`seed`",
         Rule::within => "`within`",
         Rule::priority => "`priority`",

@@ -536,7 +536,7 @@ impl Reader<'_> {
                 let mut corners = children(pair, Rule::point).map(|point| self.point(&point)).collect::<Vec<_>>();
                 let high = corners.pop().expect("a box has two corners");
                 let low = corners.pop().expect("a box has two corners");
-                Domain::Point { unit, low, high }
+                Domain::Point { unit, corners: Box::new([low, high]) }
             }
             rule => {
                 let texts = expect_child(pair, Rule::texts);
