@@ -9,13 +9,18 @@ pub mod activation;
 pub mod analysis;
 #[cfg(feature = "campaign")]
 pub mod campaign;
+pub mod changed_files;
 #[cfg(feature = "campaign")]
 mod cli;
+pub mod condition;
 pub mod coverage;
+mod decimal;
 pub mod evaluate;
 #[cfg(test)]
 mod fixture;
 pub mod fuzz;
+#[cfg(any(feature = "process", feature = "mcap"))]
+mod json;
 mod last_panic;
 pub mod message;
 pub mod metric;
@@ -33,6 +38,8 @@ pub mod simulator;
 pub mod sspr;
 pub mod stl;
 pub mod time;
+#[cfg(feature = "mcap")]
+pub mod trace;
 pub mod transport;
 pub mod value;
 pub mod wire;

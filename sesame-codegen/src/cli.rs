@@ -84,10 +84,13 @@ enum Command {
     /// Analyse the results of campaigns: what ran, fronts, points in the reduced parameter space, coverage.
     #[command(subcommand)]
     Results(results::Results),
-    /// Explain the code of a diagnostic, for example E0203.
+    /// Explain the code of a diagnostic, for example E0203; or a campaign of a space, with every default written out.
     Explain {
-        /// The code.
-        code: String,
+        /// The code, or the campaign.
+        #[arg(value_name = "CODE or CAMPAIGN")]
+        what: String,
+        /// The `.sesame` file of the campaign.
+        file: Option<PathBuf>,
     },
 }
 
@@ -128,7 +131,8 @@ pub fn run(
         Command::Generate { generation, check } => commands::generate(shell, language, &generation, check),
         Command::Run { generation, arguments } => commands::run(shell, language, &generation, &arguments),
         Command::Results(asked) => results::results(shell, asked),
-        Command::Explain { code } => commands::explain(language, &code),
+        Command::Explain { what, file: Some(file) } => commands::explain_campaign(shell, language, &what, &file),
+        Command::Explain { what, file: None } => commands::explain_code(language, &what),
     };
     result.unwrap_or_else(|failure| {
         shell.failure(&failure);

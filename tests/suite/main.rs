@@ -2,8 +2,11 @@
 #![cfg(test)]
 
 mod commands;
+mod conditions;
 mod coverage;
+mod custom;
 mod declarative;
+mod disk;
 mod exported;
 mod faults;
 mod first_front;
@@ -13,3 +16,4 @@ mod regeneration;
 mod search;
 mod stl;
 mod tampering;
+mod traces;

@@ -2,11 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use sesame_plan::{ActivationMode, CampaignPlan, Dimension, GridAxis, Parameter, Shape};
+use sesame_plan::{ActivationMode, CampaignPlan, Dimension, Domain, GridAxis, Shape};
 
 use crate::coverage::grid::{Grid, place_on};
 use crate::coverage::spread::{self, Member};
-use crate::search::Permitted;
+use crate::search::choice::PermittedChoice;
+use crate::search::permitted::{Permitted, PermittedActivation};
 use crate::search::range::Range;
 use crate::sspr::{Class, class_of};
 
@@ -63,6 +64,7 @@ impl Feasible {
     fn with_margin(plan: &CampaignPlan, grid: &Grid, margin: f64) -> Feasible {
         let one_interval_each = match plan.campaign.activation {
             ActivationMode::Time => true,
+            ActivationMode::Condition { .. } => false,
         };
         Feasible::compute(plan, grid, one_interval_each, margin)
     }
@@ -73,7 +75,9 @@ impl Feasible {
         let Ok(permitted) = Permitted::of(plan) else { return all };
         let sectors = Sectors::of(grid, one_interval_each, margin);
         let kinds = sectors.kinds(plan, &permitted);
-        let fewest = if one_interval_each { permitted.fewest() } else { 1 };
+        // Operations beside the run are no part of the point and may take the place of others.
+        let offline = permitted.operations().iter().any(|it| it.activation == PermittedActivation::Offline);
+        let fewest = if one_interval_each && !offline { permitted.fewest() } else { 1 };
         let Some(mixtures) = mixtures(kinds.len(), fewest, permitted.most()) else { return all };
 
         let mut exact = one_interval_each;
@@ -132,9 +136,22 @@ enum Values {
 }
 
 impl Values {
-    /// `None` for a parameter that has no normalised value.
-    fn of(parameter: &Parameter, range: Range, shape: Shape) -> Option<Values> {
-        let width = parameter.high - parameter.low;
+    /// What the numbers of a parameter can be: one for a number, three for a point, none for a text, a file, or what
+    /// has no width.
+    fn of(domain: &Domain, permitted: &PermittedChoice) -> Vec<Values> {
+        match (domain, permitted) {
+            (&Domain::Number { low, high, .. }, &PermittedChoice::Number(range, shape)) => {
+                Values::of_number((low, high), range, shape).into_iter().collect()
+            }
+            (Domain::Point { low, high }, _) => {
+                (0..3).filter(|&axis| low[axis] < high[axis]).map(|_| Values::All).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn of_number((low, high): (f64, f64), range: Range, shape: Shape) -> Option<Values> {
+        let width = high - low;
         if width.is_nan() || width <= 0.0 {
             return None;
         }
@@ -142,7 +159,7 @@ impl Values {
             return Some(Values::All);
         }
         let first = match shape {
-            Shape::Value => (range.low - parameter.low) / width,
+            Shape::Value => (range.low - low) / width,
             Shape::Range => 0.0,
         };
         let steps = range.high - range.low;
@@ -192,7 +209,7 @@ impl Sectors {
         dimensions.iter().any(|dimension| self.axes.contains_key(dimension))
     }
 
-    /// The operations of a campaign; those that the grid cannot tell apart are one.
+    /// The operations of a campaign that are active during the run; those that the grid cannot tell apart are one.
     fn kinds(&self, plan: &CampaignPlan, permitted: &Permitted) -> Vec<KindOfOperation> {
         let timed = self.has(&[Dimension::T1, Dimension::T2, Dimension::T3]);
         let graded = self.has(&[Dimension::P1, Dimension::P2]);
@@ -201,14 +218,24 @@ impl Sectors {
         for it in permitted.operations() {
             let operation = plan.operation(it.operation);
             let share = |time: f64| (time - operation.within.start) / operation.within.length();
-            let shortest = if self.one_interval_each { it.window.shortest / operation.within.length() } else { 0.0 };
-            let window = Window { start: share(it.window.low), end: share(it.window.high), shortest };
+            let window = match &it.activation {
+                PermittedActivation::Offline => continue,
+                PermittedActivation::Time(range) if self.one_interval_each => Window {
+                    start: share(range.low),
+                    end: share(range.high),
+                    shortest: range.shortest / operation.within.length(),
+                },
+                PermittedActivation::Time(_) | PermittedActivation::Condition { .. } => {
+                    let end = operation.within.end.min(plan.campaign.end_after);
+                    Window { start: share(operation.within.start), end: share(end), shortest: 0.0 }
+                }
+            };
             let parameters = operation.parameters.iter().zip(&it.parameters);
             let kind = KindOfOperation {
                 window: if timed { window } else { Window { start: 0.0, end: 1.0, shortest: 0.0 } },
                 parameters: parameters
                     .filter(|_| graded)
-                    .filter_map(|(parameter, &(range, shape))| Values::of(parameter, range, shape))
+                    .flat_map(|(parameter, permitted)| Values::of(&parameter.domain, permitted))
                     .collect(),
                 class: if classed { class_of(&operation.kind) } else { Class::Other },
             };

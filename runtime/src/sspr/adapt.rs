@@ -1,6 +1,6 @@
 //! Disturbances of a plan's tests, as planned and as observed.
 
-use sesame_plan::{Activation, CampaignPlan, Choice, OperationId, OperationKind, Span, Test};
+use sesame_plan::{Activation, CampaignPlan, Choice, Domain, OperationId, OperationKind, Parameter, Shape, Span, Test};
 
 use crate::observation::Observation;
 use crate::sspr::{Class, Convention, Disturbance, Intensity, Point};
@@ -11,6 +11,8 @@ pub fn class_of(kind: &OperationKind) -> Class {
         OperationKind::RandomValue { .. } => Class::Value,
         OperationKind::PacketLoss | OperationKind::Blackhole => Class::Loss,
         OperationKind::Latency { .. } => Class::Delay,
+        // What the user's code does nobody knows.
+        OperationKind::Custom { .. } => Class::Other,
     }
 }
 
@@ -22,14 +24,8 @@ pub fn disturbance(
     intervals: Vec<Span>,
 ) -> Disturbance {
     let operation = plan.operation(operation);
-    let parameters = operation.parameters.iter().zip(choices).map(|(parameter, choice)| Intensity {
-        permitted: (parameter.low, parameter.high),
-        chosen: match *choice {
-            Choice::Value { value } => (value, value),
-            Choice::Range { low, high } => (low, high),
-        },
-        shape: parameter.shape,
-    });
+    let parameters =
+        operation.parameters.iter().zip(choices).flat_map(|(parameter, choice)| intensities(parameter, choice));
     Disturbance {
         class: class_of(&operation.kind),
         window: operation.within,
@@ -38,16 +34,39 @@ pub fn disturbance(
     }
 }
 
+/// What was chosen for a parameter, in numbers: one for a number, three for a point, none for a text or a file.
+fn intensities(parameter: &Parameter, choice: &Choice) -> Vec<Intensity> {
+    match (&parameter.domain, choice) {
+        (&Domain::Number { low, high, shape, .. }, &Choice::Value { value }) => {
+            vec![Intensity { permitted: (low, high), chosen: (value, value), shape }]
+        }
+        (&Domain::Number { low, high, shape, .. }, &Choice::Range { low: from, high: to }) => {
+            vec![Intensity { permitted: (low, high), chosen: (from, to), shape }]
+        }
+        (Domain::Point { low, high }, Choice::Point { point }) => (0..3)
+            .map(|axis| Intensity {
+                permitted: (low[axis], high[axis]),
+                chosen: (point[axis], point[axis]),
+                shape: Shape::Value,
+            })
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+
 /// A test as it is planned: what its run will show if it comes to its end. `None` where only a run can tell when its
-/// operations are active.
+/// operations are active, since conditions switch them. Operations that act before the start or after the end have no
+/// interval.
 pub fn planned(plan: &CampaignPlan, test: &Test) -> Option<Vec<Disturbance>> {
-    let operations = test.operations.iter().map(|it| match it.activation {
-        Activation::Time { start, end } => {
+    let operations = test.operations.iter().map(|it| match &it.activation {
+        &Activation::Time { start, end } => {
             let within = plan.operation(it.operation).within;
             let (start, end) = (start.max(within.start), end.min(within.end).min(plan.campaign.end_after));
             let intervals = if start < end { vec![Span { start, end }] } else { Vec::new() };
             Some(disturbance(plan, it.operation, &it.parameters, intervals))
         }
+        Activation::Offline => Some(disturbance(plan, it.operation, &it.parameters, Vec::new())),
+        Activation::Condition { .. } | Activation::ConditionFor { .. } => None,
     });
     operations.collect()
 }

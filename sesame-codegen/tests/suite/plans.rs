@@ -39,6 +39,7 @@ pub(crate) fn measured(runner: &mut RunnerPlan, metric: &str) {
         unit: hook.unit.clone(),
         direction: hook.direction,
         default: Some(0.0),
+        initial: None,
         source: MetricSource::Hook { topics: hook.inputs.clone() },
         line: hook.line,
     });
@@ -82,6 +83,7 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 unit: Some("s".into()),
                 direction: Some(Direction::Minimise),
                 default: None,
+                initial: None,
                 source: MetricSource::FuzzingTime,
                 line: 30,
             }],
@@ -99,8 +101,10 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 coverage: None,
                 seed: 42,
                 end_after: 70.0,
+                record: None,
             },
         },
+        operations: vec![],
         hooks: vec![
             HookPlan {
                 doc: "R1: intervals of 0.2 s in which the gripper was inside a safety zone.".into(),
@@ -186,6 +190,7 @@ pub(crate) fn awkward() -> RunnerPlan {
         unit: unit("mm"),
         direction: None,
         default: None,
+        initial: None,
         source: MetricSource::Last { input: FieldRef { topic: TopicId(1), path: vec!["level".into()] } },
         line: 71,
     });

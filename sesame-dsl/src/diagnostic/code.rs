@@ -71,7 +71,10 @@ codes! {
     WRONG_UNIT = "E0302": "A quantity measures something else, or lacks its unit.",
     WRONG_TYPE = "E0303": "A value of this type cannot be used here.",
     NOT_A_FORMULA = "E0304": "A formula is not one number over the time of a test.",
-    IDLE_CLAUSE = "E0305": "A clause of a formula changes nothing.",
+    IDLE_CLAUSE = "E0305": "A clause of a metric changes nothing.",
+    NOT_A_CONDITION = "E0306": "A condition holds something else than comparisons of metrics.",
+    CONSTANT_COMPARISON = "E0307": "A comparison always goes the same way.",
+    TEMPORAL_REACH = "E0308": "How far a temporal operator reaches is not said.",
     REVERSED_RANGE = "E0401": "A range begins above its end.",
     OUT_OF_RANGE = "E0402": "A value lies outside of what is permitted.",
     WRONG_CHOICE = "E0403": "A test's choice does not fit the operation's parameter.",
@@ -80,10 +83,13 @@ codes! {
     NO_DIRECTION = "E0501": "An objective has no direction.",
     BAD_COUNT = "E0502": "A count of operations, tests or repetitions makes no sense.",
     SEARCH_OR_REPEAT = "E0503": "A campaign both searches and repeats, or does neither.",
+    NOTHING_TO_GROW = "E0504": "No condition that may hold and may not can be made of what a campaign offers.",
+    CANNOT_CONTAIN = "E0505": "An operation asks for something that the campaign's conditions cannot contain.",
     OUTLASTS_THE_END = "W0001": "A window goes on after the campaign's end.",
     UNUSED_OPERATION = "W0002": "No campaign and no test uses the operation.",
     OBJECTIVE_WITHOUT_DEFAULT = "W0003": "An objective may stay without a value.",
     NO_CAMPAIGN = "W0004": "The space has no campaign.",
+    EQUALITY_WITHOUT_ROOM = "W0005": "An equality in a robustness is never kept by any amount.",
 }
 
 /// The page of a code, found by its text in any case, for example `e0203`.

@@ -5,11 +5,13 @@
 //! `0..=1`; every other number is in the unit that its field or metric declares.
 
 mod campaign;
+pub mod condition;
 mod formula;
 mod fuzz;
 mod ids;
 mod measure;
 mod system;
+mod temporal;
 
 pub use campaign::*;
 pub use formula::*;
@@ -17,6 +19,7 @@ pub use fuzz::*;
 pub use ids::*;
 pub use measure::*;
 pub use system::*;
+pub use temporal::*;
 
 use crate::span::Span;
 

@@ -2,7 +2,7 @@
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, Activation, Content, Id as _, MetricId, OperationId, Search, TestId};
+use crate::model::{self, Activation, ActivationMode, Content, Id as _, MetricId, OperationId, Search, TestId};
 use crate::span::Span;
 use crate::syntax::ast::{self, Count, Strategy};
 use crate::units::Unit;
@@ -23,12 +23,19 @@ impl<'a> Resolver<'a> {
             Some(names) => self.find_all(names, Kind::Metric),
             None => Some(vec![]),
         };
-        self.at_most_one(&campaign.activates, "activate");
         let searches: Vec<Span> = campaign.searches.iter().map(|search| search.span).collect();
         self.at_most_one(&searches, "search");
         let repeats: Vec<Span> = campaign.repeats.iter().map(|repeat| repeat.span).collect();
         self.at_most_one(&repeats, "repeat");
-        let content = self.content(campaign, end_after);
+        let activation = match self.single(&campaign.activates, "activate") {
+            Some(ast::ActivationMode::Condition(by)) => self.condition_space(by).map(ActivationMode::Condition),
+            Some(ast::ActivationMode::Time) | None => Some(ActivationMode::Time),
+        };
+        let record = self.single(&campaign.records, "record").map(|record| match record {
+            ast::Record::Failing => model::Recorded::Failing,
+            ast::Record::All => model::Recorded::All,
+        });
+        let content = self.content(campaign, end_after, activation);
         let coverage = self.coverage(campaign);
         let (search, seed) = match (campaign.searches.first(), campaign.repeats.first()) {
             (_, Some(repeat)) => {
@@ -57,6 +64,7 @@ impl<'a> Resolver<'a> {
             coverage: coverage?,
             seed: seed?,
             end_after: end_after?,
+            record,
         })
     }
 
@@ -110,7 +118,12 @@ impl<'a> Resolver<'a> {
     }
 
     /// What the tests of a search hold.
-    fn content(&mut self, campaign: &'a ast::Campaign, end_after: Option<f64>) -> Option<Content> {
+    fn content(
+        &mut self,
+        campaign: &'a ast::Campaign,
+        end_after: Option<f64>,
+        activation: Option<ActivationMode>,
+    ) -> Option<Content> {
         let spans: Vec<Span> = campaign.operations.iter().map(|it| it.span).collect();
         self.at_most_one(&spans, "operations");
         let Some(operations) = campaign.operations.first() else {
@@ -122,10 +135,14 @@ impl<'a> Resolver<'a> {
         let found = self.find_all(&operations.names, Kind::Operation);
         for name in &operations.names {
             let Some(definition) = self.names.get(name.text.as_str()).copied() else { continue };
-            if definition.kind == Kind::Operation
-                && let Some(end) = end_after
-            {
+            if definition.kind != Kind::Operation {
+                continue;
+            }
+            if let Some(end) = end_after {
                 self.window_and_end(name, definition.index, end, campaign);
+            }
+            if let Some(ActivationMode::Condition(space)) = &activation {
+                self.constraints_and_space(name, definition.index, space, campaign);
             }
         }
         let min = self.count(operations.min, 1, "a test holds");
@@ -140,7 +157,7 @@ impl<'a> Resolver<'a> {
             return None;
         }
         let operations = found?.into_iter().map(OperationId::from_index).collect();
-        Some(Content { operations, min, max, activation: Activation::Time })
+        Some(Content { operations, min, max, activation: activation? })
     }
 
     /// Compares the permitted window of an operation with the end of a campaign that uses it.
@@ -234,15 +251,21 @@ impl<'a> Resolver<'a> {
         let Some(test) = self.tests[index].clone() else { return };
         let written = &self.file.tests[index].operations;
         for (operation, written) in test.operations.iter().zip(written) {
-            let Some(window) = &written.window else { continue };
             let name = &written.operation.text;
-            let diagnostic = if operation.window.low >= end {
+            // A condition may hold at any time: only what the operation permits is known beforehand.
+            let (span, window) = match (&operation.activation, &written.activation) {
+                (Activation::Window(window), ast::Activation::Window(written)) => (written.span, *window),
+                _ => match self.operations[operation.operation.index()].as_ref().and_then(|it| it.within) {
+                    Some(within) if within.low >= end => (written.operation.span, within),
+                    _ => continue,
+                },
+            };
+            let diagnostic = if window.low >= end {
                 let title = format!("`{name}` is never active: the tests of the campaign are over by then");
-                Diagnostic::new(Code::AFTER_THE_END, window.span, title)
-                    .label(format!("begins after the end at {end}s"))
-            } else if operation.window.high > end {
+                Diagnostic::new(Code::AFTER_THE_END, span, title).label(format!("begins after the end at {end}s"))
+            } else if window.high > end {
                 let title = format!("`{name}` goes on after the end of the campaign that repeats this test");
-                Diagnostic::new(Code::OUTLASTS_THE_END, window.span, title)
+                Diagnostic::new(Code::OUTLASTS_THE_END, span, title)
                     .label(format!("tests end at {end}s; what is later never happens"))
             } else {
                 continue;
@@ -252,7 +275,10 @@ impl<'a> Resolver<'a> {
     }
 
     fn only_repeats(&mut self, campaign: &'a ast::Campaign, repeat: &ast::Repeat) {
+        let by_condition =
+            campaign.activates.iter().find(|(_, mode)| matches!(mode, ast::ActivationMode::Condition(_)));
         let clauses = [
+            (by_condition.map(|(span, _)| *span), "activate by condition"),
             (campaign.searches.first().map(|search| search.span), "search"),
             (campaign.operations.first().map(|operations| operations.span), "operations"),
             (campaign.objectives.first().map(|(span, _)| *span), "objectives"),
@@ -284,7 +310,7 @@ impl<'a> Resolver<'a> {
         match u32::try_from(value) {
             Ok(found) if found >= min => Some(found),
             Ok(_) => {
-                let times = if what.ends_with("repeated") { " times" } else { "" };
+                let times = if what.ends_with("repeated") || what.ends_with("activated") { " times" } else { "" };
                 let title = format!("{what} at least {min}{times}, not {value}{times}");
                 let diagnostic = Diagnostic::new(Code::BAD_COUNT, count.span, title);
                 self.report(diagnostic.label(format!("expected {min} or more")));

@@ -4,19 +4,23 @@
 //! 2. [`system`] has message types (in an order in which each follows those it contains), topics, nodes, the simulator
 //! 3. [`measure`] has metrics (their formulas in [`formula`]) and requirements
 //! 4. [`fuzz`] has operations and known tests
-//! 5. [`campaign`] has campaigns
+//! 5. [`campaign`] has campaigns; [`condition`] the conditions of tests and what those of campaigns are made of
 //!
 //! Each pass reports all it finds. A declaration with a mistake is `None` from then on, and whoever mentions it says
 //! nothing: so one mistake is one diagnostic.
 
 mod campaign;
 mod collect;
+mod condition;
 mod coverage;
+mod custom;
 mod formula;
 mod fuzz;
 mod measure;
 mod quantity;
+mod robustness;
 mod system;
+mod truth;
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -25,8 +25,10 @@ pub(super) enum Place {
     Message,
     Node,
     Hook,
+    Custom,
     Test,
     Campaign,
+    Condition,
     Search,
     Coverage,
     Repeat,
@@ -42,8 +44,10 @@ impl Place {
             Place::Message => Rule::error_field,
             Place::Node => Rule::error_node_member,
             Place::Hook => Rule::error_hook_member,
+            Place::Custom => Rule::error_custom_parameter,
             Place::Test => Rule::error_test_member,
             Place::Campaign => Rule::error_campaign_member,
+            Place::Condition => Rule::error_condition_setting,
             Place::Search => Rule::error_search_setting,
             Place::Coverage => Rule::error_coverage_member,
             Place::Repeat => Rule::error_repeat_setting,
@@ -70,6 +74,7 @@ impl Place {
             Place::Message => &[Rule::field],
             Place::Node => &[Rule::publishes, Rule::subscribes],
             Place::Hook => &[Rule::hook_on],
+            Place::Custom => &[Rule::custom_parameter],
             Place::Test => &[Rule::expectation, Rule::test_operation],
             Place::Campaign => &[
                 Rule::objectives,
@@ -80,8 +85,10 @@ impl Place {
                 Rule::coverage,
                 Rule::end,
                 Rule::repeat,
+                Rule::record,
                 Rule::unsupported_campaign_member,
             ],
+            Place::Condition => &[Rule::setting_depth, Rule::setting_integers],
             Place::Search => &[Rule::setting_population, Rule::setting_evaluations, Rule::setting_seed],
             Place::Coverage => {
                 &[Rule::coverage_axis, Rule::coverage_hits, Rule::coverage_stop, Rule::coverage_failsafe]
@@ -99,8 +106,10 @@ impl Place {
             Place::Message => Rule::one_field,
             Place::Node => Rule::one_node_member,
             Place::Hook => Rule::one_hook_member,
+            Place::Custom => Rule::one_custom_parameter,
             Place::Test => Rule::one_test_member,
             Place::Campaign => Rule::one_campaign_member,
+            Place::Condition => Rule::one_condition_setting,
             Place::Search => Rule::one_search_setting,
             Place::Coverage => Rule::one_coverage_member,
             Place::Repeat => Rule::one_repeat_setting,
@@ -119,10 +128,12 @@ impl Place {
             Place::Message => "a field such as `level: real[mm]`",
             Place::Node => "`publishes` or `subscribes`",
             Place::Hook => "`hook on` and topics",
+            Place::Custom => "a parameter such as `points: int [3, 20]`",
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
             Place::Campaign => {
-                "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `repeat` or `end after`"
+                "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `repeat`, `record` or `end after`"
             }
+            Place::Condition => "`depth` or `integers`",
             Place::Search => "`population`, `evaluations` or `seed`",
             Place::Coverage => "a dimension such as `T1 [0, 1] cells 6`, `hits`, `stop at` or `failsafe`",
             Place::Repeat => "`seed`",
@@ -136,13 +147,14 @@ impl Place {
             Place::System => &["simulator", "message", "topic", "node"],
             Place::Simulator => &["crate", "step"],
             Place::Process => &["step"],
-            Place::Message => &[],
+            Place::Message | Place::Custom => &[],
             Place::Node => &["publishes", "subscribes"],
             Place::Hook => &["hook"],
             Place::Test => &["expect"],
             Place::Campaign => {
-                &["objectives", "operations", "observes", "activate", "search", "coverage", "repeat", "end"]
+                &["objectives", "operations", "observes", "activate", "search", "coverage", "repeat", "record", "end"]
             }
+            Place::Condition => &["depth", "integers"],
             Place::Search => &["population", "evaluations", "seed"],
             Place::Coverage => &["hits", "stop", "failsafe"],
             Place::Repeat => &["seed"],
@@ -190,8 +202,8 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
         return Diagnostic::new(Code::NOT_CLOSED, span_of(first), title).label("no block is open here");
     }
 
-    let begins =
-        place.starters().contains(&first.text) || matches!(place, Place::Message | Place::Test | Place::Coverage);
+    let begins = place.starters().contains(&first.text)
+        || matches!(place, Place::Message | Place::Custom | Place::Test | Place::Coverage);
     let continued = previous
         .and_then(|previous| read(text, previous.lo as usize, hi, place.one_rule()))
         .filter(|failure| token_at(text, failure.at).lo >= first.lo);
@@ -202,7 +214,10 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
     let found = token_at(text, failure.at);
     let span = span_of(found);
     let words: BTreeSet<&'static str> = failure.expected.iter().filter_map(|&rule| keyword_of(rule)).collect();
-    let wants_name = failure.expected.iter().any(|&rule| matches!(rule, Rule::name | Rule::names | Rule::path));
+    let wants_name = failure
+        .expected
+        .iter()
+        .any(|&rule| matches!(rule, Rule::name | Rule::names | Rule::path | Rule::condition_variable));
     let expected = describe(&failure, place, found.lo == first.lo);
 
     let before = text[..found.lo].chars().next_back();
@@ -245,7 +260,9 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
     let mut diagnostic = Diagnostic::new(Code::SYNTAX, span, title).label(format!("expected {expected}"));
     if found.kind == TokenKind::Word {
         let candidates = words.into_iter().chain(place.starters().iter().copied().filter(|_| found.lo == first.lo));
-        if let Some(similar) = crate::similar::most_similar(found.text, candidates) {
+        // A word of the language is no misspelling of another.
+        let known = Rule::all_rules().iter().any(|&rule| keyword_of(rule) == Some(found.text));
+        if let Some(similar) = crate::similar::most_similar(found.text, candidates).filter(|_| !known) {
             diagnostic = diagnostic.suggest(format!("`{similar}` is a word that fits here"), span, similar);
         }
         let number_before = before.is_some_and(char::is_whitespace)
@@ -316,16 +333,20 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::comma => "`,`",
         Rule::dots => "`..`",
         Rule::paren_open => "`(`",
-        Rule::paren_close => "`)`",
+        Rule::paren_close | Rule::point_end => "`)`",
         Rule::bracket_open => "`[`",
         Rule::bracket_close => "`]`",
-        Rule::open | Rule::hook_block | Rule::simulator_settings | Rule::process_settings | Rule::search_settings => {
-            "`{`"
-        }
+        Rule::open
+        | Rule::custom_parameters
+        | Rule::hook_block
+        | Rule::simulator_settings
+        | Rule::process_settings
+        | Rule::search_settings
+        | Rule::condition_settings => "`{`",
         Rule::close => "`}`",
-        Rule::name | Rule::names | Rule::path | Rule::identifier => "a name",
+        Rule::name | Rule::names | Rule::path | Rule::identifier | Rule::condition_variable => "a name",
         Rule::field_name | Rule::field => "a field such as `level: real[mm]`",
-        Rule::text => "a text in double quotes",
+        Rule::text | Rule::texts => "a text in double quotes",
         Rule::number | Rule::count => "a number",
         Rule::signed | Rule::quantity => "a quantity such as `20ms`",
         Rule::range => "a range such as `[0s, 65s]`",
@@ -336,11 +357,27 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::at_most => "`<=`",
         Rule::at_least => "`>=`",
         Rule::equal_to => "`==`",
+        Rule::not_equal => "`!=`",
         Rule::below => "`<`",
         Rule::above => "`>`",
         Rule::bound_within => "`in`",
         Rule::parameter_name | Rule::choice => "a parameter such as `offset`, `value`, `loss` or `delay`",
-        Rule::window | Rule::test_window => "`from`",
+        Rule::window => "`from`",
+        Rule::moment => "`before start`",
+        Rule::until_condition => "`until`",
+        Rule::for_length | Rule::for_lengths => "`for`",
+        Rule::at_most_times => "`at most`",
+        Rule::by_condition => "`condition`",
+        Rule::start_contains => "`start contains`",
+        Rule::contained_integer => "`integer`",
+        Rule::initial_value => "`initial`",
+        Rule::custom => "`custom`",
+        Rule::custom_parameter => "a parameter such as `points: int [3, 20]`",
+        Rule::domain | Rule::number_domain | Rule::point_domain | Rule::text_domain | Rule::file_domain => {
+            "what is permitted, such as `int [3, 20]`"
+        }
+        Rule::point => "a point such as `(1, 0, -0.5)m`",
+        Rule::coordinate => "a number without unit",
         Rule::draw_seed | Rule::setting_seed => "`seed`",
         Rule::dimension | Rule::coverage_axis => "a dimension such as `T1 [0, 1] cells 6`",
         Rule::coverage_hits => "`hits`",
@@ -361,8 +398,13 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::blackhole => "`blackhole`",
         Rule::formula => "a formula such as `last(cycle)`",
         Rule::expression
+        | Rule::switch
+        | Rule::switch_conjunction
+        | Rule::disjunction
         | Rule::conjunction
+        | Rule::passage
         | Rule::relation
+        | Rule::prefix
         | Rule::sum
         | Rule::product
         | Rule::factor
@@ -373,14 +415,16 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::plus => "`+`",
         Rule::times => "`*`",
         Rule::over => "`/`",
-        Rule::when_then | Rule::formula_when => "`when`",
+        Rule::trigger | Rule::when_then | Rule::formula_when => "`when`",
         Rule::formula_every => "`every`",
         Rule::formula_per => "`per`",
         Rule::formula_outbound => "`outbound`",
         Rule::fuzzing_time => "`fuzzing_time()`",
         Rule::minus
-        | Rule::k_when
-        | Rule::k_condition
+        | Rule::k_not
+        | Rule::k_always
+        | Rule::k_eventually
+        | Rule::k_implies
         | Rule::k_import
         | Rule::k_eddi
         | Rule::k_physical
@@ -388,8 +432,6 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::k_terminate
         | Rule::k_relay
         | Rule::k_boost
-        | Rule::k_record
-        | Rule::k_custom
         | Rule::k_node
         | Rule::k_parameter => return None,
         _ => return keyword_of(rule).map(|word| format!("`{word}`")),

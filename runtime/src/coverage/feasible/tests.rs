@@ -5,13 +5,21 @@ use super::*;
 use crate::rng::Stream;
 use crate::search::initial::fresh_test;
 use crate::search::landscape::LANDSCAPES;
-use crate::search::permitted::tests::any_plan;
-use crate::search::range::fresh_choice;
+use crate::search::permitted::PermittedOperation;
+use crate::search::permitted::tests::any_timed_plan;
 use crate::sspr::{Convention, Point, planned};
 
 fn point(plan: &CampaignPlan, test: &Test) -> Point {
     let disturbances = planned(plan, test).expect("tests are active by time");
     Point::of(&disturbances, Convention::Ours).expect("windows begin before the campaign's end")
+}
+
+/// The permitted window of an operation by time.
+fn window_of(kind: &PermittedOperation) -> Range {
+    match kind.activation {
+        PermittedActivation::Time(window) => window,
+        _ => panic!("by time: {kind:?}"),
+    }
 }
 
 /// The cell that random tests find, most of them far from the middle: windows short or long, values at their ends.
@@ -25,24 +33,26 @@ fn found(plan: &CampaignPlan, grid: &Grid, tests: u64) -> BTreeSet<usize> {
         for it in &mut test.operations {
             let kind = permitted.find(it.operation).unwrap();
             if stream.chance(0.7) {
-                let window = kind.window;
+                let window = window_of(kind);
                 let whole = window.high - window.low;
                 let share = same.unwrap_or_else(|| stream.unit());
                 let length = (whole * share * share).max(window.shortest);
                 let start = window.low + (whole - length) * [0.0, 1.0, stream.unit()][stream.below(3)];
                 it.activation = sesame_plan::Activation::Time { start, end: (start + length).min(window.high) };
             }
-            for (choice, &(range, shape)) in it.parameters.iter_mut().zip(&kind.parameters) {
-                *choice = match stream.below(4) {
-                    0 => match shape {
-                        Shape::Value => Choice::Value { value: range.low },
-                        Shape::Range => Choice::Range { low: range.low, high: range.low },
-                    },
-                    1 => match shape {
-                        Shape::Value => Choice::Value { value: range.high },
-                        Shape::Range => Choice::Range { low: range.low, high: range.high },
-                    },
-                    _ => fresh_choice(range, shape, &mut stream),
+            for (choice, permitted) in it.parameters.iter_mut().zip(&kind.parameters) {
+                *choice = match (stream.below(4), permitted) {
+                    (0, PermittedChoice::Number(range, Shape::Value)) => Choice::Value { value: range.low },
+                    (0, PermittedChoice::Number(range, Shape::Range)) => {
+                        Choice::Range { low: range.low, high: range.low }
+                    }
+                    (1, PermittedChoice::Number(range, Shape::Value)) => Choice::Value { value: range.high },
+                    (1, PermittedChoice::Number(range, Shape::Range)) => {
+                        Choice::Range { low: range.low, high: range.high }
+                    }
+                    (0, PermittedChoice::Point(axes)) => Choice::Point { point: axes.map(|axis| axis.low) },
+                    (1, PermittedChoice::Point(axes)) => Choice::Point { point: axes.map(|axis| axis.high) },
+                    _ => permitted.fresh(&mut stream),
                 };
             }
         }
@@ -82,21 +92,12 @@ fn climbs_into(plan: &CampaignPlan, grid: &Grid, cell: usize) -> bool {
                 let it = &mut other.operations[at];
                 let kind = permitted.find(it.operation).unwrap();
                 if stream.chance(0.5) || kind.parameters.is_empty() {
-                    let sesame_plan::Activation::Time { start, end } = it.activation;
-                    let (start, end) = kind.window.interval_near((start, end), steps, &mut stream);
+                    let sesame_plan::Activation::Time { start, end } = it.activation else { panic!("by time") };
+                    let (start, end) = window_of(kind).interval_near((start, end), steps, &mut stream);
                     it.activation = sesame_plan::Activation::Time { start, end };
                 } else {
                     let which = stream.below(kind.parameters.len());
-                    let (range, _) = kind.parameters[which];
-                    it.parameters[which] = match it.parameters[which] {
-                        Choice::Value { value } => {
-                            Choice::Value { value: range.number_near(value, steps, &mut stream) }
-                        }
-                        Choice::Range { low, high } => {
-                            let (low, high) = range.interval_near((low, high), steps, &mut stream);
-                            Choice::Range { low, high }
-                        }
-                    };
+                    it.parameters[which] = kind.parameters[which].near(&it.parameters[which], steps, &mut stream);
                 }
             }
             let then = outside(&other);
@@ -110,7 +111,7 @@ fn climbs_into(plan: &CampaignPlan, grid: &Grid, cell: usize) -> bool {
 
 /// Campaigns as in other tests, with kinds of all classes, every operation as likely as another, and few per test.
 fn campaigns() -> impl Strategy<Value = CampaignPlan> {
-    (any_plan(), 1u32..4, any::<bool>()).prop_map(|(mut plan, most, alike)| {
+    (any_timed_plan(), 1u32..4, any::<bool>()).prop_map(|(mut plan, most, alike)| {
         let kinds = [
             OperationKind::PacketLoss,
             OperationKind::RandomValue { path: vec![], mode: ValueMode::Offset, integer: false },
@@ -221,7 +222,7 @@ fn whole_numbers_reach_the_values_they_have() {
     let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
     for operation in &mut plan.operations {
         let parameter = &mut operation.parameters[0];
-        (parameter.low, parameter.high, parameter.integer, parameter.shape) = (0.0, 2.0, true, Shape::Value);
+        parameter.domain = Domain::Number { low: 0.0, high: 2.0, shape: Shape::Value, integer: true };
     }
     plan.campaign.count = Count { min: 1, max: 2 };
     // Cells around 0, 1/4, 1/2, 3/4 and 1, with the eighths between them.
