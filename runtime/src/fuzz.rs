@@ -86,8 +86,8 @@ impl Disturbance {
             }
         }
         if operation.kind.is_offline() != (test.activation == Activation::Offline) {
-            let when = if operation.kind.is_offline() { "has no activation: it acts beside" } else { "acts during" };
-            return refuse(format!("{when} the run"));
+            let (what, when) = if operation.kind.is_offline() { ("has no", "beside") } else { ("lacks an", "during") };
+            return refuse(format!("{what} activation: it acts {when} the run"));
         }
         let range = || test.parameters.first().map_or((0.0, 0.0), bounds);
         Ok(match &operation.kind {

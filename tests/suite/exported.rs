@@ -102,13 +102,20 @@ fn check(plan: &CampaignPlan, tests: &[(Test, f64)]) {
 
 #[test]
 fn every_test_that_a_search_finds_reads_back_as_it_was() {
-    let plan = plan(SPACE);
-    for seed in 0..10 {
-        let mut strategy = search::strategy(&plan, seed).unwrap();
-        let asked = strategy.ask();
-        assert!(asked.len() >= 50);
-        let values = asked.iter().map(|candidate| candidate.test.operations[0].draw_seed as f64 / 1e13);
-        check(&plan, &asked.iter().map(|candidate| candidate.test.clone()).zip(values).collect::<Vec<_>>());
+    let variables = "by condition over distance in [-2m, 1e5m], collisions, share, fastest in [0m/s, 9m/s], time";
+    for activate in [
+        "by time",
+        &format!("{variables} {{ depth 6  integers [-2, 3000000] }}"),
+        &format!("{variables} for [1ms, 0.25min] at most 3 times"),
+    ] {
+        let plan = plan(&SPACE.replace("activate by time", &format!("activate {activate}")));
+        for seed in 0..10 {
+            let mut strategy = search::strategy(&plan, seed).unwrap();
+            let asked = strategy.ask();
+            assert!(asked.len() >= 50);
+            let values = asked.iter().map(|candidate| candidate.test.operations[0].draw_seed as f64 / 1e13);
+            check(&plan, &asked.iter().map(|candidate| candidate.test.clone()).zip(values).collect::<Vec<_>>());
+        }
     }
 }
 
@@ -118,7 +125,11 @@ fn the_ends_of_what_is_permitted_read_back_as_they_are() {
     let at = |share: f64| {
         let operations = (0u32..).map(OperationId).zip(&plan.operations).map(|(id, operation)| TestOperation {
             operation: id,
-            activation: Activation::Time { start: operation.within.start, end: operation.within.end },
+            activation: if operation.kind.is_offline() {
+                Activation::Offline
+            } else {
+                Activation::Time { start: operation.within.start, end: operation.within.end }
+            },
             parameters: operation
                 .parameters
                 .iter()

@@ -4,11 +4,15 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use rusqlite::Connection;
-use sesame_plan::{Bound, KnownTestId, MetricId, Test};
+use sesame_plan::condition::ConditionEnd;
+use sesame_plan::{Activation, Bound, Choice, KnownTestId, MetricId, OperationId, Test, TestOperation};
 use tempfile::TempDir;
 
 use super::*;
 use crate::observation::{MetricObservation, WallTime};
+use crate::search::nsga2::Variation as _;
+use crate::search::permitted::Permitted;
+use crate::search::vary::{Rates, TestVariation};
 
 fn folder() -> TempDir {
     tempfile::tempdir().unwrap()
@@ -367,17 +371,17 @@ fn change(record: &mut TestRecord, kind: usize) {
         16 => next_up(&mut observation.operations[0].intervals[0].end),
         17 => observation.operations[0].first_touch = Some(0.5),
         18 => {
-            let sesame_plan::Activation::Time { start, .. } = &mut record.test.operations[0].activation else {
+            let Activation::Time { start, .. } = &mut record.test.operations[0].activation else {
                 panic!("the known test has a window")
             };
             *start = start.next_down();
         }
         19 => record.origin = Origin::Known(KnownTestId(0)),
         20 => match &mut record.test.operations[0].parameters[0] {
-            sesame_plan::Choice::Range { high, .. } => next_up(high),
-            sesame_plan::Choice::Value { value } => next_up(value),
-            sesame_plan::Choice::Point { point } => next_up(&mut point[1]),
-            sesame_plan::Choice::Text { text } => text.push('.'),
+            Choice::Range { high, .. } => next_up(high),
+            Choice::Value { value } => next_up(value),
+            Choice::Point { point } => next_up(&mut point[1]),
+            Choice::Text { text } => text.push('.'),
         },
         _ => observation.operations.clear(),
     }
@@ -406,7 +410,6 @@ fn activations_of_every_kind_come_back_as_they_were() {
 
 #[test]
 fn any_kind_of_change_to_a_condition_changes_the_digest() {
-    use sesame_plan::Activation;
     use sesame_plan::condition::{Comparison, Condition};
     let plan = sample::plan();
     let mut seen = std::collections::BTreeSet::from([digest_of(&[conditional_record(&plan)])]);
@@ -448,7 +451,6 @@ fn any_kind_of_change_to_a_condition_changes_the_digest() {
 
 #[test]
 fn a_number_in_a_condition_that_is_none_is_refused() {
-    use sesame_plan::Activation;
     use sesame_plan::condition::{Condition, Operand};
     let folder = folder();
     let plan = sample::plan();
@@ -461,6 +463,76 @@ fn a_number_in_a_condition_that_is_none_is_refused() {
     let mut recorder = Recorder::create(folder.path(), &plan, 1, 1).unwrap();
     let refused = recorder.commit(&record).unwrap_err().to_string();
     assert!(refused.starts_with("test T3: a number in a condition is NaN cannot be recorded"), "{refused}");
+}
+
+#[test]
+fn tests_by_condition_that_hold_an_offline_operation_vary_and_come_back_as_they_were() {
+    for end in [ConditionEnd::Condition, ConditionEnd::Length { low: 1.0, high: 15.0 }] {
+        let plan = sample::offline_plan(end);
+        let mut variation = TestVariation::new(Permitted::of(&plan).unwrap(), Rates::by_condition(), 5);
+        let mut tests = [variation.initial(0), variation.initial(1)];
+        let folder = folder();
+        let mut recorder = Recorder::create(folder.path(), &plan, 42, 2).unwrap();
+        let mut records = Vec::new();
+        for generation in 1..=30 {
+            tests = variation.offspring([&tests[0], &tests[1]], generation, 0).map(|child| child.genome);
+            for test in &tests {
+                let number = u32::try_from(records.len()).unwrap() + 1;
+                records.push(sample::record(&plan, number, Origin::Search, test.clone()));
+                recorder.commit(&records[records.len() - 1]).unwrap();
+            }
+        }
+        let repository = recorder.repository();
+        for record in &records {
+            assert_eq!(repository.test(record.number).unwrap(), *record);
+        }
+        let all = records.iter().flat_map(|record| &record.test.operations);
+        let (offline, others): (Vec<_>, Vec<_>) = all.partition(|used| used.operation == OperationId(4));
+        assert!(offline.iter().all(|used| used.activation == Activation::Offline));
+        assert!(others.iter().all(|used| !matches!(used.activation, Activation::Offline | Activation::Time { .. })));
+        let chosen = |text: &str| {
+            let choice = Choice::Text { text: text.to_owned() };
+            offline.iter().filter(|used| used.parameters == [choice.clone()]).count()
+        };
+        assert!(["cold", "warm", "hot"].into_iter().all(|text| chosen(text) > 0), "{offline:?}");
+        assert!(!others.is_empty());
+        let bare: u32 = repository
+            .connection
+            .query_row(
+                "SELECT count(*) FROM operations WHERE operation = 'spoil' AND start_s IS NULL AND end_s IS NULL \
+                 AND start_condition IS NULL AND end_condition IS NULL AND length_s IS NULL AND times IS NULL",
+                [],
+                |row| row.get(0),
+            )
+            .unwrap();
+        assert_eq!(bare as usize, offline.len());
+    }
+}
+
+#[test]
+fn an_activation_that_does_not_fit_its_operation_is_damage() {
+    let folder = folder();
+    let plan = sample::offline_plan(ConditionEnd::Condition);
+    let offline = TestOperation {
+        operation: OperationId(4),
+        activation: Activation::Offline,
+        parameters: vec![Choice::Text { text: "hot".to_owned() }],
+        draw_seed: 1,
+    };
+    let mut test = sample::conditional_test();
+    test.operations.push(offline);
+    let mut recorder = Recorder::create(folder.path(), &plan, 42, 2).unwrap();
+    recorder.commit(&sample::record(&plan, 3, Origin::Search, test)).unwrap();
+    let refused = |change: &str| {
+        let changing = Connection::open(folder.path().join(DATABASE)).unwrap();
+        assert_eq!(changing.execute(change, []).unwrap(), 1, "{change}");
+        recorder.repository().test(3).unwrap_err().to_string()
+    };
+    let nothing = refused("UPDATE operations SET start_s = NULL, end_s = NULL WHERE position = 1");
+    assert!(nothing.contains("switched neither by time nor by condition"), "{nothing}");
+    refused("UPDATE operations SET start_s = 1, end_s = 2 WHERE position = 3");
+    let window = refused("UPDATE operations SET start_s = 1.5, end_s = 20 WHERE position = 1");
+    assert!(window.contains("T3 has `spoil` during the run, which acts before or after it"), "{window}");
 }
 
 fn finite() -> impl Strategy<Value = f64> {

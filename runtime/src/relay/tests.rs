@@ -4,12 +4,14 @@ use proptest::prelude::*;
 use sesame_plan::condition as switch;
 use sesame_plan::{
     Activation, Aggregate, Choice, Condition, Distribution, Drain, FieldRef, Formula, Input, Members, MetricId,
-    MetricSource, Operation, OperationKind, Side, Test, TestOperation, TopicId, ValueMode,
+    MetricSource, Moment, Operation, OperationKind, Side, Test, TestOperation, TopicId, ValueMode,
 };
 
 use super::{Delivery, Exchange, Finished, Relay};
 use crate::fixture::{latency, offset, operation, plan, test_of, use_of};
+use crate::fuzz::{MessageCall, OperationContext, OperationEntry, OperationHook};
 use crate::metric::MetricTable;
+use crate::observation::Counters;
 use crate::time::SimTime;
 use crate::value::{Fields, Record, Value};
 use crate::wire::WireTable;
@@ -31,10 +33,20 @@ fn relayed(
     test: &[TestOperation],
     messages: &[(f64, &str, Value)],
 ) -> (Vec<(f64, String, Value)>, Finished) {
+    relayed_with(&[], operations, test, messages)
+}
+
+/// The same with the code of custom operations.
+fn relayed_with(
+    hooks: &[OperationEntry],
+    operations: Vec<Operation>,
+    test: &[TestOperation],
+    messages: &[(f64, &str, Value)],
+) -> (Vec<(f64, String, Value)>, Finished) {
     let plan = plan(operations);
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-    let mut relay = Relay::new(&plan, &wires, &test_of(test.to_vec()), metrics.start(), &[]).unwrap();
+    let mut relay = Relay::new(&plan, &wires, &test_of(test.to_vec()), metrics.start(), hooks).unwrap();
     let mut delivered = Vec::new();
     let mut messages = messages.iter().peekable();
     for tick in 0..=100 {
@@ -320,6 +332,67 @@ fn the_message_that_makes_a_condition_hold_is_disturbed_and_the_one_that_ends_it
     assert_eq!(kept, (0..50).filter(|n| !(10..20).contains(n)).map(f64::from).collect::<Vec<_>>());
     assert_eq!(intervals(&finished, 0), [(1.0, 2.0)]);
     assert_eq!(finished.metrics[0].value, Some(1.0), "fuzzing time");
+}
+
+/// Adds a hundred, and makes up a message besides.
+struct Raise;
+
+impl OperationHook for Raise {
+    fn on_message(&mut self, message: &mut Value, call: &mut MessageCall<'_>) {
+        call.typed(message, |number: &mut f64, ctx: &mut OperationContext<'_, f64>| {
+            *number += 100.0;
+            ctx.inject(-1.0);
+        });
+    }
+}
+
+fn custom(moment: Moment) -> Operation {
+    operation(0, OperationKind::Custom { moment })
+}
+
+/// The code of `custom` at each moment.
+fn raising() -> [OperationEntry; 3] {
+    ["custom", "custom_before_start", "custom_after_end"]
+        .map(|operation| OperationEntry { operation, build: |_| Box::new(Raise) })
+}
+
+#[test]
+fn the_code_of_a_custom_operation_is_called_while_conditions_say_so() {
+    let until = Activation::Condition { start: above(1, 9.5), end: above(1, 12.5), times: 1 };
+    let test = [by_condition(0, until, vec![])];
+    let (delivered, finished) = relayed_with(&raising(), vec![custom(Moment::OnMessage)], &test, &commands(20));
+    let heard: Vec<f64> = numbers(&delivered).into_iter().map(|(_, n)| n).collect();
+    let raised = [110.0, -1.0, 111.0, -1.0, 112.0, -1.0];
+    let expected = (0..10).map(f64::from).chain(raised).chain((13..20).map(f64::from));
+    assert_eq!(heard, expected.collect::<Vec<f64>>());
+    assert_eq!(intervals(&finished, 0), [(1.0, 1.3)]);
+    let Counters { seen, changed, injected, .. } = finished.operations[0].counters;
+    assert_eq!((seen, changed, injected), (3, 3, 3));
+}
+
+#[test]
+fn an_offline_operation_is_never_active_and_leaves_messages_alone() {
+    let operations = vec![custom(Moment::BeforeStart), custom(Moment::AfterEnd)];
+    let test = [0, 1].map(|operation| by_condition(operation, Activation::Offline, vec![]));
+    let (delivered, finished) = relayed_with(&raising(), operations, &test, &commands(20));
+    assert_eq!(delivered, relayed(vec![], &[], &commands(20)).0);
+    assert!(intervals(&finished, 0).is_empty() && intervals(&finished, 1).is_empty());
+    assert_eq!(finished.metrics[0].value, Some(0.0), "no time is spent fuzzing");
+}
+
+#[test]
+fn only_an_offline_operation_is_offline_in_a_test() {
+    let refused = |moment: Moment, activation: Activation| {
+        let plan = plan(vec![custom(moment)]);
+        let wires = WireTable::new(&plan);
+        let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+        let test = test_of(vec![by_condition(0, activation, vec![])]);
+        Relay::new(&plan, &wires, &test, metrics.start(), &raising()).err().expect("it does not fit").to_string()
+    };
+    let window = refused(Moment::AfterEnd, Activation::Time { start: 1.0, end: 2.0 });
+    assert!(window.contains("has no activation: it acts beside the run"), "{window}");
+    let offline = refused(Moment::OnMessage, Activation::Offline);
+    assert!(offline.contains("lacks an activation: it acts during the run"), "{offline}");
 }
 
 #[test]
