@@ -3,6 +3,7 @@
 mod build;
 mod commands;
 mod results;
+mod search_space;
 mod shell;
 
 use std::path::PathBuf;

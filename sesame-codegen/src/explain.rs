@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
-    ActivationMode, CampaignPlan, Distribution, Domain, Drain, MetricSource, Operation, OperationKind, Parameter,
-    Search,
+    ActivationMode, Campaign, CampaignPlan, CoverageGoal, Distribution, Domain, Drain, MetricSource, Operation,
+    OperationKind, Parameter, Recorded, Search,
 };
 
 /// More whole numbers than these are not written out one by one.
@@ -60,6 +60,7 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
         Search::Repeat { test, times } => {
             let test = &plan.tests[test.index()].name;
             clauses.push(("repeat", format!("{test} {times} times {{ seed {seed} }}")));
+            clauses.extend(record(campaign));
             clauses.push(("end", format!("after {}s", campaign.end_after)));
             return clauses;
         }
@@ -70,8 +71,30 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
     clauses.push(("operations", format!("{}   {}..{} per test", operations.join(", "), count.min, count.max)));
     clauses.push(("activate", format!("by {}", activation(plan, &campaign.activation))));
     clauses.push(("search", searches));
+    if let Some(goal) = &campaign.coverage {
+        clauses.push(("coverage", coverage(goal)));
+    }
+    clauses.extend(record(campaign));
     clauses.push(("end", format!("after {}s", campaign.end_after)));
     clauses
+}
+
+/// A failsafe has become the number of evaluations.
+fn coverage(goal: &CoverageGoal) -> String {
+    let axes = goal
+        .axes
+        .iter()
+        .map(|axis| format!("{} [{}, {}] cells {}   ", axis.dimension.name(), axis.low, axis.high, axis.cells));
+    let stop = goal.stop_at.map(|share| format!("   stop at {}%", percent(share))).unwrap_or_default();
+    format!("{{ {}hits {}{stop} }}", axes.collect::<String>(), goal.hits)
+}
+
+fn record(campaign: &Campaign) -> Option<(&'static str, String)> {
+    let tests = match campaign.record? {
+        Recorded::Failing => "failing",
+        Recorded::All => "all",
+    };
+    Some(("record", format!("mcap {tests}")))
 }
 
 fn activation(plan: &CampaignPlan, mode: &ActivationMode) -> String {
@@ -298,8 +321,9 @@ mod tests {
           search random { evaluations 8  seed 7 }  end after 70s }";
     const BY_TIME: &str = "
         campaign timed { objectives time  operations cut, swing 1 per test  observes pace
-          search random { evaluations 8 }  end after 70s }";
-    const AGAIN: &str = "campaign again { repeat still 3 times  end after 70s }";
+          search random { evaluations 8 }  record mcap failing  end after 70s
+          coverage { T1 [0, 1] cells 6  O0 [0.5, 1.5] cells 1  hits 2  stop at 7%  failsafe 30 } }";
+    const AGAIN: &str = "campaign again { repeat still 3 times  record mcap all  end after 70s }";
 
     fn plan(campaign: &str) -> CampaignPlan {
         let mut sources = SourceMap::new();

@@ -141,7 +141,8 @@ pub(super) fn explain_campaign(
 ) -> anyhow::Result<ExitCode> {
     let checked = check(shell, language, file)?;
     let chosen = choose(&checked, file, Some(campaign))?;
-    print!("{}", crate::explain::campaign(&checked.plans[chosen].plan));
+    let plan = &checked.plans[chosen].plan;
+    print!("{}\n{}", crate::explain::campaign(plan), super::search_space::described(plan));
     Ok(ExitCode::SUCCESS)
 }
 
