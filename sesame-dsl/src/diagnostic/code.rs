@@ -67,6 +67,9 @@ codes! {
     LISTED_TWICE = "E0209": "A name stands twice in one list.",
     CLAUSE_TWICE = "E0210": "A clause stands twice.",
     CLAUSE_MISSING = "E0211": "A clause is missing.",
+    NOT_IMPORTED = "E0212": "An imported file cannot be read.",
+    CIRCLE = "E0213": "Files, campaigns or monitors go back to themselves.",
+    WHICH_NODES = "E0214": "An operation cannot be limited to these nodes.",
     UNKNOWN_UNIT = "E0301": "No such unit.",
     WRONG_UNIT = "E0302": "A quantity measures something else, or lacks its unit.",
     WRONG_TYPE = "E0303": "A value of this type cannot be used here.",
@@ -80,10 +83,18 @@ codes! {
     NO_DIRECTION = "E0501": "An objective has no direction.",
     BAD_COUNT = "E0502": "A count of operations, tests or repetitions makes no sense.",
     SEARCH_OR_REPEAT = "E0503": "A campaign both searches and repeats, or does neither.",
+    BAD_MONITOR = "E0601": "A monitor's guarantees are not in order.",
+    BAD_LAB = "E0602": "A setting does not fit the lab's transport.",
     OUTLASTS_THE_END = "W0001": "A window goes on after the campaign's end.",
     UNUSED_OPERATION = "W0002": "No campaign and no test uses the operation.",
     OBJECTIVE_WITHOUT_DEFAULT = "W0003": "An objective may stay without a value.",
     NO_CAMPAIGN = "W0004": "The space has no campaign.",
+    ONE_VALUE = "W0010": "An operation permits one value only.",
+    UNUSED_METRIC = "W0011": "No campaign measures the metric.",
+    MISNAMED_OPERATION = "W0012": "An operation is named for one topic and disturbs another.",
+    TWO_PUBLISHERS = "W0013": "Two nodes publish one topic.",
+    UNUSED_TOPIC = "W0014": "A topic has no node and no use.",
+    UNUSED_EVIDENCE = "W0015": "No guarantee of a monitor needs the evidence or demand.",
 }
 
 /// The page of a code, found by its text in any case, for example `e0203`.

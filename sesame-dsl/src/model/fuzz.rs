@@ -18,6 +18,8 @@ pub struct Operation {
     pub priority: i32,
     /// Probability that a fresh test includes it. Default 1.
     pub inclusion: f64,
+    /// Whether its active time counts in `fuzzing_time()`. Default true.
+    pub timed: bool,
 }
 
 impl Operation {

@@ -2,7 +2,7 @@
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, Activation, Content, Id as _, MetricId, OperationId, Search, TestId};
+use crate::model::{self, Activation, CampaignId, Content, Id as _, MetricId, OperationId, Search, TestId};
 use crate::span::Span;
 use crate::syntax::ast::{self, Count, Strategy};
 use crate::units::Unit;
@@ -17,6 +17,10 @@ impl<'a> Resolver<'a> {
     }
 
     fn campaign(&mut self, campaign: &'a ast::Campaign) -> Option<model::Campaign> {
+        let from = match &campaign.from {
+            Some(from) => self.find(from, Kind::Campaign).map(|index| Some(CampaignId::from_index(index))),
+            None => Some(None),
+        };
         let end_after = self.end(campaign);
         let objectives = self.objectives(campaign);
         let observed = match self.single(&campaign.observes, "observes") {
@@ -28,19 +32,28 @@ impl<'a> Resolver<'a> {
         self.at_most_one(&searches, "search");
         let repeats: Vec<Span> = campaign.repeats.iter().map(|repeat| repeat.span).collect();
         self.at_most_one(&repeats, "repeat");
+        let passives: Vec<Span> = campaign.passives.iter().map(|passive| passive.span).collect();
+        self.at_most_one(&passives, "passive");
         let content = self.content(campaign, end_after);
-        let (search, seed) = match (campaign.searches.first(), campaign.repeats.first()) {
-            (_, Some(repeat)) => {
-                self.only_repeats(campaign, repeat);
+        let found = (campaign.searches.first(), campaign.repeats.first(), campaign.passives.first());
+        let (search, seed) = match found {
+            (_, repeat, Some(passive)) => {
+                self.only_observes(campaign, passive, repeat.map(|repeat| repeat.span));
+                let times = self.count(passive.times, 1, "the system is observed");
+                (times.map(|times| Search::Passive { times }), self.seed(&passive.seed))
+            }
+            (_, Some(repeat), None) => {
+                self.only_repeats(campaign, repeat.span, "a campaign that repeats a test", "repeats here");
                 let search = self.repeat(repeat, end_after);
                 (search, self.seed(&repeat.seed))
             }
-            (Some(search), None) => (self.search(campaign, search, content), self.seed(&search.seed)),
-            (None, None) => {
+            (Some(search), None, None) => (self.search(campaign, search, content), self.seed(&search.seed)),
+            (None, None, None) => {
                 if !campaign.damaged {
-                    let title = format!("campaign `{}` neither searches nor repeats", campaign.head.name.text);
+                    let title =
+                        format!("campaign `{}` neither searches nor repeats nor observes", campaign.head.name.text);
                     let diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, campaign.head.name.span, title)
-                        .label("add `search` or `repeat`")
+                        .label("add `search`, `repeat` or `passive`")
                         .note("for example `search nsga2 { population 10  evaluations 200  seed 42 }`");
                     self.report(diagnostic);
                 }
@@ -50,6 +63,7 @@ impl<'a> Resolver<'a> {
         let metric_ids = |found: Vec<usize>| found.into_iter().map(MetricId::from_index).collect();
         Some(model::Campaign {
             declaration: self.declaration(&campaign.head),
+            from: from?,
             objectives: metric_ids(objectives?),
             observed: metric_ids(observed?),
             search: search?,
@@ -76,15 +90,19 @@ impl<'a> Resolver<'a> {
 
     fn objectives(&mut self, campaign: &'a ast::Campaign) -> Option<Vec<usize>> {
         let Some(names) = self.single(&campaign.objectives, "objectives") else {
-            if campaign.repeats.is_empty() && !campaign.searches.is_empty() && !campaign.damaged {
+            if campaign.repeats.is_empty()
+                && campaign.passives.is_empty()
+                && !campaign.searches.is_empty()
+                && !campaign.damaged
+            {
                 self.missing(&campaign.head.name, "its objectives", "objectives fuzzing_time, collision_occurrence");
             }
             return Some(vec![]);
         };
         let found = self.find_all(names, Kind::Metric);
         let mut complete = true;
-        // A repetition optimises nothing, which is reported as that.
-        for name in names.iter().filter(|_| campaign.repeats.is_empty()) {
+        // A campaign without a search optimises nothing, which is reported as that.
+        for name in names.iter().filter(|_| campaign.repeats.is_empty() && campaign.passives.is_empty()) {
             let Some(definition) = self.names.get(name.text.as_str()).copied() else { continue };
             if definition.kind != Kind::Metric {
                 continue;
@@ -112,7 +130,11 @@ impl<'a> Resolver<'a> {
         let spans: Vec<Span> = campaign.operations.iter().map(|it| it.span).collect();
         self.at_most_one(&spans, "operations");
         let Some(operations) = campaign.operations.first() else {
-            if campaign.repeats.is_empty() && !campaign.searches.is_empty() && !campaign.damaged {
+            if campaign.repeats.is_empty()
+                && campaign.passives.is_empty()
+                && !campaign.searches.is_empty()
+                && !campaign.damaged
+            {
                 self.missing(&campaign.head.name, "the operations of its tests", "operations jitter 1..5 per test");
             }
             return None;
@@ -143,6 +165,10 @@ impl<'a> Resolver<'a> {
 
     /// Compares the permitted window of an operation with the end of a campaign that uses it.
     fn window_and_end(&mut self, name: &ast::Name, index: usize, end: f64, campaign: &'a ast::Campaign) {
+        // It was said of the campaign that wrote both.
+        if campaign.inherited.operations && campaign.inherited.end {
+            return;
+        }
         let Some(within) = self.operations[index].as_ref().and_then(|operation| operation.within) else { return };
         let Some(body) = &self.file.operations[index].body else { return };
         let Some((_, written)) = body.within.first() else { return };
@@ -249,7 +275,19 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    fn only_repeats(&mut self, campaign: &'a ast::Campaign, repeat: &ast::Repeat) {
+    /// A campaign without disturbances has nothing that makes some.
+    fn only_observes(&mut self, campaign: &'a ast::Campaign, passive: &ast::Passive, repeats: Option<Span>) {
+        self.only_repeats(campaign, passive.span, "a campaign that only observes", "observes here");
+        if let Some(repeat) = repeats {
+            let title = "a campaign that only observes repeats no test";
+            let diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, repeat, title)
+                .label("a test disturbs")
+                .also(passive.span, "observes here");
+            self.report(diagnostic);
+        }
+    }
+
+    fn only_repeats(&mut self, campaign: &'a ast::Campaign, place: Span, who: &str, here: &str) {
         let clauses = [
             (campaign.searches.first().map(|search| search.span), "search"),
             (campaign.operations.first().map(|operations| operations.span), "operations"),
@@ -257,10 +295,10 @@ impl<'a> Resolver<'a> {
         ];
         for (span, word) in clauses {
             let Some(span) = span else { continue };
-            let title = format!("a campaign that repeats a test has no `{word}`");
+            let title = format!("{who} has no `{word}`");
             let mut diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, span, title)
-                .label("a campaign either searches or repeats")
-                .also(repeat.span, "repeats here");
+                .label("a campaign either searches or repeats or observes")
+                .also(place, here);
             if word == "objectives" {
                 diagnostic = diagnostic.suggest("measure them with", span, "observes");
             }
@@ -276,12 +314,12 @@ impl<'a> Resolver<'a> {
     }
 
     /// A count of at least `min`. `what` begins a sentence, for example "a test holds".
-    fn count(&mut self, count: Count, min: u32, what: &str) -> Option<u32> {
+    pub(super) fn count(&mut self, count: Count, min: u32, what: &str) -> Option<u32> {
         let value = count.value?;
         match u32::try_from(value) {
             Ok(found) if found >= min => Some(found),
             Ok(_) => {
-                let times = if what.ends_with("repeated") { " times" } else { "" };
+                let times = if what.ends_with("repeated") || what.ends_with("observed") { " times" } else { "" };
                 let title = format!("{what} at least {min}{times}, not {value}{times}");
                 let diagnostic = Diagnostic::new(Code::BAD_COUNT, count.span, title);
                 self.report(diagnostic.label(format!("expected {min} or more")));

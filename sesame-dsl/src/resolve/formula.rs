@@ -473,7 +473,7 @@ impl<'a> Resolver<'a> {
 
     // ----- conditions
 
-    fn condition(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<Condition> {
+    pub(super) fn condition(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<Condition> {
         match &expression.kind {
             ExpressionKind::Truth(value) => Some(Condition::Constant(*value)),
             ExpressionKind::All(parts) => self.conditions(inputs, parts).map(Condition::All),

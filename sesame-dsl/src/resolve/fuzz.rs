@@ -31,6 +31,8 @@ impl<'a> Resolver<'a> {
             Some(quantity) => self.inclusion(quantity),
             None => Some(1.0),
         };
+        self.at_most_one(&body.untimed, "untimed");
+        self.between_nodes(body);
         let (target, kind) = what?;
         Some(model::Operation {
             declaration: self.declaration(&operation.head),
@@ -39,6 +41,7 @@ impl<'a> Resolver<'a> {
             within: within?,
             priority: priority?,
             inclusion: inclusion?,
+            timed: body.untimed.is_empty(),
         })
     }
 
@@ -54,12 +57,14 @@ impl<'a> Resolver<'a> {
                         return None;
                     }
                 }
+                self.one_value(permitted, range);
                 let mode = if *absolute { model::ValueMode::Absolute } else { model::ValueMode::Offset };
                 Some((target, OperationKind::RandomValue { mode, range: permitted, integer, unit }))
             }
             ast::OperationKind::PacketLoss(range) => {
                 let target = self.whole_messages(&body.target, "packet loss drops");
                 let loss = self.probabilities(range, "the loss")?;
+                self.one_value(loss, range);
                 Some((target?, OperationKind::PacketLoss { loss }))
             }
             ast::OperationKind::Latency { range, uniform, drain } => {
@@ -72,11 +77,21 @@ impl<'a> Resolver<'a> {
                 };
                 let distribution = if uniform.is_empty() { Distribution::Fixed } else { Distribution::Uniform };
                 let delay = self.times(range, "the delay")?;
+                self.one_value(delay, range);
                 Some((target?, OperationKind::Latency { delay, distribution, drain }))
             }
             ast::OperationKind::Blackhole => {
                 Some((self.whole_messages(&body.target, "a blackhole drops")?, OperationKind::Blackhole))
             }
+        }
+    }
+
+    /// A range without width leaves nothing to choose.
+    fn one_value(&mut self, found: Range, range: &ast::Range) {
+        if found.low == found.high {
+            let title = "this range has one value only";
+            let diagnostic = Diagnostic::new(Code::ONE_VALUE, range.span, title);
+            self.report(diagnostic.label("tests have nothing to choose here"));
         }
     }
 

@@ -29,6 +29,11 @@ pub(super) enum Place {
     Campaign,
     Search,
     Repeat,
+    Launch,
+    Budget,
+    Eddi,
+    Physical,
+    Lab,
 }
 
 impl Place {
@@ -45,6 +50,11 @@ impl Place {
             Place::Campaign => Rule::error_campaign_member,
             Place::Search => Rule::error_search_setting,
             Place::Repeat => Rule::error_repeat_setting,
+            Place::Launch => Rule::error_launch_setting,
+            Place::Budget => Rule::error_budget_setting,
+            Place::Eddi => Rule::error_eddi_member,
+            Place::Physical => Rule::error_physical_member,
+            Place::Lab => Rule::error_lab_setting,
         }
     }
 
@@ -52,17 +62,25 @@ impl Place {
         match self {
             Place::File => &[
                 Rule::space,
+                Rule::import,
                 Rule::system,
                 Rule::metric,
                 Rule::requirement,
                 Rule::operation,
                 Rule::test,
                 Rule::campaign,
-                Rule::unsupported_item,
+                Rule::eddi,
+                Rule::physical,
             ],
-            Place::System => {
-                &[Rule::simulator, Rule::message, Rule::topic, Rule::node, Rule::unsupported_system_member]
-            }
+            Place::System => &[
+                Rule::simulator,
+                Rule::message,
+                Rule::topic,
+                Rule::node,
+                Rule::launch,
+                Rule::terminate,
+                Rule::relay_budget,
+            ],
             Place::Simulator => &[Rule::setting_crate, Rule::setting_step],
             Place::Process => &[Rule::setting_step],
             Place::Message => &[Rule::field],
@@ -77,10 +95,27 @@ impl Place {
                 Rule::search,
                 Rule::end,
                 Rule::repeat,
+                Rule::passive,
                 Rule::unsupported_campaign_member,
             ],
             Place::Search => &[Rule::setting_population, Rule::setting_evaluations, Rule::setting_seed],
             Place::Repeat => &[Rule::setting_seed],
+            Place::Launch => &[Rule::ready],
+            Place::Budget => &[Rule::setting_latency, Rule::setting_jitter],
+            Place::Eddi => &[Rule::demand, Rule::evidence, Rule::guarantee, Rule::otherwise],
+            Place::Physical => &[
+                Rule::lab_simulator,
+                Rule::repeats,
+                Rule::cost,
+                Rule::exclude,
+                Rule::rank,
+                Rule::budget,
+                Rule::tolerance,
+                Rule::interlock,
+                Rule::shape,
+                Rule::fit,
+            ],
+            Place::Lab => &[Rule::lab_setting],
         }
     }
 
@@ -97,6 +132,11 @@ impl Place {
             Place::Campaign => Rule::one_campaign_member,
             Place::Search => Rule::one_search_setting,
             Place::Repeat => Rule::one_repeat_setting,
+            Place::Launch => Rule::one_launch_setting,
+            Place::Budget => Rule::one_budget_setting,
+            Place::Eddi => Rule::one_eddi_member,
+            Place::Physical => Rule::one_physical_member,
+            Place::Lab => Rule::one_lab_setting,
         }
     }
 
@@ -104,35 +144,65 @@ impl Place {
     fn members(self) -> &'static str {
         match self {
             Place::File => {
-                "a declaration: `space`, `system`, `metric`, `requirement`, `operation`, `test` or `campaign`"
+                "a declaration: `space`, `import`, `system`, `metric`, `requirement`, `operation`, `test`, `campaign`, \
+                 `eddi` or `physical`"
             }
-            Place::System => "`simulator`, `message`, `topic` or `node`",
+            Place::System => "`simulator`, `message`, `topic`, `node`, `launch`, `terminate` or `relay budget`",
             Place::Simulator => "`crate` or `step`",
             Place::Process => "`step`",
             Place::Message => "a field such as `level: real[mm]`",
             Place::Node => "`publishes` or `subscribes`",
             Place::Hook => "`hook on` and topics",
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
-            Place::Campaign => "`objectives`, `operations`, `observes`, `activate`, `search`, `repeat` or `end after`",
+            Place::Campaign => {
+                "`objectives`, `operations`, `observes`, `activate`, `search`, `repeat`, `passive` or `end after`"
+            }
             Place::Search => "`population`, `evaluations` or `seed`",
             Place::Repeat => "`seed`",
+            Place::Launch => "`ready when topic`",
+            Place::Budget => "`latency` or `jitter`",
+            Place::Eddi => "`demand`, `evidence`, `guarantee` or `otherwise`",
+            Place::Physical => {
+                "`simulator`, `repeats`, `cost`, `exclude`, `rank`, `budget`, `tolerance`, `interlock`, `shape` or `fit`"
+            }
+            Place::Lab => "a setting such as `step 20ms`",
         }
     }
 
     /// The words that begin something here.
     fn starters(self) -> &'static [&'static str] {
         match self {
-            Place::File => &["space", "system", "metric", "requirement", "operation", "test", "campaign"],
-            Place::System => &["simulator", "message", "topic", "node"],
+            Place::File => &[
+                "space",
+                "import",
+                "system",
+                "metric",
+                "requirement",
+                "operation",
+                "test",
+                "campaign",
+                "eddi",
+                "physical",
+            ],
+            Place::System => &["simulator", "message", "topic", "node", "launch", "terminate", "relay"],
             Place::Simulator => &["crate", "step"],
             Place::Process => &["step"],
             Place::Message => &[],
             Place::Node => &["publishes", "subscribes"],
             Place::Hook => &["hook"],
             Place::Test => &["expect"],
-            Place::Campaign => &["objectives", "operations", "observes", "activate", "search", "repeat", "end"],
+            Place::Campaign => {
+                &["objectives", "operations", "observes", "activate", "search", "repeat", "passive", "end"]
+            }
             Place::Search => &["population", "evaluations", "seed"],
             Place::Repeat => &["seed"],
+            Place::Launch => &["ready"],
+            Place::Budget => &["latency", "jitter"],
+            Place::Eddi => &["demand", "evidence", "guarantee", "otherwise"],
+            Place::Physical => {
+                &["simulator", "repeats", "cost", "exclude", "rank", "budget", "tolerance", "interlock", "shape", "fit"]
+            }
+            Place::Lab => &[],
         }
     }
 }
@@ -177,7 +247,7 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
         return Diagnostic::new(Code::NOT_CLOSED, span_of(first), title).label("no block is open here");
     }
 
-    let begins = place.starters().contains(&first.text) || matches!(place, Place::Message | Place::Test);
+    let begins = place.starters().contains(&first.text) || matches!(place, Place::Message | Place::Test | Place::Lab);
     let continued = previous
         .and_then(|previous| read(text, previous.lo as usize, hi, place.one_rule()))
         .filter(|failure| token_at(text, failure.at).lo >= first.lo);
@@ -305,9 +375,15 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::paren_close => "`)`",
         Rule::bracket_open => "`[`",
         Rule::bracket_close => "`]`",
-        Rule::open | Rule::hook_block | Rule::simulator_settings | Rule::process_settings | Rule::search_settings => {
-            "`{`"
-        }
+        Rule::open
+        | Rule::hook_block
+        | Rule::simulator_settings
+        | Rule::process_settings
+        | Rule::search_settings
+        | Rule::launch_settings
+        | Rule::budget_settings
+        | Rule::lab_settings
+        | Rule::repeat_settings => "`{`",
         Rule::close => "`}`",
         Rule::name | Rule::names | Rule::path | Rule::identifier => "a name",
         Rule::field_name | Rule::field => "a field such as `level: real[mm]`",
@@ -331,6 +407,24 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::within => "`within`",
         Rule::priority => "`priority`",
         Rule::inclusion => "`inclusion`",
+        Rule::untimed => "`untimed`",
+        Rule::from_nodes | Rule::campaign_from => "`from`",
+        Rule::to_nodes => "`to`",
+        Rule::held => "`held`",
+        Rule::stale => "`stale after`",
+        Rule::mitigation => "`mitigate with`",
+        Rule::lab_transport => "a simulator kind such as `simlog`",
+        Rule::lab_setting | Rule::lab_setting_name => "a setting such as `step 20ms`",
+        Rule::rank_key | Rule::tolerated => "a metric",
+        Rule::per_operation => "`, plus … per operation`",
+        Rule::sphere => "`sphere`",
+        Rule::cuboid => "`box`",
+        Rule::carried => "`on pose`",
+        Rule::fixed => "`at`",
+        Rule::expand => "`expand`",
+        Rule::vector | Rule::coordinates => "three numbers such as `(1.2, 0.4, 1.0)m`",
+        Rule::fit_delay => "`relay delay`",
+        Rule::fit_parameter => "`parameter`",
         Rule::drain => "`drain`",
         Rule::direction => "`maximise` or `minimise`",
         Rule::default_value => "`default`",
@@ -363,12 +457,6 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::minus
         | Rule::k_when
         | Rule::k_condition
-        | Rule::k_import
-        | Rule::k_eddi
-        | Rule::k_physical
-        | Rule::k_launch
-        | Rule::k_terminate
-        | Rule::k_relay
         | Rule::k_coverage
         | Rule::k_boost
         | Rule::k_record

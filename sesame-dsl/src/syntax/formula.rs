@@ -28,7 +28,7 @@ impl Reader<'_> {
         Formula { kind, when, every, per, outbound }
     }
 
-    fn expression(&mut self, pair: &Pair<'_>) -> Expression {
+    pub(super) fn expression(&mut self, pair: &Pair<'_>) -> Expression {
         self.joined(pair, Rule::conjunction, Self::conjunction, ExpressionKind::Any)
     }
 

@@ -1,10 +1,13 @@
 //! From text to [`ast`]: parsing with recovery.
 
 pub(crate) mod ast;
+pub(crate) mod eddi;
 mod explain;
 mod formula;
 mod limits;
 mod parse;
+pub(crate) mod physical;
+pub(crate) mod surroundings;
 mod token;
 mod words;
 

@@ -5,9 +5,10 @@ use pest::iterators::Pair as PestPair;
 use sesame_grammar::{Rule, SesameParser};
 
 use super::ast::{
-    Bound, Campaign, Choice, Comparison, Count, Direction, Drain, Expectation, Field, File, Head, InProcess, Message,
-    Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Process, Range, Repeat,
-    Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Topic, Transport, Type, TypeKind,
+    Bound, Campaign, Choice, Comparison, Count, Direction, Drain, Expectation, Field, File, Head, InProcess, Inherited,
+    Message, Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Passive, Process,
+    Range, Repeat, Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Topic, Transport, Type,
+    TypeKind,
 };
 use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, MAX_CALLS, too_deep};
@@ -117,7 +118,12 @@ impl Reader<'_> {
     }
 
     /// Visits the members of a block. What could not be read is explained; returns whether there was such a thing.
-    fn members<'i>(&mut self, block: &Pair<'i>, place: Place, mut visit: impl FnMut(&mut Self, Pair<'i>)) -> bool {
+    pub(super) fn members<'i>(
+        &mut self,
+        block: &Pair<'i>,
+        place: Place,
+        mut visit: impl FnMut(&mut Self, Pair<'i>),
+    ) -> bool {
         let mut damaged = false;
         let mut previous = None;
         let mut opened = None;
@@ -201,6 +207,8 @@ impl Reader<'_> {
                     | "operation"
                     | "test"
                     | "campaign"
+                    | "eddi"
+                    | "physical"
             );
             if declares {
                 let name = token_at(self.text, at);
@@ -224,7 +232,6 @@ impl Reader<'_> {
             Rule::unsupported_operation if word != "custom" => format!("an operation on a `{word}`"),
             Rule::unsupported_operation | Rule::unsupported_kind => format!("operation kind `{word}`"),
             Rule::unsupported_window => "activation by `when`".to_owned(),
-            Rule::unsupported_from => "a campaign `from` another".to_owned(),
             Rule::unsupported_activation => "activation by `condition`".to_owned(),
             Rule::unsupported_strategy => format!("search strategy `{word}`"),
             _ => format!("`{word}`"),
@@ -278,9 +285,17 @@ impl Reader<'_> {
                 let campaign = reader.campaign(&item);
                 reader.out.campaigns.push(campaign);
             }
-            Rule::unsupported_item => {
-                reader.unsupported(&item);
-                reader.out.damaged = true;
+            Rule::import => {
+                let import = reader.text_of(&expect_child(&item, Rule::text));
+                reader.out.imports.push(import);
+            }
+            Rule::eddi => {
+                let eddi = reader.eddi(&item);
+                reader.out.eddis.push(eddi);
+            }
+            Rule::physical => {
+                let physical = reader.physical(&item);
+                reader.out.physicals.push(physical);
             }
             other => unreachable!("{other:?} is no declaration"),
         });
@@ -291,8 +306,17 @@ impl Reader<'_> {
 
     fn system(&mut self, pair: &Pair<'_>) -> System {
         let span = self.span(&expect_child(pair, Rule::k_system));
-        let mut system =
-            System { span, simulators: vec![], messages: vec![], topics: vec![], nodes: vec![], damaged: false };
+        let mut system = System {
+            span,
+            simulators: vec![],
+            messages: vec![],
+            topics: vec![],
+            nodes: vec![],
+            launches: vec![],
+            terminates: vec![],
+            relay_budgets: vec![],
+            damaged: false,
+        };
         system.damaged = self.members(pair, Place::System, |reader, member| match member.as_rule() {
             Rule::simulator => system.simulators.push(reader.simulator(&member)),
             Rule::message => system.messages.push(reader.message(&member)),
@@ -302,7 +326,9 @@ impl Reader<'_> {
                 ty: reader.type_of(&expect_child(&member, Rule::type_of)),
             }),
             Rule::node => system.nodes.push(reader.node(&member)),
-            _ => reader.unsupported(&member),
+            Rule::launch => system.launches.push((reader.keyword_span(&member), reader.launch(&member))),
+            Rule::terminate => system.terminates.push((reader.keyword_span(&member), reader.command(&member))),
+            _ => system.relay_budgets.push((reader.keyword_span(&member), reader.relay_budget(&member))),
         });
         system
     }
@@ -437,7 +463,7 @@ impl Reader<'_> {
         Metric { head, ty, directions, defaults, source }
     }
 
-    fn bound(&mut self, pair: &Pair<'_>) -> Bound {
+    pub(super) fn bound(&mut self, pair: &Pair<'_>) -> Bound {
         if let Some(within) = child(pair, Rule::bound_within) {
             return Bound::Within(self.range(&expect_child(&within, Rule::range)));
         }
@@ -489,8 +515,12 @@ impl Reader<'_> {
         let within = children(pair, Rule::within)
             .map(|within| (self.keyword_span(&within), self.range(&expect_child(&within, Rule::range))))
             .collect();
+        let untimed = children(pair, Rule::untimed).map(|untimed| self.span(&untimed)).collect();
+        let mut nodes = |rule| child(pair, rule).map(|nodes| (self.keyword_span(&nodes), self.names(&nodes)));
+        let from = nodes(Rule::from_nodes);
+        let to = nodes(Rule::to_nodes);
         let target = self.path(&expect_child(pair, Rule::path));
-        Operation { head, body: Some(OperationBody { target, kind, within, priority, inclusion }) }
+        Operation { head, body: Some(OperationBody { target, from, to, kind, within, priority, inclusion, untimed }) }
     }
 
     fn test(&mut self, pair: &Pair<'_>) -> Test {
@@ -536,20 +566,19 @@ impl Reader<'_> {
     fn campaign(&mut self, pair: &Pair<'_>) -> Campaign {
         let mut campaign = Campaign {
             head: self.head(pair),
+            from: child(pair, Rule::campaign_from).map(|from| self.name(&expect_child(&from, Rule::name))),
+            inherited: Inherited::default(),
             objectives: vec![],
             observes: vec![],
             operations: vec![],
             activates: vec![],
             searches: vec![],
             repeats: vec![],
+            passives: vec![],
             ends: vec![],
             damaged: false,
         };
-        let from = child(pair, Rule::unsupported_from);
-        if let Some(from) = &from {
-            self.unsupported(from);
-        }
-        let damaged = self.members(pair, Place::Campaign, |reader, member| {
+        campaign.damaged = self.members(pair, Place::Campaign, |reader, member| {
             let span = reader.keyword_span(&member);
             match member.as_rule() {
                 Rule::objectives => campaign.objectives.push((span, reader.names(&member))),
@@ -570,13 +599,7 @@ impl Reader<'_> {
                 Rule::search => campaign.searches.push(reader.search(&member, span)),
                 Rule::end => campaign.ends.push((span, reader.signed(&expect_child(&member, Rule::signed)))),
                 Rule::repeat => {
-                    let mut seed = Vec::new();
-                    if let Some(settings) = child(&member, Rule::repeat_settings) {
-                        reader.members(&settings, Place::Repeat, |reader, setting| {
-                            let span = reader.keyword_span(&setting);
-                            seed.push((span, reader.count(&expect_child(&setting, Rule::number))));
-                        });
-                    }
+                    let seed = reader.seeds(&member);
                     campaign.repeats.push(Repeat {
                         span,
                         test: reader.name(&expect_child(&member, Rule::name)),
@@ -584,14 +607,29 @@ impl Reader<'_> {
                         seed,
                     });
                 }
+                Rule::passive => {
+                    let seed = reader.seeds(&member);
+                    let times = reader.count(&expect_child(&member, Rule::number));
+                    campaign.passives.push(Passive { span, times, seed });
+                }
                 _ => {
                     reader.unsupported(&member);
                 }
             }
         });
-        // A `from` brings clauses that are not written here; the other unsupported ones replace none.
-        campaign.damaged = damaged || from.is_some();
         campaign
+    }
+
+    /// The seeds in the settings of a repetition.
+    fn seeds(&mut self, pair: &Pair<'_>) -> Vec<(Span, Count)> {
+        let mut seeds = Vec::new();
+        if let Some(settings) = child(pair, Rule::repeat_settings) {
+            self.members(&settings, Place::Repeat, |reader, setting| {
+                let span = reader.keyword_span(&setting);
+                seeds.push((span, reader.count(&expect_child(&setting, Rule::number))));
+            });
+        }
+        seeds
     }
 
     fn search(&mut self, pair: &Pair<'_>, span: Span) -> Search {
