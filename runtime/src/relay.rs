@@ -6,7 +6,7 @@
 
 mod release;
 
-use sesame_plan::{CampaignPlan, Drain, Test};
+use sesame_plan::{CampaignPlan, Drain, Span, Test};
 
 use crate::activation::{Activity, Edge};
 use crate::fuzz::{ChoiceError, Disturbance, Draws, Fate};
@@ -64,6 +64,8 @@ struct Stage {
     disturbance: Disturbance,
     activity: Activity,
     draw_seed: u64,
+    /// Whether it counts in `fuzzing_time()`.
+    timed: bool,
     counters: Counters,
     first_touch: Option<SimTime>,
     last_touch: Option<SimTime>,
@@ -100,6 +102,7 @@ impl<'a> Relay<'a> {
                 disturbance: Disturbance::new(operation, choice)?,
                 activity: Activity::new(choice.activation, operation.within),
                 draw_seed: choice.draw_seed,
+                timed: operation.timed,
                 counters: Counters::default(),
                 first_touch: None,
                 last_touch: None,
@@ -152,7 +155,9 @@ impl<'a> Relay<'a> {
                 last_touch: stage.last_touch.map(SimTime::seconds),
             })
             .collect();
-        let (metrics, mut warnings) = self.metrics.finish(&operations);
+        let timed = self.operations.iter().zip(&operations).filter(|(stage, _)| stage.timed);
+        let active: Vec<Span> = timed.flat_map(|(_, operation)| operation.intervals.clone()).collect();
+        let (metrics, mut warnings) = self.metrics.finish(&active);
         if self.overflowed {
             warnings
                 .push(format!("more than {HELD_LIMIT} messages were held back at once; the oldest were let go early"));

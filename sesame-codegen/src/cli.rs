@@ -17,7 +17,8 @@ pub use shell::Shell;
 /// The language as the command needs it.
 #[derive(Debug, Clone, Copy)]
 pub struct Language {
-    /// Checks a space: its name as diagnostics show it, its text, and whether diagnostics are coloured.
+    /// Checks a space: its path, which diagnostics show and imports are relative to, its text, and whether diagnostics
+    /// are coloured.
     pub check: fn(file: &str, text: &str, colour: bool) -> Checked,
     /// The page of a diagnostic's code.
     pub explain: fn(code: &str) -> Option<&'static str>,
@@ -30,10 +31,21 @@ pub struct Checked {
     pub diagnostics: String,
     /// How many of them are errors.
     pub errors: usize,
+    /// How many of them are warnings.
+    pub warnings: usize,
     /// What the space holds, for example `4 campaigns, 9 operations`.
     pub summary: String,
     /// A plan for each campaign; empty when there are errors.
     pub plans: Vec<RunnerPlan>,
+    /// What the space says and no runner uses yet, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// What is an error besides errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Deny {
+    /// Warnings too.
+    Warnings,
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 done, 1 the input has errors or generated files are out of date, 2 wrong usage; \
@@ -61,6 +73,9 @@ enum Command {
     Check {
         /// The `.sesame` file.
         file: PathBuf,
+        /// Exit with 1 if there is anything of this kind.
+        #[arg(long, value_name = "KIND")]
+        deny: Option<Deny>,
     },
     /// Generate the test runners of a space, and stubs for hooks that are not there yet.
     Generate {
@@ -120,7 +135,7 @@ pub fn run(
 ) -> ExitCode {
     let result = match Arguments::parse_from(arguments).command {
         Command::New { folder, runtime } => commands::new(shell, &folder, runtime.as_ref()),
-        Command::Check { file } => commands::check(shell, language, &file).map(|_| ExitCode::SUCCESS),
+        Command::Check { file, deny } => commands::check_only(shell, language, &file, deny),
         Command::Generate { generation, check } => commands::generate(shell, language, &generation, check),
         Command::Run { generation, arguments } => commands::run(shell, language, &generation, &arguments),
         Command::Explain { code } => commands::explain(language, &code),

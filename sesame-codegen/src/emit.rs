@@ -192,6 +192,7 @@ struct SharedReadme {
 #[derive(Serialize)]
 struct ReadmeHook {
     file: String,
+    source: String,
     metric: String,
     line: u32,
     doc: String,
@@ -219,6 +220,7 @@ fn readme_hooks<'a>(hooks: impl Iterator<Item = &'a crate::plan::HookPlan>) -> V
     hooks
         .map(|hook| ReadmeHook {
             file: format!("{}.rs", names::snake(&hook.metric)),
+            source: rust::one_line(&hook.source),
             metric: hook.metric.clone(),
             line: hook.line,
             doc: rust::one_line(hook.doc.lines().next().unwrap_or_default()),

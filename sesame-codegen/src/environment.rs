@@ -192,7 +192,8 @@ pub fn environment(
         };
         options.insert("runtime".to_owned(), text);
     }
-    let space_folder = relative(&runner_folder, home).map_err(|error| vec![error])?;
+    let system = plans.first().map_or_else(|| home.to_owned(), |first| home.join(&first.system_folder));
+    let space_folder = relative(&runner_folder, &system).map_err(|error| vec![error])?;
     Ok(Environment { dependencies, lock, options, space_folder })
 }
 
@@ -246,10 +247,11 @@ fn simulator_dependency(
     plan: &RunnerPlan,
     dependencies: &BTreeMap<String, Value>,
 ) -> Result<Option<(String, Value)>, Error> {
+    let system = home.join(&plan.system_folder);
     let path = match &plan.plan.simulator.transport {
         Transport::InProcess { .. } => simulator_path(&plan.plan.simulator.transport).unwrap_or_default(),
         Transport::Process { program, .. } => {
-            let file = home.join(program);
+            let file = system.join(program);
             if program.contains('/') && !file.is_file() {
                 let (source_file, program) = (plan.plan.source.clone(), program.clone());
                 return Err(Error::NoProgram { source_file, program, file });
@@ -272,7 +274,7 @@ fn simulator_dependency(
             format!("`{name}` is the simulator's crate, which {source} places in `{folder}`: remove one of them");
         return Err(Error::Settings { path: home.join(SETTINGS), problem });
     }
-    let crate_folder = home.join(folder);
+    let crate_folder = system.join(folder);
     let manifest = crate_folder.join("Cargo.toml");
     if !manifest.is_file() {
         let source_file = plan.plan.source.clone();

@@ -1,8 +1,12 @@
 //! The Sesame language, as the command uses it: text → diagnostics, and a plan for each campaign.
 
+use std::io;
+use std::path::Path;
+
 use sesame_dsl::diagnostic::{Severity, page, render};
 use sesame_dsl::model::Space;
 use sesame_dsl::source::SourceMap;
+use sesame_dsl::span::Span;
 
 use crate::cli::{Checked, Language};
 use crate::lower::lower;
@@ -16,19 +20,67 @@ const GENERATOR: &str = concat!("sesamec ", env!("CARGO_PKG_VERSION"));
 fn check(file: &str, text: &str, colour: bool) -> Checked {
     let mut sources = SourceMap::new();
     let root = sources.add(file, text);
+    sesame_dsl::load_imports(&mut sources, root, read);
     let analysis = sesame_dsl::analyse(&sources, root);
-    let errors = analysis.diagnostics.iter().filter(|found| found.severity() == Severity::Error).count();
+    let count = |severity| analysis.diagnostics.iter().filter(|found| found.severity() == severity).count();
+    let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
     let diagnostics = render::human(&analysis.diagnostics, &sources, colour);
     // A plan names the file without its folder: the same space gives the same plan wherever it lies.
     let source = file.rsplit(['/', std::path::MAIN_SEPARATOR]).next().unwrap_or(file);
-    let (summary, plans) = match &analysis.model {
+    let (summary, plans, notes) = match &analysis.model {
         Some(space) => {
             let plans = space.campaigns.iter().map(|(campaign, _)| lower(space, campaign, source, GENERATOR)).collect();
-            (summary(space), plans)
+            (summary(space), plans, not_used(space, &sources))
         }
-        None => (String::new(), Vec::new()),
+        None => (String::new(), Vec::new(), Vec::new()),
     };
-    Checked { diagnostics, errors, summary, plans }
+    Checked { diagnostics, errors, warnings, summary, plans, notes }
+}
+
+/// An imported file, or why there is none.
+fn read(name: &str) -> Result<String, String> {
+    let path = Path::new(name);
+    let metadata = std::fs::metadata(path).map_err(|error| in_words(&error))?;
+    if !metadata.is_file() {
+        return Err("it is not a file".to_owned());
+    }
+    std::fs::read_to_string(path).map_err(|error| in_words(&error))
+}
+
+fn in_words(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "there is no such file".to_owned(),
+        io::ErrorKind::InvalidData => "it is not text in UTF-8".to_owned(),
+        _ => format!("it cannot be read: {error}"),
+    }
+}
+
+/// What a space says and no runner uses yet, with its places.
+fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
+    let at = |span: Span| {
+        let file = space.files.get(&span.file).map_or("", String::as_str);
+        format!("{file}:{}", sources.position(span).line)
+    };
+    let mut notes = Vec::new();
+    if let Some(launch) = &space.surroundings.launch {
+        let place = at(launch.command.span);
+        notes.push(format!("`launch` ({place}) is not used by runners yet: they start the simulator themselves"));
+    }
+    if let Some(terminate) = &space.surroundings.terminate {
+        let place = at(terminate.span);
+        notes.push(format!("`terminate` ({place}) is not used by runners yet: they end the simulator themselves"));
+    }
+    if let Some(budget) = &space.surroundings.relay_budget {
+        let place = at(budget.span);
+        notes.push(format!("`relay budget` ({place}) is not used by runners yet: in lock-step a relay adds no delay"));
+    }
+    let monitors = space.eddis.values().map(|eddi| ("monitor", &eddi.declaration));
+    let labs = space.physicals.values().map(|lab| ("lab", &lab.declaration));
+    notes.extend(monitors.chain(labs).map(|(what, declaration)| {
+        let place = at(declaration.span);
+        format!("{what} `{}` ({place}) is checked, but not used by runners yet", declaration.name)
+    }));
+    notes
 }
 
 /// What a space holds, for example `4 campaigns, 9 operations, 6 metrics, 2 requirements`.
@@ -56,6 +108,48 @@ mod tests {
         assert_eq!(checked.summary, "1 campaign, 2 operations, 2 metrics, 1 requirement");
         assert_eq!(checked.plans[0].plan.source, "demo.sesame");
         assert_eq!(checked.plans[0].hooks[0].metric, "close_calls");
+    }
+
+    #[test]
+    fn imports_are_read_beside_the_file_that_imports_and_named_as_seen_from_the_space() {
+        let folder = tempfile::tempdir().unwrap();
+        let spaces = folder.path().join("spaces");
+        std::fs::create_dir_all(&spaces).unwrap();
+        let cell = "system {\n  simulator sim = in_process \"cell_sim::Cell\" { crate \"simulator\"  step 20ms }\n\
+                    topic a = \"a\" : int }\nmetric hits maximise default 0 { hook on a }\n\
+                    operation cut on a = blackhole\n";
+        std::fs::write(folder.path().join("cell.sesame"), cell).unwrap();
+        let demo = "space demo import \"../cell.sesame\" campaign c { objectives hits  operations cut 1 per test\n\
+                    search random { evaluations 3 }  end after 3s }";
+        let file = spaces.join("demo.sesame");
+        let checked = check(file.to_str().unwrap(), demo, false);
+        assert_eq!(checked.diagnostics, "");
+        let runner = &checked.plans[0];
+        assert_eq!((runner.hooks[0].source.as_str(), runner.hooks[0].line), ("../cell.sesame", 4));
+        assert_eq!(runner.system_folder, "..", "the simulator's crate is beside the file that names it");
+        assert_eq!(runner.plan.source, "demo.sesame");
+        let missing = check(file.to_str().unwrap(), "space demo import \"..\" import \"gone.sesame\"", false);
+        assert!(missing.diagnostics.contains("it is not a file"), "{}", missing.diagnostics);
+        assert!(missing.diagnostics.contains("there is no such file"), "{}", missing.diagnostics);
+    }
+
+    #[test]
+    fn what_no_runner_uses_yet_is_said_with_its_place() {
+        let text = include_str!("../../sesame-dsl/tests/good/blocks.sesame");
+        let checked = check("spaces/blocks.sesame", text, false);
+        assert_eq!(checked.diagnostics, "");
+        assert_eq!(
+            checked.notes,
+            [
+                "`launch` (blocks.sesame:6) is not used by runners yet: they start the simulator themselves",
+                "`terminate` (blocks.sesame:6) is not used by runners yet: they end the simulator themselves",
+                "`relay budget` (blocks.sesame:7) is not used by runners yet: in lock-step a relay adds no delay",
+                "monitor `transport` (blocks.sesame:32) is checked, but not used by runners yet",
+                "monitor `conveyor` (blocks.sesame:41) is checked, but not used by runners yet",
+                "lab `lab` (blocks.sesame:47) is checked, but not used by runners yet",
+                "lab `by_hand` (blocks.sesame:63) is checked, but not used by runners yet",
+            ]
+        );
     }
 
     #[test]

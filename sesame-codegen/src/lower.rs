@@ -4,10 +4,12 @@
 //! What a campaign's plan holds:
 //! - messages, topics, nodes and requirements of the whole space;
 //! - operations: those its tests may hold, or those of the test it repeats;
-//! - known tests: those whose operations are all in the plan and begin before the campaign's end;
+//! - known tests: one without operations for a campaign that only observes; else those whose operations are all in the plan and begin before the campaign's end;
 //! - metrics: its objectives, those it observes, and those of all requirements and of the expectations of these tests.
 
 mod formula;
+
+use std::path::Path;
 
 use sesame_dsl::model::{self, CampaignId, Id as _, Space};
 use sesame_dsl::units::Unit;
@@ -46,10 +48,22 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             .iter()
             .map(|&id| operation(&space.operations[id], declared.end_after))
             .collect(),
-        tests: selection.tests.iter().map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect(),
+        tests: match declared.search {
+            model::Search::Passive { .. } => vec![undisturbed()],
+            _ => {
+                let tests = selection.tests.iter();
+                tests.map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect()
+            }
+        },
         campaign: selection.campaign(space, declared),
     };
-    RunnerPlan { plan, hooks: hooks(space), simulator_crate }
+    RunnerPlan { plan, hooks: hooks(space), simulator_crate, system_folder: system_folder(space) }
+}
+
+/// The folder of the file that declares the simulator, as seen from that of the space.
+fn system_folder(space: &Space) -> String {
+    let file = Path::new(space.file_of(&space.simulator.declaration));
+    file.parent().map(|folder| folder.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
 /// The parts of a space that are in a campaign's plan, in declaration order: a position here is the id there.
@@ -66,6 +80,7 @@ impl Selection {
             model::Search::Repeat { test, .. } => {
                 space.tests[*test].operations.iter().map(|operation| operation.operation).collect()
             }
+            model::Search::Passive { .. } => Vec::new(),
         };
         operations.sort();
         operations.dedup();
@@ -73,6 +88,7 @@ impl Selection {
             test.operations.iter().all(|it| operations.contains(&it.operation) && it.window.low < campaign.end_after)
         };
         let tests: Vec<model::TestId> = space.tests.iter().filter(|(_, test)| fits(test)).map(|(id, _)| id).collect();
+        // A test holds an operation at least, so a campaign that only observes has none of them.
         let mut metrics: Vec<model::MetricId> = campaign.objectives.clone();
         metrics.extend(&campaign.observed);
         metrics.extend(space.requirements.values().map(|requirement| requirement.metric));
@@ -144,6 +160,11 @@ impl Selection {
                     plan::Count { min: held, max: held },
                 )
             }
+            model::Search::Passive { times } => (
+                plan::Search::Repeat { test: plan::KnownTestId(0), times: *times },
+                &self.operations,
+                plan::Count { min: 0, max: 0 },
+            ),
         };
         plan::Campaign {
             name: campaign.declaration.name.clone(),
@@ -160,6 +181,16 @@ impl Selection {
     }
 }
 
+/// The test of a campaign that only observes: nothing is intercepted.
+fn undisturbed() -> plan::KnownTest {
+    plan::KnownTest {
+        name: "undisturbed".to_owned(),
+        doc: String::new(),
+        test: plan::Test { operations: Vec::new() },
+        expectations: Vec::new(),
+    }
+}
+
 /// The position of a selected item. The selection holds everything that is asked for, by its construction.
 fn position<I: Copy + Eq>(selected: &[I], id: I) -> u32 {
     let position = selected.iter().position(|&selected| selected == id).expect("the plan holds what its parts mention");
@@ -173,6 +204,7 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
             doc: metric.declaration.doc.clone(),
             unit: unit(metric.unit.as_ref()),
             direction: metric.direction.map(direction),
+            source: space.file_of(&metric.declaration).to_owned(),
             line: metric.declaration.line,
             inputs: topics.iter().map(|&id| topic_id(id)).collect(),
         }),
@@ -287,6 +319,7 @@ fn operation(operation: &model::Operation, end_after: f64) -> plan::Operation {
         within: within(operation, end_after),
         priority: operation.priority,
         inclusion: operation.inclusion,
+        timed: operation.timed,
     }
 }
 
@@ -377,7 +410,8 @@ mod tests {
 
     #[test]
     fn a_search_has_the_parts_it_needs_and_all_hooks() {
-        let RunnerPlan { plan, hooks, simulator_crate } = lowered("look");
+        let RunnerPlan { plan, hooks, simulator_crate, system_folder } = lowered("look");
+        assert_eq!(system_folder, "");
         let names: Vec<&str> = plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
         assert_eq!(names, ["collisions", "time"]);
         assert_eq!(plan.campaign.objectives, [plan::MetricId(1), plan::MetricId(0)]);

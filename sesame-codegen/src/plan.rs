@@ -13,10 +13,13 @@ pub struct RunnerPlan {
     /// Every hook metric of the space in declaration order, measured by this campaign or not: the traits of all are
     /// generated, so that a hook file shared by several campaigns compiles in each of them.
     pub hooks: Vec<HookPlan>,
-    /// Folder of the simulator's crate as the `.sesame` file has it (`crate "simulator"`), relative to that file.
+    /// Folder of the simulator's crate as the `.sesame` file has it (`crate "simulator"`), relative to the file that declares it.
     /// `None` when the file names none: the crate of an in-process simulator then comes from `[dependencies]` in
     /// `sesame.toml`.
     pub simulator_crate: Option<String>,
+    /// Folder of the file that declares the system, as seen from that of the space; empty where they are one. The
+    /// simulator's crate or program is relative to it.
+    pub system_folder: String,
 }
 
 /// A metric that the user writes in Rust.
@@ -30,6 +33,8 @@ pub struct HookPlan {
     pub unit: Option<String>,
     /// Which end of it is of interest.
     pub direction: Option<Direction>,
+    /// The file of its declaration, as seen from the folder of the space's own.
+    pub source: String,
     /// Line of its declaration, from 1.
     pub line: u32,
     /// Its inputs in declaration order: positions in [`CampaignPlan::topics`], each at most once.

@@ -66,7 +66,7 @@ pub(crate) fn normal(path: &Path) -> String {
 pub(crate) struct Merged {
     /// Their declarations: those of imported files stand before those of the files that import them.
     pub(crate) file: ast::File,
-    /// Their names as seen from the folder of the first; an absolute one without its folder.
+    /// Their names as seen from the folder of the first.
     pub(crate) names: BTreeMap<FileId, String>,
     /// Their places in the order of declarations.
     pub(crate) ranks: BTreeMap<FileId, usize>,
@@ -134,12 +134,7 @@ impl Merger<'_> {
             self.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, import.span, title).label("too deep"));
             return false;
         }
-        let seen_from_root = if Path::new(&import.text).is_absolute() {
-            Path::new(&import.text).file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
-        } else {
-            imported_name(importing_name, &import.text)
-        };
-        self.visit(id, seen_from_root);
+        self.visit(id, imported_name(importing_name, &import.text));
         true
     }
 

@@ -10,6 +10,7 @@ const SAMPLES: &[&str] = &[
     include_str!("good/kuka_cell.sesame"),
     include_str!("bad/ten_mistakes.sesame"),
     include_str!("bad/e0104_later_constructs.sesame"),
+    include_str!("good/blocks.sesame"),
 ];
 
 /// Pieces that mean something somewhere.
@@ -49,6 +50,11 @@ const PIECES: &[&str] = &[
     "to",
     "within",
     "search",
+    "import \"a.sesame\"",
+    "eddi a publishes b {",
+    "from eddi",
+    "physical lab {",
+    "passive 3 times",
     "seed",
     "end after",
     "when",

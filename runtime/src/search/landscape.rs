@@ -87,6 +87,7 @@ impl Landscape {
             within: Span { start: 0.0, end: 65.0 },
             priority: 0,
             inclusion: 1.0,
+            timed: true,
         };
         let metric = |name: &str, direction| Metric {
             name: name.to_owned(),

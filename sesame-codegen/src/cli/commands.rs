@@ -7,7 +7,7 @@ use std::process::{Command, ExitCode};
 use anyhow::{Context as _, anyhow, bail};
 
 use super::shell::{self, Shell};
-use super::{Checked, Generation, Language, build};
+use super::{Checked, Deny, Generation, Language, build};
 use crate::environment::{RuntimeChoice, environment};
 use crate::files::{Owner, Tree};
 use crate::output::{self, Change, Mode, Orphan, Report};
@@ -34,6 +34,21 @@ pub(super) fn new(shell: Shell, folder: &Path, runtime: Option<&RuntimeChoice>) 
 }
 
 /// `sesamec check`
+pub(super) fn check_only(
+    shell: Shell,
+    language: &Language,
+    file: &Path,
+    deny: Option<Deny>,
+) -> anyhow::Result<ExitCode> {
+    let checked = check(shell, language, file)?;
+    match (deny, checked.warnings) {
+        (None, _) | (Some(Deny::Warnings), 0) => Ok(ExitCode::SUCCESS),
+        (Some(Deny::Warnings), 1) => bail!("{} has a warning, which `--deny warnings` refuses", file.display()),
+        (Some(Deny::Warnings), n) => bail!("{} has {n} warnings, which `--deny warnings` refuses", file.display()),
+    }
+}
+
+/// Reads and checks a space, and says what is wrong with it.
 pub(super) fn check(shell: Shell, language: &Language, file: &Path) -> anyhow::Result<Checked> {
     let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
     let checked = (language.check)(&file.display().to_string(), &text, shell.colour());
@@ -168,6 +183,9 @@ fn write(
     let trees: Vec<Tree> = std::iter::once(shared).chain(chosen.iter().map(|&at| &runners[at])).cloned().collect();
     let report = output::apply(&out, &trees, mode)?;
     tell(shell, &out, &trees, &report, mode);
+    for note in &checked.notes {
+        shell.note(note);
+    }
     Ok((out, report))
 }
 

@@ -47,6 +47,11 @@ impl Shell {
         self.line(&format!("{} {what}", self.painted("1;33", "warning:")));
     }
 
+    /// Something that is good to know and needs nothing done.
+    pub(super) fn note(self, what: impl Display) {
+        self.line(&format!("{} {what}", self.painted("1;36", "note:")));
+    }
+
     /// What went wrong, with its causes.
     pub(super) fn failure(self, failure: &anyhow::Error) {
         for error in format!("{failure:#}").split('\u{1e}') {

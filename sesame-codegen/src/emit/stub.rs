@@ -67,7 +67,7 @@ pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -
         doc: hook.doc.lines().map(one_line).collect(),
         metric: hook.metric.clone(),
         space: runner.plan.space.clone(),
-        source: one_line(&runner.plan.source),
+        source: one_line(&hook.source),
         line: hook.line,
         meaning: metrics::meaning(hook).as_deref().map(one_line),
         imports,

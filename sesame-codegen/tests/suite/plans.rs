@@ -25,6 +25,7 @@ pub(crate) fn hook(metric: &str, line: u32, inputs: &[u32]) -> HookPlan {
         doc: String::new(),
         unit: None,
         direction: None,
+        source: "kuka_cell.sesame".into(),
         line,
         inputs: inputs.iter().map(|&input| TopicId(input)).collect(),
     }
@@ -109,6 +110,7 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
             HookPlan { unit: Some("m/s".into()), direction: Some(Direction::Maximise), ..hook("top_speed", 35, &[2]) },
         ],
         simulator_crate: Some("simulator".into()),
+        system_folder: String::new(),
     };
     measured(&mut runner, "collision_occurrence");
     runner

@@ -455,7 +455,6 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::formula_outbound => "`outbound`",
         Rule::fuzzing_time => "`fuzzing_time()`",
         Rule::minus
-        | Rule::k_when
         | Rule::k_condition
         | Rule::k_coverage
         | Rule::k_boost
