@@ -390,7 +390,7 @@ mod tests {
         metric time minimise = fuzzing_time()
         requirement R1 "nothing is hit" = collisions <= 0
         operation swing on link = random offset [-18deg, 18deg] within [0s, 1min]
-        operation lose on link = packet loss [0%, 50%]
+        operation lose on link = packet loss [0%, 50%] untimed
         operation recount on count = random absolute [-3, 3] priority 2 inclusion 40%
         operation level on zones.level = random absolute [0m, 1m]
         test early { lose loss 25% from 1s to 30s  expect seen > 3 }
@@ -398,6 +398,7 @@ mod tests {
         campaign look { objectives time, collisions  operations recount, swing 1..3 per test
                         search nsga2 { population 4  evaluations 8 }  end after 10s }
         campaign again { repeat early 3 times { seed 9 }  observes time  end after 10s }
+        campaign watch from again { passive 4 times { seed 2 }  observes seen }
     "#;
 
     fn lowered(campaign: &str) -> RunnerPlan {
@@ -435,6 +436,32 @@ mod tests {
         assert_eq!(plan.tests[0].test.operations[0].parameters, [plan::Choice::Value { value: 0.25 }]);
         let names: Vec<&str> = plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
         assert_eq!(names, ["collisions", "seen", "time"]);
+    }
+
+    #[test]
+    fn a_campaign_that_only_observes_repeats_a_test_without_operations() {
+        let RunnerPlan { plan, hooks, .. } = lowered("watch");
+        assert!(plan.operations.is_empty() && plan.campaign.operations.is_empty());
+        assert_eq!(plan.campaign.search, plan::Search::Repeat { test: plan::KnownTestId(0), times: 4 });
+        assert_eq!((plan.campaign.seed, plan.campaign.end_after), (2, 10.0));
+        let [test] = plan.tests.as_slice() else { panic!("{:?}", plan.tests) };
+        assert_eq!((test.name.as_str(), test.test.operations.len()), ("undisturbed", 0));
+        let names: Vec<&str> = plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
+        assert_eq!(names, ["collisions", "seen"]);
+        assert_eq!(hooks.len(), 2);
+    }
+
+    #[test]
+    fn an_operation_says_if_it_counts_in_the_fuzzing_time() {
+        assert!(lowered("look").plan.operations.iter().all(|operation| operation.timed));
+        let plan = lowered("again").plan;
+        assert!(!plan.operations[0].timed);
+        let json = serde_json::to_string(&plan.operations[0]).unwrap();
+        let read: plan::Operation = serde_json::from_str(&json).unwrap();
+        assert_eq!(read, plan.operations[0]);
+        let before = json.replace(",\"timed\":false", "");
+        assert_ne!(before, json);
+        assert!(serde_json::from_str::<plan::Operation>(&before).unwrap().timed, "as older plans meant it");
     }
 
     #[test]

@@ -155,6 +155,7 @@ pub(crate) mod tests {
                 within: Span { start, end: end + 0.01 },
                 priority: 0,
                 inclusion,
+                timed: true,
             },
         );
         (proptest::collection::vec(operation, 1..6), 1u32..4, 0u32..6, 0.5..120.0f64).prop_map(
