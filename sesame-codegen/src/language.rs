@@ -147,7 +147,7 @@ mod tests {
                 "monitor `transport` (blocks.sesame:32) is checked, but not used by runners yet",
                 "monitor `conveyor` (blocks.sesame:41) is checked, but not used by runners yet",
                 "lab `lab` (blocks.sesame:47) is checked, but not used by runners yet",
-                "lab `by_hand` (blocks.sesame:63) is checked, but not used by runners yet",
+                "lab `by_hand` (blocks.sesame:62) is checked, but not used by runners yet",
             ]
         );
     }

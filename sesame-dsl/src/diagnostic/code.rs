@@ -82,7 +82,7 @@ codes! {
     AFTER_THE_END = "E0405": "A window begins when the campaign is already over.",
     NO_DIRECTION = "E0501": "An objective has no direction.",
     BAD_COUNT = "E0502": "A count of operations, tests or repetitions makes no sense.",
-    SEARCH_OR_REPEAT = "E0503": "A campaign both searches and repeats, or does neither.",
+    SEARCH_OR_REPEAT = "E0503": "A campaign does two of search, repeat and observe, or none.",
     BAD_MONITOR = "E0601": "A monitor's guarantees are not in order.",
     BAD_LAB = "E0602": "A setting does not fit the lab's transport.",
     OUTLASTS_THE_END = "W0001": "A window goes on after the campaign's end.",
