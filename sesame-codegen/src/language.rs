@@ -111,6 +111,18 @@ mod tests {
     }
 
     #[test]
+    fn the_examples_deserve_no_warning() {
+        let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");
+        for name in ["kuka_cell", "two_robots"] {
+            let file = examples.join(name).join(format!("{name}.sesame"));
+            let text = std::fs::read_to_string(&file).unwrap();
+            let checked = check(file.to_str().unwrap(), &text, false);
+            assert_eq!((checked.diagnostics.as_str(), checked.warnings), ("", 0));
+            assert!(checked.notes.is_empty(), "{:?}", checked.notes);
+        }
+    }
+
+    #[test]
     fn imports_are_read_beside_the_file_that_imports_and_named_as_seen_from_the_space() {
         let folder = tempfile::tempdir().unwrap();
         let spaces = folder.path().join("spaces");

@@ -48,12 +48,11 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             .iter()
             .map(|&id| operation(&space.operations[id], declared.end_after))
             .collect(),
-        tests: match declared.search {
-            model::Search::Passive { .. } => vec![undisturbed()],
-            _ => {
-                let tests = selection.tests.iter();
-                tests.map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect()
-            }
+        tests: if let model::Search::Passive { .. } = declared.search {
+            vec![undisturbed()]
+        } else {
+            let tests = selection.tests.iter();
+            tests.map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect()
         },
         campaign: selection.campaign(space, declared),
     };

@@ -50,12 +50,11 @@ pub(crate) fn normal(path: &Path) -> String {
     let mut parts: Vec<Component<'_>> = Vec::new();
     for part in path.components() {
         match (part, parts.last()) {
-            (Component::CurDir, _) => {}
             (Component::ParentDir, Some(Component::Normal(_))) => {
                 parts.pop();
             }
             // Nothing is above the root.
-            (Component::ParentDir, Some(Component::RootDir)) => {}
+            (Component::CurDir, _) | (Component::ParentDir, Some(Component::RootDir)) => {}
             _ => parts.push(part),
         }
     }

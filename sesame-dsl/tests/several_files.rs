@@ -135,7 +135,7 @@ fn a_long_chain_of_imports_is_refused_and_not_followed_for_ever() {
 fn campaign(more: &str, name: &str) -> (Space, sesame_dsl::model::Campaign) {
     let main = format!("{MAIN}{more}");
     let space = space(&[("demo.sesame", &main), ("shared/cell.sesame", CELL)]);
-    let id = space.campaign(name).unwrap();
+    let id = space.campaign(name).expect("the text declares it");
     let campaign = space.campaigns[id].clone();
     (space, campaign)
 }

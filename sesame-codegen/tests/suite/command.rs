@@ -12,7 +12,8 @@ fn check(file: &str, text: &str, _colour: bool) -> Checked {
     if text.contains("mistake") {
         return Checked { diagnostics: format!("error: {file}"), errors: 1, ..Checked::default() };
     }
-    Checked { summary: "2 campaigns".into(), plans: vec![small("day"), small("night")], ..Checked::default() }
+    let warnings = usize::from(text.contains("doubtful"));
+    Checked { warnings, summary: "2 campaigns".into(), plans: vec![small("day"), small("night")], ..Checked::default() }
 }
 
 const LANGUAGE: Language = Language { check, explain: |code| (code == "E0203").then_some("# E0203") };
@@ -68,6 +69,16 @@ fn a_space_with_mistakes_generates_nothing() {
     assert!(!sesamec(&["check", &file]));
     assert!(!sesamec(&["generate", &file]));
     assert!(!folder.path().join("runners").exists());
+}
+
+#[test]
+fn warnings_are_refused_on_demand_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = project(folder.path(), "doubtful");
+    assert!(sesamec(&["check", &file]));
+    assert!(!sesamec(&["check", "--deny", "warnings", &file]));
+    let file = project(folder.path(), "fine");
+    assert!(sesamec(&["check", &file, "--deny", "warnings"]));
 }
 
 #[test]

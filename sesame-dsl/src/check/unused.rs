@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::eddi::Gate;
-use crate::model::{MetricId, MetricSource, OperationId, Search, Space, TopicId};
+use crate::model::{MetricId, MetricSource, Operation, OperationId, Search, Space, TopicId};
 use crate::span::FileId;
 
 /// Operations of the file itself that no campaign and no known test uses.
@@ -83,7 +83,7 @@ fn used_topics(space: &Space) -> BTreeSet<TopicId> {
         used.extend(&node.publishes);
         used.extend(&node.subscribes);
     }
-    used.extend(space.operations.values().map(|operation| operation.topic()));
+    used.extend(space.operations.values().map(Operation::topic));
     for metric in space.metrics.values() {
         match &metric.source {
             MetricSource::FuzzingTime => {}

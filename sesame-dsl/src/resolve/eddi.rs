@@ -37,15 +37,10 @@ impl<'a> Resolver<'a> {
         let demands: Vec<_> = eddi.demands.iter().map(|demand| self.demand(demand)).collect();
         let evidence: Vec<_> = eddi.evidence.iter().map(|evidence| self.evidence(evidence)).collect();
         let mut guarantees = self.guarantees(eddi, &members);
-        let otherwise = match self.single(&eddi.otherwise, "otherwise") {
-            Some(otherwise) => self.otherwise(otherwise),
-            None => {
-                if !eddi.damaged {
-                    self.missing(name, "what holds when no guarantee does", "otherwise not_safe");
-                }
-                None
-            }
-        };
+        if eddi.otherwise.is_empty() && !eddi.damaged {
+            self.missing(name, "what holds when no guarantee does", "otherwise not_safe");
+        }
+        let otherwise = self.single(&eddi.otherwise, "otherwise").and_then(|otherwise| self.otherwise(otherwise));
         if eddi.guarantees.is_empty() && !eddi.damaged {
             self.missing(name, "a guarantee", "guarantee safe  integrity 1 = brakes_ok");
             return None;
@@ -256,9 +251,9 @@ impl<'a> Resolver<'a> {
         members: &Members<'a>,
         expression: &'a ast::Expression,
     ) -> Option<Gate> {
-        let (parts, join): (&[ast::Expression], fn(Vec<Gate>) -> Gate) = match &expression.kind {
-            ExpressionKind::All(parts) => (parts, Gate::All),
-            ExpressionKind::Any(parts) => (parts, Gate::Any),
+        let (parts, all) = match &expression.kind {
+            ExpressionKind::All(parts) => (parts, true),
+            ExpressionKind::Any(parts) => (parts, false),
             ExpressionKind::Field(path) if path.fields.is_empty() => {
                 return self.gate_member(eddi, members, &path.topic);
             }
@@ -270,7 +265,8 @@ impl<'a> Resolver<'a> {
             }
         };
         let parts: Vec<Option<Gate>> = parts.iter().map(|part| self.gate(eddi, members, part)).collect();
-        parts.into_iter().collect::<Option<Vec<Gate>>>().map(join)
+        let parts = parts.into_iter().collect::<Option<Vec<Gate>>>()?;
+        Some(if all { Gate::All(parts) } else { Gate::Any(parts) })
     }
 
     fn gate_member(&mut self, eddi: &'a written::Eddi, members: &Members<'a>, name: &Name) -> Option<Gate> {

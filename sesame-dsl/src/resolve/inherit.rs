@@ -77,7 +77,7 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
     }
     let searches = !child.searches.is_empty();
     // What the base lacks was said of it.
-    child.damaged |= base.damaged || !own || searches == !base.searches.is_empty();
+    child.damaged |= base.damaged || !own || searches != base.searches.is_empty();
     if child.observes.is_empty() {
         child.observes.clone_from(&base.observes);
     }

@@ -23,16 +23,23 @@ enum Takes {
     Text,
 }
 
-/// The settings of each transport, and how many texts it takes: at least, at most.
-const TRANSPORTS: [(&str, usize, usize, &[(&str, Takes)]); 8] = [
-    ("in_process", 1, 1, &[("crate", Takes::Text), ("step", Takes::Time)]),
-    ("process", 1, usize::MAX, &[("step", Takes::Time)]),
-    ("ros2", 0, 0, &[("domain", Takes::Count), ("types", Takes::Text)]),
-    ("ros1", 1, 1, &[]),
-    ("rosbridge", 1, 1, &[("clock", Takes::Text)]),
-    ("simlog", 1, 1, &[("step", Takes::Time), ("lockstep", Takes::Nothing)]),
-    ("zenoh", 0, 1, &[]),
-    ("grpc", 1, 1, &[]),
+/// What a transport is told.
+struct LabTransport {
+    word: &'static str,
+    /// How many texts it takes: at least, at most.
+    texts: (usize, usize),
+    settings: &'static [(&'static str, Takes)],
+}
+
+const TRANSPORTS: [LabTransport; 8] = [
+    LabTransport { word: "in_process", texts: (1, 1), settings: &[("crate", Takes::Text), ("step", Takes::Time)] },
+    LabTransport { word: "process", texts: (1, usize::MAX), settings: &[("step", Takes::Time)] },
+    LabTransport { word: "ros2", texts: (0, 0), settings: &[("domain", Takes::Count), ("types", Takes::Text)] },
+    LabTransport { word: "ros1", texts: (1, 1), settings: &[] },
+    LabTransport { word: "rosbridge", texts: (1, 1), settings: &[("clock", Takes::Text)] },
+    LabTransport { word: "simlog", texts: (1, 1), settings: &[("step", Takes::Time), ("lockstep", Takes::Nothing)] },
+    LabTransport { word: "zenoh", texts: (0, 1), settings: &[] },
+    LabTransport { word: "grpc", texts: (1, 1), settings: &[] },
 ];
 
 impl<'a> Resolver<'a> {
@@ -110,8 +117,10 @@ impl<'a> Resolver<'a> {
 
     fn lab_simulator(&mut self, simulator: &'a written::LabSimulator) -> Option<LabSimulator> {
         let transport = &simulator.transport;
-        let (word, least, most, known) =
-            *TRANSPORTS.iter().find(|(word, ..)| *word == transport.text).expect("the grammar has these transports");
+        let LabTransport { word, texts: (least, most), settings: known } = TRANSPORTS
+            .into_iter()
+            .find(|known| known.word == transport.text)
+            .expect("the grammar has these transports");
         let mut complete = true;
         let given = simulator.arguments.len();
         if given < least || given > most {

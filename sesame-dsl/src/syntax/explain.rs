@@ -187,7 +187,7 @@ impl Place {
             Place::System => &["simulator", "message", "topic", "node", "launch", "terminate", "relay"],
             Place::Simulator => &["crate", "step"],
             Place::Process => &["step"],
-            Place::Message => &[],
+            Place::Message | Place::Lab => &[],
             Place::Node => &["publishes", "subscribes"],
             Place::Hook => &["hook"],
             Place::Test => &["expect"],
@@ -202,7 +202,6 @@ impl Place {
             Place::Physical => {
                 &["simulator", "repeats", "cost", "exclude", "rank", "budget", "tolerance", "interlock", "shape", "fit"]
             }
-            Place::Lab => &[],
         }
     }
 }
@@ -402,13 +401,12 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::above => "`>`",
         Rule::bound_within => "`in`",
         Rule::parameter_name | Rule::choice => "a parameter such as `offset`, `value`, `loss` or `delay`",
-        Rule::window | Rule::test_window => "`from`",
+        Rule::window | Rule::test_window | Rule::from_nodes | Rule::campaign_from => "`from`",
         Rule::draw_seed | Rule::setting_seed => "`seed`",
         Rule::within => "`within`",
         Rule::priority => "`priority`",
         Rule::inclusion => "`inclusion`",
         Rule::untimed => "`untimed`",
-        Rule::from_nodes | Rule::campaign_from => "`from`",
         Rule::to_nodes => "`to`",
         Rule::held => "`held`",
         Rule::stale => "`stale after`",
