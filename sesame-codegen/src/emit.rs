@@ -398,7 +398,7 @@ fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> Str
             }
         },
     );
-    let place = format!("simulator `{}` in {}", plan.simulator.name, plan.source);
+    let place = format!("simulator `{}` in {}", plan.simulator.name, runner.system_file);
     rust::note_lines(&source, &[("type Simulator =".to_owned(), place)])
 }
 

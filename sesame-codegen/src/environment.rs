@@ -192,7 +192,7 @@ pub fn environment(
         };
         options.insert("runtime".to_owned(), text);
     }
-    let system = plans.first().map_or_else(|| home.to_owned(), |first| home.join(&first.system_folder));
+    let system = plans.first().map_or_else(|| home.to_owned(), |first| home.join(first.system_folder()));
     let space_folder = relative(&runner_folder, &system).map_err(|error| vec![error])?;
     Ok(Environment { dependencies, lock, options, space_folder })
 }
@@ -247,7 +247,7 @@ fn simulator_dependency(
     plan: &RunnerPlan,
     dependencies: &BTreeMap<String, Value>,
 ) -> Result<Option<(String, Value)>, Error> {
-    let system = home.join(&plan.system_folder);
+    let system = home.join(plan.system_folder());
     let path = match &plan.plan.simulator.transport {
         Transport::InProcess { .. } => simulator_path(&plan.plan.simulator.transport).unwrap_or_default(),
         Transport::Process { program, .. } => {

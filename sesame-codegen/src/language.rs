@@ -138,7 +138,7 @@ mod tests {
         assert_eq!(checked.diagnostics, "");
         let runner = &checked.plans[0];
         assert_eq!((runner.hooks[0].source.as_str(), runner.hooks[0].line), ("../cell.sesame", 4));
-        assert_eq!(runner.system_folder, "..", "the simulator's crate is beside the file that names it");
+        assert_eq!(runner.system_folder(), Path::new(".."), "the simulator's crate is beside the file that names it");
         assert_eq!(runner.plan.source, "demo.sesame");
         let missing = check(file.to_str().unwrap(), "space demo import \"..\" import \"gone.sesame\"", false);
         assert!(missing.diagnostics.contains("it is not a file"), "{}", missing.diagnostics);

@@ -9,8 +9,6 @@
 
 mod formula;
 
-use std::path::Path;
-
 use sesame_dsl::model::{self, CampaignId, Id as _, Space};
 use sesame_dsl::units::Unit;
 use sesame_plan as plan;
@@ -31,6 +29,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             (plan::Transport::Process { program, arguments, step_ns: *step_ns }, None)
         }
     };
+    let system_file = space.file_of(&space.simulator.declaration).to_owned();
     let plan = plan::CampaignPlan {
         schema: plan::SCHEMA,
         generator: generator.to_owned(),
@@ -56,13 +55,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
         },
         campaign: selection.campaign(space, declared),
     };
-    RunnerPlan { plan, hooks: hooks(space), simulator_crate, system_folder: system_folder(space) }
-}
-
-/// The folder of the file that declares the simulator, as seen from that of the space.
-fn system_folder(space: &Space) -> String {
-    let file = Path::new(space.file_of(&space.simulator.declaration));
-    file.parent().map(|folder| folder.to_string_lossy().into_owned()).unwrap_or_default()
+    RunnerPlan { plan, hooks: hooks(space), simulator_crate, system_file }
 }
 
 /// The parts of a space that are in a campaign's plan, in declaration order: a position here is the id there.
@@ -410,8 +403,8 @@ mod tests {
 
     #[test]
     fn a_search_has_the_parts_it_needs_and_all_hooks() {
-        let RunnerPlan { plan, hooks, simulator_crate, system_folder } = lowered("look");
-        assert_eq!(system_folder, "");
+        let RunnerPlan { plan, hooks, simulator_crate, system_file } = lowered("look");
+        assert_eq!(system_file, "cell.sesame");
         let names: Vec<&str> = plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
         assert_eq!(names, ["collisions", "time"]);
         assert_eq!(plan.campaign.objectives, [plan::MetricId(1), plan::MetricId(0)]);

@@ -3,6 +3,8 @@
 //! `lower` makes it from the language's model. Everything a runner needs at run time is in the
 //! [`CampaignPlan`]; beside it stands only what decides the generated code.
 
+use std::path::Path;
+
 use sesame_plan::{CampaignPlan, Direction, MetricSource, TopicId};
 
 /// The plan of one runner crate.
@@ -17,9 +19,9 @@ pub struct RunnerPlan {
     /// `None` when the file names none: the crate of an in-process simulator then comes from `[dependencies]` in
     /// `sesame.toml`.
     pub simulator_crate: Option<String>,
-    /// Folder of the file that declares the system, as seen from that of the space; empty where they are one. The
-    /// simulator's crate or program is relative to it.
-    pub system_folder: String,
+    /// The file that declares the simulator, as seen from the folder of the space's own. The simulator's crate or
+    /// program is relative to its folder.
+    pub system_file: String,
 }
 
 /// A metric that the user writes in Rust.
@@ -42,6 +44,11 @@ pub struct HookPlan {
 }
 
 impl RunnerPlan {
+    /// The folder of the file that declares the simulator, as seen from that of the space; empty where they are one.
+    pub fn system_folder(&self) -> &Path {
+        Path::new(&self.system_file).parent().unwrap_or(Path::new(""))
+    }
+
     /// Whether this campaign measures a hook metric, and so needs its hook to be compiled.
     pub fn uses(&self, hook: &HookPlan) -> bool {
         self.plan

@@ -110,7 +110,7 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
             HookPlan { unit: Some("m/s".into()), direction: Some(Direction::Maximise), ..hook("top_speed", 35, &[2]) },
         ],
         simulator_crate: Some("simulator".into()),
-        system_folder: String::new(),
+        system_file: "kuka_cell.sesame".into(),
     };
     measured(&mut runner, "collision_occurrence");
     runner
