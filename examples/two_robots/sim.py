@@ -18,7 +18,7 @@ CLEAR = 1.2  # metres behind the crossing from which on `east` is no concern
 REACTION = 2.6  # seconds that `north` needs to be across
 
 POSES = {"east": "robots/east/pose", "north": "robots/north/pose"}
-CLOSEST, COMPLETED = "crossing/closest", "crossing/completed"
+COMPLETED = "crossing/completed"
 
 
 class Robot:
@@ -46,7 +46,6 @@ class World:
             "north": Robot(-TURN, 0.95 + luck.uniform(-0.02, 0.02)),
         }
         self.heard = None  # the last pose of `east` that reached `north`
-        self.closest = math.inf
 
     def poses(self):
         messages = []
@@ -71,15 +70,8 @@ class World:
         for name, robot in self.robots.items():
             stands = robot.trips == TRIPS or time < robot.trips * TIMETABLE or (name == "north" and self.must_wait(robot))
             robot.drive(0.0 if stands else robot.top_speed, time, step)
-        distance = math.hypot(*(robot.along for robot in self.robots.values()))
-        messages = []
-        if distance < self.closest:
-            self.closest = distance
-            messages.append({"topic": CLOSEST, "value": distance})
         completed = [robot.completed for robot in self.robots.values()]
-        if None not in completed:
-            messages.append({"topic": COMPLETED, "value": max(completed)})
-        return messages
+        return [] if None in completed else [{"topic": COMPLETED, "value": max(completed)}]
 
 
 def answer(what):
@@ -93,14 +85,13 @@ def main():
     while order:
         if "reset" in order:
             world, step = World(order["reset"]["seed"]), order["reset"]["step"]
-            topics = [*POSES.values(), CLOSEST, COMPLETED]
+            topics = [*POSES.values(), COMPLETED]
             order = answer({"ready": {"publishes": topics, "subscribes": list(POSES.values()), "resets": True}})
         else:
             time, late = order["step"]["time"], order["step"]["messages"]
             in_time = answer({"publish": world.poses()})["deliver"]
             messages = world.step(time, step, late + in_time)
-            ended = messages != [] and messages[-1]["topic"] == COMPLETED
-            order = answer({"done": {"messages": messages, "ended": ended}})
+            order = answer({"done": {"messages": messages, "ended": messages != []}})
 
 
 main()

@@ -8,9 +8,11 @@ mod alone;
 mod conduct;
 mod frames;
 mod pool;
+mod traced;
 mod worker;
 
 pub use alone::{AloneSettings, run_alone};
 pub use conduct::{CampaignError, Conducted, Progress, Settings, conduct, patience};
 pub use pool::{Ended, Job, Pool, PoolError, PoolSettings};
+pub use traced::TraceOrder;
 pub use worker::serve;

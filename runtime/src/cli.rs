@@ -9,6 +9,7 @@ mod progress;
 mod recorded;
 mod repeat;
 mod replay;
+mod replay_recording;
 mod report_anew;
 mod run;
 mod work;
@@ -37,7 +38,7 @@ const STOPPED: u8 = 130;
     version,
     args_conflicts_with_subcommands = true,
     after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but not as required (`known`: an expectation is not \
-                  kept; `replay`: the test came out different; `--fail-on-violation`: a requirement or expectation is \
+                  kept; `replay`: the test came out different; `replay-recording`: a metric did; `--fail-on-violation`: a requirement or expectation is \
                   violated); 130 stopped by the user."
 )]
 struct Cli {
@@ -59,6 +60,8 @@ enum Command {
     Repeat(repeat::Options),
     /// Run a recorded test again just as it was and say whether it is the same, bit for bit
     Replay(replay::Options),
+    /// Feed a recording to the campaign's metrics, without a simulator
+    ReplayRecording(replay_recording::Options),
     /// Print a recorded test as a `test` block for the `.sesame` file
     Export(export::Options),
     /// Write the page with pictures anew and print what was found, also of an unfinished run
@@ -153,6 +156,7 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
         Some(Command::Known(options)) => known::known(runner, &plan, &results, &options),
         Some(Command::Repeat(options)) => repeat::repeat(runner, &plan, &results, &options),
         Some(Command::Replay(options)) => replay::replay(runner, &plan, &results, &options),
+        Some(Command::ReplayRecording(options)) => replay_recording::replay_recording(runner, &plan, &options),
         Some(Command::Export(options)) => export::export(&results, &options),
         Some(Command::Report(options)) => report_anew::report_anew(&results, &options),
         Some(Command::List(which)) => list(&results, &which),

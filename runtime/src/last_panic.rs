@@ -1,6 +1,5 @@
 //! The words of the last panic, with its place: `catch_unwind` alone does not tell where it was.
 
-use std::panic;
 use std::sync::Mutex;
 
 static LAST: Mutex<Option<String>> = Mutex::new(None);
@@ -8,7 +7,7 @@ static LAST: Mutex<Option<String>> = Mutex::new(None);
 /// Keeps the words of every panic from now on, and prints them. For a process of our own, such as a worker.
 #[cfg(feature = "campaign")]
 pub(crate) fn listen() {
-    panic::set_hook(Box::new(|panic| {
+    std::panic::set_hook(Box::new(|panic| {
         eprintln!("{panic}");
         if let Ok(mut last) = LAST.lock() {
             *last = Some(panic.to_string());

@@ -7,12 +7,17 @@
 pub mod activation;
 #[cfg(feature = "campaign")]
 pub mod campaign;
+pub mod changed_files;
 #[cfg(feature = "campaign")]
 mod cli;
+pub mod condition;
+mod decimal;
 pub mod evaluate;
 #[cfg(test)]
 mod fixture;
 pub mod fuzz;
+#[cfg(any(feature = "process", feature = "mcap"))]
+mod json;
 mod last_panic;
 pub mod message;
 pub mod metric;
@@ -29,6 +34,8 @@ pub mod search;
 pub mod simulator;
 pub mod stl;
 pub mod time;
+#[cfg(feature = "mcap")]
+pub mod trace;
 pub mod transport;
 pub mod value;
 pub mod wire;

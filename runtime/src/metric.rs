@@ -8,11 +8,14 @@ use crate::value::{Text, Value};
 mod aggregate;
 mod engine;
 mod expression;
+mod held;
 mod probe;
+mod robustness;
 #[cfg(test)]
 mod tests;
 
-pub use engine::{MetricTable, Metrics, MissingHook};
+pub use engine::{MetricError, MetricTable, Metrics};
+pub(crate) use probe::sample;
 pub use probe::unimplemented_hooks;
 
 /// A user's metric hook as the runtime calls it. Generated code implements it around the typed hook trait.

@@ -28,10 +28,11 @@ use crate::observation::{Observation, Outcome};
 pub use difference::{Difference, differences};
 pub use digest::digest;
 pub use error::RecordError;
-pub use folder::{Claim, DATABASE, LOCK, claim_folder, latest_folder};
+pub use folder::{Claim, DATABASE, LOCK, TRACES, claim_folder, latest_folder, trace_file};
 pub use recorder::Recorder;
 pub use repository::{CampaignFacts, Repository};
 pub use schema::SCHEMA;
+#[cfg(feature = "report")]
 pub(crate) use verdict::ends;
 pub use verdict::{Verdict, verdict, violation_spans};
 

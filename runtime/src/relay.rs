@@ -1,22 +1,30 @@
 //! The relay: the man in the middle, for one run of one test.
 //!
 //! Sans-IO. Messages and time go in, deliveries come out; a transport feeds it and carries out what it says. Within one
-//! event the order is: due releases, inbound metrics, activations, operations (the triggering message included), outbound
+//! event the order is: due releases, inbound metrics, conditions, operations (the triggering message included), outbound
 //! metrics, then delivery. A message on a wire that no operation of the test touches is handed on as it came.
+//!
+//! Conditions are weighed once in every event, be it a message or a step of time, and at every edge and release between
+//! two events. So what an outbound metric shows of a message counts from the next event on, and no operation goes on and
+//! off in one event. A test without conditions pays nothing for them.
 
 mod release;
+mod tap;
 
-use sesame_plan::{CampaignPlan, Drain, Span, Test};
+use sesame_plan::{CampaignPlan, Drain, Moment, Span, Test};
 
 use crate::activation::{Activity, Edge};
-use crate::fuzz::{ChoiceError, Disturbance, Draws, Fate};
+use crate::changed_files::ChangedFiles;
+use crate::fuzz::{ChoiceError, Disturbance, Draws, Fate, OperationEntry, RunContext};
 use crate::metric::Metrics;
 use crate::observation::{Counters, OperationEffect};
+use crate::rng::derive_seed;
 use crate::time::SimTime;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
 use release::{Held, ReleaseQueue};
+pub use tap::{Deed, Tap, Touched};
 
 /// A message that is to reach its subscribers now.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,21 +54,31 @@ pub const HELD_LIMIT: usize = 100_000;
 pub struct Relay<'a> {
     wires: &'a WireTable,
     operations: Vec<Stage>,
+    /// Their positions by priority, then declaration.
+    order: Vec<usize>,
     /// Per wire: the stages a message passes, in order, with the wire's position in the operation's topic.
     pipelines: Vec<Vec<(usize, u64)>>,
     /// Per wire: messages published so far.
     published: Vec<u64>,
     queue: ReleaseQueue,
     metrics: Metrics<'a>,
+    /// The operations that conditions switch.
+    conditional: Vec<usize>,
+    /// Those of them that went off in the step at hand; here so that no step has to allocate.
+    ended: Vec<usize>,
+    /// The number of the step: an event, or an edge or release between two.
+    step: u64,
     now: SimTime,
     messages: u64,
     overflowed: bool,
     /// The run is over: nothing is delivered any more.
     over: bool,
+    tap: Option<&'a mut dyn Tap>,
 }
 
 /// One operation of the test.
 struct Stage {
+    name: String,
     disturbance: Disturbance,
     activity: Activity,
     draw_seed: u64,
@@ -89,6 +107,7 @@ impl<'a> Relay<'a> {
         wires: &'a WireTable,
         test: &Test,
         metrics: Metrics<'a>,
+        hooks: &[OperationEntry],
     ) -> Result<Self, ChoiceError> {
         let mut order: Vec<usize> = (0..test.operations.len()).collect();
         order.sort_by_key(|&at| {
@@ -99,8 +118,9 @@ impl<'a> Relay<'a> {
         for choice in &test.operations {
             let operation = plan.operation(choice.operation);
             operations.push(Stage {
-                disturbance: Disturbance::new(operation, choice)?,
-                activity: Activity::new(choice.activation, operation.within),
+                name: operation.name.clone(),
+                disturbance: Disturbance::new(operation, choice, hooks)?,
+                activity: Activity::new(&choice.activation, operation.within),
                 draw_seed: choice.draw_seed,
                 timed: operation.timed,
                 counters: Counters::default(),
@@ -114,12 +134,18 @@ impl<'a> Relay<'a> {
             let topic = wires.topic(wire);
             let member = members[topic.index()];
             members[topic.index()] += 1;
-            let touched = order.iter().filter(|&&at| plan.operation(test.operations[at].operation).topic == topic);
+            let touched =
+                order.iter().filter(|&&at| plan.operation(test.operations[at].operation).topic == Some(topic));
             pipelines[wire.index()].extend(touched.map(|&at| (at, member)));
         }
+        let conditional = (0..operations.len()).filter(|&at| operations[at].activity.is_conditional()).collect();
         Ok(Relay {
             wires,
+            conditional,
+            ended: Vec::with_capacity(operations.len()),
+            step: 0,
             operations,
+            order,
             pipelines,
             published: vec![0; wires.len()],
             queue: ReleaseQueue::new(test.operations.len(), wires.len()),
@@ -128,7 +154,19 @@ impl<'a> Relay<'a> {
             messages: 0,
             overflowed: false,
             over: false,
+            tap: None,
         })
+    }
+
+    /// The same relay, telling this tap what happens.
+    pub fn tapped(self, tap: &'a mut dyn Tap) -> Self {
+        Relay { tap: Some(tap), ..self }
+    }
+
+    fn tell(&mut self, now: SimTime, operation: usize, deed: Deed) {
+        if let Some(tap) = &mut self.tap {
+            tap.operated(now, operation, deed);
+        }
     }
 
     /// Tells the metrics' hooks that the run begins.
@@ -158,6 +196,13 @@ impl<'a> Relay<'a> {
         let timed = self.operations.iter().zip(&operations).filter(|(stage, _)| stage.timed);
         let active: Vec<Span> = timed.flat_map(|(_, operation)| operation.intervals.clone()).collect();
         let (metrics, mut warnings) = self.metrics.finish(&active);
+        for stage in &self.operations {
+            if let Disturbance::Custom(custom) = &stage.disturbance
+                && let Some(mismatch) = &custom.mismatch
+            {
+                warnings.push(format!("operation `{}`: {mismatch}", stage.name));
+            }
+        }
         if self.overflowed {
             warnings
                 .push(format!("more than {HELD_LIMIT} messages were held back at once; the oldest were let go early"));
@@ -166,7 +211,8 @@ impl<'a> Relay<'a> {
     }
 
     /// Carries out, in order of time, every activation edge and every release up to `now`; at one moment edges come
-    /// first, since an operation is active for `start <= t < end`.
+    /// first, since an operation is active for `start <= t < end`. Conditions are weighed at each moment before `now`, for
+    /// which the event at hand does it.
     fn follow_time(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
         loop {
             let release = self.queue.next_release().filter(|&time| time <= now);
@@ -174,10 +220,16 @@ impl<'a> Relay<'a> {
             match (edge.filter(|&time| time <= now), release) {
                 (Some(edge), release) if release.is_none_or(|release| edge <= release) => {
                     self.follow_activities(edge, deliveries);
+                    if edge < now {
+                        self.weigh_conditions(edge, deliveries);
+                    }
                 }
                 (_, Some(release)) => {
                     if let Some(held) = self.queue.pop() {
                         self.pass(release, held, deliveries);
+                    }
+                    if release < now {
+                        self.weigh_conditions(release, deliveries);
                     }
                 }
                 (_, None) => return,
@@ -188,22 +240,56 @@ impl<'a> Relay<'a> {
     /// Carries out the edges at one moment; messages let go by them are let go then.
     fn follow_activities(&mut self, edge: SimTime, deliveries: &mut Vec<Delivery>) {
         for at in 0..self.operations.len() {
-            let stage = &mut self.operations[at];
-            if stage.activity.follow(edge) != Edge::Ended {
-                continue;
+            match self.operations[at].activity.follow(edge, self.step) {
+                Edge::None => {}
+                Edge::Started => self.tell(edge, at, Deed::Started),
+                Edge::Ended => self.end_activity(at, edge, deliveries),
             }
-            let Disturbance::Latency(latency) = &stage.disturbance else { continue };
-            match latency.drain {
-                Drain::Finish => {}
-                Drain::Flush => {
-                    for held in self.queue.take_all(at) {
-                        self.pass(edge, held, deliveries);
-                    }
+        }
+    }
+
+    /// Weighs the conditions of all operations on the same values, and ends the step.
+    fn weigh_conditions(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
+        if self.conditional.is_empty() || self.over {
+            return;
+        }
+        let timed = self.operations.iter().filter(|stage| stage.timed);
+        let active = |sum, stage: &Stage| sum + stage.activity.active_time(now);
+        let active_time = timed.fold(SimTime::ZERO, active).seconds();
+        for next in 0..self.conditional.len() {
+            let at = self.conditional[next];
+            let value = |metric| self.metrics.value(metric, active_time);
+            match self.operations[at].activity.weigh(now, self.step, &value) {
+                Edge::None => {}
+                Edge::Started => self.tell(now, at, Deed::Started),
+                Edge::Ended => self.ended.push(at),
+            }
+        }
+        self.step += 1;
+        for next in 0..self.ended.len() {
+            self.end_activity(self.ended[next], now, deliveries);
+        }
+        self.ended.clear();
+    }
+
+    /// What happens when an operation goes off: it is told, and the messages it holds become what they are to become.
+    fn end_activity(&mut self, at: usize, now: SimTime, deliveries: &mut Vec<Delivery>) {
+        self.tell(now, at, Deed::Ended);
+        let Disturbance::Latency(latency) = &self.operations[at].disturbance else { return };
+        match latency.drain {
+            Drain::Finish => {}
+            Drain::Flush => {
+                for held in self.queue.take_all(at) {
+                    self.pass(now, held, deliveries);
                 }
-                Drain::Drop => {
-                    let lost = self.queue.take_all(at).len() as u64;
-                    stage.counters.delayed -= lost;
-                    stage.counters.dropped += lost;
+            }
+            Drain::Drop => {
+                let lost = self.queue.take_all(at);
+                let counters = &mut self.operations[at].counters;
+                counters.delayed -= lost.len() as u64;
+                counters.dropped += lost.len() as u64;
+                for held in lost {
+                    self.tell(now, at, Deed::Dropped(held.touched()));
                 }
             }
         }
@@ -219,6 +305,9 @@ impl<'a> Relay<'a> {
             if active {
                 stage.counters.seen += 1;
             }
+            if active && matches!(stage.disturbance, Disturbance::Custom(_)) {
+                return self.pass_custom(now, at, member, message, deliveries);
+            }
             let fate = if active {
                 stage.disturbance.apply(Draws::new(stage.draw_seed, member, message.index), &mut message.value)
             } else {
@@ -232,15 +321,19 @@ impl<'a> Relay<'a> {
             if fate == Fate::Dropped {
                 stage.counters.dropped += 1;
                 stage.touch(now);
+                self.tell(now, at, Deed::Dropped(message.touched()));
                 return;
             }
             if fate == Fate::Changed {
                 stage.counters.changed += 1;
                 stage.touch(now);
+                self.tell(now, at, Deed::Changed(message.touched()));
             }
             if release > now {
+                let stage = &mut self.operations[at];
                 stage.counters.delayed += 1;
                 stage.touch(now);
+                self.tell(now, at, Deed::Delayed(message.touched(), release));
                 self.queue.push(release, at, message);
                 if self.queue.len() > HELD_LIMIT {
                     self.overflowed = true;
@@ -253,8 +346,66 @@ impl<'a> Relay<'a> {
         }
         if !self.over {
             self.metrics.delivered(now, message.wire, &message.value);
+            if let Some(tap) = &mut self.tap {
+                tap.delivered(now, message.wire, message.published, &message.value);
+            }
         }
         deliveries.push(Delivery { wire: message.wire, value: message.value });
+    }
+}
+
+/// What the user's code does.
+impl Relay<'_> {
+    /// Calls the custom operations of the test before the start, or those after the end, in priority, then declaration
+    /// order. The error says which could not do what.
+    pub fn beside_run(&mut self, moment: Moment, files: &mut ChangedFiles) -> Result<(), String> {
+        for at in self.order.clone() {
+            let stage = &mut self.operations[at];
+            let Disturbance::Custom(custom) = &mut stage.disturbance else { continue };
+            if custom.moment != moment {
+                continue;
+            }
+            let mut ctx = RunContext::new(files, Draws::new(stage.draw_seed, 0, 0));
+            custom.hook.beside_run(&mut ctx);
+            stage.counters.side_effects += ctx.side_effects;
+            if let Some(failure) = ctx.failure {
+                return Err(format!("operation `{}`: {failure}", stage.name));
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes a message through a custom operation and on, then what the operation made up.
+    fn pass_custom(&mut self, now: SimTime, at: usize, member: u64, mut message: Held, deliveries: &mut Vec<Delivery>) {
+        let stage = &mut self.operations[at];
+        let Disturbance::Custom(custom) = &mut stage.disturbance else {
+            unreachable!("only custom operations come here")
+        };
+        let draws = Draws::new(stage.draw_seed, member, message.index);
+        let call = custom.on_message(now, self.wires.path(message.wire), draws, &mut message.value);
+        stage.counters.injected += call.injected.len() as u64;
+        stage.counters.changed += u64::from(call.changed && !call.dropped);
+        stage.counters.dropped += u64::from(call.dropped);
+        if call.changed || call.dropped || !call.injected.is_empty() {
+            stage.touch(now);
+        }
+        if call.dropped {
+            self.tell(now, at, Deed::Dropped(message.touched()));
+        } else if call.changed {
+            self.tell(now, at, Deed::Changed(message.touched()));
+        }
+        for _ in &call.injected {
+            self.tell(now, at, Deed::Injected(message.touched()));
+        }
+        let Held { wire, published, index, next_stage, .. } = message;
+        if !call.dropped {
+            self.pass(now, message, deliveries);
+        }
+        for (number, value) in (0u64..).zip(call.injected) {
+            // An index of its own, so that later operations draw for it apart from the message it came with.
+            let index = derive_seed(index, "injected", &[at as u64, number]);
+            self.pass(now, Held { wire, published, index, value, next_stage }, deliveries);
+        }
     }
 }
 
@@ -270,17 +421,23 @@ impl Exchange for Relay<'_> {
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
         self.now = self.now.max(now);
         self.follow_time(self.now, deliveries);
+        self.weigh_conditions(self.now, deliveries);
     }
 
     fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>) {
         if now > self.now || self.messages == 0 {
-            self.advance(now, deliveries);
+            self.now = self.now.max(now);
+            self.follow_time(self.now, deliveries);
         }
         self.messages += 1;
         let index = self.published[wire.index()];
         self.published[wire.index()] += 1;
+        if let Some(tap) = &mut self.tap {
+            tap.published(self.now, wire, index, &value);
+        }
         self.metrics.message(self.now, wire, &value);
-        self.pass(self.now, Held { wire, index, value, next_stage: 0 }, deliveries);
+        self.weigh_conditions(self.now, deliveries);
+        self.pass(self.now, Held { wire, published: index, index, value, next_stage: 0 }, deliveries);
     }
 }
 

@@ -10,6 +10,7 @@ mod junit;
 mod markup;
 mod number;
 mod page;
+mod recording;
 mod repetition;
 mod replay;
 mod scatter;
@@ -24,6 +25,7 @@ pub(crate) use export::is_name;
 pub use export::{ExportError, Exported, export};
 pub use junit::{junit, write_junit};
 pub use page::{page, write_page};
+pub use recording::{FedMetric, RecordingReplay, Sameness, recording_text};
 pub use repetition::{Repetition, ViolationRate};
 pub use replay::{Replay, replay_text};
 pub use show::{

@@ -6,6 +6,8 @@
 //!
 //! Objectives are oriented once, in [`fitness`]: from there on smaller is better, in fronts and hypervolumes too.
 
+pub mod choice;
+pub mod condition;
 pub mod crowding;
 pub mod dominance;
 pub mod front;
@@ -26,7 +28,7 @@ mod repeat;
 #[cfg(test)]
 mod landscape;
 
-use sesame_plan::{CampaignPlan, Direction, KnownTestId, Search, Test};
+use sesame_plan::{ActivationMode, CampaignPlan, Direction, KnownTestId, Search, Test};
 
 use crate::observation::{Observation, Outcome};
 
@@ -82,7 +84,11 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
             return Err(SearchError::NoPopulation { campaign: plan.campaign.name.clone() });
         }
         &Search::Nsga2 { population, evaluations } => {
-            let variation = TestVariation::new(Permitted::of(plan)?, vary::Rates::default(), seed);
+            let rates = match plan.campaign.activation {
+                ActivationMode::Time => vary::Rates::default(),
+                ActivationMode::Condition { .. } => vary::Rates::by_condition(),
+            };
+            let variation = TestVariation::new(Permitted::of(plan)?, rates, seed);
             Box::new(Nsga2::new(nsga2::Settings { population, evaluations, seed }, variation))
         }
         &Search::Random { evaluations } => Box::new(Random::new(Permitted::of(plan)?, evaluations, seed)),

@@ -25,7 +25,9 @@
 //! the right, like the signals, so that nothing happens between samples.)
 //!
 //! **Time is dense**, as far as that can be told: simulation time is whole nanoseconds, so all signals jump at whole
-//! nanoseconds, and so do the robustness signals of all subformulas. Nothing is lost by computing on these alone, and
+//! nanoseconds, and so do the robustness signals of all subformulas. For windows that are cut this holds since the last
+//! instant of a trace lasts one nanosecond, as any other does: were the trace to end with the instant itself, a window
+//! that begins there would be empty for all times in between. Nothing is lost by computing on these alone, and
 //! nothing is rounded but the ends of intervals, to the nearest nanosecond.
 //!
 //! The cost is constant per sample and operator, amortised, whatever the window: minima and maxima slide on monotonic

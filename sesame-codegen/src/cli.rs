@@ -95,10 +95,13 @@ enum Command {
         #[arg(last = true, value_name = "RUNNER ARGUMENTS")]
         arguments: Vec<std::ffi::OsString>,
     },
-    /// Explain the code of a diagnostic, for example E0203.
+    /// Explain the code of a diagnostic, for example E0203; or a campaign of a space, with every default written out.
     Explain {
-        /// The code.
-        code: String,
+        /// The code, or the campaign.
+        #[arg(value_name = "CODE or CAMPAIGN")]
+        what: String,
+        /// The `.sesame` file of the campaign.
+        file: Option<PathBuf>,
     },
 }
 
@@ -138,7 +141,8 @@ pub fn run(
         Command::Check { file, deny } => commands::check_only(shell, language, &file, deny),
         Command::Generate { generation, check } => commands::generate(shell, language, &generation, check),
         Command::Run { generation, arguments } => commands::run(shell, language, &generation, &arguments),
-        Command::Explain { code } => commands::explain(language, &code),
+        Command::Explain { what, file: Some(file) } => commands::explain_campaign(shell, language, &what, &file),
+        Command::Explain { what, file: None } => commands::explain_code(language, &what),
     };
     result.unwrap_or_else(|failure| {
         shell.failure(&failure);

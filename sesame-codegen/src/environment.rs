@@ -193,8 +193,9 @@ pub fn environment(
         options.insert("runtime".to_owned(), text);
     }
     let system = plans.first().map_or_else(|| home.to_owned(), |first| home.join(first.system_folder()));
-    let space_folder = relative(&runner_folder, &system).map_err(|error| vec![error])?;
-    Ok(Environment { dependencies, lock, options, space_folder })
+    let space_folder = relative(&runner_folder, home).map_err(|error| vec![error])?;
+    let simulator_folder = relative(&runner_folder, &system).map_err(|error| vec![error])?;
+    Ok(Environment { dependencies, lock, options, space_folder, simulator_folder })
 }
 
 /// The runtime as a dependency of a crate in `folder`, which need not exist yet.

@@ -7,6 +7,7 @@
 pub mod cli;
 pub mod emit;
 pub mod environment;
+pub mod explain;
 pub mod files;
 #[cfg(feature = "cli")]
 pub mod language;

@@ -4,16 +4,20 @@
 //! What a campaign's plan holds:
 //! - messages, topics, nodes and requirements of the whole space;
 //! - operations: those its tests may hold, or those of the test it repeats;
-//! - known tests: one without operations for a campaign that only observes; else those whose operations are all in the plan and begin before the campaign's end;
-//! - metrics: its objectives, those it observes, and those of all requirements and of the expectations of these tests.
+//! - known tests: one without operations for a campaign that only observes; else those whose operations are all in the
+//!   plan and begin before the campaign's end;
+//! - metrics: its objectives, those it observes, its condition variables, and those of all requirements and of the
+//!   conditions and expectations of these tests.
 
+mod condition;
 mod formula;
+mod robustness;
 
 use sesame_dsl::model::{self, CampaignId, Id as _, Space};
 use sesame_dsl::units::Unit;
 use sesame_plan as plan;
 
-use crate::plan::{HookPlan, RunnerPlan};
+use crate::plan::{HookPlan, OperationPlan, RunnerPlan};
 
 /// The plan of a campaign's runner. `source` is the `.sesame` file's name without its folder, `generator` the name and
 /// version of what generates.
@@ -45,7 +49,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
         operations: selection
             .operations
             .iter()
-            .map(|&id| operation(&space.operations[id], declared.end_after))
+            .map(|&id| selection.operation_of(&space.operations[id], declared))
             .collect(),
         tests: if let model::Search::Passive { .. } = declared.search {
             vec![undisturbed()]
@@ -55,7 +59,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
         },
         campaign: selection.campaign(space, declared),
     };
-    RunnerPlan { plan, hooks: hooks(space), simulator_crate, system_file }
+    RunnerPlan { plan, hooks: hooks(space), operations: custom_operations(space), simulator_crate, system_file }
 }
 
 /// The parts of a space that are in a campaign's plan, in declaration order: a position here is the id there.
@@ -76,14 +80,25 @@ impl Selection {
         };
         operations.sort();
         operations.dedup();
+        let begins = |it: &model::TestOperation| match &it.activation {
+            model::Activation::Window(window) => window.low,
+            model::Activation::Offline => 0.0,
+            model::Activation::Condition { .. } => {
+                space.operations[it.operation].within.map_or(0.0, |within| within.low)
+            }
+        };
         let fits = |test: &model::Test| {
-            test.operations.iter().all(|it| operations.contains(&it.operation) && it.window.low < campaign.end_after)
+            test.operations.iter().all(|it| operations.contains(&it.operation) && begins(it) < campaign.end_after)
         };
         let tests: Vec<model::TestId> = space.tests.iter().filter(|(_, test)| fits(test)).map(|(id, _)| id).collect();
         // A test holds an operation at least, so a campaign that only observes has none of them.
         let mut metrics: Vec<model::MetricId> = campaign.objectives.clone();
         metrics.extend(&campaign.observed);
         metrics.extend(space.requirements.values().map(|requirement| requirement.metric));
+        metrics.extend(condition_space(campaign).into_iter().flat_map(|it| &it.variables).map(|it| it.metric));
+        for operation in tests.iter().flat_map(|&test| &space.tests[test].operations) {
+            operation.activation.conditions().for_each(|condition| condition.metrics_into(&mut metrics));
+        }
         let expectations = tests.iter().flat_map(|&test| &space.tests[test].expectations);
         metrics.extend(expectations.map(|expectation| expectation.metric));
         metrics.sort();
@@ -97,6 +112,15 @@ impl Selection {
 
     fn operation(&self, id: model::OperationId) -> plan::OperationId {
         plan::OperationId(position(&self.operations, id))
+    }
+
+    /// An operation, with its constraints where conditions are grown: elsewhere they say nothing.
+    fn operation_of(&self, declared: &model::Operation, campaign: &model::Campaign) -> plan::Operation {
+        let constraints = match condition_space(campaign) {
+            Some(_) => declared.constraints.iter().map(|constraint| self.constraint(constraint)).collect(),
+            None => Vec::new(),
+        };
+        operation(declared, campaign.end_after, constraints)
     }
 
     fn requirement(&self, requirement: &model::Requirement) -> plan::Requirement {
@@ -113,9 +137,8 @@ impl Selection {
             let within = within(&space.operations[it.operation], end_after);
             plan::TestOperation {
                 operation: self.operation(it.operation),
-                // Nothing is active after the end, so a window cut there is the same test.
-                activation: plan::Activation::Time { start: it.window.low, end: it.window.high.min(within.end) },
-                parameters: it.choice.iter().map(choice).collect(),
+                activation: self.activation(&it.activation, within.end),
+                parameters: it.choices.iter().map(choice).collect(),
                 draw_seed: it.draw_seed,
             }
         });
@@ -164,11 +187,18 @@ impl Selection {
             objectives: campaign.objectives.iter().map(|&id| self.metric(id)).collect(),
             operations: operations.iter().map(|&id| self.operation(id)).collect(),
             count,
-            // The language has no other activation yet, and a repeated test brings its own.
-            activation: plan::ActivationMode::Time,
+            activation: match content(campaign) {
+                Some(content) => self.activation_mode(space, &content.activation),
+                // A repeated test brings its own.
+                None => plan::ActivationMode::Time,
+            },
             search,
             seed: campaign.seed,
             end_after: campaign.end_after,
+            record: campaign.record.map(|record| match record {
+                model::Recorded::Failing => plan::Recorded::Failing,
+                model::Recorded::All => plan::Recorded::All,
+            }),
         }
     }
 }
@@ -180,6 +210,22 @@ fn undisturbed() -> plan::KnownTest {
         doc: String::new(),
         test: plan::Test { operations: Vec::new() },
         expectations: Vec::new(),
+    }
+}
+
+/// What the tests of a search hold; `None` for a campaign that repeats.
+fn content(campaign: &model::Campaign) -> Option<&model::Content> {
+    match &campaign.search {
+        model::Search::Nsga2 { content, .. } | model::Search::Random { content, .. } => Some(content),
+        model::Search::Repeat { .. } | model::Search::Passive { .. } => None,
+    }
+}
+
+/// What a campaign grows conditions from, if it does.
+fn condition_space(campaign: &model::Campaign) -> Option<&model::condition::ConditionSpace> {
+    match &content(campaign)?.activation {
+        model::ActivationMode::Time => None,
+        model::ActivationMode::Condition(space) => Some(space),
     }
 }
 
@@ -200,9 +246,57 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
             line: metric.declaration.line,
             inputs: topics.iter().map(|&id| topic_id(id)).collect(),
         }),
-        model::MetricSource::FuzzingTime | model::MetricSource::Last(_) | model::MetricSource::Formula(_) => None,
+        model::MetricSource::FuzzingTime
+        | model::MetricSource::Last(_)
+        | model::MetricSource::Robustness(_)
+        | model::MetricSource::Formula(_) => None,
     });
     hooks.collect()
+}
+
+fn custom_operations(space: &Space) -> Vec<OperationPlan> {
+    let operations = space.operations.values().filter_map(|operation| match &operation.kind {
+        model::OperationKind::Custom { moment: when, parameters } => Some(OperationPlan {
+            operation: operation.declaration.name.clone(),
+            doc: operation.declaration.doc.clone(),
+            source: space.file_of(&operation.declaration).to_owned(),
+            line: operation.declaration.line,
+            topic: operation.topic().map(topic_id),
+            moment: moment(*when),
+            parameters: parameters.iter().map(|it| (parameter(it), it.doc.clone())).collect(),
+        }),
+        _ => None,
+    });
+    operations.collect()
+}
+
+fn moment(moment: model::Moment) -> plan::Moment {
+    match moment {
+        model::Moment::OnMessage => plan::Moment::OnMessage,
+        model::Moment::BeforeStart => plan::Moment::BeforeStart,
+        model::Moment::AfterEnd => plan::Moment::AfterEnd,
+    }
+}
+
+fn parameter(parameter: &model::Parameter) -> plan::Parameter {
+    plan::Parameter {
+        name: parameter.name.clone(),
+        unit: unit(parameter.unit.as_ref()),
+        domain: match &parameter.domain {
+            model::Domain::Number { range, shape, integer } => plan::Domain::Number {
+                low: range.low,
+                high: range.high,
+                shape: match shape {
+                    model::Shape::Value => plan::Shape::Value,
+                    model::Shape::Range => plan::Shape::Range,
+                },
+                integer: *integer,
+            },
+            model::Domain::Point { low, high } => plan::Domain::Point { low: *low, high: *high },
+            model::Domain::Texts(texts) => plan::Domain::Texts { texts: texts.clone() },
+            model::Domain::Files(files) => plan::Domain::Files { files: files.clone() },
+        },
+    }
 }
 
 fn message(message: &model::Message) -> plan::MessageType {
@@ -255,22 +349,30 @@ fn metric(metric: &model::Metric) -> plan::Metric {
         unit: unit(metric.unit.as_ref()),
         direction: metric.direction.map(direction),
         default: metric.default,
+        initial: metric.initial,
         source: match &metric.source {
             model::MetricSource::Hook(topics) => {
                 plan::MetricSource::Hook { topics: topics.iter().map(|&id| topic_id(id)).collect() }
             }
             model::MetricSource::FuzzingTime => plan::MetricSource::FuzzingTime,
             model::MetricSource::Last(input) => plan::MetricSource::Last { input: formula::field(input) },
+            model::MetricSource::Robustness(of) => {
+                plan::MetricSource::Robustness { robustness: robustness::robustness(of) }
+            }
             model::MetricSource::Formula(of) => plan::MetricSource::Formula { formula: formula::formula(of) },
         },
         line: metric.declaration.line,
     }
 }
 
-fn operation(operation: &model::Operation, end_after: f64) -> plan::Operation {
+fn operation(
+    operation: &model::Operation,
+    end_after: f64,
+    constraints: Vec<plan::condition::Constraint>,
+) -> plan::Operation {
     let kind = match &operation.kind {
         model::OperationKind::RandomValue { mode, integer, .. } => plan::OperationKind::RandomValue {
-            path: operation.target.fields.clone(),
+            path: operation.target.as_ref().map_or_else(Vec::new, |target| target.fields.clone()),
             mode: match mode {
                 model::ValueMode::Absolute => plan::ValueMode::Absolute,
                 model::ValueMode::Offset => plan::ValueMode::Offset,
@@ -290,28 +392,19 @@ fn operation(operation: &model::Operation, end_after: f64) -> plan::Operation {
             },
         },
         model::OperationKind::Blackhole => plan::OperationKind::Blackhole,
+        model::OperationKind::Custom { moment: when, .. } => plan::OperationKind::Custom { moment: moment(*when) },
     };
-    let parameters = operation.parameter().into_iter().map(|parameter| plan::Parameter {
-        name: parameter.name.to_owned(),
-        unit: unit(parameter.unit.as_ref()),
-        low: parameter.range.low,
-        high: parameter.range.high,
-        shape: match parameter.shape {
-            model::Shape::Value => plan::Shape::Value,
-            model::Shape::Range => plan::Shape::Range,
-        },
-        integer: parameter.integer,
-    });
     plan::Operation {
         name: operation.declaration.name.clone(),
         doc: operation.declaration.doc.clone(),
-        topic: topic_id(operation.topic()),
+        topic: operation.topic().map(topic_id),
         kind,
-        parameters: parameters.collect(),
+        parameters: operation.parameters().iter().map(parameter).collect(),
         within: within(operation, end_after),
         priority: operation.priority,
         inclusion: operation.inclusion,
         timed: operation.timed,
+        constraints,
     }
 }
 
@@ -324,9 +417,11 @@ fn within(operation: &model::Operation, end_after: f64) -> plan::Span {
 }
 
 fn choice(choice: &model::Choice) -> plan::Choice {
-    match *choice {
-        model::Choice::Value(value) => plan::Choice::Value { value },
+    match choice {
+        model::Choice::Value(value) => plan::Choice::Value { value: *value },
         model::Choice::Range(range) => plan::Choice::Range { low: range.low, high: range.high },
+        model::Choice::Point(point) => plan::Choice::Point { point: *point },
+        model::Choice::Text(text) => plan::Choice::Text { text: text.clone() },
     }
 }
 
@@ -403,7 +498,7 @@ mod tests {
 
     #[test]
     fn a_search_has_the_parts_it_needs_and_all_hooks() {
-        let RunnerPlan { plan, hooks, simulator_crate, system_file } = lowered("look");
+        let RunnerPlan { plan, hooks, simulator_crate, system_file, .. } = lowered("look");
         assert_eq!(system_file, "cell.sesame");
         let names: Vec<&str> = plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
         assert_eq!(names, ["collisions", "time"]);
@@ -457,13 +552,59 @@ mod tests {
     }
 
     #[test]
+    fn a_search_by_condition_measures_its_variables_and_those_of_known_tests() {
+        let text = CELL.replace("metric seen", "metric near initial 0rad = last(abs(link)) outbound metric seen").replace(
+            "campaign look {",
+            "test watch { swing offset [1deg, 2deg] when near > 0.1rad and collisions == 2 until time > 1min at most 2 times
+                          recount value [1, 2] when collisions > 1 for 500ms }
+             operation shake on link = random offset [0rad, 1rad] start contains near, integer [2, 3]
+             campaign grown { objectives time  operations shake, swing, recount 1..3 per test
+                              activate by condition over unused in [-1km/h, 36km/h], near
+                              search random { evaluations 8 }  end after 10s }
+             campaign look {",
+        );
+        let mut sources = SourceMap::new();
+        let file = sources.add("cell.sesame", text);
+        let analysis = analyse(&sources, file);
+        let space = analysis.model.unwrap_or_else(|| panic!("{:#?}", analysis.diagnostics));
+        let grown = lower(&space, space.campaign("grown").unwrap(), "cell.sesame", "sesamec 0.0.0");
+        let names: Vec<&str> = grown.plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
+        assert_eq!(names, ["collisions", "unused", "near", "time"]);
+        assert!(grown.hooks.iter().all(|hook| grown.uses(hook)), "the hook of a variable is compiled");
+        assert_eq!(grown.plan.metrics[2].initial, Some(0.0));
+        insta::assert_snapshot!(serde_json::to_string_pretty(&grown.plan.campaign.activation).unwrap());
+        insta::assert_snapshot!(serde_json::to_string_pretty(&grown.plan.tests[0].test).unwrap());
+        let constraints: Vec<usize> = grown.plan.operations.iter().map(|it| it.constraints.len()).collect();
+        assert_eq!(constraints, [0, 0, 2]);
+        let read: plan::CampaignPlan = serde_json::from_str(&serde_json::to_string(&grown.plan).unwrap()).unwrap();
+        assert_eq!(read, grown.plan);
+        let by_time = lower(&space, space.campaign("look").unwrap(), "cell.sesame", "sesamec 0.0.0");
+        assert!(by_time.plan.operations.iter().all(|it| it.constraints.is_empty()));
+        let names: Vec<&str> = by_time.plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
+        assert_eq!(names, ["collisions", "near", "time"], "the known test is in this plan too");
+    }
+
+    #[test]
+    fn the_deepest_condition_can_be_read_again_from_the_plan() {
+        let chained = vec!["time > 1s"; model::condition::Condition::MAX_DEPTH].join(" and ");
+        let text = CELL.replace("lose loss 25% from 1s to 30s", &format!("lose loss 25% when {chained} for 1s"));
+        let mut sources = SourceMap::new();
+        let file = sources.add("cell.sesame", text);
+        let space = analyse(&sources, file).model.unwrap();
+        let RunnerPlan { plan, .. } = lower(&space, space.campaign("again").unwrap(), "cell.sesame", "sesamec 0.0.0");
+        let read: plan::CampaignPlan = serde_json::from_str(&serde_json::to_string(&plan).unwrap()).unwrap();
+        assert_eq!(read, plan);
+    }
+
+    #[test]
     fn quantities_arrive_in_the_units_of_the_wire() {
         let RunnerPlan { plan, .. } = lowered("look");
         let swing = &plan.operations[0];
-        assert_eq!(swing.parameters[0].high, std::f64::consts::PI / 10.0);
+        let plan::Domain::Number { high, .. } = swing.parameters[0].domain else { panic!("an offset is a number") };
+        assert_eq!(high, std::f64::consts::PI / 10.0);
         assert_eq!(swing.within, plan::Span { start: 0.0, end: 60.0 });
         assert_eq!(plan.operations[1].inclusion, 0.4);
-        assert!(plan.operations[1].parameters[0].integer);
+        assert!(matches!(plan.operations[1].parameters[0].domain, plan::Domain::Number { integer: true, .. }));
     }
 
     #[test]

@@ -8,6 +8,7 @@ use sesame_dsl::{Analysis, analyse};
 
 const SAMPLES: &[&str] = &[
     include_str!("good/kuka_cell.sesame"),
+    include_str!("good/conditions.sesame"),
     include_str!("bad/ten_mistakes.sesame"),
     include_str!("bad/e0104_later_constructs.sesame"),
     include_str!("good/blocks.sesame"),
@@ -17,6 +18,12 @@ const SAMPLES: &[&str] = &[
 const PIECES: &[&str] = &[
     "{",
     "}",
+    "when",
+    "until",
+    "for",
+    "at most",
+    "over",
+    "start contains",
     "[",
     "]",
     "(",
@@ -132,6 +139,15 @@ proptest! {
         let text = SAMPLES[sample];
         has_a_sound_answer(&text[..boundary(text, at)]);
     }
+}
+
+#[test]
+fn what_is_quoted_over_several_lines_is_said_in_one() {
+    let text =
+        "space s\noperation o on t = latency [1s,\r\n  2s]\ntest t { o delay 1s when a +\n b until c\n == 2 + 1 }";
+    has_a_sound_answer(text);
+    let (_, _, analysis) = analyse_text(text);
+    assert!(analysis.diagnostics.iter().any(|diagnostic| diagnostic.title.contains("a + b")), "{analysis:?}");
 }
 
 #[test]

@@ -10,7 +10,13 @@ use sesame_tests::{Done, Project, Runner, workspace};
 
 /// The runner of a campaign on the faulty simulator, with its hook filled in.
 pub(crate) fn faulty(name: &str, campaign: &str) -> Runner {
+    recording(name, campaign, "")
+}
+
+/// The same, with this clause in all campaigns.
+pub(crate) fn recording(name: &str, campaign: &str, clause: &str) -> Runner {
     let space = fs::read_to_string(workspace().join("tests/simulators/faulty/space.sesame")).unwrap();
+    let space = space.replace("  end        after 1s\n", &format!("  end        after 1s\n  {clause}\n"));
     let project = Project::new(name, &space.replace("NAME", name), "faulty");
     project.sesamec("generate", &["--campaign", campaign]).expect(0);
     let hook = project.runners.join("hooks/fragile.rs");
@@ -89,6 +95,7 @@ fn a_system_that_does_not_work_undisturbed_is_not_fuzzed() {
     for (fault, words) in [
         ("crash", "the reference run is to crash"),
         ("missing topic", "the simulator has no topic `faulty/level`; did you mean `faulty/lvel`?"),
+        ("flood", "it publishes more than 100000 messages in the step to 0.010 s"),
         ("wrong type", "a message on `faulty/level` is not of its declared type: "),
     ] {
         let said = undisturbed(&runner, fault).expect(1);
@@ -104,6 +111,16 @@ fn a_system_that_does_not_work_undisturbed_is_not_fuzzed() {
 }
 
 #[test]
+fn a_run_that_the_simulator_ends_early_is_complete_at_its_own_end() {
+    let runner = faulty("brief", "harmless");
+    let said = undisturbed(&runner, "early end").expect(0);
+    let repository = Repository::open(&runner.folder.join("early end/3")).unwrap();
+    let rows = repository.tests().unwrap();
+    assert_eq!(rows.len(), 62, "{}", said.out);
+    assert!(rows.iter().all(|row| row.end == 0.5 && matches!(row.outcome.word(), "completed" | "void")), "{rows:?}");
+}
+
+#[test]
 fn a_requirement_broken_undisturbed_is_a_warning() {
     let runner = faulty("tilted", "harmless");
     let said = undisturbed(&runner, "broken requirement").expect(0);
@@ -111,4 +128,18 @@ fn a_requirement_broken_undisturbed_is_a_warning() {
     assert!(said.out.contains(words), "{}", said.out);
     let repository = Repository::open(&runner.folder.join("broken requirement/3")).unwrap();
     assert!(repository.events().unwrap().iter().any(|event| event.text == words));
+}
+
+#[test]
+fn every_row_of_the_table_of_faults_names_a_test_that_exists() {
+    let page = fs::read_to_string(workspace().join("docs/faults.md")).unwrap();
+    let rows: Vec<&str> = page.lines().filter(|line| line.starts_with("| ") && line.contains("](../")).collect();
+    assert!(rows.len() >= 20, "{} rows", rows.len());
+    for row in rows {
+        let (name, file) = row.rsplit_once("[`").unwrap().1.split_once("`](../").unwrap();
+        let file = file.split(')').next().unwrap();
+        let text = fs::read_to_string(workspace().join(file)).unwrap_or_else(|error| panic!("{error}: {row}"));
+        let test = text.split(&format!("fn {name}(")).next().unwrap();
+        assert!(test.len() < text.len() && test.trim_end().ends_with(']'), "{file} has no test `{name}`: {row}");
+    }
 }

@@ -2,7 +2,10 @@
 #![cfg(test)]
 
 mod commands;
+mod conditions;
+mod custom;
 mod declarative;
+mod disk;
 mod exported;
 mod faults;
 mod first_front;
@@ -12,3 +15,4 @@ mod regeneration;
 mod search;
 mod stl;
 mod tampering;
+mod traces;

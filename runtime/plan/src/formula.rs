@@ -157,6 +157,8 @@ pub enum Condition {
     All(Vec<Condition>),
     /// At least one of them holds.
     Any(Vec<Condition>),
+    /// It does not hold.
+    Not(Box<Condition>),
 }
 
 /// How two numbers are compared.
@@ -173,6 +175,8 @@ pub enum Comparison {
     Above,
     /// `==`
     Equal,
+    /// `!=`
+    NotEqual,
 }
 
 impl Comparison {
@@ -184,6 +188,7 @@ impl Comparison {
             Comparison::AtLeast => left >= right,
             Comparison::Above => left > right,
             Comparison::Equal => left == right,
+            Comparison::NotEqual => left != right && !left.is_nan() && !right.is_nan(),
         }
     }
 }

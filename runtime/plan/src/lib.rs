@@ -8,6 +8,7 @@
 //! seconds of simulation time; every other quantity is in the unit its field, metric or topic declares (the unit on
 //! the wire), probabilities are in `0..=1`.
 
+pub mod condition;
 mod formula;
 mod model;
 pub mod stl;

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::condition::{ConditionSpace, Constraint};
 use crate::{Formula, KnownTest};
 
 macro_rules! id {
@@ -237,6 +238,8 @@ pub struct Metric {
     pub direction: Option<Direction>,
     /// The value of a test in which it was never set.
     pub default: Option<f64>,
+    /// Its value for conditions before it is first set.
+    pub initial: Option<f64>,
     /// Where its value comes from.
     pub source: MetricSource,
     /// Line of its declaration, from 1.
@@ -258,6 +261,11 @@ pub enum MetricSource {
     Last {
         /// Which value of which message.
         input: FieldRef,
+    },
+    /// By how much a formula of signal temporal logic is kept over the whole run; known when it is over.
+    Robustness {
+        /// Of what.
+        robustness: crate::stl::Robustness,
     },
     /// Computed from messages as the space says.
     Formula {
@@ -347,13 +355,14 @@ pub struct Operation {
     pub name: String,
     /// Its doc comment.
     pub doc: String,
-    /// The topic whose messages it disturbs.
-    pub topic: TopicId,
+    /// The topic whose messages it disturbs; `None` exactly for a custom operation before the start or after the end.
+    pub topic: Option<TopicId>,
     /// What it does to them.
     pub kind: OperationKind,
     /// The parameters a test chooses, in the order that [`OperationKind`] documents.
     pub parameters: Vec<Parameter>,
-    /// The time outside of which it is never active (`within`); seconds, `start < end`.
+    /// The time outside of which it is never active (`within`); seconds, `start < end`. Of an offline operation, which is
+    /// never active, the whole run.
     pub within: Span,
     /// Operations of a higher priority come first on a message; equal ones in declaration order. Default 0.
     pub priority: i32,
@@ -362,6 +371,8 @@ pub struct Operation {
     /// Whether its active time counts in `fuzzing_time()`. Default true, and then not written.
     #[serde(default = "timed", skip_serializing_if = "is_timed")]
     pub timed: bool,
+    /// What its start conditions contain where a search grows them.
+    pub constraints: Vec<Constraint>,
 }
 
 fn timed() -> bool {
@@ -393,8 +404,8 @@ impl Span {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum OperationKind {
-    /// Replaces or shifts a number by a fresh uniform draw per message. One parameter: a sub-range ([`Parameter`] of
-    /// shape [`Shape::Range`]) in the field's unit.
+    /// Replaces or shifts a number by a fresh uniform draw per message. One parameter: a sub-range
+    /// ([`Shape::Range`]) in the field's unit.
     RandomValue {
         /// Field names from the message inwards; empty for a topic that carries the number itself.
         path: Vec<String>,
@@ -414,9 +425,32 @@ pub enum OperationKind {
     },
     /// Drops every message. No parameters.
     Blackhole,
+    /// The user's Rust code, with parameters as declared.
+    Custom {
+        /// When it is called.
+        moment: Moment,
+    },
+}
+
+/// When the code of a custom operation is called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Moment {
+    /// With each message of its topic while the operation is active.
+    OnMessage,
+    /// Once, before the simulator starts afresh for the test.
+    BeforeStart,
+    /// Once, after a run that came to its end.
+    AfterEnd,
 }
 
 impl OperationKind {
+    /// Whether it acts beside the run, before its start or after its end: its activation in a test is then
+    /// [`crate::Activation::Offline`], and it has no observed intervals.
+    pub fn is_offline(&self) -> bool {
+        matches!(self, OperationKind::Custom { moment: Moment::BeforeStart | Moment::AfterEnd })
+    }
+
     /// The kind in words, as the `.sesame` file has it.
     pub fn words(&self) -> &'static str {
         match self {
@@ -425,6 +459,9 @@ impl OperationKind {
             OperationKind::PacketLoss => "packet loss",
             OperationKind::Latency { .. } => "latency",
             OperationKind::Blackhole => "blackhole",
+            OperationKind::Custom { moment: Moment::OnMessage } => "custom",
+            OperationKind::Custom { moment: Moment::BeforeStart } => "custom before start",
+            OperationKind::Custom { moment: Moment::AfterEnd } => "custom after end",
         }
     }
 }
@@ -462,21 +499,60 @@ pub enum Drain {
     Drop,
 }
 
-/// A parameter of an operation: its permitted range in the space, and what a test makes of it.
+/// A parameter of an operation: what is permitted in the space, and what a test makes of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// Its name in a test, for example `offset`, `loss`, `delay`.
     pub name: String,
-    /// Its unit; `None` for probabilities and plain numbers.
+    /// Its unit; `None` for probabilities, plain numbers, texts and files.
     pub unit: Option<String>,
-    /// Lower end of what is permitted.
-    pub low: f64,
-    /// Upper end of what is permitted.
-    pub high: f64,
-    /// What a test chooses.
-    pub shape: Shape,
-    /// Whether only whole numbers are permitted.
-    pub integer: bool,
+    /// What is permitted.
+    pub domain: Domain,
+}
+
+/// What a test may choose for a parameter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Domain {
+    /// Numbers of a range.
+    Number {
+        /// Lower end of what is permitted.
+        low: f64,
+        /// Upper end of what is permitted.
+        high: f64,
+        /// What a test chooses.
+        shape: Shape,
+        /// Whether only whole numbers are permitted.
+        integer: bool,
+    },
+    /// A point of a box, both corners included; `low <= high` on each axis.
+    Point {
+        /// Lower corner: x, y, z.
+        low: [f64; 3],
+        /// Upper corner.
+        high: [f64; 3],
+    },
+    /// One of these texts: at least one, none twice.
+    Texts {
+        /// The texts, in declaration order.
+        texts: Vec<String>,
+    },
+    /// One of these files: at least one, none twice. Paths are relative to the folder of the `.sesame` file, with `/`.
+    Files {
+        /// The paths, in declaration order.
+        files: Vec<String>,
+    },
+}
+
+impl Domain {
+    /// The texts or paths to choose from; `None` for numbers and points.
+    pub fn items(&self) -> Option<&[String]> {
+        match self {
+            Domain::Texts { texts } => Some(texts),
+            Domain::Files { files } => Some(files),
+            Domain::Number { .. } | Domain::Point { .. } => None,
+        }
+    }
 }
 
 /// What a test chooses of a permitted range.
@@ -510,6 +586,19 @@ pub struct Campaign {
     pub seed: u64,
     /// Simulation time at which a test ends, in seconds.
     pub end_after: f64,
+    /// Of which tests the messages and the activity of operations are recorded; `None` for none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub record: Option<Recorded>,
+}
+
+/// Of which tests the messages and the activity of operations are recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Recorded {
+    /// Of those that violate a requirement, crash or time out, and of the undisturbed runs to compare them with.
+    Failing,
+    /// Of all.
+    All,
 }
 
 /// Bounds of a count, both included.
@@ -527,6 +616,11 @@ pub struct Count {
 pub enum ActivationMode {
     /// In windows of simulation time.
     Time,
+    /// By conditions grown from this space.
+    Condition {
+        /// What they are made of.
+        space: ConditionSpace,
+    },
 }
 
 /// How the tests of a campaign are found.

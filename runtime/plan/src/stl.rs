@@ -4,6 +4,22 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::{Expression, Input, Side};
+
+/// By how much a run keeps a formula (positive) or breaks it (negative).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Robustness {
+    /// What the signals refer to by position; at least one. Those that are [`crate::Members::Each`] are all of one group:
+    /// then the formula is that of each member, and the least robustness counts.
+    pub inputs: Vec<Input>,
+    /// The signals of the formula, all in one unit; each refers to an input.
+    pub signals: Vec<Expression>,
+    /// What is to hold.
+    pub formula: Formula,
+    /// Where it listens.
+    pub side: Side,
+}
+
 /// A formula. Guarantees of a plan written by the generator: signals are in range, constants are finite, intervals
 /// are sound.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

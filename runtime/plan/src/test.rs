@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::condition::Condition;
 use crate::{Bound, MetricId, OperationId};
 
 /// One test configuration: what a search evolves and a run applies. An empty list disturbs nothing.
@@ -24,8 +25,9 @@ pub struct TestOperation {
     pub draw_seed: u64,
 }
 
-/// When an operation of a test is active.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// When an operation of a test is active. [`Activation::Offline`] is that of the operations that are
+/// [offline](crate::OperationKind::is_offline), and of no others.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Activation {
     /// For `start <= t < end`, in seconds of simulation time, inside the operation's `within`.
@@ -35,10 +37,30 @@ pub enum Activation {
         /// Where it ends.
         end: f64,
     },
+    /// From the moment at which a condition holds until the moment at which another does, inside the operation's `within`.
+    Condition {
+        /// Switches it on.
+        start: Condition,
+        /// Switches it off; never in the step that switched it on.
+        end: Condition,
+        /// How often at most in one run, from 1.
+        times: u32,
+    },
+    /// From the moment at which a condition holds, for a length of time, inside the operation's `within`.
+    ConditionFor {
+        /// Switches it on.
+        start: Condition,
+        /// For how long, in seconds of simulation time; positive.
+        length: f64,
+        /// How often at most in one run, from 1.
+        times: u32,
+    },
+    /// Never during the run: it acts before the start or after the end, and has no window.
+    Offline,
 }
 
 /// What a test chose for one parameter, in the parameter's unit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Choice {
     /// One value ([`crate::Shape::Value`]).
@@ -52,6 +74,16 @@ pub enum Choice {
         low: f64,
         /// Upper end.
         high: f64,
+    },
+    /// A point ([`crate::Domain::Point`]).
+    Point {
+        /// Its x, y and z.
+        point: [f64; 3],
+    },
+    /// One of the texts, or the path of one of the files ([`crate::Domain::Texts`], [`crate::Domain::Files`]).
+    Text {
+        /// The text or path.
+        text: String,
     },
 }
 

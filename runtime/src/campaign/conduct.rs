@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use sesame_plan::{CampaignPlan, Search, Test};
+use sesame_plan::{CampaignPlan, Recorded, Search, Test};
 
 use super::pool::{Ended, Job, Pool, PoolError, PoolSettings};
+use super::traced::TraceOrder;
 use crate::observation::{Observation, Outcome};
 use crate::record::{
-    Difference, Event, EventKind, MetricValue, Origin, RecordError, Recorder, Repository, ResultSet, Status,
+    self, Difference, Event, EventKind, MetricValue, Origin, RecordError, Recorder, Repository, ResultSet, Status,
     TestRecord, Verdict, differences, verdict,
 };
 use crate::rng::derive_seed;
@@ -82,6 +83,16 @@ pub enum CampaignError {
         "the undisturbed reference run failed: {0}\nnothing was fuzzed: a campaign needs a system that works undisturbed"
     )]
     Reference(String),
+    /// A trace could not be written. The test is not recorded, so that `resume` runs it again with its trace.
+    #[error(
+        "{reason}\nT{test} is not recorded without its trace, what was recorded before is kept: `resume` goes on once that is mended"
+    )]
+    Trace {
+        /// The test.
+        test: u32,
+        /// Why not.
+        reason: String,
+    },
     /// A resumed campaign asks for other tests than those recorded.
     #[error(
         "test T{0} of these results is not the one that this runner asks for: the results come from another model or version; start anew with `run`"
@@ -106,7 +117,11 @@ pub fn conduct(
         directory: directory.to_path_buf(),
         timeout: settings.timeout.unwrap_or(FIRST_TIMEOUT),
     })?;
-    let mut desk = Desk { recorder: &mut recorder, recorded, pool, interrupted };
+    let traces = match plan.campaign.record {
+        Some(keep) => Some(Traces { folder: recorder.repository().make_trace_folder()?, keep }),
+        None => None,
+    };
+    let mut desk = Desk { recorder: &mut recorder, recorded, pool, traces, interrupted };
 
     let mut ended = None;
     if !desk.evaluate(vec![undisturbed(0, settings.seed)], &mut |record| ended = Some(record.observation.clone()))? {
@@ -269,7 +284,22 @@ struct Desk<'a> {
     /// Numbers of the tests already recorded when the campaign was taken up again.
     recorded: BTreeSet<u32>,
     pool: Pool,
+    traces: Option<Traces>,
     interrupted: &'a AtomicBool,
+}
+
+/// Which traces are kept, and in which folder of results.
+struct Traces {
+    folder: PathBuf,
+    keep: Recorded,
+}
+
+impl Traces {
+    fn order(&self, test: &Planned) -> TraceOrder {
+        // The undisturbed run is what others are compared with.
+        let keep = if test.origin == Origin::Reference { Recorded::All } else { self.keep };
+        TraceOrder { file: record::trace_file(&self.folder, test.number), keep }
+    }
 }
 
 impl Desk<'_> {
@@ -288,7 +318,12 @@ impl Desk<'_> {
             } else if let Some(original) = test.duplicate_of {
                 duplicates.push((original, test));
             } else {
-                let job = Job { number: test.number, test: test.test.clone(), simulator_seed: test.simulator_seed };
+                let job = Job {
+                    number: test.number,
+                    test: test.test.clone(),
+                    simulator_seed: test.simulator_seed,
+                    trace: self.traces.as_ref().map(|traces| traces.order(&test)),
+                };
                 self.pool.submit(job);
                 waiting.insert(test.number, test);
             }
@@ -297,10 +332,15 @@ impl Desk<'_> {
             if self.interrupted.load(Ordering::Relaxed) {
                 return Ok(false);
             }
-            let Some(Ended { number, observation, last_words }) = self.pool.next(Duration::from_millis(100))? else {
+            let Some(Ended { number, observation, last_words, trace_failure }) =
+                self.pool.next(Duration::from_millis(100))?
+            else {
                 continue;
             };
             let Some(test) = waiting.remove(&number) else { continue };
+            if let Some(reason) = trace_failure {
+                return Err(CampaignError::Trace { test: number, reason });
+            }
             self.record(&test.with(observation), each)?;
             if let Some(words) = last_words {
                 let text = format!("the worker's last words:\n{words}");

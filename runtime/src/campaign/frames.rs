@@ -8,6 +8,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sesame_plan::Test;
 
+use super::traced::TraceOrder;
 use crate::observation::Observation;
 
 /// The largest frame either side accepts; time series of a long test are the largest thing sent.
@@ -29,6 +30,8 @@ pub struct Job {
     pub test: Test,
     /// Seed of the simulator's own randomness.
     pub simulator_seed: u64,
+    /// The trace that is asked for, if any.
+    pub trace: Option<TraceOrder>,
 }
 
 /// What the worker answers.
@@ -36,6 +39,8 @@ pub struct Job {
 pub(super) struct Reply {
     pub(super) number: u32,
     pub(super) observation: Observation,
+    /// Why the trace that was asked for could not be written.
+    pub(super) trace_failure: Option<String>,
 }
 
 pub(super) fn send(stream: &mut impl Write, message: &impl Serialize) -> io::Result<()> {

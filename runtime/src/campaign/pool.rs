@@ -15,6 +15,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use super::frames::{self, Hello, Reply};
+use super::traced;
 use super::worker::{crashed, empty};
 use crate::observation::{Observation, Outcome};
 
@@ -55,6 +56,8 @@ pub struct Ended {
     pub observation: Observation,
     /// What its worker printed last before it died, if it died. Of this one session: it may hold process numbers.
     pub last_words: Option<String>,
+    /// Why the trace that was asked for could not be written: the result must not be recorded without it.
+    pub trace_failure: Option<String>,
 }
 
 /// Worker processes and the threads that talk to them.
@@ -148,21 +151,33 @@ impl Lane {
         };
         let printed = fs::metadata(output_file(&self.directory())).map_or(0, |file| file.len());
         let timeout = Duration::from_millis(self.timeout.load(Ordering::Relaxed));
-        let (observation, last_words) = match worker.ask(job, timeout, &self.stop) {
+        let (observation, last_words, trace_failure) = match worker.ask(job, timeout, &self.stop) {
             Ok(reply) => {
                 self.worker = Some(worker);
-                (reply.observation, None)
+                (reply.observation, None, reply.trace_failure)
             }
             Err(error) if error.kind() == io::ErrorKind::TimedOut => {
-                (empty(Outcome::Timeout { limit: timeout.as_secs_f64() }), None)
+                let outcome = Outcome::Timeout { limit: timeout.as_secs_f64() };
+                // Only of a worker that is gone is it known that it writes no more.
+                drop(worker);
+                let lost = self.save_trace(job, &outcome);
+                (empty(outcome), None, lost)
             }
             Err(error) => {
                 // Only what is the same in every session: the cause is part of the digest.
                 let observation = crashed(format!("the worker process ended: {}", worker.how_it_ended(&error)));
-                (observation, last_lines(&output_file(&self.directory()), printed, 10))
+                drop(worker);
+                let lost = self.save_trace(job, &observation.outcome);
+                (observation, last_lines(&output_file(&self.directory()), printed, 10), lost)
             }
         };
-        Ok(Ended { number: job.number, observation, last_words })
+        Ok(Ended { number: job.number, observation, last_words, trace_failure })
+    }
+
+    /// Saves what a dead worker wrote of a trace that was asked for; why not, otherwise.
+    fn save_trace(&self, job: &Job, outcome: &Outcome) -> Option<String> {
+        let order = job.trace.as_ref().filter(|_| !self.stop.load(Ordering::Relaxed))?;
+        traced::save(order, &self.directory(), outcome).err()
     }
 
     fn directory(&self) -> PathBuf {

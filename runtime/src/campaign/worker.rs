@@ -2,13 +2,16 @@
 
 use std::io;
 use std::net::{SocketAddr, TcpStream};
+use std::path::Path;
 use std::sync::mpsc;
 use std::thread;
 
 use sesame_plan::CampaignPlan;
 
 use super::frames::{self, Hello, Job, Reply};
-use crate::evaluate::evaluate;
+use super::traced;
+use crate::changed_files::ChangedFiles;
+use crate::evaluate::Custom;
 use crate::last_panic;
 use crate::metric::MetricTable;
 use crate::observation::{Observation, Outcome, WallTime};
@@ -28,15 +31,20 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: SocketAddr, token
     let wires = WireTable::new(plan);
     let metrics = MetricTable::new(plan, &wires, runner.hooks).map_err(io::Error::other)?;
     let jobs = read_jobs(stream.try_clone()?);
+    let space = Path::new(runner.directory).join(runner.space);
+    let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
+    let files = if may_change { ChangedFiles::for_worker(&space) } else { Ok(ChangedFiles::unlocked(&space)) };
+    let mut custom = Custom { hooks: runner.operations, files: files.map_err(io::Error::other)? };
     let mut transport = None;
-    for Job { number, test, simulator_seed } in jobs {
+    let directory = std::env::current_dir()?;
+    for job in jobs {
         let simulator = transport.get_or_insert_with(|| runner.connect.transport(plan));
-        let observation = evaluate(plan, &wires, &metrics, simulator.as_mut(), &test, simulator_seed)
-            .unwrap_or_else(|misfit| crashed(misfit.to_string()));
+        let (observation, trace_failure) =
+            traced::run(plan, &wires, &metrics, simulator.as_mut(), &job, &directory, &mut custom);
         if matches!(observation.outcome, Outcome::Crash { .. }) {
             transport = None;
         }
-        frames::send(&mut stream, &Reply { number, observation })?;
+        frames::send(&mut stream, &Reply { number: job.number, observation, trace_failure })?;
     }
     Ok(())
 }

@@ -3,10 +3,11 @@
 
 use std::collections::BTreeMap;
 
-use sesame_plan::{Aggregate, CampaignPlan, Formula, Members, TopicId};
+use sesame_plan::{Aggregate, CampaignPlan, Formula, TopicId};
 
 use super::Context;
 use super::expression::{Held, greatest, holds, least, number};
+use super::held::{HeldInputs, hear};
 use crate::time::SimTime;
 use crate::value::{Text, Value};
 
@@ -16,8 +17,6 @@ const KEY_LIMIT: usize = 1_000;
 /// A formula in one run.
 pub(super) struct FormulaState<'p> {
     formula: &'p Formula,
-    /// Per input: how many members its topic has.
-    members: Vec<usize>,
     /// All there is without keys; with them, what a new key begins with.
     common: Stream,
     keys: BTreeMap<Key, Stream>,
@@ -35,40 +34,19 @@ enum Key {
 impl<'p> FormulaState<'p> {
     /// Before the first message.
     pub(super) fn new(formula: &'p Formula, plan: &CampaignPlan) -> Self {
-        let members: Vec<usize> =
-            formula.inputs.iter().map(|input| plan.topic(input.field.topic).paths.len()).collect();
-        let common = Stream {
-            members: members.iter().map(|&members| vec![None; members]).collect(),
-            inputs: vec![[0.0; 3]; members.len()],
-            known: vec![false; members.len()],
-            tally: Tally::default(),
-        };
-        FormulaState { formula, members, common, keys: BTreeMap::new(), heard: Vec::new() }
+        let common = Stream { held: HeldInputs::new(&formula.inputs, plan), tally: Tally::default() };
+        FormulaState { formula, common, keys: BTreeMap::new(), heard: Vec::new() }
     }
 
     /// A message on the `member`th path of a topic, at the context's time.
     pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) {
-        self.heard.clear();
-        for (at, input) in self.formula.inputs.iter().enumerate().filter(|(_, input)| input.field.topic == topic) {
-            match value.at(&input.field.path) {
-                Some(Value::Point(point)) => self.heard.push((at, *point)),
-                Some(Value::Real(x)) => self.heard.push((at, [*x, 0.0, 0.0])),
-                Some(Value::Int(n)) => self.heard.push((at, [*n as f64, 0.0, 0.0])),
-                Some(Value::Bool(b)) => self.heard.push((at, [f64::from(u8::from(*b)), 0.0, 0.0])),
-                _ => {
-                    context.note(format!(
-                        "a message on `{}` has no value `{}`",
-                        context.topic,
-                        input.field.path.join(".")
-                    ));
-                    return;
-                }
-            }
+        if let Err(lacking) = hear(&self.formula.inputs, topic, value, &mut self.heard) {
+            context.note(format!("a message on `{}` has no value `{lacking}`", context.topic));
+            return;
         }
-        debug_assert!(self.heard.iter().all(|&(at, _)| member < self.members[at]), "a wire is a member of its topic");
         match &self.formula.per {
             None => {
-                self.common.hear(self.formula, &self.heard, member);
+                self.common.held.hold(&self.formula.inputs, &self.heard, member);
                 self.common.step(self.formula, context);
             }
             Some(per) if per.topic == topic => {
@@ -88,13 +66,13 @@ impl<'p> FormulaState<'p> {
                     return;
                 }
                 let stream = self.keys.entry(key).or_insert_with(|| self.common.clone());
-                stream.hear(self.formula, &self.heard, member);
+                stream.held.hold(&self.formula.inputs, &self.heard, member);
                 stream.step(self.formula, context);
             }
             Some(_) => {
-                self.common.hear(self.formula, &self.heard, member);
+                self.common.held.hold(&self.formula.inputs, &self.heard, member);
                 for stream in self.keys.values_mut() {
-                    stream.hear(self.formula, &self.heard, member);
+                    stream.held.hold(&self.formula.inputs, &self.heard, member);
                     stream.step(self.formula, context);
                 }
             }
@@ -132,52 +110,25 @@ impl<'p> FormulaState<'p> {
 /// What is held of the inputs, and what has become of the values so far; one for each key.
 #[derive(Clone)]
 struct Stream {
-    /// Per input: the last value of each member.
-    members: Vec<Vec<Option<Held>>>,
-    /// Per input: what is made of them.
-    inputs: Vec<Held>,
-    /// Per input: whether there was a message at all.
-    known: Vec<bool>,
+    held: HeldInputs,
     tally: Tally,
 }
 
 impl Stream {
-    fn hear(&mut self, formula: &Formula, heard: &[(usize, Held)], member: usize) {
-        for &(at, value) in heard {
-            self.known[at] = true;
-            let members = &mut self.members[at];
-            members[member] = Some(value);
-            let join: fn(f64, f64) -> f64 = match formula.inputs[at].members {
-                Members::Each => {
-                    self.inputs[at] = value;
-                    continue;
-                }
-                Members::Min => least,
-                Members::Max => greatest,
-                Members::Sum => |a, b| a + b,
-            };
-            // A point is never joined: it is that of a single topic.
-            let joined = members.iter().flatten().copied().reduce(|a, b| [join(a[0], b[0]), a[1], a[2]]);
-            self.inputs[at] = joined.unwrap_or(value);
-        }
-    }
-
     /// Takes the values into account as they are now, once all are known.
     fn step(&mut self, formula: &Formula, context: &mut Context) {
-        if self.known.contains(&false) {
-            return;
-        }
+        let Some(inputs) = self.held.values() else { return };
         let now = context.now;
         let due = |tally: &mut Tally| formula.every.is_none_or(|period| tally.due(now, SimTime::from_seconds(period)));
-        let counts = formula.when.as_ref().is_none_or(|when| holds(when, &self.inputs));
+        let counts = formula.when.as_ref().is_none_or(|when| holds(when, inputs));
         let of = match &formula.aggregate {
             Aggregate::Duration { of } => {
-                return self.tally.hold(now, counts && holds(of, &self.inputs));
+                return self.tally.hold(now, counts && holds(of, inputs));
             }
             Aggregate::Count { of } => {
                 let count = self.tally.value.get_or_insert(0.0);
                 let before = *count;
-                if counts && holds(of, &self.inputs) && due(&mut self.tally) {
+                if counts && holds(of, inputs) && due(&mut self.tally) {
                     self.tally.value = Some(before + 1.0);
                 }
                 return;
@@ -187,7 +138,7 @@ impl Stream {
         if !counts {
             return;
         }
-        let value = number(of, &self.inputs);
+        let value = number(of, inputs);
         if !value.is_finite() {
             context.note(format!("refused the value {value} at {now}"));
             return;

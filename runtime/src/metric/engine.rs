@@ -1,10 +1,13 @@
 //! All metrics of one run: which message goes to which, and what comes out.
 
-use sesame_plan::{CampaignPlan, MetricSource, Side, Span, TopicId};
+use sesame_plan::stl::Robustness;
+use sesame_plan::{CampaignPlan, Formula, MetricId, MetricSource, Side, Span, TopicId};
 
 use super::aggregate::FormulaState;
+use super::robustness::RobustnessState;
 use super::{Context, Hook, HookEntry};
 use crate::observation::MetricObservation;
+use crate::stl::FormulaError;
 use crate::time::SimTime;
 use crate::value::{Text, Value};
 use crate::wire::{Wire, WireTable};
@@ -22,14 +25,25 @@ pub struct MetricTable<'p> {
     wires: Vec<(Text, TopicId, usize)>,
 }
 
-/// A hook that the plan wants and the runner does not have.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("metric `{0}` has no hook in this runner: run `sesamec generate` again")]
-pub struct MissingHook(pub String);
+/// Why a runner cannot measure what its plan wants.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MetricError {
+    /// A hook that the runner does not have.
+    #[error("metric `{0}` has no hook in this runner: run `sesamec generate` again")]
+    MissingHook(String),
+    /// A temporal formula that is none.
+    #[error("metric `{metric}`: {error}; the plan was not written by sesamec: run `sesamec generate` again")]
+    Formula {
+        /// The metric.
+        metric: String,
+        /// What is wrong with it.
+        error: FormulaError,
+    },
+}
 
 impl<'p> MetricTable<'p> {
-    /// Wires the metrics of a plan to its topics and to the runner's hooks.
-    pub fn new(plan: &'p CampaignPlan, wires: &WireTable, hooks: &[HookEntry]) -> Result<Self, MissingHook> {
+    /// Wires the metrics of a plan to its topics and to the runner's hooks, and checks its temporal formulas.
+    pub fn new(plan: &'p CampaignPlan, wires: &WireTable, hooks: &[HookEntry]) -> Result<Self, MetricError> {
         let mut found = Vec::with_capacity(plan.metrics.len());
         let mut taps = vec![Vec::new(); wires.len()];
         let mut delivered = vec![Vec::new(); wires.len()];
@@ -38,10 +52,20 @@ impl<'p> MetricTable<'p> {
                 MetricSource::Hook { topics } => topics.clone(),
                 MetricSource::FuzzingTime => Vec::new(),
                 MetricSource::Last { input } => vec![input.topic],
-                MetricSource::Formula { formula } => formula.inputs.iter().map(|input| input.field.topic).collect(),
+                MetricSource::Robustness { robustness: Robustness { inputs, .. } }
+                | MetricSource::Formula { formula: Formula { inputs, .. } } => {
+                    inputs.iter().map(|input| input.field.topic).collect()
+                }
             };
-            let outbound =
-                matches!(&metric.source, MetricSource::Formula { formula } if formula.side == Side::Outbound);
+            let outbound = match &metric.source {
+                MetricSource::Robustness { robustness } => robustness.side == Side::Outbound,
+                MetricSource::Formula { formula } => formula.side == Side::Outbound,
+                _ => false,
+            };
+            if let MetricSource::Robustness { robustness } = &metric.source {
+                let refused = |error| MetricError::Formula { metric: metric.name.clone(), error };
+                RobustnessState::new(robustness, plan).map_err(refused)?;
+            }
             for wire in wires.iter() {
                 let input = topics.iter().position(|&topic| topic == wires.topic(wire));
                 if outbound {
@@ -53,7 +77,7 @@ impl<'p> MetricTable<'p> {
             found.push(match metric.source {
                 MetricSource::Hook { .. } => {
                     let entry = hooks.iter().find(|hook| hook.metric == metric.name);
-                    Some(*entry.ok_or_else(|| MissingHook(metric.name.clone()))?)
+                    Some(*entry.ok_or_else(|| MetricError::MissingHook(metric.name.clone()))?)
                 }
                 _ => None,
             });
@@ -80,6 +104,13 @@ impl<'p> MetricTable<'p> {
                     MetricSource::Formula { formula } => Some(FormulaState::new(formula, self.plan)),
                     _ => None,
                 },
+                robustness: match &metric.source {
+                    MetricSource::Robustness { robustness } => Some(
+                        RobustnessState::new(robustness, self.plan)
+                            .expect("the table was made of formulas that are sound"),
+                    ),
+                    _ => None,
+                },
                 context: Context::default(),
             })
             .collect();
@@ -96,6 +127,7 @@ pub struct Metrics<'p> {
 struct State<'p> {
     hook: Option<Box<dyn Hook>>,
     formula: Option<FormulaState<'p>>,
+    robustness: Option<RobustnessState<'p>>,
     context: Context,
 }
 
@@ -111,10 +143,13 @@ impl Metrics<'_> {
 
     /// Tells hooks and formulas that the run has come to its end. After a failure nobody does.
     pub fn end(&mut self, now: SimTime) {
-        for State { hook, formula, context } in &mut self.states {
+        for State { hook, formula, robustness, context } in &mut self.states {
             context.now = now;
             if let Some(formula) = formula {
                 formula.end(context);
+            }
+            if let Some(robustness) = robustness {
+                robustness.end(context);
             }
             if let Some(hook) = hook {
                 hook.on_end(context);
@@ -125,7 +160,14 @@ impl Metrics<'_> {
     /// A message, as the simulator sent it.
     pub fn message(&mut self, now: SimTime, wire: Wire, value: &Value) {
         for &(at, input) in &self.table.taps[wire.index()] {
-            let State { hook, formula, context } = &mut self.states[at];
+            let State { hook, formula, robustness, context } = &mut self.states[at];
+            if let Some(robustness) = robustness {
+                let (path, topic, member) = &self.table.wires[wire.index()];
+                context.now = now;
+                context.topic.clone_from(path);
+                robustness.message(*topic, *member, value, context);
+                continue;
+            }
             let (path, topic, member) = &self.table.wires[wire.index()];
             context.now = now;
             context.topic.clone_from(path);
@@ -145,15 +187,28 @@ impl Metrics<'_> {
         }
     }
 
+    /// The value that a metric has for conditions at this moment: its last one, or its initial one before that. The active
+    /// time so far, in seconds, is what the relay knows and a metric of it shows.
+    pub fn value(&self, metric: MetricId, active_time: f64) -> Option<f64> {
+        let declared = self.table.plan.metric(metric);
+        match declared.source {
+            MetricSource::FuzzingTime => Some(active_time),
+            _ => self.states[metric.index()].context.value.or(declared.initial),
+        }
+    }
+
     /// A message, as it is delivered.
     pub fn delivered(&mut self, now: SimTime, wire: Wire, value: &Value) {
         for &at in &self.table.delivered[wire.index()] {
-            let State { formula, context, .. } = &mut self.states[at];
+            let State { formula, robustness, context, .. } = &mut self.states[at];
             let (path, topic, member) = &self.table.wires[wire.index()];
             context.now = now;
             context.topic.clone_from(path);
             if let Some(formula) = formula {
                 formula.message(*topic, *member, value, context);
+            }
+            if let Some(robustness) = robustness {
+                robustness.message(*topic, *member, value, context);
             }
         }
     }
@@ -167,6 +222,9 @@ impl Metrics<'_> {
         let mut observations = Vec::with_capacity(self.states.len());
         for (state, metric) in self.states.iter_mut().zip(&self.table.plan.metrics) {
             let context = &mut state.context;
+            if let Some(robustness) = &mut state.robustness {
+                robustness.break_off(context);
+            }
             if matches!(metric.source, MetricSource::FuzzingTime) {
                 for (time, total) in fuzzing_time(active) {
                     context.now = SimTime::from_seconds(time);

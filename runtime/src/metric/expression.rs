@@ -39,6 +39,7 @@ pub(super) fn holds(of: &Condition, inputs: &[Held]) -> bool {
         Condition::Same { left, right } => holds(left, inputs) == holds(right, inputs),
         Condition::All(of) => of.iter().all(|part| holds(part, inputs)),
         Condition::Any(of) => of.iter().any(|part| holds(part, inputs)),
+        Condition::Not(of) => !holds(of, inputs),
     }
 }
 
@@ -103,5 +104,8 @@ mod tests {
         assert!(holds(&Condition::Any(vec![no(), yes()]), &[]));
         assert!(holds(&Condition::Same { left: Box::new(no()), right: Box::new(Condition::Constant(false)) }, &[]));
         assert!(holds(&Condition::Input(2), &INPUTS));
+        assert!(holds(&Condition::Not(Box::new(no())), &[]));
+        let different = |left, right| holds(&compare(left, Comparison::NotEqual, right), &[]);
+        assert!(different(1.0, 2.0) && !different(1.0, 1.0) && !different(f64::NAN, 1.0));
     }
 }

@@ -29,12 +29,13 @@ const CONTENT: &[(&str, &str)] = &[
     ("parents", "SELECT test, position, parent FROM parents ORDER BY test, position"),
     (
         "operations",
-        "SELECT test, position, operation, start_s, end_s, draw_seed, seen, changed, dropped, delayed, injected, \
-         side_effects, first_touch_s, last_touch_s FROM operations ORDER BY test, position",
+        "SELECT test, position, operation, start_s, end_s, start_condition, end_condition, length_s, times, draw_seed, \
+         seen, changed, dropped, delayed, injected, side_effects, first_touch_s, last_touch_s \
+         FROM operations ORDER BY test, position",
     ),
     (
         "choices",
-        "SELECT test, operation, position, parameter, unit, value, low, high FROM choices \
+        "SELECT test, operation, position, parameter, unit, value, low, high, x, y, z, text FROM choices \
          ORDER BY test, operation, position",
     ),
     ("intervals", "SELECT test, operation, position, start_s, end_s FROM intervals ORDER BY test, operation, position"),

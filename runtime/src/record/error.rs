@@ -42,10 +42,23 @@ pub enum RecordError {
     },
     /// A later release wrote the file.
     #[error(
-        "these results have schema {found}, this release reads up to {known}; read them with the release that wrote \
+        "these results have schema {found}, this release reads {known}; read them with the release that wrote \
          them, or a later one: {}", path.display()
     )]
     Newer {
+        /// Schema of the file.
+        found: i64,
+        /// Schema of this release.
+        known: i64,
+        /// The file.
+        path: PathBuf,
+    },
+    /// An earlier release wrote the file, whose tests had less to say.
+    #[error(
+        "these results have schema {found}, this release reads {known}; read them with the release that wrote them, or \
+         run the campaign again: {}", path.display()
+    )]
+    Older {
         /// Schema of the file.
         found: i64,
         /// Schema of this release.

@@ -12,6 +12,14 @@ pub const DATABASE: &str = "results.sqlite";
 /// Name of the lock file in a run's folder.
 pub const LOCK: &str = "results.lock";
 
+/// Name of the folder of traces in a run's folder.
+pub const TRACES: &str = "traces";
+
+/// Where the trace of a test is, if it has one, in the results in this folder.
+pub fn trace_file(folder: &Path, test: u32) -> PathBuf {
+    folder.join(TRACES).join(format!("T{test}.mcap"))
+}
+
 /// A fresh folder for a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Claim {

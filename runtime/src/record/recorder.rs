@@ -4,8 +4,10 @@ use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use rusqlite::{Connection, ErrorCode, Transaction, params};
+use sesame_plan::condition::{Condition, Operand};
 use sesame_plan::{Activation, CampaignPlan, Choice};
 
+use crate::condition;
 use crate::observation::{Observation, Outcome};
 use crate::record::folder::{DATABASE, Lock};
 use crate::record::schema::{self, index};
@@ -195,12 +197,27 @@ fn unrecordable(record: &TestRecord) -> Option<String> {
         numbers.push(("the time limit", *limit));
     }
     for operation in &record.test.operations {
-        let Activation::Time { start, end } = operation.activation;
-        numbers.extend([("the start of an operation", start), ("the end of an operation", end)]);
+        match &operation.activation {
+            Activation::Time { start, end } => {
+                numbers.extend([("the start of an operation", *start), ("the end of an operation", *end)]);
+            }
+            Activation::Condition { start, end, .. } => {
+                for condition in [start, end] {
+                    numbers_of(condition, &mut |number| numbers.push(("a number in a condition", number)));
+                }
+            }
+            Activation::ConditionFor { start, length, .. } => {
+                numbers.push(("the length of an activation", *length));
+                numbers_of(start, &mut |number| numbers.push(("a number in a condition", number)));
+            }
+            Activation::Offline => {}
+        }
         for choice in &operation.parameters {
-            match *choice {
-                Choice::Value { value } => numbers.push(("a parameter", value)),
-                Choice::Range { low, high } => numbers.extend([("a parameter", low), ("a parameter", high)]),
+            match choice {
+                Choice::Value { value } => numbers.push(("a parameter", *value)),
+                Choice::Range { low, high } => numbers.extend([("a parameter", *low), ("a parameter", *high)]),
+                Choice::Point { point } => numbers.extend(point.map(|coordinate| ("a parameter", coordinate))),
+                Choice::Text { .. } => {}
             }
         }
     }
@@ -227,6 +244,38 @@ fn unrecordable(record: &TestRecord) -> Option<String> {
     });
     let count = counts.chain([*messages]).find(|&count| i64::try_from(count).is_err())?;
     Some(format!("the count {count}, which is beyond 63 bits,"))
+}
+
+/// Every number that something is compared with.
+fn numbers_of(condition: &Condition, take: &mut impl FnMut(f64)) {
+    match condition {
+        Condition::Compare { left, right, .. } => {
+            for operand in [left, right] {
+                if let Operand::Number(number) = *operand {
+                    take(number);
+                }
+            }
+        }
+        Condition::And(a, b) | Condition::Or(a, b) => {
+            numbers_of(a, take);
+            numbers_of(b, take);
+        }
+    }
+}
+
+/// An activation as columns: start, end, start condition, end condition, length, times.
+type Switched = (Option<f64>, Option<f64>, Option<String>, Option<String>, Option<f64>, Option<u32>);
+
+fn switched(activation: &Activation, plan: &CampaignPlan) -> Switched {
+    let text = |condition| Some(condition::text::write(condition, &plan.metrics));
+    match activation {
+        Activation::Time { start, end } => (Some(*start), Some(*end), None, None, None, None),
+        Activation::Condition { start, end, times } => (None, None, text(start), text(end), None, Some(*times)),
+        Activation::ConditionFor { start, length, times } => {
+            (None, None, text(start), None, Some(*length), Some(*times))
+        }
+        Activation::Offline => (None, None, None, None, None, None),
+    }
 }
 
 fn count(count: u64) -> i64 {
@@ -299,14 +348,15 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
     let number = record.number;
     for (position, operation) in record.test.operations.iter().enumerate() {
         let kind = plan.operation(operation.operation);
-        let Activation::Time { start, end } = operation.activation;
+        let (start, end, start_condition, end_condition, length, times) = switched(&operation.activation, plan);
         let effect = record.observation.operations.get(position);
         let counters = effect.map(|effect| effect.counters);
         transaction
             .prepare_cached(
-                "INSERT INTO operations (test, position, operation, start_s, end_s, draw_seed, seen, changed, \
-                 dropped, delayed, injected, side_effects, first_touch_s, last_touch_s) \
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14)",
+                "INSERT INTO operations (test, position, operation, start_s, end_s, start_condition, end_condition, \
+                 length_s, times, draw_seed, seen, changed, dropped, delayed, injected, side_effects, first_touch_s, \
+                 last_touch_s) \
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18)",
             )?
             .execute(params![
                 number,
@@ -314,6 +364,10 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
                 kind.name,
                 start,
                 end,
+                start_condition,
+                end_condition,
+                length,
+                times,
                 operation.draw_seed.to_string(),
                 counters.map(|c| count(c.seen)),
                 counters.map(|c| count(c.changed)),
@@ -325,14 +379,18 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
                 effect.and_then(|effect| effect.last_touch),
             ])?;
         for (at, (choice, parameter)) in operation.parameters.iter().zip(&kind.parameters).enumerate() {
-            let (value, low, high) = match *choice {
-                Choice::Value { value } => (Some(value), None, None),
-                Choice::Range { low, high } => (None, Some(low), Some(high)),
-            };
+            let (mut value, mut low, mut high, mut point, mut text) = (None, None, None, None, None);
+            match choice {
+                Choice::Value { value: chosen } => value = Some(*chosen),
+                Choice::Range { low: from, high: to } => (low, high) = (Some(*from), Some(*to)),
+                Choice::Point { point: chosen } => point = Some(*chosen),
+                Choice::Text { text: chosen } => text = Some(chosen.as_str()),
+            }
+            let axis = |axis: usize| point.map(|point| point[axis]);
             transaction
                 .prepare_cached(
-                    "INSERT INTO choices (test, operation, position, parameter, unit, value, low, high) \
-                     VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+                    "INSERT INTO choices (test, operation, position, parameter, unit, value, low, high, x, y, z, text) \
+                     VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
                 )?
                 .execute(params![
                     number,
@@ -342,7 +400,11 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
                     parameter.unit,
                     value,
                     low,
-                    high
+                    high,
+                    axis(0),
+                    axis(1),
+                    axis(2),
+                    text
                 ])?;
         }
         for (at, span) in effect.into_iter().flat_map(|effect| &effect.intervals).enumerate() {

@@ -7,8 +7,9 @@ use rusqlite::types::FromSql;
 use rusqlite::{Connection, Row, params};
 use sesame_plan::{Activation, CampaignPlan, Choice, KnownTestId, OperationId, Span, Test, TestOperation};
 
+use crate::condition;
 use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
-use crate::record::folder::DATABASE;
+use crate::record::folder::{DATABASE, trace_file};
 use crate::record::{
     Event, EventKind, MetricValue, Origin, RecordError, ResultSet, Session, Status, TestRecord, TestRow, digest, schema,
 };
@@ -37,6 +38,12 @@ pub struct CampaignFacts {
 /// One observed number: test, position of its operation or metric, and the value.
 type At = (i64, i64);
 
+/// Start and end of a planned window.
+type Window = (Option<f64>, Option<f64>);
+
+/// Start condition, end condition, length and times of an activation by condition.
+type Conditions = (Option<String>, Option<String>, Option<f64>, Option<u32>);
+
 impl Repository {
     /// Opens the results in a run's folder, or a results file itself, for reading only. A run may be writing them.
     pub fn open(path: &Path) -> Result<Repository, RecordError> {
@@ -63,6 +70,24 @@ impl Repository {
     /// The database's file.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// The folder of the run, in which the database lies.
+    pub fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// Makes the folder for traces, if there is none. Gives the run's folder as workers, which work elsewhere, need it.
+    #[cfg(feature = "campaign")]
+    pub(crate) fn make_trace_folder(&self) -> Result<PathBuf, RecordError> {
+        let traces = self.folder().join(crate::record::TRACES);
+        let made = std::fs::create_dir_all(&traces).and_then(|()| std::path::absolute(self.folder()));
+        made.map_err(|e| RecordError::io("make the folder for traces", &traces, e))
+    }
+
+    /// The trace of a test, or of the test whose result stands for it, if there is one.
+    pub fn trace(&self, test: u32, duplicate_of: Option<u32>) -> Option<PathBuf> {
+        Some(trace_file(self.folder(), duplicate_of.unwrap_or(test))).filter(|file| file.exists())
     }
 
     /// What is fixed for the run.
@@ -247,13 +272,16 @@ impl Repository {
 
     fn operations(&self, only: Option<u32>) -> Result<BTreeMap<i64, Vec<TestOperation>>, RecordError> {
         let choices = self.read(
-            "SELECT test, operation, value, low, high FROM choices WHERE ?1 IS NULL OR test = ?1 \
+            "SELECT test, operation, value, low, high, x, y, z, text FROM choices WHERE ?1 IS NULL OR test = ?1 \
              ORDER BY test, operation, position",
             params![only],
             |row| {
-                let choice = match (row.get(2)?, row.get(3)?, row.get(4)?) {
-                    (Some(value), None, None) => Some(Choice::Value { value }),
-                    (None, Some(low), Some(high)) => Some(Choice::Range { low, high }),
+                let point: [Option<f64>; 3] = [row.get(5)?, row.get(6)?, row.get(7)?];
+                let choice = match (row.get(2)?, row.get(3)?, row.get(4)?, point, row.get(8)?) {
+                    (Some(value), None, None, [None, None, None], None) => Some(Choice::Value { value }),
+                    (None, Some(low), Some(high), [None, None, None], None) => Some(Choice::Range { low, high }),
+                    (None, None, None, [Some(x), Some(y), Some(z)], None) => Some(Choice::Point { point: [x, y, z] }),
+                    (None, None, None, [None, None, None], Some(text)) => Some(Choice::Text { text }),
                     _ => None,
                 };
                 Ok(((row.get(0)?, row.get(1)?), choice))
@@ -262,17 +290,22 @@ impl Repository {
         let mut parameters: BTreeMap<At, Vec<Choice>> = BTreeMap::new();
         for (at, choice) in choices {
             let choice = choice.ok_or_else(|| {
-                RecordError::damaged(&self.path, format!("T{} has a choice that is neither value nor range", at.0))
+                RecordError::damaged(
+                    &self.path,
+                    format!("T{} has a choice that is neither value, range, point nor text", at.0),
+                )
             })?;
             parameters.entry(at).or_default().push(choice);
         }
         let rows = self.read(
-            "SELECT test, position, operation, start_s, end_s, draw_seed FROM operations \
-             WHERE ?1 IS NULL OR test = ?1 ORDER BY test, position",
+            "SELECT test, position, operation, draw_seed, start_s, end_s, start_condition, end_condition, length_s, times \
+             FROM operations WHERE ?1 IS NULL OR test = ?1 ORDER BY test, position",
             params![only],
             |row| {
                 let at: At = (row.get(0)?, row.get(1)?);
-                Ok((at, row.get::<_, String>(2)?, row.get(3)?, row.get(4)?, row.get::<_, String>(5)?))
+                let window = (row.get(4)?, row.get(5)?);
+                let conditions = (row.get(6)?, row.get(7)?, row.get(8)?, row.get(9)?);
+                Ok((at, row.get::<_, String>(2)?, row.get::<_, String>(3)?, window, conditions))
             },
         )?;
         let ids: BTreeMap<&str, OperationId> = (0u32..)
@@ -280,18 +313,50 @@ impl Repository {
             .map(|(id, operation)| (operation.name.as_str(), OperationId(id)))
             .collect();
         let mut tests: BTreeMap<i64, Vec<TestOperation>> = BTreeMap::new();
-        for (at, name, start, end, draw_seed) in rows {
+        for (at, name, draw_seed, window, conditions) in rows {
             let operation = *ids.get(name.as_str()).ok_or_else(|| {
                 RecordError::damaged(&self.path, format!("T{} has an operation `{name}` that the plan lacks", at.0))
             })?;
             tests.entry(at.0).or_default().push(TestOperation {
                 operation,
-                activation: Activation::Time { start, end },
+                activation: self.activation(at.0, operation, window, conditions)?,
                 parameters: parameters.remove(&at).unwrap_or_default(),
                 draw_seed: self.seed(&draw_seed)?,
             });
         }
         Ok(tests)
+    }
+
+    fn activation(
+        &self,
+        test: i64,
+        operation: OperationId,
+        window: Window,
+        conditions: Conditions,
+    ) -> Result<Activation, RecordError> {
+        let operation = self.plan().operation(operation);
+        let read = |text: String| {
+            condition::text::read(&text, &self.plan().metrics)
+                .map_err(|problem| RecordError::damaged(&self.path, format!("a condition of T{test}: {problem}")))
+        };
+        match (window, conditions) {
+            ((None, None), (None, None, None, None)) if operation.kind.is_offline() => Ok(Activation::Offline),
+            _ if operation.kind.is_offline() => Err(RecordError::damaged(
+                &self.path,
+                format!("T{test} has `{}` during the run, which acts before or after it", operation.name),
+            )),
+            ((Some(start), Some(end)), (None, None, None, None)) => Ok(Activation::Time { start, end }),
+            ((None, None), (Some(start), Some(end), None, Some(times))) => {
+                Ok(Activation::Condition { start: read(start)?, end: read(end)?, times })
+            }
+            ((None, None), (Some(start), None, Some(length), Some(times))) => {
+                Ok(Activation::ConditionFor { start: read(start)?, length, times })
+            }
+            _ => Err(RecordError::damaged(
+                &self.path,
+                format!("T{test} has an operation that is switched neither by time nor by condition"),
+            )),
+        }
     }
 
     fn effects(&self, number: u32) -> Result<Vec<OperationEffect>, RecordError> {

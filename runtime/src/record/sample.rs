@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use sesame_plan::condition::{Comparison, Condition, Operand};
 use sesame_plan::*;
 
 use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
@@ -16,6 +17,7 @@ fn metric(name: &str, unit: Option<&str>, direction: Direction, default: Option<
         unit: unit.map(str::to_owned),
         direction: Some(direction),
         default,
+        initial: None,
         source,
         line: 1,
     }
@@ -25,13 +27,14 @@ fn operation(name: &str, topic: u32, kind: OperationKind, parameters: Vec<Parame
     Operation {
         name: name.to_owned(),
         doc: String::new(),
-        topic: TopicId(topic),
+        topic: Some(TopicId(topic)),
         kind,
         parameters,
         within: Span { start: 0.0, end: 65.0 },
         priority: 0,
         inclusion: 1.0,
         timed: true,
+        constraints: Vec::new(),
     }
 }
 
@@ -41,13 +44,13 @@ pub(crate) fn plan() -> CampaignPlan {
     let offset = Parameter {
         name: "offset".to_owned(),
         unit: Some("rad".to_owned()),
-        low: -0.3,
-        high: 0.3,
-        shape: Shape::Range,
-        integer: false,
+        domain: Domain::Number { low: -0.3, high: 0.3, shape: Shape::Range, integer: false },
     };
-    let loss =
-        Parameter { name: "loss".to_owned(), unit: None, low: 0.0, high: 1.0, shape: Shape::Value, ..offset.clone() };
+    let loss = Parameter {
+        name: "loss".to_owned(),
+        unit: None,
+        domain: Domain::Number { low: 0.0, high: 1.0, shape: Shape::Value, integer: false },
+    };
     let jitter = || OperationKind::RandomValue { path: vec![], mode: ValueMode::Offset, integer: false };
     let topic = |name: &str, path: &str| Topic {
         name: name.to_owned(),
@@ -120,7 +123,41 @@ pub(crate) fn plan() -> CampaignPlan {
             search: Search::Nsga2 { population: 10, evaluations: 210 },
             seed: 42,
             end_after: 70.0,
+            record: None,
         },
+    }
+}
+
+/// When an operation is active: its window, or where conditions decide it a window that they might give.
+fn window(operation: &TestOperation) -> (f64, f64) {
+    match operation.activation {
+        Activation::Time { start, end } => (start, end),
+        Activation::Condition { .. } => (12.0, 33.0),
+        Activation::ConditionFor { length, .. } => (30.0, 30.0 + length),
+        Activation::Offline => (0.0, 0.0),
+    }
+}
+
+/// A test with every kind of activation in it.
+pub(crate) fn conditional_test() -> Test {
+    let compare = |left, by, right| Condition::Compare { left, by, right };
+    let (speed, distance) = (Operand::Variable(MetricId(2)), Operand::Variable(MetricId(4)));
+    let near = || compare(distance, Comparison::Below, Operand::Number(450.0));
+    let fast = || compare(Operand::Number(1.5), Comparison::Below, speed);
+    let use_of = |operation, activation, parameters| TestOperation {
+        operation: OperationId(operation),
+        activation,
+        parameters,
+        draw_seed: 11,
+    };
+    let start = Condition::And(Box::new(near()), Box::new(Condition::Or(Box::new(fast()), Box::new(near()))));
+    let offset = Choice::Range { low: -0.1, high: 0.2 };
+    Test {
+        operations: vec![
+            use_of(0, Activation::Condition { start, end: fast(), times: 1 }, vec![offset.clone()]),
+            use_of(1, Activation::Time { start: 1.5, end: 20.0 }, vec![offset]),
+            use_of(3, Activation::ConditionFor { start: fast(), length: 0.1 + 0.2, times: 3 }, vec![]),
+        ],
     }
 }
 
@@ -129,7 +166,7 @@ pub(crate) fn observe(plan: &CampaignPlan, test: &Test, seed: u64) -> Observatio
     let mut stream = Stream::derive(seed, "observation", &[]);
     let (mut fuzzing, mut effects) = (0.0, Vec::new());
     for operation in &test.operations {
-        let Activation::Time { start, end } = operation.activation;
+        let (start, end) = window(operation);
         fuzzing += end - start;
         let seen = count_of((end - start) * 50.0);
         let whole = Counters { seen, ..Counters::default() };
@@ -155,13 +192,14 @@ pub(crate) fn observe(plan: &CampaignPlan, test: &Test, seed: u64) -> Observatio
             .operations
             .iter()
             .map(|operation| {
-                let Activation::Time { start, end } = operation.activation;
+                let (start, end) = window(operation);
                 if time < start || time >= end {
                     0.0
                 } else {
-                    operation.parameters.first().map_or(0.2, |&choice| match choice {
+                    operation.parameters.first().map_or(0.2, |choice| match choice {
                         Choice::Range { low, high } => (low + (high - low) * stream.unit()).abs(),
                         Choice::Value { value } => value * 0.2,
+                        other => panic!("{other:?} is none of this plan's"),
                     })
                 }
             })
@@ -226,9 +264,11 @@ fn random_test(plan: &CampaignPlan, seed: u64, number: u32) -> Test {
                 .parameters
                 .iter()
                 .map(|parameter| {
-                    let (a, b) =
-                        (stream.uniform(parameter.low, parameter.high), stream.uniform(parameter.low, parameter.high));
-                    match parameter.shape {
+                    let Domain::Number { low, high, shape, .. } = parameter.domain else {
+                        panic!("this plan has numbers only")
+                    };
+                    let (a, b) = (stream.uniform(low, high), stream.uniform(low, high));
+                    match shape {
                         Shape::Value => Choice::Value { value: a },
                         Shape::Range => Choice::Range { low: a.min(b), high: a.max(b) },
                     }

@@ -10,7 +10,7 @@ use crate::record::RecordError;
 use crate::record::verdict::ends;
 
 /// The schema's version, in the file's `user_version`.
-pub const SCHEMA: i64 = 1;
+pub const SCHEMA: i64 = 2;
 
 /// Marks an SQLite file as ours, in its `application_id`: "SESM".
 pub(crate) const APPLICATION_ID: i64 = 0x5345_534D;
@@ -132,6 +132,7 @@ pub(crate) fn open(path: &Path, writable: bool) -> Result<Connection, RecordErro
     match pragma("user_version")? {
         SCHEMA => {}
         found if found > SCHEMA => return Err(RecordError::Newer { found, known: SCHEMA, path: path.to_owned() }),
+        found if found >= 1 => return Err(RecordError::Older { found, known: SCHEMA, path: path.to_owned() }),
         found => return Err(RecordError::damaged(path, format!("there is no schema {found}"))),
     }
     Ok(connection)

@@ -68,8 +68,12 @@ CREATE TABLE operations (
     test            INTEGER NOT NULL REFERENCES tests,
     position        INTEGER NOT NULL, -- in the test, from 0
     operation       TEXT NOT NULL,
-    start_s         REAL NOT NULL,  -- planned
-    end_s           REAL NOT NULL,  -- planned, excluded
+    start_s         REAL,           -- planned; NULL where a condition starts it, and for an operation before the start or after the end
+    end_s           REAL,           -- planned, excluded; NULL likewise
+    start_condition TEXT,           -- what starts it, in the words of the language; NULL where time does
+    end_condition   TEXT,           -- what ends it, likewise; NULL where it has a length
+    length_s        REAL,           -- how long each activation by condition is; NULL where a condition ends it
+    times           INTEGER,        -- how often at most it is activated by condition; NULL where time starts it
     draw_seed       TEXT NOT NULL,
     seen            INTEGER,        -- messages that reached it while it was active
     changed         INTEGER,
@@ -92,6 +96,10 @@ CREATE TABLE choices (
     value           REAL,
     low             REAL,
     high            REAL,
+    x               REAL,           -- a point has x, y and z
+    y               REAL,
+    z               REAL,
+    text            TEXT,           -- a text, or the path of a file
     PRIMARY KEY (test, operation, position)
 ) STRICT, WITHOUT ROWID;
 

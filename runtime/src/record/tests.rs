@@ -182,7 +182,10 @@ fn what_is_no_repository_of_this_release_is_refused_with_what_to_do() {
     let open = Connection::open(&path).unwrap();
     open.pragma_update(None, "user_version", SCHEMA + 1).unwrap();
     drop(open);
-    assert!(matches!(refused("schema 2, this release reads up to 1"), RecordError::Newer { found: 2, known: 1, .. }));
+    assert!(matches!(refused("schema 3, this release reads 2"), RecordError::Newer { found: 3, known: 2, .. }));
+    Connection::open(&path).unwrap().pragma_update(None, "user_version", 1).unwrap();
+    let earlier = refused("schema 1, this release reads 2; read them with the release that wrote them");
+    assert!(matches!(earlier, RecordError::Older { found: 1, known: 2, .. }));
     for length in [whole.len() / 2, 4096, 700] {
         std::fs::write(&path, &whole[..length]).unwrap();
         assert!(matches!(refused("restore the file"), RecordError::Damaged { .. }), "cut to {length} bytes");
@@ -364,16 +367,100 @@ fn change(record: &mut TestRecord, kind: usize) {
         16 => next_up(&mut observation.operations[0].intervals[0].end),
         17 => observation.operations[0].first_touch = Some(0.5),
         18 => {
-            let sesame_plan::Activation::Time { start, .. } = &mut record.test.operations[0].activation;
+            let sesame_plan::Activation::Time { start, .. } = &mut record.test.operations[0].activation else {
+                panic!("the known test has a window")
+            };
             *start = start.next_down();
         }
         19 => record.origin = Origin::Known(KnownTestId(0)),
         20 => match &mut record.test.operations[0].parameters[0] {
             sesame_plan::Choice::Range { high, .. } => next_up(high),
             sesame_plan::Choice::Value { value } => next_up(value),
+            sesame_plan::Choice::Point { point } => next_up(&mut point[1]),
+            sesame_plan::Choice::Text { text } => text.push('.'),
         },
         _ => observation.operations.clear(),
     }
+}
+
+/// The record of a test that conditions switch.
+fn conditional_record(plan: &sesame_plan::CampaignPlan) -> TestRecord {
+    sample::record(plan, 3, Origin::Search, sample::conditional_test())
+}
+
+#[test]
+fn activations_of_every_kind_come_back_as_they_were() {
+    let folder = folder();
+    let plan = sample::plan();
+    let record = conditional_record(&plan);
+    let recorder = commit_all(folder.path(), std::slice::from_ref(&record));
+    assert_eq!(recorder.repository().test(3).unwrap(), record);
+    let read = |sql: &str| -> String { recorder.repository().connection.query_row(sql, [], |row| row.get(0)).unwrap() };
+    assert_eq!(
+        read("SELECT start_condition FROM operations WHERE position = 0"),
+        "arm_distance < 450mm and (1.5m/s < top_speed or arm_distance < 450mm)"
+    );
+    let columns = "start_s || ',' || end_s || ',' || times IS NULL AND start_condition IS NULL";
+    assert_eq!(read(&format!("SELECT CAST({columns} AS TEXT) FROM operations WHERE position = 1")), "1");
+}
+
+#[test]
+fn any_kind_of_change_to_a_condition_changes_the_digest() {
+    use sesame_plan::Activation;
+    use sesame_plan::condition::{Comparison, Condition};
+    let plan = sample::plan();
+    let mut seen = std::collections::BTreeSet::from([digest_of(&[conditional_record(&plan)])]);
+    let changes: [fn(&mut Activation, &mut Activation); 6] = [
+        |until, _| {
+            if let Activation::Condition { times, .. } = until {
+                *times += 1;
+            }
+        },
+        |until, _| {
+            if let Activation::Condition { start, end, .. } = until {
+                std::mem::swap(start, end);
+            }
+        },
+        |until, _| {
+            if let Activation::Condition { end: Condition::Compare { by, .. }, .. } = until {
+                *by = Comparison::Equal;
+            }
+        },
+        |until, lasting| *until = lasting.clone(),
+        |_, lasting| {
+            if let Activation::ConditionFor { length, .. } = lasting {
+                *length = length.next_up();
+            }
+        },
+        |_, lasting| {
+            if let Activation::ConditionFor { times, .. } = lasting {
+                *times += 1;
+            }
+        },
+    ];
+    for (kind, change) in changes.into_iter().enumerate() {
+        let mut record = conditional_record(&plan);
+        let [until, _, lasting] = &mut record.test.operations[..] else { panic!("three operations") };
+        change(&mut until.activation, &mut lasting.activation);
+        assert!(seen.insert(digest_of(&[record])), "change {kind} goes unnoticed");
+    }
+}
+
+#[test]
+fn a_number_in_a_condition_that_is_none_is_refused() {
+    use sesame_plan::Activation;
+    use sesame_plan::condition::{Condition, Operand};
+    let folder = folder();
+    let plan = sample::plan();
+    let mut record = conditional_record(&plan);
+    if let Activation::Condition { end: Condition::Compare { left, .. }, .. } =
+        &mut record.test.operations[0].activation
+    {
+        *left = Operand::Number(f64::NAN);
+    }
+    let mut recorder = Recorder::create(folder.path(), &plan, 1, 1).unwrap();
+    let refused = recorder.commit(&record).unwrap_err().to_string();
+    assert!(refused.starts_with("test T3: a number in a condition is NaN cannot be recorded"), "{refused}");
 }
 
 fn finite() -> impl Strategy<Value = f64> {

@@ -3,6 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use super::Touched;
 use crate::time::SimTime;
 use crate::value::Value;
 use crate::wire::Wire;
@@ -11,11 +12,20 @@ use crate::wire::Wire;
 #[derive(Debug)]
 pub(super) struct Held {
     pub(super) wire: Wire,
-    /// Its index among the messages published on its wire.
+    /// Its index among the messages published on its wire; of an injected one, that of the message it came with.
+    pub(super) published: u64,
+    /// What its draws are keyed by: its index, or of an injected one a number of its own.
     pub(super) index: u64,
     pub(super) value: Value,
     /// The position in its wire's pipeline at which it goes on.
     pub(super) next_stage: usize,
+}
+
+impl Held {
+    /// Which message it is, for a tap.
+    pub(super) fn touched(&self) -> Touched {
+        Touched { wire: self.wire, index: self.published }
+    }
 }
 
 struct Entry {

@@ -1,9 +1,10 @@
 //! Behaviour of the relay on small message streams, and a naive model beside the release queue.
 
 use proptest::prelude::*;
+use sesame_plan::condition as switch;
 use sesame_plan::{
-    Aggregate, Choice, Condition, Distribution, Drain, FieldRef, Formula, Input, Members, MetricSource, Operation,
-    OperationKind, Side, Test, TestOperation, TopicId, ValueMode,
+    Activation, Aggregate, Choice, Condition, Distribution, Drain, FieldRef, Formula, Input, Members, MetricId,
+    MetricSource, Operation, OperationKind, Side, Test, TestOperation, TopicId, ValueMode,
 };
 
 use super::{Delivery, Exchange, Finished, Relay};
@@ -33,7 +34,7 @@ fn relayed(
     let plan = plan(operations);
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-    let mut relay = Relay::new(&plan, &wires, &test_of(test.to_vec()), metrics.start()).unwrap();
+    let mut relay = Relay::new(&plan, &wires, &test_of(test.to_vec()), metrics.start(), &[]).unwrap();
     let mut delivered = Vec::new();
     let mut messages = messages.iter().peekable();
     for tick in 0..=100 {
@@ -226,7 +227,7 @@ fn choices_outside_what_is_permitted_are_refused() {
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     let test: Test = test_of(vec![use_of(0, 0.0, 1.0, one(1.5), 1)]);
-    let refused = Relay::new(&plan, &wires, &test, metrics.start()).err().map(|error| error.to_string());
+    let refused = Relay::new(&plan, &wires, &test, metrics.start(), &[]).err().map(|error| error.to_string());
     assert_eq!(refused.as_deref(), Some("operation `packet_loss` `loss` permits [0, 1], not [1.5, 1.5]"));
 }
 
@@ -288,7 +289,7 @@ fn an_outbound_metric_hears_what_operations_made_of_a_message_and_an_inbound_one
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     // From 1 s to 2 s all is lost; what is sent from 3 s on is delayed by 5 s, and the run ends at 8 s.
     let test = test_of(vec![use_of(0, 1.0, 2.0, vec![], 1), use_of(1, 3.0, 10.0, one(5.0), 1)]);
-    let mut relay = Relay::new(&plan, &wires, &test, metrics.start()).unwrap();
+    let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).unwrap();
     let command = wires.find(COMMAND).unwrap();
     for tenth in 0..80 {
         relay.message(SimTime::from_nanos(tenth * 100_000_000), command, Value::Real(0.0), &mut Vec::new());
@@ -297,4 +298,127 @@ fn an_outbound_metric_hears_what_operations_made_of_a_message_and_an_inbound_one
     assert_eq!(finished.metrics[0].value, Some(80.0));
     // Ten before the loss, ten after it; nothing delayed has been delivered by the last event at 7.9 s.
     assert_eq!(finished.metrics[1].value, Some(20.0));
+}
+
+/// A metric above a number, and one below it.
+fn above(metric: u32, number: f64) -> switch::Condition {
+    compared(metric, switch::Comparison::Above, number)
+}
+
+fn below(metric: u32, number: f64) -> switch::Condition {
+    compared(metric, switch::Comparison::Below, number)
+}
+
+fn compared(metric: u32, by: switch::Comparison, number: f64) -> switch::Condition {
+    let (left, right) = (switch::Operand::Variable(MetricId(metric)), switch::Operand::Number(number));
+    switch::Condition::Compare { left, by, right }
+}
+
+fn by_condition(operation: u32, activation: Activation, parameters: Vec<Choice>) -> TestOperation {
+    TestOperation { activation, ..use_of(operation, 0.0, 0.0, parameters, 1) }
+}
+
+fn intervals(finished: &Finished, operation: usize) -> Vec<(f64, f64)> {
+    finished.operations[operation].intervals.iter().map(|span| (span.start, span.end)).collect()
+}
+
+#[test]
+fn the_message_that_makes_a_condition_hold_is_disturbed_and_the_one_that_ends_it_is_not() {
+    let hole = vec![operation(0, OperationKind::Blackhole)];
+    let until = Activation::Condition { start: above(1, 9.5), end: above(1, 19.5), times: 1 };
+    let (delivered, finished) = relayed(hole, &[by_condition(0, until, vec![])], &commands(50));
+    let kept: Vec<f64> = numbers(&delivered).into_iter().map(|(_, n)| n).collect();
+    assert_eq!(kept, (0..50).filter(|n| !(10..20).contains(n)).map(f64::from).collect::<Vec<_>>());
+    assert_eq!(intervals(&finished, 0), [(1.0, 2.0)]);
+    assert_eq!(finished.metrics[0].value, Some(1.0), "fuzzing time");
+}
+
+#[test]
+fn a_condition_that_never_holds_leaves_everything_as_it_is() {
+    let hole = vec![operation(0, OperationKind::Blackhole)];
+    let never = Activation::Condition { start: above(1, 100.0), end: above(1, 0.0), times: 3 };
+    let (delivered, finished) = relayed(hole, &[by_condition(0, never, vec![])], &commands(50));
+    assert_eq!(delivered.len(), 50);
+    assert!(intervals(&finished, 0).is_empty() && !finished.operations[0].counters.any_effect());
+}
+
+#[test]
+fn a_length_ends_between_two_steps_and_its_held_messages_go_then() {
+    let lag = vec![operation(0, latency(Distribution::Fixed, Drain::Flush))];
+    let burst = Activation::ConditionFor { start: above(1, 9.5), length: 0.25, times: 1 };
+    let (delivered, finished) = relayed(lag, &[by_condition(0, burst, one(5.0))], &commands(20));
+    assert_eq!(intervals(&finished, 0), [(1.0, 1.25)]);
+    // The three of 1.0, 1.1 and 1.2 s are let go at 1.25 s, which the next step carries out.
+    let late: Vec<(f64, f64)> = numbers(&delivered).into_iter().filter(|(t, n)| *t != n / 10.0).collect();
+    assert_eq!(late, [(1.3, 10.0), (1.3, 11.0), (1.3, 12.0)]);
+}
+
+#[test]
+fn an_activation_begins_with_its_window_if_its_condition_holds_by_then() {
+    let mut hole = operation(0, OperationKind::Blackhole);
+    hole.within.start = 1.05;
+    let until = Activation::Condition { start: above(1, 3.5), end: above(1, 100.0), times: 1 };
+    let (_, finished) = relayed(vec![hole.clone()], &[by_condition(0, until, vec![])], &commands(50));
+    assert_eq!(intervals(&finished, 0), [(1.05, 10.0)]);
+    hole.within.end = 3.0;
+    let again = Activation::ConditionFor { start: above(1, 3.5), length: 0.4, times: 100 };
+    let (_, finished) = relayed(vec![hole], &[by_condition(0, again, vec![])], &commands(50));
+    let spans = intervals(&finished, 0);
+    // Each is followed by the next as soon as a step comes after its end, and the window ends the last.
+    assert_eq!(&spans[..3], [(1.05, 1.45), (1.5, 1.9), (1.9, 2.3)], "{spans:?}");
+    assert_eq!(spans.last(), Some(&(2.7, 3.0)), "{spans:?}");
+}
+
+#[test]
+fn conditions_over_active_time_see_it_grow() {
+    let hole = vec![operation(0, OperationKind::Blackhole), operation(1, OperationKind::Blackhole)];
+    let until = Activation::Condition { start: above(1, 9.5), end: above(0, 0.95), times: 1 };
+    let (_, finished) = relayed(hole, &[by_condition(0, until, vec![])], &commands(50));
+    assert_eq!(intervals(&finished, 0), [(1.0, 2.0)]);
+}
+
+#[test]
+fn a_variable_has_its_initial_value_before_its_first_and_without_one_its_comparison_is_false() {
+    let activations = |initial: Option<f64>| {
+        let mut plan = plan(vec![operation(0, OperationKind::Blackhole)]);
+        plan.metrics[1].initial = initial;
+        let wires = WireTable::new(&plan);
+        let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+        let until = Activation::Condition { start: below(1, 1.0), end: above(1, 1.0), times: 1 };
+        let mut relay =
+            Relay::new(&plan, &wires, &test_of(vec![by_condition(0, until, vec![])]), metrics.start(), &[]).unwrap();
+        relay.advance(SimTime::from_seconds(1.0), &mut Vec::new());
+        relay.message(SimTime::from_seconds(2.0), wires.find(COMMAND).unwrap(), Value::Real(0.0), &mut Vec::new());
+        relay.message(SimTime::from_seconds(3.0), wires.find(COMMAND).unwrap(), Value::Real(2.0), &mut Vec::new());
+        intervals(&relay.finish(SimTime::from_seconds(10.0)), 0)
+    };
+    assert_eq!(activations(None), [(2.0, 3.0)]);
+    assert_eq!(activations(Some(0.0)), [(0.0, 3.0)], "it holds as soon as the window begins");
+    assert_eq!(activations(Some(5.0)), [(2.0, 3.0)]);
+}
+
+#[test]
+fn what_an_outbound_metric_shows_counts_from_the_next_event_on() {
+    let mut plan = plan(vec![operation(0, OperationKind::Blackhole)]);
+    plan.metrics[1].source = MetricSource::Formula {
+        formula: Formula {
+            inputs: vec![Input { field: FieldRef { topic: TopicId(0), path: Vec::new() }, members: Members::Min }],
+            aggregate: Aggregate::Count { of: Condition::Constant(true) },
+            when: None,
+            every: None,
+            per: None,
+            side: Side::Outbound,
+        },
+    };
+    let wires = WireTable::new(&plan);
+    let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+    let until = Activation::Condition { start: above(1, 2.5), end: above(1, 100.0), times: 1 };
+    let mut relay =
+        Relay::new(&plan, &wires, &test_of(vec![by_condition(0, until, vec![])]), metrics.start(), &[]).unwrap();
+    for second in 1..=5 {
+        let now = SimTime::from_seconds(f64::from(second));
+        relay.message(now, wires.find(COMMAND).unwrap(), Value::Real(0.0), &mut Vec::new());
+    }
+    let finished = relay.finish(SimTime::from_seconds(10.0));
+    assert_eq!((intervals(&finished, 0), finished.metrics[1].value), (vec![(4.0, 10.0)], Some(3.0)));
 }

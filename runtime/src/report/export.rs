@@ -6,8 +6,10 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use sesame_plan::{Activation, CampaignPlan, Choice, MetricId, OperationKind};
+use sesame_plan::{Activation, CampaignPlan, Choice, MetricId, Moment, OperationKind, TestOperation};
 
+use crate::condition;
+use crate::decimal::{decimal, quantity};
 use crate::observation::Outcome;
 use crate::record::{RecordError, Repository, TestRecord};
 
@@ -60,20 +62,47 @@ fn block(plan: &CampaignPlan, seed: u64, record: &TestRecord, name: &str) -> Str
                 (OperationKind::PacketLoss, _) => format!("{}%", decimal(x, 2)),
                 (_, unit) => quantity(x, unit.as_deref()),
             };
-            let _ = match *choice {
-                Choice::Value { value } => write!(text, " {} {}", parameter.name, written(value)),
+            let _ = match choice {
+                Choice::Value { value } => write!(text, " {} {}", parameter.name, written(*value)),
                 Choice::Range { low, high } => {
-                    write!(text, " {} [{}, {}]", parameter.name, written(low), written(high))
+                    write!(text, " {} [{}, {}]", parameter.name, written(*low), written(*high))
+                }
+                Choice::Point { point } => {
+                    let [x, y, z] = point.map(|coordinate| decimal(coordinate, 0));
+                    let unit = parameter.unit.as_deref().unwrap_or_default();
+                    write!(text, " {} ({x}, {y}, {z}){unit}", parameter.name)
+                }
+                Choice::Text { text: chosen } => {
+                    let escaped = chosen.replace('\\', "\\\\").replace('"', "\\\"");
+                    write!(text, " {} \"{escaped}\"", parameter.name)
                 }
             };
         }
-        let Activation::Time { start, end } = used.activation;
-        let seconds = |time| quantity(time, Some("s"));
-        let _ = writeln!(text, " from {} to {} seed {}", seconds(start), seconds(end), used.draw_seed);
+        let _ = writeln!(text, " {} seed {}", activation(plan, used), used.draw_seed);
     }
     expectations(&mut text, plan, record);
     text.push_str("}\n");
     text
+}
+
+/// When an operation is active, in the words of the language.
+pub(super) fn activation(plan: &CampaignPlan, used: &TestOperation) -> String {
+    let seconds = |time: &f64| quantity(*time, Some("s"));
+    let words = |condition| condition::text::write(condition, &plan.metrics);
+    let often = |times: &u32| if *times == 1 { String::new() } else { format!(" at most {times} times") };
+    match &used.activation {
+        Activation::Time { start, end } => format!("from {} to {}", seconds(start), seconds(end)),
+        Activation::Condition { start, end, times } => {
+            format!("when {} until {}{}", words(start), words(end), often(times))
+        }
+        Activation::ConditionFor { start, length, times } => {
+            format!("when {} for {}{}", words(start), seconds(length), often(times))
+        }
+        Activation::Offline => match plan.operation(used.operation).kind {
+            OperationKind::Custom { moment: Moment::AfterEnd } => "after end".to_owned(),
+            _ => "before start".to_owned(),
+        },
+    }
 }
 
 fn expectations(text: &mut String, plan: &CampaignPlan, record: &TestRecord) {
@@ -121,38 +150,6 @@ fn free_name(plan: &CampaignPlan, number: u32) -> String {
     std::iter::once(name.clone()).chain(more).find(|name| !taken.contains(&name.as_str())).unwrap_or(name)
 }
 
-/// A number with its unit glued on, as the language has it.
-fn quantity(x: f64, unit: Option<&str>) -> String {
-    format!("{}{}", decimal(x, 0), unit.unwrap_or_default())
-}
-
-/// The shortest decimal that reads back as this number, its point moved right by so many digits.
-fn decimal(x: f64, shift: i32) -> String {
-    // The shortest digits that tell the number from all others, as `d.ddde-x`.
-    let scientific = format!("{:e}", x + 0.0);
-    let (mantissa, exponent) = scientific.split_once('e').expect("a number in scientific notation has an exponent");
-    let exponent = exponent.parse::<i32>().expect("an exponent is a small whole number") + shift;
-    let (sign, mantissa) = mantissa.strip_prefix('-').map_or(("", mantissa), |mantissa| ("-", mantissa));
-    let digits: String = mantissa.chars().filter(char::is_ascii_digit).collect();
-    if !(-6..=15).contains(&exponent) && x != 0.0 {
-        let (first, rest) = digits.split_at(1);
-        let point = if rest.is_empty() { "" } else { "." };
-        return format!("{sign}{first}{point}{rest}e{exponent}");
-    }
-    let whole = usize::try_from(exponent + 1).unwrap_or(0);
-    if whole == 0 {
-        let zeros = "0".repeat(usize::try_from(-exponent - 1).unwrap_or(0));
-        return format!("{sign}0.{zeros}{digits}");
-    }
-    if digits.len() <= whole {
-        let zeros = if x == 0.0 { String::new() } else { "0".repeat(whole - digits.len()) };
-        let digits = if x == 0.0 { "0" } else { &digits };
-        return format!("{sign}{digits}{zeros}");
-    }
-    let (whole, fraction) = digits.split_at(whole);
-    format!("{sign}{whole}.{fraction}")
-}
-
 /// Whether a name can be that of a test; the words of the language are refused when the block is read.
 #[cfg(feature = "campaign")]
 pub(crate) fn is_name(name: &str) -> bool {
@@ -163,8 +160,6 @@ pub(crate) fn is_name(name: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
     use crate::record::sample;
 
@@ -181,38 +176,27 @@ mod tests {
     }
 
     #[test]
+    fn a_block_says_what_switches_an_operation() {
+        let plan = sample::plan();
+        let record = sample::record(&plan, 5, crate::record::Origin::Search, sample::conditional_test());
+        insta::assert_snapshot!(block(&plan, 42, &record, "by_condition"), @r"
+        /// T5 of `coverage_experiment`, seed 42.
+        test by_condition {
+          jitter_link0 offset [-0.1rad, 0.2rad] when arm_distance < 450mm and (1.5m/s < top_speed or arm_distance < 450mm) until 1.5m/s < top_speed seed 11
+          jitter_link1 offset [-0.1rad, 0.2rad] from 1.5s to 20s seed 11
+          cut_link1 when 1.5m/s < top_speed for 0.30000000000000004s at most 3 times seed 11
+          expect fuzzing_time == 39.8s
+          expect collision_occurrence == 5
+        }
+        ");
+    }
+
+    #[test]
     fn a_name_that_is_taken_is_not_given_again() {
         let mut plan = sample::plan();
         assert_eq!(free_name(&plan, 9), "coverage_experiment_T9");
         plan.tests[0].name = "coverage_experiment_T9".to_owned();
         plan.metrics[0].name = "coverage_experiment_T9_2".to_owned();
         assert_eq!(free_name(&plan, 9), "coverage_experiment_T9_3");
-    }
-
-    #[test]
-    fn numbers_are_written_as_people_write_them() {
-        let written = [0.0, -0.0, 18.0, -0.27, 100.0, 1e15, 1e16, 0.1 + 0.2, 1.5e-6, 1.5e-7].map(|x| decimal(x, 0));
-        assert_eq!(
-            written,
-            ["0", "0", "18", "-0.27", "100", "1000000000000000", "1e16", "0.30000000000000004", "0.0000015", "1.5e-7"]
-        );
-        assert_eq!([0.0, 1.0, 0.4, 0.123, 0.07, 1e-9].map(|x| decimal(x, 2)), ["0", "100", "40", "12.3", "7", "1e-7"]);
-    }
-
-    proptest! {
-        #[test]
-        fn every_number_reads_back_as_it_was(bits in any::<u64>(), unit in 0.0..=1.0f64) {
-            for x in [f64::from_bits(bits), unit].into_iter().filter(|x| x.is_finite()) {
-                let written = decimal(x, 0);
-                prop_assert_eq!(written.parse::<f64>().unwrap(), x);
-                let digits = written.strip_prefix('-').unwrap_or(&written);
-                prop_assert!(digits.starts_with(|c: char| c.is_ascii_digit()) && !digits.contains(".e"), "{}", written);
-            }
-            let (digits, exponent) = decimal(unit, 2).split_once('e').map_or_else(
-                || (decimal(unit, 2), -2),
-                |(digits, exponent)| (digits.to_owned(), exponent.parse::<i32>().unwrap() - 2),
-            );
-            prop_assert_eq!(format!("{digits}e{exponent}").parse::<f64>().unwrap(), unit);
-        }
     }
 }

@@ -6,8 +6,7 @@ use std::path::Path;
 use sesame_plan::Search;
 
 use crate::observation::Outcome;
-use crate::record::MetricValue;
-use crate::record::{Origin, RecordError, Repository, TestRow, Verdict};
+use crate::record::{MetricValue, Origin, RecordError, Repository, TestRow, Verdict, trace_file};
 use crate::report::markup::{Markup, coordinate, fill};
 use crate::report::number::{self, plural, with_unit};
 use crate::report::scatter::{Detail, Dimension, Kind, Point, scatter};
@@ -15,7 +14,7 @@ use crate::report::show::{TestReport, report_on};
 use crate::report::summary::{Objective, RequirementSummary, Summary, summarise, value_text};
 use crate::report::text::{
     came_out, choices_text, counts_sentence, effect_text, expectation_value, headline, objective_columns,
-    outcome_sentence, rate_text, spans_text,
+    outcome_sentence, planned_text, rate_text, spans_text,
 };
 use crate::report::timeline::timeline;
 
@@ -24,7 +23,9 @@ const TIMELINES: usize = 24;
 
 /// Writes the page beside the results, or wherever it is wanted.
 pub fn write_page(repository: &Repository, path: &Path) -> Result<(), RecordError> {
-    write_aside(path, &page(repository)?).map_err(|e| RecordError::io("write the page", path, e))
+    let beside = path.parent() == Some(repository.folder());
+    let folder = if beside { Path::new("") } else { repository.folder() };
+    write_aside(path, &page_in(repository, folder)?).map_err(|e| RecordError::io("write the page", path, e))
 }
 
 /// Writes a file aside and renames it, so that nobody who reads it meanwhile sees half of it.
@@ -34,8 +35,13 @@ pub(crate) fn write_aside(path: &Path, content: &str) -> std::io::Result<()> {
     std::fs::write(&aside, content).and_then(|()| std::fs::rename(&aside, path))
 }
 
-/// The page, from a campaign's results; a run may still be going on.
+/// The page, from a campaign's results; a run may still be going on. Links to traces lead from the run's folder.
 pub fn page(repository: &Repository) -> Result<String, RecordError> {
+    page_in(repository, Path::new(""))
+}
+
+/// The page, with the run's folder as it is seen from the page's place.
+fn page_in(repository: &Repository, folder: &Path) -> Result<String, RecordError> {
     let rows = repository.tests()?;
     let members = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
     let summary = summarise(repository, &rows, &members)?;
@@ -62,6 +68,9 @@ pub fn page(repository: &Repository) -> Result<String, RecordError> {
             test_heading(&mut body, &summary, &report);
             timeline(&mut body, repository.plan(), &record, &report);
             figures(&mut body, &report);
+            if repository.trace(number, record.duplicate_of).is_some() {
+                trace_link(&mut body, &trace_file(folder, record.duplicate_of.unwrap_or(number)));
+            }
             body.close();
         }
         body.close();
@@ -507,9 +516,9 @@ fn figures(body: &mut Markup, report: &TestReport) {
                 let observed = operation.observed.as_deref().map_or("unknown".to_owned(), spans_text);
                 let cells = [
                     operation.kind.clone(),
-                    operation.topic.clone(),
+                    operation.topic.clone().unwrap_or_default(),
                     choices_text(operation),
-                    spans_text(&[operation.planned]),
+                    planned_text(operation),
                     observed,
                     effect_text(operation),
                 ];
@@ -539,6 +548,13 @@ fn figures(body: &mut Markup, report: &TestReport) {
     for warning in &report.warnings {
         body.element("p", &[("class", "warning")], &format!("Warning: {warning}"));
     }
+    body.close();
+}
+
+/// A link to a trace, for tools that read MCAP.
+fn trace_link(body: &mut Markup, file: &Path) {
+    body.open("p", &[("class", "quiet")]);
+    body.element("a", &[("href", &file.display().to_string())], "Trace (MCAP)");
     body.close();
 }
 

@@ -1,5 +1,7 @@
 //! The tests of a campaign: a line for each, or everything on one.
 
+use std::path::PathBuf;
+
 use serde::Serialize;
 use sesame_plan::{Activation, CampaignPlan, Choice, Span};
 
@@ -7,7 +9,7 @@ use crate::observation::Counters;
 use crate::record::{
     EventKind, MetricValue, Origin, RecordError, Repository, TestRecord, TestRow, Verdict, verdict, violation_spans,
 };
-use crate::report::{number, summary};
+use crate::report::{export, number, summary};
 
 /// A line in the list of all tests.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -80,6 +82,9 @@ pub struct TestReport {
     pub warnings: Vec<String>,
     /// What the session in which it ran left about it, such as the last words of its worker.
     pub notes: Vec<String>,
+    /// Its trace, or that of the test whose result stands for it, where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trace: Option<PathBuf>,
 }
 
 /// One operation of a test.
@@ -89,10 +94,14 @@ pub struct OperationReport {
     pub operation: String,
     /// Its kind in words.
     pub kind: String,
-    /// The topic it disturbs.
-    pub topic: String,
-    /// When it was to be active, in seconds.
-    pub planned: Span,
+    /// The topic it disturbs; `None` for one that acts before the start or after the end.
+    pub topic: Option<String>,
+    /// When it was to be active, in seconds; `None` where conditions decide that, and for one that acts before the start or
+    /// after the end.
+    pub planned: Option<Span>,
+    /// What switched it on and off, in the words of the language; `None` where a planned window did, and for one that acts
+    /// before the start or after the end.
+    pub conditions: Option<String>,
     /// When it was seen to be active, in seconds; `None` where the run could not report it.
     pub observed: Option<Vec<Span>>,
     /// What the test chose.
@@ -114,7 +123,7 @@ pub struct ChoiceReport {
     pub parameter: String,
     /// Its unit; `None` for probabilities and plain numbers.
     pub unit: Option<String>,
-    /// The value or sub-range.
+    /// The value, sub-range, point or text.
     pub choice: Choice,
     /// Both in words, as in `offset 0.27…0.29 rad`.
     pub text: String,
@@ -195,10 +204,11 @@ pub fn show(repository: &Repository, name: &str) -> Result<TestReport, RecordErr
     let notes = repository.events()?.into_iter();
     let notes = notes.filter(|event| event.kind == EventKind::Session && event.test == Some(ran));
     report.notes = notes.map(|event| event.text).collect();
+    report.trace = repository.trace(record.number, record.duplicate_of);
     Ok(report)
 }
 
-/// Everything on a test, from its record; notes are not there.
+/// Everything on a test, from its record; notes and trace are not there.
 pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, front: bool) -> TestReport {
     let observation = &record.observation;
     TestReport {
@@ -233,6 +243,7 @@ pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, front: bool) -
         requirements: verdicts(plan, record),
         warnings: observation.warnings.clone(),
         notes: Vec::new(),
+        trace: None,
     }
 }
 
@@ -240,21 +251,28 @@ fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> 
     let reports = record.test.operations.iter().enumerate().map(|(position, used)| {
         let operation = plan.operation(used.operation);
         let effect = record.observation.operations.get(position);
-        let Activation::Time { start, end } = used.activation;
+        let (planned, conditions) = match used.activation {
+            Activation::Time { start, end } => (Some(Span { start, end }), None),
+            Activation::Condition { .. } | Activation::ConditionFor { .. } => {
+                (None, Some(export::activation(plan, used)))
+            }
+            Activation::Offline => (None, None),
+        };
         OperationReport {
             operation: operation.name.clone(),
             kind: operation.kind.words().to_owned(),
-            topic: plan.topic(operation.topic).name.clone(),
-            planned: Span { start, end },
+            topic: operation.topic.map(|topic| plan.topic(topic).name.clone()),
+            planned,
+            conditions,
             observed: effect.map(|effect| effect.intervals.clone()),
             choices: operation
                 .parameters
                 .iter()
                 .zip(&used.parameters)
-                .map(|(parameter, &choice)| ChoiceReport {
+                .map(|(parameter, choice)| ChoiceReport {
                     parameter: parameter.name.clone(),
                     unit: parameter.unit.clone(),
-                    choice,
+                    choice: choice.clone(),
                     text: number::choice(&operation.kind, parameter, choice),
                 })
                 .collect(),

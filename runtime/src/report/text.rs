@@ -295,8 +295,8 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
             table.row([
                 operation.operation.clone(),
                 operation.kind.clone(),
-                operation.topic.clone(),
-                spans_text(&[operation.planned]),
+                operation.topic.clone().unwrap_or_default(),
+                planned_text(operation),
                 operation.observed.as_deref().map_or("unknown".to_owned(), spans_text),
                 choices_text(operation),
                 effect_text(operation),
@@ -337,6 +337,9 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     for line in test.notes.iter().flat_map(|note| note.lines()) {
         paragraph(&mut text, &visible(line), options);
     }
+    if let Some(trace) = &test.trace {
+        paragraph(&mut text, &format!("trace {}", visible(&trace.display().to_string())), options);
+    }
     text
 }
 
@@ -361,6 +364,14 @@ pub(crate) fn outcome_sentence(test: &TestReport) -> String {
         sentence.push_str(", on the front");
     }
     sentence
+}
+
+/// When an operation was to be active: its window, or the conditions that switched it; a dash for an offline one.
+pub(crate) fn planned_text(operation: &OperationReport) -> String {
+    match (&operation.conditions, operation.planned) {
+        (Some(conditions), _) => conditions.clone(),
+        (None, planned) => spans_text(planned.as_slice()),
+    }
 }
 
 /// Spans in seconds, as in `8.00–57.00 s`; a dash for none.

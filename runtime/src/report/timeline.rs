@@ -12,7 +12,7 @@ use crate::report::axis::Axis;
 use crate::report::markup::{Markup, coordinate, percent};
 use crate::report::number;
 use crate::report::show::{OperationReport, TestReport};
-use crate::report::text::{choices_text, effect_text, spans_text};
+use crate::report::text::{choices_text, effect_text, planned_text, spans_text};
 
 /// Height of a lane of an operation, in pixels.
 const LANE: f64 = 30.0;
@@ -81,12 +81,8 @@ fn lane(markup: &mut Markup, time: &Axis, operation: &OperationReport, broke_off
         Some(spans) => format!("active {}", spans_text(spans)),
         None => "activity unknown".to_owned(),
     };
-    let title = format!(
-        "{}: planned {}, {said}; {}",
-        operation.operation,
-        spans_text(&[operation.planned]),
-        effect_text(operation)
-    );
+    let title =
+        format!("{}: planned {}, {said}; {}", operation.operation, planned_text(operation), effect_text(operation));
     let height = coordinate(LANE);
     markup.open("svg", &[("class", "plot"), ("height", &height), ("role", "img"), ("aria-label", &title)]);
     backdrop(markup, time, broke_off);
@@ -99,7 +95,10 @@ fn lane(markup: &mut Markup, time: &Axis, operation: &OperationReport, broke_off
         markup.element("title", &[], &title);
         markup.close();
     };
-    window(operation.planned, "planned", 5.0);
+    // Where conditions decide, what was seen is what was planned.
+    for &span in operation.planned.as_ref().map_or(observed, std::slice::from_ref) {
+        window(span, "planned", 5.0);
+    }
     for &span in observed {
         window(span, if effect == Some(false) { "seen idle" } else { "seen" }, 9.0);
     }
@@ -113,8 +112,9 @@ fn shown_metrics(plan: &CampaignPlan, record: &TestRecord) -> Vec<usize> {
     let objectives = plan.campaign.objectives.iter().map(|id| id.index());
     let mut order: Vec<usize> = Vec::new();
     for id in bounded.chain(objectives).chain(0..plan.metrics.len()) {
-        // The time spent fuzzing is what the lanes above show.
-        let drawn = plan.metrics[id].source != MetricSource::FuzzingTime
+        // The time spent fuzzing is what the lanes above show; a robustness is known at the end only.
+        let source = &plan.metrics[id].source;
+        let drawn = !matches!(source, MetricSource::FuzzingTime | MetricSource::Robustness { .. })
             && record.observation.metrics.get(id).is_some_and(|shown| !shown.series.is_empty());
         if drawn && !order.contains(&id) {
             order.push(id);
@@ -193,6 +193,15 @@ fn series(
         markup.leaf("path", &[("class", "line bad"), ("d", &bad)]);
     }
     markup.close();
+    // A value set at the very end has no line, only a place.
+    if let Some(&(at, value)) = points.last()
+        && at >= end
+    {
+        let bad = bounds.iter().any(|(_, bound)| !bound.holds(value));
+        let (x, y) = (percent(time.share(at)), coordinate(height(value)));
+        let class = if bad { "at-end bad" } else { "at-end" };
+        markup.leaf("circle", &[("class", class), ("cx", &x), ("cy", &y), ("r", "3")]);
+    }
     // After the lines, so that none strikes a name out.
     for &(name, bound, at) in &lines {
         let y = coordinate(height(at));
@@ -293,6 +302,21 @@ mod tests {
         let mut markup = Markup::default();
         timeline(&mut markup, &plan, &record, &report_on(&plan, &record, true));
         insta::assert_snapshot!("timeline", markup.finish().replace("><", ">\n<"));
+    }
+
+    #[test]
+    fn where_conditions_decide_what_was_seen_is_what_was_planned() {
+        let plan = sample::plan();
+        let record = sample::record(&plan, 1, Origin::Search, sample::conditional_test());
+        let mut markup = Markup::default();
+        let report = report_on(&plan, &record, true);
+        timeline(&mut markup, &plan, &record, &report);
+        let drawn = markup.finish();
+        assert_eq!(drawn.matches(r#"class="planned""#).count(), 3, "{drawn}");
+        assert!(
+            drawn.contains("planned when 1.5m/s &lt; top_speed for 0.30000000000000004s at most 3 times"),
+            "{drawn}"
+        );
     }
 
     proptest! {

@@ -5,13 +5,16 @@
 //! permits. If there are more kinds than places, a random choice of them stays; if there are fewer, each has its place
 //! and the other places are filled with them at random: a test may hold an operation several times, with windows and
 //! parameters of its own each time. Windows and sub-ranges are uniform over all feasible pairs of ends, values uniform
-//! over their range. The order of the list is random.
+//! over their range. The order of the list is random. Where conditions switch, start and end are grown independently, and
+//! lengths are uniform.
 
+use sesame_plan::condition::ConditionEnd;
 use sesame_plan::{Activation, Test, TestOperation};
 
 use crate::rng::Stream;
-use crate::search::permitted::{Permitted, PermittedOperation};
-use crate::search::range::fresh_choice;
+use crate::search::condition::grown;
+use crate::search::permitted::{Permitted, PermittedActivation, PermittedOperation};
+use crate::search::range::Range;
 
 /// A fresh test; one that the campaign permits.
 pub fn fresh_test(permitted: &Permitted, stream: &mut Stream) -> Test {
@@ -34,13 +37,33 @@ pub fn fresh_test(permitted: &Permitted, stream: &mut Stream) -> Test {
 
 /// A fresh instance of an operation, with a draw seed of its own.
 pub fn fresh_operation(kind: &PermittedOperation, stream: &mut Stream) -> TestOperation {
-    let (start, end) = kind.window.interval(stream);
-    let parameters = kind.parameters.iter().map(|&(range, shape)| fresh_choice(range, shape, stream)).collect();
-    TestOperation {
-        operation: kind.operation,
-        activation: Activation::Time { start, end },
-        parameters,
-        draw_seed: stream.bits(),
+    let activation = fresh_activation(&kind.activation, stream);
+    let parameters = kind.parameters.iter().map(|permitted| permitted.fresh(stream)).collect();
+    TestOperation { operation: kind.operation, activation, parameters, draw_seed: stream.bits() }
+}
+
+/// A fresh window, or fresh conditions; of an offline operation there is nothing to choose.
+fn fresh_activation(activation: &PermittedActivation, stream: &mut Stream) -> Activation {
+    match activation {
+        PermittedActivation::Offline => Activation::Offline,
+        PermittedActivation::Time(window) => {
+            let (start, end) = window.interval(stream);
+            Activation::Time { start, end }
+        }
+        PermittedActivation::Condition { space, constraints, first } => {
+            let [first_start, first_end] = &**first;
+            let start = grown(space, constraints, stream).unwrap_or_else(|| first_start.clone());
+            match space.end {
+                ConditionEnd::Condition => {
+                    let end = grown(space, &[], stream).unwrap_or_else(|| first_end.clone());
+                    Activation::Condition { start, end, times: space.times }
+                }
+                ConditionEnd::Length { low, high } => {
+                    let length = Range::between(low, high).number(stream);
+                    Activation::ConditionFor { start, length, times: space.times }
+                }
+            }
+        }
     }
 }
 

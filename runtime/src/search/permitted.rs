@@ -1,9 +1,17 @@
 //! What a campaign permits its tests: which operations, how many, when, and how strong.
 
-use sesame_plan::{CampaignPlan, Count, OperationId, Shape};
+use sesame_plan::condition::{Condition, ConditionSpace, Constraint};
+use sesame_plan::{ActivationMode, CampaignPlan, Count, OperationId};
 use thiserror::Error;
 
+use crate::rng::Stream;
+use crate::search::choice::PermittedChoice;
+use crate::search::condition::grown;
 use crate::search::range::Range;
+
+/// How often a first condition is tried before a campaign is said to have none; so rarely does one try fail where there
+/// are any that this is certain enough.
+const FIRST_TRIES: u64 = 100;
 
 /// Why a plan cannot be searched. The generator refuses such campaigns, so a plan that is one was edited.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -32,6 +40,17 @@ pub enum SearchError {
         /// The parameter.
         parameter: String,
     },
+    /// No condition could be grown that is neither always true nor never.
+    #[error(
+        "campaign `{campaign}` has no start condition for operation `{operation}` that could be true as well as false; \
+         offer more variables, wider integers or more depth, or demand less of it"
+    )]
+    NoCondition {
+        /// The campaign.
+        campaign: String,
+        /// The operation.
+        operation: String,
+    },
     /// A population of nobody.
     #[error("campaign `{campaign}` has a population of 0; give it at least 1")]
     NoPopulation {
@@ -45,6 +64,7 @@ pub enum SearchError {
 pub struct Permitted {
     operations: Vec<PermittedOperation>,
     count: Count,
+    conditions: Option<ConditionSpace>,
 }
 
 /// One operation as far as a campaign permits it.
@@ -52,12 +72,40 @@ pub struct Permitted {
 pub struct PermittedOperation {
     /// Which.
     pub operation: OperationId,
-    /// Its windows: inside `within` and the campaign.
-    pub window: Range,
+    /// When it may be active.
+    pub activation: PermittedActivation,
     /// Its parameters, in the operation's order.
-    pub parameters: Vec<(Range, Shape)>,
+    pub parameters: Vec<PermittedChoice>,
     /// Probability that a fresh test includes it.
     pub inclusion: f64,
+}
+
+/// When a campaign permits an operation to be active.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PermittedActivation {
+    /// Never, as it acts before the start or after the end: there is nothing to choose.
+    Offline,
+    /// In a window of time inside this range, which lies in `within` and the campaign.
+    Time(Range),
+    /// As conditions say.
+    Condition {
+        /// What they are grown from.
+        space: ConditionSpace,
+        /// What the start conditions contain.
+        constraints: Vec<Constraint>,
+        /// A start condition and an end condition that are permitted, for when many tries give no others.
+        first: Box<[Condition; 2]>,
+    },
+}
+
+impl PermittedActivation {
+    /// What the start conditions of an operation contain.
+    pub fn constraints(&self) -> &[Constraint] {
+        match self {
+            PermittedActivation::Condition { constraints, .. } => constraints,
+            PermittedActivation::Offline | PermittedActivation::Time(_) => &[],
+        }
+    }
 }
 
 impl Permitted {
@@ -69,24 +117,40 @@ impl Permitted {
         if count.min > count.max {
             return Err(SearchError::Count { campaign: name(), min: campaign.count.min, max: campaign.count.max });
         }
+        let conditions = match &campaign.activation {
+            ActivationMode::Time => None,
+            ActivationMode::Condition { space } => Some(space.clone()),
+        };
         let mut operations = Vec::new();
         for &id in &campaign.operations {
             let operation = plan.operation(id);
+            let offline = operation.kind.is_offline();
             let end = operation.within.end.min(campaign.end_after);
-            if operation.within.start >= end {
+            if !offline && operation.within.start >= end {
                 continue;
             }
             let mut parameters = Vec::new();
             for parameter in &operation.parameters {
-                let range = Range::parameter(parameter).ok_or_else(|| SearchError::NoWholeNumber {
+                let permitted = PermittedChoice::of(&parameter.domain).ok_or_else(|| SearchError::NoWholeNumber {
                     operation: operation.name.clone(),
                     parameter: parameter.name.clone(),
                 })?;
-                parameters.push((range, parameter.shape));
+                parameters.push(permitted);
             }
             operations.push(PermittedOperation {
                 operation: id,
-                window: Range::window(operation.within.start, end),
+                activation: match &conditions {
+                    _ if offline => PermittedActivation::Offline,
+                    None => PermittedActivation::Time(Range::window(operation.within.start, end)),
+                    Some(space) => {
+                        let none = || SearchError::NoCondition { campaign: name(), operation: operation.name.clone() };
+                        PermittedActivation::Condition {
+                            space: space.clone(),
+                            constraints: operation.constraints.clone(),
+                            first: Box::new(first_conditions(space, &operation.constraints).ok_or_else(none)?),
+                        }
+                    }
+                },
                 parameters,
                 inclusion: operation.inclusion,
             });
@@ -94,12 +158,17 @@ impl Permitted {
         if operations.is_empty() {
             return Err(SearchError::NoOperation { campaign: name() });
         }
-        Ok(Permitted { operations, count })
+        Ok(Permitted { operations, count, conditions })
     }
 
     /// The operations, in the campaign's order; at least one.
     pub fn operations(&self) -> &[PermittedOperation] {
         &self.operations
+    }
+
+    /// What conditions are grown from; `None` where operations are active in windows of time.
+    pub fn conditions(&self) -> Option<&ConditionSpace> {
+        self.conditions.as_ref()
     }
 
     /// The least number of operations of a test, at least 1.
@@ -118,22 +187,35 @@ impl Permitted {
     }
 }
 
+/// A start condition and an end condition that are permitted, if there are any. No seed decides them, since a campaign can
+/// be searched with every seed or with none.
+fn first_conditions(space: &ConditionSpace, constraints: &[Constraint]) -> Option<[Condition; 2]> {
+    let first = |constraints: &[Constraint]| {
+        (0..FIRST_TRIES).find_map(|at| grown(space, constraints, &mut Stream::derive(0, "first condition", &[at])))
+    };
+    Some([first(constraints)?, first(&[])?])
+}
+
 #[cfg(test)]
 pub(crate) mod tests {
     use proptest::prelude::*;
-    use sesame_plan::{Activation, Choice, Drain, Operation, OperationKind, Parameter, Search, Span, Test};
+    use sesame_plan::condition::{ConditionEnd, Integers};
+    use sesame_plan::{
+        Activation, Choice, Domain, Drain, Operation, OperationKind, Parameter, Search, Shape, Span, Test,
+    };
 
     use super::*;
+    use crate::condition::constant::has_constant_part;
+    use crate::search::condition::contains;
+    use crate::search::condition::tests::{any_constraints, any_space, wrong};
     use crate::search::landscape::LANDSCAPES;
 
     /// Plans with up to five operations of varied windows and parameters, and varied counts.
-    pub(crate) fn any_plan() -> impl Strategy<Value = CampaignPlan> {
+    fn any_timed_plan() -> impl Strategy<Value = CampaignPlan> {
         let ends = || (0.0..100.0f64, 0.0..100.0f64).prop_map(|(a, b)| (a.min(b), a.max(b)));
         let parameter =
             (ends(), any::<bool>(), any::<bool>(), any::<bool>()).prop_map(|((a, b), value, integer, fixed)| {
-                Parameter {
-                    name: "p".to_owned(),
-                    unit: None,
+                Domain::Number {
                     low: if integer { libm::floor(a) - 50.0 } else { a - 50.0 },
                     high: if fixed {
                         if integer { libm::floor(a) - 50.0 } else { a - 50.0 }
@@ -144,18 +226,30 @@ pub(crate) mod tests {
                     integer,
                 }
             });
-        let operation = (ends(), proptest::collection::vec(parameter, 0..4), 0.0..=1.0f64).prop_map(
-            |((start, end), parameters, inclusion)| Operation {
+        let point = (ends(), ends(), -9.0..9.0f64)
+            .prop_map(|(x, y, z)| Domain::Point { low: [x.0, y.0, z], high: [x.1, y.1, z] });
+        let items = |n: usize| (0..n).map(|item| format!("item {item}")).collect();
+        let texts = (1usize..4).prop_map(move |n| Domain::Texts { texts: items(n) });
+        let files = (1usize..3).prop_map(move |n| Domain::Files { files: items(n) });
+        let domain = prop_oneof![4 => parameter, 1 => point, 1 => texts, 1 => files];
+        let parameter = domain.prop_map(|domain| Parameter { name: "p".to_owned(), unit: None, domain });
+        let operation = (ends(), proptest::collection::vec(parameter, 0..4), 0.0..=1.0f64, 0u32..5).prop_map(
+            |((start, end), parameters, inclusion, kind)| Operation {
                 name: "o".to_owned(),
                 doc: String::new(),
-                topic: sesame_plan::TopicId(0),
-                // What is varied follows from the parameters alone, whatever the kind.
-                kind: OperationKind::Latency { distribution: sesame_plan::Distribution::Fixed, drain: Drain::Finish },
+                topic: (kind > 0).then_some(sesame_plan::TopicId(0)),
+                // What is varied follows from the parameters, and from the kind only whether there is a window.
+                kind: if kind == 0 {
+                    OperationKind::Custom { moment: sesame_plan::Moment::BeforeStart }
+                } else {
+                    OperationKind::Latency { distribution: sesame_plan::Distribution::Fixed, drain: Drain::Finish }
+                },
                 parameters,
                 within: Span { start, end: end + 0.01 },
                 priority: 0,
                 inclusion,
                 timed: true,
+                constraints: Vec::new(),
             },
         );
         (proptest::collection::vec(operation, 1..6), 1u32..4, 0u32..6, 0.5..120.0f64).prop_map(
@@ -165,10 +259,54 @@ pub(crate) mod tests {
                 plan.campaign.count = Count { min, max: min + more };
                 plan.campaign.end_after = end_after;
                 plan.operations = operations;
+                for operation in plan.operations.iter_mut().filter(|operation| operation.kind.is_offline()) {
+                    operation.within = Span { start: 0.0, end: end_after };
+                }
                 plan.operations[0].within.start = plan.operations[0].within.start.min(end_after / 2.0);
                 plan
             },
         )
+    }
+
+    /// Such plans, by time or by condition.
+    pub(crate) fn any_plan() -> impl Strategy<Value = CampaignPlan> {
+        let conditional =
+            (any_timed_plan(), any_space(), any_constraints()).prop_map(|(mut plan, space, constraints)| {
+                plan.operations[0].constraints = constraints;
+                plan.campaign.activation = ActivationMode::Condition { space };
+                plan
+            });
+        let grows = conditional.prop_filter("conditions to grow", |plan| Permitted::of(plan).is_ok());
+        prop_oneof![any_timed_plan(), grows]
+    }
+
+    /// What of an activation by condition the plan does not permit.
+    fn broken_condition(space: &ConditionSpace, constraints: &[Constraint], activation: &Activation) -> Option<String> {
+        let (start, times) = match (activation, space.end) {
+            (Activation::Condition { start, end, times }, ConditionEnd::Condition) => {
+                if has_constant_part(end, &space.variables) {
+                    return Some("a constant end".to_owned());
+                }
+                if let Some(wrong) = wrong(end, space, space.depth) {
+                    return Some(wrong);
+                }
+                (start, times)
+            }
+            (Activation::ConditionFor { start, length, times }, ConditionEnd::Length { low, high }) => {
+                if !(low..=high).contains(length) {
+                    return Some(format!("length {length}"));
+                }
+                (start, times)
+            }
+            _ => return Some("kind of activation".to_owned()),
+        };
+        if *times != space.times || has_constant_part(start, &space.variables) {
+            return Some(format!("{times} times from {start:?}"));
+        }
+        if !constraints.iter().all(|constraint| contains(start, constraint)) {
+            return Some(format!("{start:?} lacks one of {constraints:?}"));
+        }
+        wrong(start, space, space.depth)
     }
 
     /// What of the plan a test breaks, if anything: read off the plan itself.
@@ -179,23 +317,49 @@ pub(crate) mod tests {
         }
         for applied in &test.operations {
             let operation = plan.operation(applied.operation);
-            let Activation::Time { start, end } = applied.activation;
-            let within = operation.within;
-            if !(within.start <= start && start < end && end <= within.end && start < plan.campaign.end_after) {
-                return Some(format!("window {start} to {end}"));
+            match (&applied.activation, &plan.campaign.activation) {
+                (Activation::Offline, _) if operation.kind.is_offline() => {}
+                (activation, _) if operation.kind.is_offline() => {
+                    return Some(format!("{activation:?} of an offline operation"));
+                }
+                (&Activation::Time { start, end }, ActivationMode::Time) => {
+                    let within = operation.within;
+                    if !(within.start <= start && start < end && end <= within.end && start < plan.campaign.end_after) {
+                        return Some(format!("window {start} to {end}"));
+                    }
+                }
+                (activation, ActivationMode::Condition { space }) => {
+                    let broken = broken_condition(space, &operation.constraints, activation);
+                    if broken.is_some() {
+                        return broken;
+                    }
+                }
+                _ => return Some("kind of activation".to_owned()),
             }
             if applied.parameters.len() != operation.parameters.len() {
                 return Some("number of parameters".to_owned());
             }
             for (choice, parameter) in applied.parameters.iter().zip(&operation.parameters) {
-                let (low, high) = match (*choice, parameter.shape) {
-                    (Choice::Value { value }, Shape::Value) => (value, value),
-                    (Choice::Range { low, high }, Shape::Range) => (low, high),
-                    _ => return Some("shape of a parameter".to_owned()),
+                let fits = match (&parameter.domain, choice) {
+                    (Domain::Point { low, high }, Choice::Point { point }) => {
+                        (0..3).all(|axis| (low[axis]..=high[axis]).contains(&point[axis]))
+                    }
+                    (Domain::Texts { texts: items } | Domain::Files { files: items }, Choice::Text { text }) => {
+                        items.contains(text)
+                    }
+                    (Domain::Number { low: least, high: most, shape, integer }, choice) => {
+                        let (low, high) = match (choice, shape) {
+                            (Choice::Value { value }, Shape::Value) => (*value, *value),
+                            (Choice::Range { low, high }, Shape::Range) => (*low, *high),
+                            _ => return Some("shape of a parameter".to_owned()),
+                        };
+                        let whole = !integer || (libm::trunc(low) == low && libm::trunc(high) == high);
+                        *least <= low && low <= high && high <= *most && whole
+                    }
+                    _ => false,
                 };
-                let whole = !parameter.integer || (libm::trunc(low) == low && libm::trunc(high) == high);
-                if !(parameter.low <= low && low <= high && high <= parameter.high && whole) {
-                    return Some(format!("choice {low} to {high} of {parameter:?}"));
+                if !fits {
+                    return Some(format!("choice {choice:?} of {parameter:?}"));
                 }
             }
         }
@@ -217,8 +381,14 @@ pub(crate) mod tests {
 
         let mut no_number = plan();
         let offset = &mut no_number.operations[1].parameters[0];
-        (offset.integer, offset.low, offset.high) = (true, 0.2, 0.8);
+        offset.domain = Domain::Number { low: 0.2, high: 0.8, shape: Shape::Range, integer: true };
         assert!(refusal(&no_number).contains("`jitter1` permits no whole number for `offset`"));
+
+        let mut unreachable =
+            LANDSCAPES[0].plan_by_condition(Search::Random { evaluations: 10 }, ConditionEnd::Condition);
+        let bounds = Integers { lowest: 30, highest: 40 };
+        unreachable.operations[1].constraints = vec![Constraint::Integer { bounds }];
+        assert!(refusal(&unreachable).contains("has no start condition for operation `jitter1`"));
     }
 
     #[test]
@@ -228,6 +398,7 @@ pub(crate) mod tests {
         plan.operations[1].within = Span { start: 60.0, end: 90.0 };
         let permitted = Permitted::of(&plan).unwrap();
         let [only] = permitted.operations() else { panic!("{permitted:?}") };
-        assert_eq!((only.operation, only.window.low, only.window.high), (OperationId(1), 60.0, 70.0));
+        let PermittedActivation::Time(window) = only.activation else { panic!("{only:?}") };
+        assert_eq!((only.operation, window.low, window.high), (OperationId(1), 60.0, 70.0));
     }
 }

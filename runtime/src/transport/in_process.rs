@@ -30,6 +30,9 @@ fn connect<S: Simulator + 'static>(plan: &CampaignPlan, _: Place) -> Box<dyn Tra
     })
 }
 
+/// Messages in one step beyond which a simulator is taken to have lost its mind; what is more is not kept.
+const STEP_LIMIT: u64 = 100_000;
+
 struct InProcess<S> {
     simulator: Option<S>,
     bus: Switchboard,
@@ -63,6 +66,7 @@ impl<S: Simulator> Transport for InProcess<S> {
             return Ok(Progress::Ended);
         }
         self.now = self.now + self.step;
+        self.bus.published = 0;
         relay.advance(self.now, &mut self.bus.deliveries);
         self.bus.deliver();
         let mut linked = Linked { board: &mut self.bus, plan: &self.plan, relay };
@@ -93,6 +97,8 @@ struct Switchboard {
     by_wire: Vec<Option<usize>>,
     deliveries: Vec<Delivery>,
     misfit: Option<TransportError>,
+    /// Messages since the last step began.
+    published: u64,
 }
 
 /// One topic of the simulator.
@@ -158,6 +164,12 @@ impl Wires for Linked<'_> {
     }
 
     fn publish(&mut self, now: SimTime, port: Port, value: Value) {
+        self.board.published += 1;
+        if self.board.published > STEP_LIMIT {
+            let flood = format!("it publishes more than {STEP_LIMIT} messages in the step to {now}");
+            self.board.misfit.get_or_insert(TransportError::Simulator(flood));
+            return;
+        }
         let line = &mut self.board.lines[port.0];
         let Some(wire) = line.wire else {
             if let Some(inbox) = &mut line.inbox {

@@ -5,7 +5,6 @@
 //! with `publish` is there for its subscribers in the same step, what is published with `done` in the next.
 
 mod child;
-mod json;
 mod protocol;
 mod session;
 

@@ -130,15 +130,34 @@ fn start(mut runner: Command) -> std::io::Result<ExitCode> {
     Ok(u8::try_from(code).map_or(ExitCode::FAILURE, ExitCode::from))
 }
 
-/// `sesamec explain`
-pub(super) fn explain(language: &Language, code: &str) -> anyhow::Result<ExitCode> {
-    match (language.explain)(code) {
-        Some(page) => {
-            println!("{}", page.trim_end());
-            Ok(ExitCode::SUCCESS)
-        }
-        None => bail!("there is no diagnostic `{}`; codes look like E0203", code.escape_debug()),
+/// `sesamec explain CODE`
+pub(super) fn explain_code(language: &Language, code: &str) -> anyhow::Result<ExitCode> {
+    if let Some(page) = (language.explain)(code) {
+        println!("{}", page.trim_end());
+        return Ok(ExitCode::SUCCESS);
     }
+    let shown = code.escape_debug();
+    let digits = code.strip_prefix(['E', 'e', 'W', 'w']).unwrap_or_default();
+    if !digits.is_empty() && digits.chars().all(|c| c.is_ascii_digit()) {
+        bail!("there is no diagnostic `{shown}`; codes look like E0203");
+    }
+    bail!(
+        "`{shown}` is no code like E0203; to explain a campaign, name its file: `{} explain {shown} FILE`",
+        shell::command()
+    )
+}
+
+/// `sesamec explain CAMPAIGN FILE`
+pub(super) fn explain_campaign(
+    shell: Shell,
+    language: &Language,
+    campaign: &str,
+    file: &Path,
+) -> anyhow::Result<ExitCode> {
+    let checked = check(shell, language, file)?;
+    let chosen = choose(&checked, file, Some(campaign))?;
+    print!("{}", crate::explain::campaign(&checked.plans[chosen].plan));
+    Ok(ExitCode::SUCCESS)
 }
 
 /// The campaign of a name, or the only one.
@@ -224,11 +243,8 @@ fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode) {
         }
     }
     for hook in &report.changed_hooks {
-        let mut lines = format!(
-            "metric `{}` is given something else now; look into {}:",
-            hook.metric,
-            out.join(&hook.path).display()
-        );
+        let mut lines =
+            format!("{} is given something else now; look into {}:", hook.of, out.join(&hook.path).display());
         let changes = hook.gone.iter().map(|line| ('-', line)).chain(hook.new.iter().map(|line| ('+', line)));
         for (sign, line) in changes {
             lines = format!("{lines}\n           {sign} {line}");
@@ -237,10 +253,9 @@ fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode) {
     }
     for orphan in &report.orphans {
         shell.warning(match orphan {
-            Orphan::Hook { path, metric } => format!(
-                "there is no metric `{metric}` any more; its hook {} is kept but not compiled",
-                out.join(path).display()
-            ),
+            Orphan::Hook { path, of } => {
+                format!("there is no {of} any more; its hook {} is kept but not compiled", out.join(path).display())
+            }
             Orphan::Edited { path } => {
                 format!("{} is not generated any more; it is kept since it was edited", out.join(path).display())
             }

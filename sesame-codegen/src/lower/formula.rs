@@ -10,17 +10,8 @@ pub(super) fn field(field: &model::FieldPath) -> plan::FieldRef {
 }
 
 pub(super) fn formula(formula: &model::Formula) -> plan::Formula {
-    let inputs = formula.inputs.iter().map(|input| plan::Input {
-        field: field(&input.field),
-        members: match input.members {
-            model::Members::Min => plan::Members::Min,
-            model::Members::Max => plan::Members::Max,
-            model::Members::Sum => plan::Members::Sum,
-            model::Members::Each => plan::Members::Each,
-        },
-    });
     plan::Formula {
-        inputs: inputs.collect(),
+        inputs: inputs(&formula.inputs),
         aggregate: match &formula.aggregate {
             model::Aggregate::Last(of) => plan::Aggregate::Last { of: expression(of) },
             model::Aggregate::Min(of) => plan::Aggregate::Min { of: expression(of) },
@@ -32,11 +23,28 @@ pub(super) fn formula(formula: &model::Formula) -> plan::Formula {
         when: formula.when.as_ref().map(condition),
         every: formula.every,
         per: formula.per.as_ref().map(field),
-        side: if formula.outbound { plan::Side::Outbound } else { plan::Side::Inbound },
+        side: side(formula.outbound),
     }
 }
 
-fn expression(of: &model::Expression) -> plan::Expression {
+pub(super) fn inputs(inputs: &[model::Input]) -> Vec<plan::Input> {
+    let inputs = inputs.iter().map(|input| plan::Input {
+        field: field(&input.field),
+        members: match input.members {
+            model::Members::Min => plan::Members::Min,
+            model::Members::Max => plan::Members::Max,
+            model::Members::Sum => plan::Members::Sum,
+            model::Members::Each => plan::Members::Each,
+        },
+    });
+    inputs.collect()
+}
+
+pub(super) fn side(outbound: bool) -> plan::Side {
+    if outbound { plan::Side::Outbound } else { plan::Side::Inbound }
+}
+
+pub(super) fn expression(of: &model::Expression) -> plan::Expression {
     let boxed = |of: &model::Expression| Box::new(expression(of));
     let all = |of: &[model::Expression]| of.iter().map(expression).collect();
     match of {
@@ -67,6 +75,7 @@ fn condition(of: &model::Condition) -> plan::Condition {
                 model::Comparison::AtLeast => plan::Comparison::AtLeast,
                 model::Comparison::Above => plan::Comparison::Above,
                 model::Comparison::Equal => plan::Comparison::Equal,
+                model::Comparison::NotEqual => plan::Comparison::NotEqual,
             },
             right: expression(right),
         },
@@ -74,6 +83,7 @@ fn condition(of: &model::Condition) -> plan::Condition {
             plan::Condition::Same { left: Box::new(condition(left)), right: Box::new(condition(right)) }
         }
         model::Condition::All(of) => plan::Condition::All(of.iter().map(condition).collect()),
+        model::Condition::Not(of) => plan::Condition::Not(Box::new(condition(of))),
         model::Condition::Any(of) => plan::Condition::Any(of.iter().map(condition).collect()),
     }
 }

@@ -125,3 +125,13 @@ fn explaining_an_unknown_code_is_an_error() {
     assert!(sesamec(&["explain", "E0203"]));
     assert!(!sesamec(&["explain", "E9999"]));
 }
+
+#[test]
+fn a_campaign_is_explained_from_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = project(folder.path(), "");
+    assert!(sesamec(&["explain", "night", &file]));
+    assert!(!sesamec(&["explain", "nihgt", &file]));
+    assert!(!sesamec(&["explain", "night"]), "nobody knows which space it is in");
+    assert!(!folder.path().join("runners").exists(), "explaining writes nothing");
+}

@@ -40,6 +40,7 @@ pub(crate) fn measured(runner: &mut RunnerPlan, metric: &str) {
         unit: hook.unit.clone(),
         direction: hook.direction,
         default: Some(0.0),
+        initial: None,
         source: MetricSource::Hook { topics: hook.inputs.clone() },
         line: hook.line,
     });
@@ -83,6 +84,7 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 unit: Some("s".into()),
                 direction: Some(Direction::Minimise),
                 default: None,
+                initial: None,
                 source: MetricSource::FuzzingTime,
                 line: 30,
             }],
@@ -99,8 +101,10 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 search: Search::Random { evaluations: 10 },
                 seed: 42,
                 end_after: 70.0,
+                record: None,
             },
         },
+        operations: vec![],
         hooks: vec![
             HookPlan {
                 doc: "R1: intervals of 0.2 s in which the gripper was inside a safety zone.".into(),
@@ -187,6 +191,7 @@ pub(crate) fn awkward() -> RunnerPlan {
         unit: unit("mm"),
         direction: None,
         default: None,
+        initial: None,
         source: MetricSource::Last { input: FieldRef { topic: TopicId(1), path: vec!["level".into()] } },
         line: 71,
     });
@@ -208,5 +213,6 @@ pub(crate) fn environment() -> Environment {
         lock: None,
         options: [].into(),
         space_folder: "../..".to_owned(),
+        simulator_folder: "../..".to_owned(),
     }
 }

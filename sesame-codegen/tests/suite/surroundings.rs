@@ -108,10 +108,13 @@ fn a_program_needs_no_crate_and_its_folder_is_known_as_seen_from_the_runner() {
     assert_eq!(dependencies(folder.path(), with_program("c"), Some("1.0.0")).unwrap(), "sesame-runtime = \"1.0.0\"");
     let found = |out: &str| {
         let space = folder.path().join("kuka_cell.sesame");
-        environment(&space, &folder.path().join(out), &[with_program("c")], None).unwrap().space_folder
+        let plan = RunnerPlan { system_file: "shared/cell.sesame".to_owned(), ..with_program("c") };
+        let found = environment(&space, &folder.path().join(out), &[plan], None).unwrap();
+        (found.space_folder, found.simulator_folder)
     };
-    assert_eq!(found("runners"), "../..");
-    assert_eq!(found("else/where"), "../../..");
+    fs::create_dir(folder.path().join("shared")).unwrap();
+    assert_eq!(found("runners"), ("../..".to_owned(), "../../shared".to_owned()));
+    assert_eq!(found("else/where"), ("../../..".to_owned(), "../../../shared".to_owned()));
 }
 
 #[test]

@@ -10,7 +10,7 @@ pub(super) fn misnamed_operations(space: &Space, diagnostics: &mut Vec<Diagnosti
     for operation in space.operations.values() {
         let name = &operation.declaration.name;
         let ends_in = |topic: &str| name.strip_suffix(topic).is_some_and(|before| before.ends_with('_'));
-        let own = &space.topics[operation.topic()].declaration;
+        let Some(own) = operation.topic().map(|topic| &space.topics[topic].declaration) else { continue };
         if name == &own.name || ends_in(&own.name) {
             continue;
         }

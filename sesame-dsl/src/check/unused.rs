@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::eddi::Gate;
-use crate::model::{MetricId, MetricSource, Operation, OperationId, Search, Space, TopicId};
+use crate::model::{ActivationMode, MetricId, MetricSource, Operation, OperationId, Search, Space, TopicId};
 use crate::span::FileId;
 
 /// Operations of the file itself that no campaign and no known test uses.
@@ -36,7 +36,7 @@ pub(super) fn metrics(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnos
         if !used.contains(&id) && declaration.span.file == root {
             let title = format!("metric `{}` is never measured", declaration.name);
             let diagnostic = Diagnostic::new(Code::UNUSED_METRIC, declaration.span, title)
-                .label("in no campaign, requirement or expectation");
+                .label("in no campaign, requirement, condition or expectation");
             diagnostics.push(diagnostic.note("a campaign measures it with `observes`"));
         }
     }
@@ -47,6 +47,16 @@ fn used_metrics(space: &Space) -> BTreeSet<MetricId> {
     for campaign in space.campaigns.values() {
         used.extend(&campaign.objectives);
         used.extend(&campaign.observed);
+        if let Search::Nsga2 { content, .. } | Search::Random { content, .. } = &campaign.search
+            && let ActivationMode::Condition(grown) = &content.activation
+        {
+            used.extend(grown.variables.iter().map(|variable| variable.metric));
+        }
+    }
+    for activation in space.tests.values().flat_map(|test| &test.operations).map(|operation| &operation.activation) {
+        let mut compared = Vec::new();
+        activation.conditions().for_each(|condition| condition.metrics_into(&mut compared));
+        used.extend(compared);
     }
     used.extend(space.requirements.values().map(|requirement| requirement.metric));
     used.extend(space.tests.values().flat_map(|test| &test.expectations).map(|expectation| expectation.metric));
@@ -83,12 +93,15 @@ fn used_topics(space: &Space) -> BTreeSet<TopicId> {
         used.extend(&node.publishes);
         used.extend(&node.subscribes);
     }
-    used.extend(space.operations.values().map(Operation::topic));
+    used.extend(space.operations.values().filter_map(Operation::topic));
     for metric in space.metrics.values() {
         match &metric.source {
             MetricSource::FuzzingTime => {}
             MetricSource::Hook(topics) => used.extend(topics),
             MetricSource::Last(input) => used.extend([input.topic]),
+            MetricSource::Robustness(robustness) => {
+                used.extend(robustness.inputs.iter().map(|input| input.field.topic));
+            }
             MetricSource::Formula(formula) => used.extend(formula.inputs.iter().map(|input| input.field.topic)),
         }
     }

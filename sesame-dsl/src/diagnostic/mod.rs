@@ -43,7 +43,7 @@ impl Diagnostic {
     pub fn new(code: Code, span: Span, title: impl Into<String>) -> Self {
         Diagnostic {
             code,
-            title: title.into(),
+            title: one_line(&title.into()),
             span,
             label: String::new(),
             secondary: Vec::new(),
@@ -54,13 +54,13 @@ impl Diagnostic {
 
     /// With this label at the primary span.
     pub fn label(mut self, label: impl Into<String>) -> Self {
-        self.label = label.into();
+        self.label = one_line(&label.into());
         self
     }
 
     /// With another place and what it has to do with the mistake.
     pub fn also(mut self, span: Span, label: impl Into<String>) -> Self {
-        self.secondary.push((span, label.into()));
+        self.secondary.push((span, one_line(&label.into())));
         self
     }
 
@@ -80,4 +80,9 @@ impl Diagnostic {
     pub fn severity(&self) -> Severity {
         self.code.severity()
     }
+}
+
+/// A text that quotes source text may hold its line ends; what is said of a place is one line.
+fn one_line(text: &str) -> String {
+    if text.contains(['\n', '\r']) { text.split_whitespace().collect::<Vec<_>>().join(" ") } else { text.to_owned() }
 }

@@ -1,5 +1,6 @@
 //! Campaigns: how tests are found and run.
 
+use super::condition::ConditionSpace;
 use super::{CampaignId, Declaration, MetricId, OperationId, TestId};
 
 /// A campaign.
@@ -19,10 +20,21 @@ pub struct Campaign {
     pub seed: u64,
     /// Simulation time at which a test ends, in seconds; positive.
     pub end_after: f64,
+    /// Of which tests the messages are recorded. Default none.
+    pub record: Option<Recorded>,
+}
+
+/// Of which tests the messages and the activity of operations are recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Recorded {
+    /// Of those that violate a requirement, crash or time out, and of the undisturbed runs to compare them with.
+    Failing,
+    /// Of all.
+    All,
 }
 
 /// How the tests of a campaign are found.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Search {
     /// NSGA-II over tests of these operations.
     Nsga2 {
@@ -55,7 +67,7 @@ pub enum Search {
 }
 
 /// What a searched test holds.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Content {
     /// The operations it may hold, in written order; at least one, each once.
     pub operations: Vec<OperationId>,
@@ -64,12 +76,14 @@ pub struct Content {
     /// At most so many operations: `min` or more.
     pub max: u32,
     /// How tests switch their operations on and off.
-    pub activation: Activation,
+    pub activation: ActivationMode,
 }
 
 /// How tests switch their operations on and off.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Activation {
-    /// In windows of simulation time.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ActivationMode {
+    /// In windows of simulation time. The default.
     Time,
+    /// By conditions that are grown from this.
+    Condition(ConditionSpace),
 }

@@ -116,6 +116,8 @@ pub enum Condition {
     All(Vec<Condition>),
     /// At least one of two or more holds.
     Any(Vec<Condition>),
+    /// It does not hold.
+    Not(Box<Condition>),
 }
 
 impl Condition {
@@ -124,6 +126,7 @@ impl Condition {
         1 + match self {
             Condition::Constant(_) | Condition::Input(_) => 0,
             Condition::Compare(left, _, right) => left.depth().max(right.depth()),
+            Condition::Not(of) => of.depth(),
             Condition::Same(left, right) => left.depth().max(right.depth()),
             Condition::All(of) | Condition::Any(of) => of.iter().map(Condition::depth).max().unwrap_or(0),
         }
@@ -143,4 +146,6 @@ pub enum Comparison {
     Above,
     /// `==`
     Equal,
+    /// `!=`
+    NotEqual,
 }

@@ -1,6 +1,6 @@
 //! What is measured, and what must hold of it.
 
-use super::{Declaration, FieldPath, Formula, MetricId, TopicId};
+use super::{Declaration, FieldPath, Formula, MetricId, Robustness, TopicId};
 use crate::units::Unit;
 
 /// A number computed from the messages of a test.
@@ -14,6 +14,8 @@ pub struct Metric {
     pub direction: Option<Direction>,
     /// The value of a test in which it was never set, in its unit.
     pub default: Option<f64>,
+    /// Its value for conditions before it is first set, in its unit; `None` when it is unknown then.
+    pub initial: Option<f64>,
     /// Where its value comes from.
     pub source: MetricSource,
 }
@@ -36,6 +38,8 @@ pub enum MetricSource {
     FuzzingTime,
     /// `last(…)` of one field of one topic, as published: the last value received.
     Last(FieldPath),
+    /// By how much a temporal formula is kept: its robustness over the whole test.
+    Robustness(Robustness),
     /// Any other formula.
     Formula(Formula),
 }

@@ -5,6 +5,7 @@
 //! `0..=1`; every other number is in the unit that its field or metric declares.
 
 mod campaign;
+pub mod condition;
 pub mod eddi;
 mod formula;
 mod fuzz;
@@ -12,6 +13,7 @@ mod ids;
 mod measure;
 pub mod physical;
 mod system;
+mod temporal;
 
 pub use campaign::*;
 pub use formula::*;
@@ -19,6 +21,7 @@ pub use fuzz::*;
 pub use ids::*;
 pub use measure::*;
 pub use system::*;
+pub use temporal::*;
 
 use std::collections::BTreeMap;
 

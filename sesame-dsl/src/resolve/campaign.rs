@@ -2,7 +2,9 @@
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, Activation, CampaignId, Content, Id as _, MetricId, OperationId, Search, TestId};
+use crate::model::{
+    self, Activation, ActivationMode, CampaignId, Content, Id as _, MetricId, OperationId, Search, TestId,
+};
 use crate::span::Span;
 use crate::syntax::ast::{self, Count, Strategy};
 use crate::units::Unit;
@@ -27,14 +29,21 @@ impl<'a> Resolver<'a> {
             Some(names) => self.find_all(names, Kind::Metric),
             None => Some(vec![]),
         };
-        self.at_most_one(&campaign.activates, "activate");
         let searches: Vec<Span> = campaign.searches.iter().map(|search| search.span).collect();
         self.at_most_one(&searches, "search");
         let repeats: Vec<Span> = campaign.repeats.iter().map(|repeat| repeat.span).collect();
         self.at_most_one(&repeats, "repeat");
         let passives: Vec<Span> = campaign.passives.iter().map(|passive| passive.span).collect();
         self.at_most_one(&passives, "passive");
-        let content = self.content(campaign, end_after);
+        let activation = match self.single(&campaign.activates, "activate") {
+            Some(ast::ActivationMode::Condition(by)) => self.condition_space(by).map(ActivationMode::Condition),
+            Some(ast::ActivationMode::Time) | None => Some(ActivationMode::Time),
+        };
+        let record = self.single(&campaign.records, "record").map(|record| match record {
+            ast::Record::Failing => model::Recorded::Failing,
+            ast::Record::All => model::Recorded::All,
+        });
+        let content = self.content(campaign, end_after, activation);
         let found = (campaign.searches.first(), campaign.repeats.first(), campaign.passives.first());
         let (search, seed) = match found {
             (_, repeat, Some(passive)) => {
@@ -69,6 +78,7 @@ impl<'a> Resolver<'a> {
             search: search?,
             seed: seed?,
             end_after: end_after?,
+            record,
         })
     }
 
@@ -126,7 +136,12 @@ impl<'a> Resolver<'a> {
     }
 
     /// What the tests of a search hold.
-    fn content(&mut self, campaign: &'a ast::Campaign, end_after: Option<f64>) -> Option<Content> {
+    fn content(
+        &mut self,
+        campaign: &'a ast::Campaign,
+        end_after: Option<f64>,
+        activation: Option<ActivationMode>,
+    ) -> Option<Content> {
         let spans: Vec<Span> = campaign.operations.iter().map(|it| it.span).collect();
         self.at_most_one(&spans, "operations");
         let Some(operations) = campaign.operations.first() else {
@@ -142,10 +157,16 @@ impl<'a> Resolver<'a> {
         let found = self.find_all(&operations.names, Kind::Operation);
         for name in &operations.names {
             let Some(definition) = self.names.get(name.text.as_str()).copied() else { continue };
-            if definition.kind == Kind::Operation
-                && let Some(end) = end_after
-            {
+            if definition.kind != Kind::Operation {
+                continue;
+            }
+            if let Some(end) = end_after {
                 self.window_and_end(name, definition.index, end, campaign);
+            }
+            // As above: the campaign that wrote both says it.
+            let told = campaign.inherited.operations && campaign.inherited.activate;
+            if let (Some(ActivationMode::Condition(space)), false) = (&activation, told) {
+                self.constraints_and_space(name, definition.index, space, campaign);
             }
         }
         let min = self.count(operations.min, 1, "a test holds");
@@ -160,7 +181,7 @@ impl<'a> Resolver<'a> {
             return None;
         }
         let operations = found?.into_iter().map(OperationId::from_index).collect();
-        Some(Content { operations, min, max, activation: Activation::Time })
+        Some(Content { operations, min, max, activation: activation? })
     }
 
     /// Compares the permitted window of an operation with the end of a campaign that uses it.
@@ -258,15 +279,21 @@ impl<'a> Resolver<'a> {
         let Some(test) = self.tests[index].clone() else { return };
         let written = &self.file.tests[index].operations;
         for (operation, written) in test.operations.iter().zip(written) {
-            let Some(window) = &written.window else { continue };
             let name = &written.operation.text;
-            let diagnostic = if operation.window.low >= end {
+            // A condition may hold at any time: only what the operation permits is known beforehand.
+            let (span, window) = match (&operation.activation, &written.activation) {
+                (Activation::Window(window), ast::Activation::Window(written)) => (written.span, *window),
+                _ => match self.operations[operation.operation.index()].as_ref().and_then(|it| it.within) {
+                    Some(within) if within.low >= end => (written.operation.span, within),
+                    _ => continue,
+                },
+            };
+            let diagnostic = if window.low >= end {
                 let title = format!("`{name}` is never active: the tests of the campaign are over by then");
-                Diagnostic::new(Code::AFTER_THE_END, window.span, title)
-                    .label(format!("begins after the end at {end}s"))
-            } else if operation.window.high > end {
+                Diagnostic::new(Code::AFTER_THE_END, span, title).label(format!("begins after the end at {end}s"))
+            } else if window.high > end {
                 let title = format!("`{name}` goes on after the end of the campaign that repeats this test");
-                Diagnostic::new(Code::OUTLASTS_THE_END, window.span, title)
+                Diagnostic::new(Code::OUTLASTS_THE_END, span, title)
                     .label(format!("tests end at {end}s; what is later never happens"))
             } else {
                 continue;
@@ -288,7 +315,10 @@ impl<'a> Resolver<'a> {
     }
 
     fn only_repeats(&mut self, campaign: &'a ast::Campaign, place: Span, who: &str, here: &str) {
+        let by_condition =
+            campaign.activates.iter().find(|(_, mode)| matches!(mode, ast::ActivationMode::Condition(_)));
         let clauses = [
+            (by_condition.map(|(span, _)| *span), "activate by condition"),
             (campaign.searches.first().map(|search| search.span), "search"),
             (campaign.operations.first().map(|operations| operations.span), "operations"),
             (campaign.objectives.first().map(|(span, _)| *span), "objectives"),
@@ -319,7 +349,8 @@ impl<'a> Resolver<'a> {
         match u32::try_from(value) {
             Ok(found) if found >= min => Some(found),
             Ok(_) => {
-                let times = if what.ends_with("repeated") || what.ends_with("observed") { " times" } else { "" };
+                let repetition = ["repeated", "observed", "activated"].iter().any(|word| what.ends_with(word));
+                let times = if repetition { " times" } else { "" };
                 let title = format!("{what} at least {min}{times}, not {value}{times}");
                 let diagnostic = Diagnostic::new(Code::BAD_COUNT, count.span, title);
                 self.report(diagnostic.label(format!("expected {min} or more")));

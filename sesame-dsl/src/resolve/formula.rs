@@ -1,20 +1,20 @@
 //! Formulas of metrics: their inputs, their units, and what becomes of their values over time.
 
-use super::{Kind, Resolver};
+use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
-use crate::model::{Aggregate, Comparison, Condition, Expression, FieldPath, Formula, Id as _, Input, Members};
+use crate::model::{Aggregate, Condition, Expression, FieldPath, Formula, Id as _, Input, Members};
 use crate::model::{MetricSource, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
-use crate::syntax::ast::{self, ExpressionKind, FormulaKind, Name, Path};
+use crate::syntax::ast::{self, ExpressionKind, FormulaKind, Name, Path, PrefixWord};
 use crate::units::{Unit, convert, dimension, product};
 
 /// What begins a formula. `last` is first: it is what a formula without any most likely means.
-const AGGREGATES: [&str; 6] = ["last", "min", "max", "mean", "count", "duration"];
+const AGGREGATES: [&str; 7] = ["last", "min", "max", "mean", "count", "duration", "robustness"];
 /// What stands inside of one.
 const FUNCTIONS: [&str; 4] = ["abs", "min", "max", "distance"];
 /// The deepest expression. A plan is JSON, whose readers limit its depth.
-const MAX_DEPTH: usize = 40;
+pub(super) const MAX_DEPTH: usize = 40;
 
 /// A number with its unit; `None` for a plain one.
 type Number = (Expression, Option<Unit>);
@@ -22,6 +22,13 @@ type Number = (Expression, Option<Unit>);
 impl<'a> Resolver<'a> {
     /// A formula, with the unit of its value.
     pub(super) fn formula(&mut self, formula: &'a ast::Formula) -> Option<(MetricSource, Option<Unit>)> {
+        if let FormulaKind::Plain(whole) = &formula.kind
+            && let ExpressionKind::Call(name, arguments) = &whole.kind
+            && name.text == "robustness"
+            && let [of] = arguments.as_slice()
+        {
+            return self.robustness(formula, of);
+        }
         let mut inputs = Vec::new();
         let when = self.single(&formula.when, "when").map(|when| self.condition(&mut inputs, when));
         let (aggregate, unit) = match &formula.kind {
@@ -89,7 +96,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// How many topics on the wire a field is that of.
-    fn members_of(&self, field: &FieldPath) -> usize {
+    pub(super) fn members_of(&self, field: &FieldPath) -> usize {
         self.system.topics[field.topic.index()].as_ref().map_or(0, |topic| topic.paths.len())
     }
 
@@ -140,6 +147,10 @@ impl<'a> Resolver<'a> {
     fn no_aggregate(&mut self, expression: &'a ast::Expression) {
         let span = expression.span;
         let condition = self.is_condition(expression);
+        if condition && of_time(expression) {
+            self.no_robustness(expression);
+            return;
+        }
         let word = if condition { "count" } else { "last" };
         let title = format!("`{}` changes during a test, and a metric is one number", self.text(span));
         let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, span, title).label(if condition {
@@ -150,6 +161,17 @@ impl<'a> Resolver<'a> {
         diagnostic.suggestions.push(Suggestion {
             message: format!("take {}", if condition { "the number of messages" } else { "the last value" }),
             edits: vec![(Span { hi: span.lo, ..span }, format!("{word}(")), (span.end(), ")".to_owned())],
+        });
+        self.report(diagnostic);
+    }
+
+    fn no_robustness(&mut self, expression: &'a ast::Expression) {
+        let span = expression.span;
+        let title = format!("`{}` holds or does not, and a metric is a number", self.text(span));
+        let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, span, title).label("by how much is it kept?");
+        diagnostic.suggestions.push(Suggestion {
+            message: "take its robustness".to_owned(),
+            edits: vec![(Span { hi: span.lo, ..span }, "robustness(".to_owned()), (span.end(), ")".to_owned())],
         });
         self.report(diagnostic);
     }
@@ -197,7 +219,7 @@ impl<'a> Resolver<'a> {
 
     // ----- numbers
 
-    fn number(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<Number> {
+    pub(super) fn number(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<Number> {
         match &expression.kind {
             ExpressionKind::Number(quantity) => {
                 let unit = self.unit_in_formula(quantity)?;
@@ -222,7 +244,10 @@ impl<'a> Resolver<'a> {
             ExpressionKind::Truth(_)
             | ExpressionKind::Compare(..)
             | ExpressionKind::All(_)
-            | ExpressionKind::Any(_) => {
+            | ExpressionKind::Any(_)
+            | ExpressionKind::Prefixed(..)
+            | ExpressionKind::Until(..)
+            | ExpressionKind::Implies(..) => {
                 let title = format!("`{}` holds or does not, but a number is needed", self.text(expression.span));
                 self.report(Diagnostic::new(Code::WRONG_TYPE, expression.span, title).label("expected a number"));
                 None
@@ -256,7 +281,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// The position of an input, which is added if it is new.
-    fn input(
+    pub(super) fn input(
         &mut self,
         inputs: &mut Vec<Input>,
         path: &'a Path,
@@ -316,7 +341,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// Numbers that are added, compared or chosen from, all in one unit: that of the first that is no constant.
-    fn common(
+    pub(super) fn common(
         &mut self,
         inputs: &mut Vec<Input>,
         parts: &[&'a ast::Expression],
@@ -390,7 +415,7 @@ impl<'a> Resolver<'a> {
             }
             ("abs", _) => "one value",
             ("distance", _) => "two points",
-            ("min" | "max", [_]) | ("last" | "mean" | "count" | "duration", _) => {
+            ("min" | "max", [_]) | ("last" | "mean" | "count" | "duration" | "robustness", _) => {
                 let title = format!("`{}(…)` over time cannot stand inside a formula", name.text);
                 let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, call.span, title)
                     .label("it begins a formula, or is none")
@@ -470,91 +495,23 @@ impl<'a> Resolver<'a> {
         }
         Some((self.input(inputs, path, field, members)?, unit))
     }
+}
 
-    // ----- conditions
-
-    pub(super) fn condition(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<Condition> {
-        match &expression.kind {
-            ExpressionKind::Truth(value) => Some(Condition::Constant(*value)),
-            ExpressionKind::All(parts) => self.conditions(inputs, parts).map(Condition::All),
-            ExpressionKind::Any(parts) => self.conditions(inputs, parts).map(Condition::Any),
-            ExpressionKind::Compare(left, comparison, right) => {
-                if matches!(comparison, ast::Comparison::Equal) && self.is_condition(left) && self.is_condition(right) {
-                    let left = self.condition(inputs, left);
-                    let right = self.condition(inputs, right);
-                    return Some(Condition::Same(Box::new(left?), Box::new(right?)));
-                }
-                let (sides, _) = self.common(inputs, &[left, right])?;
-                let [left, right] = <[Expression; 2]>::try_from(sides).expect("two parts give two numbers");
-                let comparison = match comparison {
-                    ast::Comparison::AtMost => Comparison::AtMost,
-                    ast::Comparison::Below => Comparison::Below,
-                    ast::Comparison::AtLeast => Comparison::AtLeast,
-                    ast::Comparison::Above => Comparison::Above,
-                    ast::Comparison::Equal => Comparison::Equal,
-                };
-                Some(Condition::Compare(left, comparison, right))
-            }
-            ExpressionKind::Field(path) if self.is_condition(expression) => {
-                let (field, _) = self.field(path)?;
-                self.input(inputs, path, field, None).map(Condition::Input)
-            }
-            ExpressionKind::Members(members, word, path) if self.is_condition(expression) => {
-                let (field, _) = self.field(path)?;
-                if matches!(members, ast::Members::Sum) {
-                    let title = format!("`{}` is true or false, which have no sum", self.text(path.span));
-                    let label = "expected a number after `sum of`";
-                    self.report(Diagnostic::new(Code::WRONG_TYPE, expression.span, title).label(label));
-                    return None;
-                }
-                self.input(inputs, path, field, Some((*members, *word))).map(Condition::Input)
-            }
-            _ => {
-                // What is wrong with the number itself comes first.
-                let before = self.diagnostics.len();
-                self.number(inputs, expression);
-                if self.diagnostics.len() == before {
-                    let title = format!("`{}` is a number, but a condition is needed", self.text(expression.span));
-                    let diagnostic = Diagnostic::new(Code::WRONG_TYPE, expression.span, title);
-                    self.report(diagnostic.label("expected a comparison such as `link0 > 2.5rad`"));
-                }
-                None
-            }
+/// Whether an expression speaks of stretches of time.
+fn of_time(expression: &ast::Expression) -> bool {
+    match &expression.kind {
+        ExpressionKind::Until(..) => true,
+        ExpressionKind::Prefixed(prefixes, of) => {
+            prefixes.iter().any(|prefix| prefix.word != PrefixWord::Not) || of_time(of)
         }
-    }
-
-    fn conditions(&mut self, inputs: &mut Vec<Input>, parts: &'a [ast::Expression]) -> Option<Vec<Condition>> {
-        let conditions: Vec<_> = parts.iter().map(|part| self.condition(inputs, part)).collect();
-        conditions.into_iter().collect()
-    }
-
-    /// Whether an expression holds or does not, rather than being a number. Reports nothing.
-    fn is_condition(&self, expression: &ast::Expression) -> bool {
-        match &expression.kind {
-            ExpressionKind::Truth(_)
-            | ExpressionKind::Compare(..)
-            | ExpressionKind::All(_)
-            | ExpressionKind::Any(_) => true,
-            ExpressionKind::Field(path) | ExpressionKind::Members(_, _, path) => {
-                self.type_at(path).is_some_and(|ty| *ty == Type::Bool)
-            }
-            _ => false,
-        }
-    }
-
-    fn type_at(&self, path: &Path) -> Option<&Type> {
-        let definition = self.names.get(path.topic.text.as_str()).filter(|found| found.kind == Kind::Topic)?;
-        let topic = self.system.topics.get(definition.index)?.as_ref()?;
-        path.fields.iter().try_fold(&topic.ty, |ty, name| {
-            let Type::Message(id) = ty else { return None };
-            let message = self.system.messages.get(id.index())?.as_ref()?;
-            message.fields.iter().find(|field| field.declaration.name == name.text).map(|field| &field.ty)
-        })
+        ExpressionKind::All(parts) | ExpressionKind::Any(parts) => parts.iter().any(of_time),
+        ExpressionKind::Implies(premise, conclusion) => of_time(premise) || of_time(conclusion),
+        _ => false,
     }
 }
 
 /// A number times a constant, unless that is one.
-fn scaled(value: Expression, scale: f64) -> Expression {
+pub(super) fn scaled(value: Expression, scale: f64) -> Expression {
     match value {
         value if scale == 1.0 => value,
         Expression::Constant(constant) => Expression::Constant(constant * scale),

@@ -81,6 +81,9 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
     if child.observes.is_empty() {
         child.observes.clone_from(&base.observes);
     }
+    if child.records.is_empty() {
+        child.records.clone_from(&base.records);
+    }
     if child.ends.is_empty() {
         child.ends.clone_from(&base.ends);
         child.inherited.end = true;
@@ -95,6 +98,7 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
         }
         if child.activates.is_empty() {
             child.activates.clone_from(&base.activates);
+            child.inherited.activate = true;
         }
     }
 }

@@ -21,13 +21,19 @@ impl<'a> Resolver<'a> {
             ast::Direction::Minimise => model::Direction::Minimise,
         });
         let default = self.single(&metric.defaults, "default");
+        let initial = self.single(&metric.initials, "initial");
         // Both are looked at, so that a mistake in one does not hide one in the other or in the default.
-        let (source, ty): (Option<MetricSource>, Option<Type>) = match metric.source.as_ref()? {
+        let (source, ty): (Option<MetricSource>, Option<Type>) = match &metric.source {
             ast::MetricSource::Hook { hooks, damaged } => {
                 (self.hook(name, hooks, *damaged), self.hook_type(metric.ty.as_ref()))
             }
             ast::MetricSource::FuzzingTime => {
                 self.no_type(metric.ty.as_ref(), "`fuzzing_time()` is in seconds");
+                if let Some((word, initial)) = metric.initials.first() {
+                    let title = "`initial` changes nothing: `fuzzing_time()` is 0s at the beginning";
+                    let span = word.to(initial.span);
+                    self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("leave it out"));
+                }
                 (Some(MetricSource::FuzzingTime), Some(Type::Real(Some(Unit::seconds()))))
             }
             ast::MetricSource::Formula(formula) => {
@@ -39,11 +45,20 @@ impl<'a> Resolver<'a> {
             }
         };
         let Type::Real(unit) = ty? else { return None };
-        let default = match default {
-            Some(quantity) => Some(self.value(quantity, unit.as_ref(), &format!("metric `{}`", name.text))?),
-            None => None,
+        let what = format!("metric `{}`", name.text);
+        let mut value = |quantity: Option<&ast::Quantity>| match quantity {
+            Some(quantity) => self.value(quantity, unit.as_ref(), &what).map(Some),
+            None => Some(None),
         };
-        Some(model::Metric { declaration: self.declaration(&metric.head), unit, direction, default, source: source? })
+        let [default, initial] = [value(default), value(initial)];
+        Some(model::Metric {
+            declaration: self.declaration(&metric.head),
+            unit,
+            direction,
+            default: default?,
+            initial: initial?,
+            source: source?,
+        })
     }
 
     fn hook(

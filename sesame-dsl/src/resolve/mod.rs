@@ -4,7 +4,8 @@
 //! 2. [`system`] has message types (in an order in which each follows those it contains), topics, nodes, the simulator
 //! 3. [`measure`] has metrics (their formulas in [`formula`]) and requirements
 //! 4. [`fuzz`] has operations and known tests
-//! 5. [`campaign`] has campaigns, whose inherited clauses [`inherit`] has put in their places before all else
+//! 5. [`campaign`] has campaigns, whose inherited clauses [`inherit`] has put in their places before all else;
+//!    [`condition`] the conditions of tests and what those of campaigns are made of
 //! 6. [`eddi`] has runtime monitors, [`physical`] labs, and [`surroundings`] what a system says beside its simulator
 //!
 //! Each pass reports all it finds. A declaration with a mistake is `None` from then on, and whoever mentions it says
@@ -12,6 +13,8 @@
 
 mod campaign;
 mod collect;
+mod condition;
+mod custom;
 mod eddi;
 mod formula;
 mod fuzz;
@@ -20,8 +23,10 @@ mod measure;
 mod nodes;
 mod physical;
 mod quantity;
+mod robustness;
 mod surroundings;
 mod system;
+mod truth;
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -3,35 +3,36 @@
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::Span;
-use crate::syntax::ast::{Name, OperationBody, Transport};
+use crate::syntax::ast::{Name, OperationBody, Path, Transport};
 
 impl<'a> Resolver<'a> {
     /// Nodes have to publish or subscribe to the topic, and the transport has to tell them apart.
     pub(super) fn between_nodes(&mut self, body: &'a OperationBody) {
-        let Some(topic) = self.names.get(body.target.topic.text.as_str()).copied() else { return };
+        let Some(target) = &body.target else { return };
+        let Some(topic) = self.names.get(target.topic.text.as_str()).copied() else { return };
         if topic.kind != Kind::Topic {
             return;
         }
         for (nodes, from) in [(&body.from, true), (&body.to, false)] {
             let Some((span, names)) = nodes else { continue };
             for index in self.find_all(names, Kind::Node).into_iter().flatten() {
-                self.on_its_way(body, topic.index, index, from, names);
+                self.on_its_way(target, topic.index, index, from, names);
             }
             self.tells_nodes_apart(*span, from);
         }
     }
 
-    fn on_its_way(&mut self, body: &OperationBody, topic: usize, node: usize, from: bool, names: &[Name]) {
+    fn on_its_way(&mut self, target: &Path, topic: usize, node: usize, from: bool, names: &[Name]) {
         let Some(node) = self.system.nodes[node].as_ref() else { return };
         let lists = if from { &node.publishes } else { &node.subscribes };
         if lists.iter().any(|id| crate::model::Id::index(*id) == topic) {
             return;
         }
         let name = names.iter().find(|name| name.text == node.declaration.name);
-        let span = name.map_or(body.target.span, |name| name.span);
+        let span = name.map_or(target.span, |name| name.span);
         let does = if from { "publishes" } else { "subscribes to" };
         let not = if from { "publish" } else { "subscribe to" };
-        let title = format!("node `{}` does not {not} `{}`", node.declaration.name, body.target.topic.text);
+        let title = format!("node `{}` does not {not} `{}`", node.declaration.name, target.topic.text);
         let diagnostic = Diagnostic::new(Code::WHICH_NODES, span, title)
             .label(format!("expected a node that {does} it"))
             .also(node.declaration.span, "the node is declared here");

@@ -10,7 +10,7 @@ use crate::model::physical::{
 use crate::model::{Id as _, MetricId};
 use crate::similar::most_similar;
 use crate::span::Span;
-use crate::syntax::ast::{Name, Quantity};
+use crate::syntax::ast::{self, Name, Quantity};
 use crate::syntax::physical as written;
 use crate::units::Unit;
 
@@ -310,30 +310,14 @@ impl<'a> Resolver<'a> {
     }
 
     /// Three lengths, in metres.
-    fn vector(&mut self, vector: &written::Vector, positive: bool) -> Option<[f64; 3]> {
-        let mut lengths = [0.0; 3];
+    fn vector(&mut self, point: &'a ast::Point, positive: bool) -> Option<[f64; 3]> {
         let metre = metre();
-        let unit = self.unit(&vector.unit)?;
-        for (length, coordinate) in lengths.iter_mut().zip(&vector.coordinates) {
-            if let Some(own) = &coordinate.unit {
-                let title = "a unit stands after the parenthesis, once for all three";
-                let diagnostic = Diagnostic::new(Code::WRONG_UNIT, own.span, title).label("here it is one too many");
-                self.report(diagnostic.suggest("leave it out", own.span, ""));
-                return None;
+        let what = if positive { "an edge of a box" } else { "a coordinate" };
+        let lengths = self.coordinates(point, Some(&metre), what)?;
+        if positive {
+            for edge in &point.coordinates {
+                self.positive(edge, &metre, what)?;
             }
-            let quantity = Quantity { unit: Some(vector.unit.clone()), ..coordinate.clone() };
-            let what = if positive { "an edge of a box" } else { "a coordinate" };
-            if unit.dimension() != metre.dimension() {
-                let title = format!("`{}` is no place in metres", self.text(vector.span));
-                let diagnostic = Diagnostic::new(Code::WRONG_UNIT, vector.unit.span, title);
-                self.report(diagnostic.label(format!("this is {}, expected a length", unit.dimension().name())));
-                return None;
-            }
-            *length = if positive {
-                self.positive(&quantity, &metre, what)?
-            } else {
-                self.value(&quantity, Some(&metre), what)?
-            };
         }
         Some(lengths)
     }

@@ -150,8 +150,8 @@ pub(crate) struct Metric {
     pub(crate) ty: Option<Type>,
     pub(crate) directions: Vec<(Span, Direction)>,
     pub(crate) defaults: Vec<(Span, Quantity)>,
-    /// `None` for a formula that is not supported yet.
-    pub(crate) source: Option<MetricSource>,
+    pub(crate) initials: Vec<(Span, Quantity)>,
+    pub(crate) source: MetricSource,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -191,6 +191,8 @@ pub(crate) enum FormulaKind {
 pub(crate) struct Expression {
     pub(crate) kind: ExpressionKind,
     pub(crate) span: Span,
+    /// Stands in parentheses, which are part of its span.
+    pub(crate) parenthesised: bool,
 }
 
 #[derive(Debug)]
@@ -205,10 +207,43 @@ pub(crate) enum ExpressionKind {
     Sum(Vec<(bool, Expression)>),
     /// Two factors or more; true for one that divides.
     Product(Vec<(bool, Expression)>),
-    Compare(Box<Expression>, Comparison, Box<Expression>),
+    Compare(Box<Expression>, Relation, Box<Expression>),
+    /// One word or more before it, the outermost first.
+    Prefixed(Vec<Prefix>, Box<Expression>),
+    Until(Box<Expression>, Until, Box<Expression>),
     All(Vec<Expression>),
     Any(Vec<Expression>),
+    Implies(Box<Expression>, Box<Expression>),
     Call(Name, Vec<Expression>),
+}
+
+/// How two values of a formula compare: as those of a bound do, or by being different.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Relation {
+    Comparison(Comparison),
+    NotEqual,
+}
+
+/// A word before a condition.
+#[derive(Debug)]
+pub(crate) struct Prefix {
+    pub(crate) word: PrefixWord,
+    pub(crate) span: Span,
+    pub(crate) interval: Option<Range>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PrefixWord {
+    Not,
+    Always,
+    Eventually,
+}
+
+/// The word between two sides, and its interval.
+#[derive(Debug)]
+pub(crate) struct Until {
+    pub(crate) span: Span,
+    pub(crate) interval: Option<Range>,
 }
 
 /// What a group of topics is taken as, other than its minimum.
@@ -283,7 +318,8 @@ pub(crate) struct Operation {
 
 #[derive(Debug)]
 pub(crate) struct OperationBody {
-    pub(crate) target: Path,
+    /// `None` for an operation on no topic.
+    pub(crate) target: Option<Path>,
     pub(crate) from: Option<(Span, Vec<Name>)>,
     pub(crate) to: Option<(Span, Vec<Name>)>,
     pub(crate) kind: OperationKind,
@@ -291,6 +327,15 @@ pub(crate) struct OperationBody {
     pub(crate) priority: Vec<(Span, Quantity)>,
     pub(crate) inclusion: Vec<(Span, Quantity)>,
     pub(crate) untimed: Vec<Span>,
+    pub(crate) contains: Vec<(Span, Vec<Contained>)>,
+}
+
+/// What the start condition of an operation has to contain.
+#[derive(Debug)]
+pub(crate) enum Contained {
+    Variable(Name),
+    /// A whole number; the span is that of all of it.
+    Integer(Span, Range),
 }
 
 #[derive(Debug)]
@@ -299,6 +344,56 @@ pub(crate) enum OperationKind {
     PacketLoss(Range),
     Latency { range: Range, uniform: Vec<Span>, drain: Vec<(Span, Drain)> },
     Blackhole,
+    Custom(Custom),
+}
+
+/// The user's code.
+#[derive(Debug)]
+pub(crate) struct Custom {
+    /// The word `custom`.
+    pub(crate) span: Span,
+    pub(crate) moment: Option<(Span, Moment)>,
+    pub(crate) parameters: Vec<CustomParameter>,
+    pub(crate) damaged: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Moment {
+    BeforeStart,
+    AfterEnd,
+}
+
+#[derive(Debug)]
+pub(crate) struct CustomParameter {
+    pub(crate) name: Name,
+    pub(crate) doc: String,
+    pub(crate) domain: Domain,
+    /// The domain as written.
+    pub(crate) span: Span,
+}
+
+#[derive(Debug)]
+pub(crate) enum Domain {
+    Number {
+        integer: bool,
+        unit: Option<UnitName>,
+        range: Range,
+    },
+    /// Two opposite corners.
+    Point {
+        unit: Option<UnitName>,
+        corners: Box<[Point; 2]>,
+    },
+    Texts(Vec<Text>),
+    Files(Vec<Text>),
+}
+
+/// Three numbers of one unit.
+#[derive(Debug)]
+pub(crate) struct Point {
+    /// Each with the point's unit.
+    pub(crate) coordinates: [Quantity; 3],
+    pub(crate) span: Span,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -320,15 +415,39 @@ pub(crate) struct Test {
 pub(crate) struct TestOperation {
     pub(crate) operation: Name,
     pub(crate) choices: Vec<(Name, Choice)>,
-    /// `None` for a window that is not supported yet.
-    pub(crate) window: Option<Range>,
+    pub(crate) activation: Activation,
     pub(crate) seed: Option<Count>,
+}
+
+/// When an operation of a test is active.
+#[derive(Debug)]
+pub(crate) enum Activation {
+    Window(Range),
+    Trigger(Box<Trigger>),
+    /// In the place of a window.
+    Moment(Span, Moment),
+}
+
+/// Activation by condition. What the conditions may hold, is for resolution to say.
+#[derive(Debug)]
+pub(crate) struct Trigger {
+    pub(crate) start: Expression,
+    pub(crate) end: TriggerEnd,
+    pub(crate) times: Option<Count>,
+}
+
+#[derive(Debug)]
+pub(crate) enum TriggerEnd {
+    Until(Expression),
+    For(Quantity),
 }
 
 #[derive(Debug)]
 pub(crate) enum Choice {
     Value(Quantity),
     Range(Range),
+    Point(Point),
+    Text(Text),
 }
 
 impl Choice {
@@ -336,6 +455,8 @@ impl Choice {
         match self {
             Choice::Value(quantity) => quantity.span,
             Choice::Range(range) => range.span,
+            Choice::Point(point) => point.span,
+            Choice::Text(text) => text.span,
         }
     }
 }
@@ -356,11 +477,12 @@ pub(crate) struct Campaign {
     pub(crate) objectives: Vec<(Span, Vec<Name>)>,
     pub(crate) observes: Vec<(Span, Vec<Name>)>,
     pub(crate) operations: Vec<Operations>,
-    pub(crate) activates: Vec<Span>,
+    pub(crate) activates: Vec<(Span, ActivationMode)>,
     pub(crate) searches: Vec<Search>,
     pub(crate) repeats: Vec<Repeat>,
     pub(crate) passives: Vec<Passive>,
     pub(crate) ends: Vec<(Span, Quantity)>,
+    pub(crate) records: Vec<(Span, Record)>,
     /// Something of it could not be read or is not supported: what is missing may be there.
     pub(crate) damaged: bool,
 }
@@ -369,7 +491,33 @@ pub(crate) struct Campaign {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Inherited {
     pub(crate) operations: bool,
+    pub(crate) activate: bool,
     pub(crate) end: bool,
+}
+
+/// How the tests of a search switch operations on and off.
+#[derive(Debug, Clone)]
+pub(crate) enum ActivationMode {
+    Time,
+    Condition(ByCondition),
+}
+
+/// `condition over …`, with its settings as written.
+#[derive(Debug, Clone)]
+pub(crate) struct ByCondition {
+    /// The variables and their known ranges, as long as each other.
+    pub(crate) variables: Vec<Name>,
+    pub(crate) ranges: Vec<Option<Range>>,
+    pub(crate) depth: Vec<(Span, Count)>,
+    pub(crate) integers: Vec<(Span, Range)>,
+    pub(crate) lengths: Vec<(Span, Range)>,
+    pub(crate) times: Vec<(Span, Count)>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Record {
+    Failing,
+    All,
 }
 
 #[derive(Debug, Clone)]

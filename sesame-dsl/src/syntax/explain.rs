@@ -25,8 +25,10 @@ pub(super) enum Place {
     Message,
     Node,
     Hook,
+    Custom,
     Test,
     Campaign,
+    Condition,
     Search,
     Repeat,
     Launch,
@@ -46,8 +48,10 @@ impl Place {
             Place::Message => Rule::error_field,
             Place::Node => Rule::error_node_member,
             Place::Hook => Rule::error_hook_member,
+            Place::Custom => Rule::error_custom_parameter,
             Place::Test => Rule::error_test_member,
             Place::Campaign => Rule::error_campaign_member,
+            Place::Condition => Rule::error_condition_setting,
             Place::Search => Rule::error_search_setting,
             Place::Repeat => Rule::error_repeat_setting,
             Place::Launch => Rule::error_launch_setting,
@@ -86,6 +90,7 @@ impl Place {
             Place::Message => &[Rule::field],
             Place::Node => &[Rule::publishes, Rule::subscribes],
             Place::Hook => &[Rule::hook_on],
+            Place::Custom => &[Rule::custom_parameter],
             Place::Test => &[Rule::expectation, Rule::test_operation],
             Place::Campaign => &[
                 Rule::objectives,
@@ -96,8 +101,10 @@ impl Place {
                 Rule::end,
                 Rule::repeat,
                 Rule::passive,
+                Rule::record,
                 Rule::unsupported_campaign_member,
             ],
+            Place::Condition => &[Rule::setting_depth, Rule::setting_integers],
             Place::Search => &[Rule::setting_population, Rule::setting_evaluations, Rule::setting_seed],
             Place::Repeat => &[Rule::setting_seed],
             Place::Launch => &[Rule::ready],
@@ -128,8 +135,10 @@ impl Place {
             Place::Message => Rule::one_field,
             Place::Node => Rule::one_node_member,
             Place::Hook => Rule::one_hook_member,
+            Place::Custom => Rule::one_custom_parameter,
             Place::Test => Rule::one_test_member,
             Place::Campaign => Rule::one_campaign_member,
+            Place::Condition => Rule::one_condition_setting,
             Place::Search => Rule::one_search_setting,
             Place::Repeat => Rule::one_repeat_setting,
             Place::Launch => Rule::one_launch_setting,
@@ -153,10 +162,12 @@ impl Place {
             Place::Message => "a field such as `level: real[mm]`",
             Place::Node => "`publishes` or `subscribes`",
             Place::Hook => "`hook on` and topics",
+            Place::Custom => "a parameter such as `points: int [3, 20]`",
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
             Place::Campaign => {
-                "`objectives`, `operations`, `observes`, `activate`, `search`, `repeat`, `passive` or `end after`"
+                "`objectives`, `operations`, `observes`, `activate`, `search`, `repeat`, `passive`, `record` or `end after`"
             }
+            Place::Condition => "`depth` or `integers`",
             Place::Search => "`population`, `evaluations` or `seed`",
             Place::Repeat => "`seed`",
             Place::Launch => "`ready when topic`",
@@ -187,13 +198,14 @@ impl Place {
             Place::System => &["simulator", "message", "topic", "node", "launch", "terminate", "relay"],
             Place::Simulator => &["crate", "step"],
             Place::Process => &["step"],
-            Place::Message | Place::Lab => &[],
+            Place::Message | Place::Custom | Place::Lab => &[],
             Place::Node => &["publishes", "subscribes"],
             Place::Hook => &["hook"],
             Place::Test => &["expect"],
             Place::Campaign => {
-                &["objectives", "operations", "observes", "activate", "search", "repeat", "passive", "end"]
+                &["objectives", "operations", "observes", "activate", "search", "repeat", "passive", "record", "end"]
             }
+            Place::Condition => &["depth", "integers"],
             Place::Search => &["population", "evaluations", "seed"],
             Place::Repeat => &["seed"],
             Place::Launch => &["ready"],
@@ -246,7 +258,8 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
         return Diagnostic::new(Code::NOT_CLOSED, span_of(first), title).label("no block is open here");
     }
 
-    let begins = place.starters().contains(&first.text) || matches!(place, Place::Message | Place::Test | Place::Lab);
+    let begins = place.starters().contains(&first.text)
+        || matches!(place, Place::Message | Place::Custom | Place::Test | Place::Lab);
     let continued = previous
         .and_then(|previous| read(text, previous.lo as usize, hi, place.one_rule()))
         .filter(|failure| token_at(text, failure.at).lo >= first.lo);
@@ -257,7 +270,10 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
     let found = token_at(text, failure.at);
     let span = span_of(found);
     let words: BTreeSet<&'static str> = failure.expected.iter().filter_map(|&rule| keyword_of(rule)).collect();
-    let wants_name = failure.expected.iter().any(|&rule| matches!(rule, Rule::name | Rule::names | Rule::path));
+    let wants_name = failure
+        .expected
+        .iter()
+        .any(|&rule| matches!(rule, Rule::name | Rule::names | Rule::path | Rule::condition_variable));
     let expected = describe(&failure, place, found.lo == first.lo);
 
     let before = text[..found.lo].chars().next_back();
@@ -300,7 +316,9 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
     let mut diagnostic = Diagnostic::new(Code::SYNTAX, span, title).label(format!("expected {expected}"));
     if found.kind == TokenKind::Word {
         let candidates = words.into_iter().chain(place.starters().iter().copied().filter(|_| found.lo == first.lo));
-        if let Some(similar) = crate::similar::most_similar(found.text, candidates) {
+        // A word of the language is no misspelling of another.
+        let known = Rule::all_rules().iter().any(|&rule| keyword_of(rule) == Some(found.text));
+        if let Some(similar) = crate::similar::most_similar(found.text, candidates).filter(|_| !known) {
             diagnostic = diagnostic.suggest(format!("`{similar}` is a word that fits here"), span, similar);
         }
         let number_before = before.is_some_and(char::is_whitespace)
@@ -371,10 +389,11 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::comma => "`,`",
         Rule::dots => "`..`",
         Rule::paren_open => "`(`",
-        Rule::paren_close => "`)`",
+        Rule::paren_close | Rule::point_end => "`)`",
         Rule::bracket_open => "`[`",
         Rule::bracket_close => "`]`",
         Rule::open
+        | Rule::custom_parameters
         | Rule::hook_block
         | Rule::simulator_settings
         | Rule::process_settings
@@ -382,11 +401,12 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::launch_settings
         | Rule::budget_settings
         | Rule::lab_settings
-        | Rule::repeat_settings => "`{`",
+        | Rule::repeat_settings
+        | Rule::condition_settings => "`{`",
         Rule::close => "`}`",
-        Rule::name | Rule::names | Rule::path | Rule::identifier => "a name",
+        Rule::name | Rule::names | Rule::path | Rule::identifier | Rule::condition_variable => "a name",
         Rule::field_name | Rule::field => "a field such as `level: real[mm]`",
-        Rule::text => "a text in double quotes",
+        Rule::text | Rule::texts => "a text in double quotes",
         Rule::number | Rule::count => "a number",
         Rule::signed | Rule::quantity => "a quantity such as `20ms`",
         Rule::range => "a range such as `[0s, 65s]`",
@@ -397,11 +417,27 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::at_most => "`<=`",
         Rule::at_least => "`>=`",
         Rule::equal_to => "`==`",
+        Rule::not_equal => "`!=`",
         Rule::below => "`<`",
         Rule::above => "`>`",
         Rule::bound_within => "`in`",
         Rule::parameter_name | Rule::choice => "a parameter such as `offset`, `value`, `loss` or `delay`",
-        Rule::window | Rule::test_window | Rule::from_nodes | Rule::campaign_from => "`from`",
+        Rule::window | Rule::from_nodes | Rule::campaign_from => "`from`",
+        Rule::moment => "`before start`",
+        Rule::until_condition => "`until`",
+        Rule::for_length | Rule::for_lengths => "`for`",
+        Rule::at_most_times => "`at most`",
+        Rule::by_condition => "`condition`",
+        Rule::start_contains => "`start contains`",
+        Rule::contained_integer => "`integer`",
+        Rule::initial_value => "`initial`",
+        Rule::custom => "`custom`",
+        Rule::custom_parameter => "a parameter such as `points: int [3, 20]`",
+        Rule::domain | Rule::number_domain | Rule::point_domain | Rule::text_domain | Rule::file_domain => {
+            "what is permitted, such as `int [3, 20]`"
+        }
+        Rule::point => "a point such as `(1, 0, -0.5)m`",
+        Rule::coordinate => "a number without unit",
         Rule::draw_seed | Rule::setting_seed => "`seed`",
         Rule::within => "`within`",
         Rule::priority => "`priority`",
@@ -420,7 +456,6 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::carried => "`on pose`",
         Rule::fixed => "`at`",
         Rule::expand => "`expand`",
-        Rule::vector | Rule::coordinates => "three numbers such as `(1.2, 0.4, 1.0)m`",
         Rule::fit_delay => "`relay delay`",
         Rule::fit_parameter => "`parameter`",
         Rule::drain => "`drain`",
@@ -435,8 +470,13 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::blackhole => "`blackhole`",
         Rule::formula => "a formula such as `last(cycle)`",
         Rule::expression
+        | Rule::switch
+        | Rule::switch_conjunction
+        | Rule::disjunction
         | Rule::conjunction
+        | Rule::passage
         | Rule::relation
+        | Rule::prefix
         | Rule::sum
         | Rule::product
         | Rule::factor
@@ -447,17 +487,18 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::plus => "`+`",
         Rule::times => "`*`",
         Rule::over => "`/`",
-        Rule::when_then | Rule::formula_when => "`when`",
+        Rule::trigger | Rule::when_then | Rule::formula_when => "`when`",
         Rule::formula_every => "`every`",
         Rule::formula_per => "`per`",
         Rule::formula_outbound => "`outbound`",
         Rule::fuzzing_time => "`fuzzing_time()`",
         Rule::minus
-        | Rule::k_condition
+        | Rule::k_not
+        | Rule::k_always
+        | Rule::k_eventually
+        | Rule::k_implies
         | Rule::k_coverage
         | Rule::k_boost
-        | Rule::k_record
-        | Rule::k_custom
         | Rule::k_node
         | Rule::k_parameter => return None,
         _ => return keyword_of(rule).map(|word| format!("`{word}`")),

@@ -2,7 +2,9 @@
 
 use sesame_grammar::Rule;
 
-use super::ast::{Expression, ExpressionKind, Formula, FormulaKind, Members, Name};
+use super::ast::{
+    Expression, ExpressionKind, Formula, FormulaKind, Members, Name, Prefix, PrefixWord, Relation, Until,
+};
 use super::parse::{Pair, Reader, child, children, comparison, expect_child};
 
 impl Reader<'_> {
@@ -29,11 +31,44 @@ impl Reader<'_> {
     }
 
     pub(super) fn expression(&mut self, pair: &Pair<'_>) -> Expression {
-        self.joined(pair, Rule::conjunction, Self::conjunction, ExpressionKind::Any)
+        let mut sides = children(pair, Rule::disjunction)
+            .map(|side| self.joined(&side, Rule::conjunction, Self::conjunction, ExpressionKind::Any));
+        let first = sides.next().expect("an expression has a side");
+        let second = sides.next();
+        drop(sides);
+        match second {
+            None => first,
+            Some(second) => self.whole(pair, ExpressionKind::Implies(Box::new(first), Box::new(second))),
+        }
     }
 
     fn conjunction(&mut self, pair: &Pair<'_>) -> Expression {
+        self.joined(pair, Rule::passage, Self::passage, ExpressionKind::All)
+    }
+
+    /// A condition that switches an operation on or off.
+    pub(super) fn switch(&mut self, pair: &Pair<'_>) -> Expression {
+        self.joined(pair, Rule::switch_conjunction, Self::switch_conjunction, ExpressionKind::Any)
+    }
+
+    fn switch_conjunction(&mut self, pair: &Pair<'_>) -> Expression {
         self.joined(pair, Rule::relation, Self::relation, ExpressionKind::All)
+    }
+
+    fn passage(&mut self, pair: &Pair<'_>) -> Expression {
+        let mut sides: Vec<Expression> = children(pair, Rule::relation).map(|side| self.relation(&side)).collect();
+        let right = sides.pop().expect("a passage has a side");
+        let Some(left) = sides.pop() else { return right };
+        let until = Until {
+            span: self.span(&expect_child(pair, Rule::k_until)),
+            interval: child(pair, Rule::range).map(|range| self.range(&range)),
+        };
+        self.whole(pair, ExpressionKind::Until(Box::new(left), until, Box::new(right)))
+    }
+
+    /// An expression that is all of a pair.
+    fn whole(&self, pair: &Pair<'_>, kind: ExpressionKind) -> Expression {
+        Expression { kind, span: self.span(pair), parenthesised: false }
     }
 
     fn joined(
@@ -47,20 +82,40 @@ impl Reader<'_> {
         if parts.len() == 1 {
             return parts.remove(0);
         }
-        Expression { kind: join(parts), span: self.span(pair) }
+        self.whole(pair, join(parts))
     }
 
     fn relation(&mut self, pair: &Pair<'_>) -> Expression {
         let mut sides: Vec<Expression> =
             children(pair, Rule::sum).map(|side| self.chain(&side, Rule::product, Rule::minus)).collect();
         let right = sides.pop().expect("a relation has a side");
-        match (sides.pop(), comparison(pair)) {
-            (Some(left), Some(comparison)) => Expression {
-                kind: ExpressionKind::Compare(Box::new(left), comparison, Box::new(right)),
-                span: self.span(pair),
-            },
-            _ => right,
+        let relation = match comparison(pair) {
+            Some(comparison) => Relation::Comparison(comparison),
+            None => Relation::NotEqual,
+        };
+        let prefixes: Vec<Prefix> = children(pair, Rule::prefix).map(|prefix| self.prefix(&prefix)).collect();
+        let of = match sides.pop() {
+            None => right,
+            Some(left) => {
+                let span = left.span.to(right.span);
+                let kind = ExpressionKind::Compare(Box::new(left), relation, Box::new(right));
+                Expression { kind, span, parenthesised: false }
+            }
+        };
+        if prefixes.is_empty() {
+            return of;
         }
+        self.whole(pair, ExpressionKind::Prefixed(prefixes, Box::new(of)))
+    }
+
+    fn prefix(&mut self, pair: &Pair<'_>) -> Prefix {
+        let word = match pair {
+            _ if child(pair, Rule::k_always).is_some() => PrefixWord::Always,
+            _ if child(pair, Rule::k_eventually).is_some() => PrefixWord::Eventually,
+            _ => PrefixWord::Not,
+        };
+        let interval = child(pair, Rule::range).map(|range| self.range(&range));
+        Prefix { word, span: self.keyword_span(pair), interval }
     }
 
     /// A sum of products or a product of factors; `inverse` is the sign before what is subtracted or divides.
@@ -82,7 +137,7 @@ impl Reader<'_> {
             return links.remove(0).1;
         }
         let kind = if link == Rule::product { ExpressionKind::Sum(links) } else { ExpressionKind::Product(links) };
-        Expression { kind, span: self.span(pair) }
+        self.whole(pair, kind)
     }
 
     fn factor(&mut self, pair: &Pair<'_>) -> Expression {
@@ -114,17 +169,21 @@ impl Reader<'_> {
             Rule::path => ExpressionKind::Field(self.path(&operand)),
             _ => self.expression(&operand).kind,
         };
+        let parenthesised = operand.as_rule() == Rule::expression;
         if !negative {
-            return Expression { kind, span };
+            return Expression { kind, span, parenthesised };
         }
         // A sign before a number is part of it, as everywhere in the language.
         match kind {
             ExpressionKind::Number(mut quantity) => {
                 quantity.value = if quantity.value == 0.0 { 0.0 } else { -quantity.value };
                 quantity.span = span;
-                Expression { kind: ExpressionKind::Number(quantity), span }
+                self.whole(pair, ExpressionKind::Number(quantity))
             }
-            kind => Expression { kind: ExpressionKind::Negate(Box::new(Expression { kind, span })), span },
+            kind => {
+                let of = Expression { kind, span, parenthesised };
+                self.whole(pair, ExpressionKind::Negate(Box::new(of)))
+            }
         }
     }
 }

@@ -1,5 +1,6 @@
 //! From text to [`ast`]: parsing with recovery.
 
+mod activation;
 pub(crate) mod ast;
 pub(crate) mod eddi;
 mod explain;

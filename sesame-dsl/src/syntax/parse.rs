@@ -5,10 +5,10 @@ use pest::iterators::Pair as PestPair;
 use sesame_grammar::{Rule, SesameParser};
 
 use super::ast::{
-    Bound, Campaign, Choice, Comparison, Count, Direction, Drain, Expectation, Field, File, Head, InProcess, Inherited,
-    Message, Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Passive, Process,
-    Range, Repeat, Requirement, Search, Simulator, Strategy, System, Test, TestOperation, Topic, Transport, Type,
-    TypeKind,
+    ActivationMode, Bound, Campaign, Comparison, Count, Custom, CustomParameter, Direction, Domain, Drain, Expectation,
+    Field, File, Head, InProcess, Inherited, Message, Metric, MetricSource, Moment, Name, Node, Operation,
+    OperationBody, OperationKind, Operations, Passive, Process, Record, Repeat, Requirement, Search, Simulator,
+    Strategy, System, Test, Topic, Transport, Type, TypeKind,
 };
 use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, MAX_CALLS, too_deep};
@@ -70,7 +70,7 @@ pub(super) fn children<'i>(pair: &Pair<'i>, rule: Rule) -> impl Iterator<Item = 
     pair.clone().into_inner().filter(move |inner| inner.as_rule() == rule)
 }
 
-fn first_of<'i>(pair: &Pair<'i>, rules: &[Rule]) -> Option<Pair<'i>> {
+pub(super) fn first_of<'i>(pair: &Pair<'i>, rules: &[Rule]) -> Option<Pair<'i>> {
     pair.clone().into_inner().find(|inner| rules.contains(&inner.as_rule()))
 }
 
@@ -165,6 +165,7 @@ impl Reader<'_> {
         let span = self.span_of(at.lo, at.hi());
         let what = match block.as_rule() {
             Rule::hook_block => "metric".to_owned(),
+            Rule::custom_parameters => "operation".to_owned(),
             rule => format!("{rule:?}").replace("_settings", ""),
         };
         let label = if at.text.is_empty() {
@@ -223,16 +224,13 @@ impl Reader<'_> {
 
     /// Says that a construct belongs to a later version. Its first word decides where; its rule decides what it is called.
     fn unsupported(&mut self, pair: &Pair<'_>) {
-        let words = [Rule::k_node, Rule::k_parameter, Rule::k_custom, Rule::kind_name];
+        let words = [Rule::k_node, Rule::k_parameter, Rule::kind_name];
         let span = first_of(pair, &words).map_or_else(|| self.keyword_span(pair), |word| self.span(&word));
         let word = &self.text[span.range()];
         let what = match pair.as_rule() {
             Rule::unsupported_transport => format!("simulator kind `{word}`"),
-            Rule::unsupported_formula => format!("a metric by `{word}(…)`"),
-            Rule::unsupported_operation if word != "custom" => format!("an operation on a `{word}`"),
-            Rule::unsupported_operation | Rule::unsupported_kind => format!("operation kind `{word}`"),
-            Rule::unsupported_window => "activation by `when`".to_owned(),
-            Rule::unsupported_activation => "activation by `condition`".to_owned(),
+            Rule::unsupported_operation => format!("an operation on a `{word}`"),
+            Rule::unsupported_kind => format!("operation kind `{word}`"),
             Rule::unsupported_strategy => format!("search strategy `{word}`"),
             _ => format!("`{word}`"),
         };
@@ -440,10 +438,13 @@ impl Reader<'_> {
             (self.span(&direction), value)
         });
         let directions = directions.collect();
-        let defaults = children(pair, Rule::default_value)
-            .map(|default| (self.keyword_span(&default), self.signed(&expect_child(&default, Rule::signed))))
-            .collect();
-        let sources = [Rule::hook_block, Rule::formula, Rule::fuzzing_time, Rule::unsupported_formula];
+        let mut values = |rule| {
+            let clauses = children(pair, rule);
+            clauses.map(|it| (self.keyword_span(&it), self.signed(&expect_child(&it, Rule::signed)))).collect()
+        };
+        let defaults = values(Rule::default_value);
+        let initials = values(Rule::initial_value);
+        let sources = [Rule::hook_block, Rule::formula, Rule::fuzzing_time];
         let source = first_of(pair, &sources).expect("a metric has a source");
         let source = match source.as_rule() {
             Rule::hook_block => {
@@ -451,16 +452,12 @@ impl Reader<'_> {
                 let damaged = self.members(&source, Place::Hook, |reader, hook| {
                     hooks.push((reader.keyword_span(&hook), reader.names(&hook)));
                 });
-                Some(MetricSource::Hook { hooks, damaged })
+                MetricSource::Hook { hooks, damaged }
             }
-            Rule::formula => Some(MetricSource::Formula(Box::new(self.formula(&source)))),
-            Rule::fuzzing_time => Some(MetricSource::FuzzingTime),
-            _ => {
-                self.unsupported(&source);
-                None
-            }
+            Rule::formula => MetricSource::Formula(Box::new(self.formula(&source))),
+            _ => MetricSource::FuzzingTime,
         };
-        Metric { head, ty, directions, defaults, source }
+        Metric { head, ty, directions, defaults, initials, source }
     }
 
     pub(super) fn bound(&mut self, pair: &Pair<'_>) -> Bound {
@@ -480,7 +477,7 @@ impl Reader<'_> {
             self.unsupported(&unsupported);
             return Operation { head, body: None };
         }
-        let kinds = [Rule::random_value, Rule::packet_loss, Rule::latency, Rule::blackhole];
+        let kinds = [Rule::random_value, Rule::packet_loss, Rule::latency, Rule::blackhole, Rule::custom];
         let kind = first_of(pair, &kinds).expect("an operation has a kind");
         let kind = match kind.as_rule() {
             Rule::random_value => OperationKind::Random {
@@ -504,6 +501,7 @@ impl Reader<'_> {
                     })
                     .collect(),
             },
+            Rule::custom => OperationKind::Custom(self.custom(&kind)),
             _ => OperationKind::Blackhole,
         };
         let mut signed = |rule| {
@@ -515,12 +513,64 @@ impl Reader<'_> {
         let within = children(pair, Rule::within)
             .map(|within| (self.keyword_span(&within), self.range(&expect_child(&within, Rule::range))))
             .collect();
+        let contains = children(pair, Rule::start_contains)
+            .map(|clause| (self.keyword_span(&clause), self.contained(&clause)))
+            .collect();
         let untimed = children(pair, Rule::untimed).map(|untimed| self.span(&untimed)).collect();
         let mut nodes = |rule| child(pair, rule).map(|nodes| (self.keyword_span(&nodes), self.names(&nodes)));
         let from = nodes(Rule::from_nodes);
         let to = nodes(Rule::to_nodes);
-        let target = self.path(&expect_child(pair, Rule::path));
-        Operation { head, body: Some(OperationBody { target, from, to, kind, within, priority, inclusion, untimed }) }
+        let target = child(pair, Rule::path).map(|path| self.path(&path));
+        Operation {
+            head,
+            body: Some(OperationBody { target, from, to, kind, within, priority, inclusion, untimed, contains }),
+        }
+    }
+
+    fn custom(&mut self, pair: &Pair<'_>) -> Custom {
+        let span = self.keyword_span(pair);
+        let moment = child(pair, Rule::moment).map(|moment| self.moment(&moment));
+        let mut custom = Custom { span, moment, parameters: vec![], damaged: false };
+        let block = expect_child(pair, Rule::custom_parameters);
+        custom.damaged = self.members(&block, Place::Custom, |reader, member| {
+            let word = expect_child(&member, Rule::parameter_name);
+            let domains = [Rule::number_domain, Rule::point_domain, Rule::text_domain, Rule::file_domain];
+            let domain = first_of(&member, &domains).expect("a parameter has a domain");
+            custom.parameters.push(CustomParameter {
+                name: reader.name(&word),
+                doc: Self::doc(&member),
+                span: reader.span(&domain),
+                domain: reader.domain(&domain),
+            });
+        });
+        custom
+    }
+
+    pub(super) fn moment(&mut self, pair: &Pair<'_>) -> (Span, Moment) {
+        let moment = if child(pair, Rule::k_before).is_some() { Moment::BeforeStart } else { Moment::AfterEnd };
+        (self.span(pair), moment)
+    }
+
+    fn domain(&mut self, pair: &Pair<'_>) -> Domain {
+        let unit = child(pair, Rule::unit_in_brackets).map(|unit| self.unit(&expect_child(&unit, Rule::unit)));
+        match pair.as_rule() {
+            Rule::number_domain => Domain::Number {
+                integer: child(pair, Rule::k_int).is_some(),
+                unit,
+                range: self.range(&expect_child(pair, Rule::range)),
+            },
+            Rule::point_domain => {
+                let mut corners = children(pair, Rule::point).map(|point| self.point(&point)).collect::<Vec<_>>();
+                let high = corners.pop().expect("a box has two corners");
+                let low = corners.pop().expect("a box has two corners");
+                Domain::Point { unit, corners: Box::new([low, high]) }
+            }
+            rule => {
+                let texts = expect_child(pair, Rule::texts);
+                let texts = children(&texts, Rule::text).map(|text| self.text_of(&text)).collect();
+                if rule == Rule::file_domain { Domain::Files(texts) } else { Domain::Texts(texts) }
+            }
+        }
     }
 
     fn test(&mut self, pair: &Pair<'_>) -> Test {
@@ -533,32 +583,6 @@ impl Reader<'_> {
             _ => test.operations.push(reader.test_operation(&member)),
         });
         test
-    }
-
-    fn test_operation(&mut self, pair: &Pair<'_>) -> TestOperation {
-        let operation = self.name(&expect_child(pair, Rule::name));
-        let choices = children(pair, Rule::choice)
-            .map(|choice| {
-                let word = expect_child(&choice, Rule::parameter_name);
-                let name = Name { text: word.as_str().to_owned(), span: self.span(&word) };
-                let value = match child(&choice, Rule::range) {
-                    Some(range) => Choice::Range(self.range(&range)),
-                    None => Choice::Value(self.signed(&expect_child(&choice, Rule::signed))),
-                };
-                (name, value)
-            })
-            .collect();
-        let window = child(pair, Rule::window).map(|window| {
-            let mut ends = children(&window, Rule::signed).map(|end| self.signed(&end)).collect::<Vec<_>>();
-            let high = ends.pop().expect("a window has an end");
-            let low = ends.pop().expect("a window has a start");
-            Range { span: low.span.to(high.span), low, high }
-        });
-        if let Some(unsupported) = child(pair, Rule::unsupported_window) {
-            self.unsupported(&unsupported);
-        }
-        let seed = child(pair, Rule::draw_seed).map(|seed| self.count(&expect_child(&seed, Rule::number)));
-        TestOperation { operation, choices, window, seed }
     }
 
     // ----- campaigns
@@ -576,6 +600,7 @@ impl Reader<'_> {
             repeats: vec![],
             passives: vec![],
             ends: vec![],
+            records: vec![],
             damaged: false,
         };
         campaign.damaged = self.members(pair, Place::Campaign, |reader, member| {
@@ -591,13 +616,18 @@ impl Reader<'_> {
                     campaign.operations.push(Operations { span, names: reader.names(&member), min, max });
                 }
                 Rule::activate => {
-                    campaign.activates.push(span);
-                    if let Some(activation) = child(&member, Rule::unsupported_activation) {
-                        reader.unsupported(&activation);
-                    }
+                    let mode = match child(&member, Rule::by_condition) {
+                        Some(condition) => ActivationMode::Condition(reader.by_condition(&condition)),
+                        None => ActivationMode::Time,
+                    };
+                    campaign.activates.push((span, mode));
                 }
                 Rule::search => campaign.searches.push(reader.search(&member, span)),
                 Rule::end => campaign.ends.push((span, reader.signed(&expect_child(&member, Rule::signed)))),
+                Rule::record => {
+                    let all = child(&member, Rule::k_all).is_some();
+                    campaign.records.push((span, if all { Record::All } else { Record::Failing }));
+                }
                 Rule::repeat => {
                     let seed = reader.seeds(&member);
                     campaign.repeats.push(Repeat {

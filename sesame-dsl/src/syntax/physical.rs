@@ -2,7 +2,7 @@
 
 use sesame_grammar::Rule;
 
-use super::ast::{Bound, Count, Head, Name, Quantity, Range, Text, UnitName};
+use super::ast::{Bound, Count, Head, Name, Point, Quantity, Range, Text};
 use super::explain::Place;
 use super::parse::{Pair, Reader, child, children, expect_child};
 use crate::span::Span;
@@ -59,21 +59,13 @@ pub(crate) struct Shape {
 #[derive(Debug)]
 pub(crate) enum Form {
     Sphere(Quantity),
-    Box(Vector),
+    Box(Point),
 }
 
 #[derive(Debug)]
 pub(crate) enum ShapePlace {
     Carried(Text),
-    Fixed(Vector),
-}
-
-/// Three numbers and their unit.
-#[derive(Debug)]
-pub(crate) struct Vector {
-    pub(crate) coordinates: Vec<Quantity>,
-    pub(crate) unit: UnitName,
-    pub(crate) span: Span,
+    Fixed(Point),
 }
 
 #[derive(Debug)]
@@ -174,22 +166,13 @@ impl Reader<'_> {
     fn shape(&mut self, pair: &Pair<'_>) -> Shape {
         let form = match child(pair, Rule::sphere) {
             Some(sphere) => Form::Sphere(self.signed(&expect_child(&sphere, Rule::signed))),
-            None => Form::Box(self.vector(&expect_child(&expect_child(pair, Rule::cuboid), Rule::vector))),
+            None => Form::Box(self.point(&expect_child(&expect_child(pair, Rule::cuboid), Rule::point))),
         };
         let place = match child(pair, Rule::carried) {
             Some(carried) => ShapePlace::Carried(self.text_of(&expect_child(&carried, Rule::text))),
-            None => ShapePlace::Fixed(self.vector(&expect_child(&expect_child(pair, Rule::fixed), Rule::vector))),
+            None => ShapePlace::Fixed(self.point(&expect_child(&expect_child(pair, Rule::fixed), Rule::point))),
         };
         let expand = child(pair, Rule::expand).map(|expand| self.signed(&expect_child(&expand, Rule::signed)));
         Shape { head: self.head(pair), form, place, expand }
-    }
-
-    fn vector(&mut self, pair: &Pair<'_>) -> Vector {
-        let coordinates = expect_child(pair, Rule::coordinates);
-        Vector {
-            coordinates: children(&coordinates, Rule::signed).map(|number| self.signed(&number)).collect(),
-            unit: self.unit(&expect_child(pair, Rule::unit)),
-            span: self.span(pair),
-        }
     }
 }

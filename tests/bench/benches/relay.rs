@@ -3,7 +3,8 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use sesame_plan::{Activation, CampaignPlan, Choice, OperationId, Shape, Test, TestOperation};
+use sesame_plan::condition::{Comparison, Condition, Operand};
+use sesame_plan::{Activation, CampaignPlan, Choice, Domain, MetricId, OperationId, Shape, Test, TestOperation};
 use sesame_runtime::metric::MetricTable;
 use sesame_runtime::relay::{Exchange as _, Relay};
 use sesame_runtime::time::SimTime;
@@ -17,9 +18,9 @@ fn active(plan: &CampaignPlan, names: &[&str]) -> Test {
     let operation = |name: &&str| {
         let at = plan.operations.iter().position(|operation| operation.name == **name).expect("it is declared");
         let parameters = plan.operations[at].parameters.iter().map(|parameter| {
-            let (low, high) =
-                (parameter.low * 0.75 + parameter.high * 0.25, parameter.high * 0.75 + parameter.low * 0.25);
-            match parameter.shape {
+            let Domain::Number { low, high, shape, .. } = parameter.domain else { panic!("these have numbers only") };
+            let (low, high) = (low * 0.75 + high * 0.25, high * 0.75 + low * 0.25);
+            match shape {
                 Shape::Value => Choice::Value { value: f64::midpoint(low, high) },
                 Shape::Range => Choice::Range { low, high },
             }
@@ -34,6 +35,17 @@ fn active(plan: &CampaignPlan, names: &[&str]) -> Test {
     Test { operations: names.iter().map(operation).collect() }
 }
 
+/// The same test switched by conditions that are weighed on every event: active from the first one on.
+fn by_condition(mut test: Test) -> Test {
+    let active_time =
+        |by| Condition::Compare { left: Operand::Variable(MetricId(0)), by, right: Operand::Number(2000.0) };
+    for operation in &mut test.operations {
+        let (start, end) = (active_time(Comparison::Below), active_time(Comparison::Above));
+        operation.activation = Activation::Condition { start, end, times: 1 };
+    }
+    test
+}
+
 fn zone() -> Value {
     let fields = Fields::new(["zone", "level", "object1", "object2"]);
     Record::new(&fields, vec!["Z1".into(), 700.0.into(), "Z1".into(), "gripper".into()]).into()
@@ -46,21 +58,24 @@ fn relay(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("per_message");
     group.throughput(Throughput::Elements(u64::from(MESSAGES)));
 
-    let cases: [(&str, &str, Value, &[&str]); 7] = [
+    let cases: [(&str, &str, Value, &[&str]); 9] = [
         ("number, untouched", "arm/command", Value::Real(1.0), &[]),
         ("number, offset", "arm/command", Value::Real(1.0), &["jitter"]),
         ("number, loss", "arm/command", Value::Real(1.0), &["lose"]),
         ("number, latency", "arm/command", Value::Real(1.0), &["lag"]),
         ("number, four operations", "arm/command", Value::Real(1.0), &["jitter", "jitter", "lose", "lag"]),
+        ("number, offset by condition", "arm/command", Value::Real(1.0), &["jitter"]),
+        ("number, four operations by condition", "arm/command", Value::Real(1.0), &["jitter", "jitter", "lose", "lag"]),
         ("message, untouched and measured", "zones/Z1", zone(), &[]),
         ("message, offset and measured", "zones/Z1", zone(), &["shift"]),
     ];
     for (name, path, value, operations) in cases {
         let wire = wires.find(path).expect("the topic is declared");
-        let test = active(&plan, operations);
+        let timed = active(&plan, operations);
+        let test = if name.ends_with("by condition") { by_condition(timed) } else { timed };
         group.bench_function(BenchmarkId::new("relay", name), |bencher| {
             bencher.iter(|| {
-                let mut relay = Relay::new(&plan, &wires, &test, metrics.start()).expect("the test fits");
+                let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).expect("the test fits");
                 let mut deliveries = Vec::new();
                 for step in 0..MESSAGES {
                     let now = SimTime::from_nanos(i64::from(step) * 1_000_000);

@@ -133,7 +133,7 @@ pub(crate) fn become_simulator(
 
     let failed = |what: String| {
         let mut line = b"{\"failed\":".to_vec();
-        super::json::quoted(&what, &mut line);
+        crate::json::quoted(&what, &mut line);
         line.extend_from_slice(b"}\n");
         // Nobody is left to be told if this fails.
         io::stdout().write_all(&line).and_then(|()| io::stdout().flush()).ok();

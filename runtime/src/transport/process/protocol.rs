@@ -8,7 +8,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::value::RawValue;
 
-use super::json::{number, quoted};
+use crate::json::{number, quoted};
 use crate::time::SimTime;
 use crate::transport::TransportError;
 

@@ -7,8 +7,8 @@ use std::mem;
 use serde_json::value::RawValue;
 use sesame_plan::CampaignPlan;
 
-use super::json::{self, Shapes};
 use super::protocol::{LINE_LIMIT, Lines, Message, Ready, Said, order};
+use crate::json::{self, Shapes};
 use crate::message::Mismatch;
 use crate::relay::{Delivery, Exchange};
 use crate::simulator::Progress;

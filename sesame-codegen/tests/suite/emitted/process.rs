@@ -60,7 +60,7 @@ def answer(what):
     return json.loads(sys.stdin.readline() or "null")
 note("started")
 EAST = "robots/east/pose"
-TOPICS = [EAST, "robots/north/pose", "crossing/closest", "crossing/completed"]
+TOPICS = [EAST, "robots/north/pose", "crossing/completed"]
 order = json.loads(sys.stdin.readline())
 while order:
     if "reset" in order:
@@ -71,7 +71,7 @@ while order:
     if not heard:
         note("caught")
         while True: pass
-    results = [{"topic": "crossing/closest", "value": 2}, {"topic": "crossing/completed", "value": 50}]
+    results = [{"topic": "crossing/completed", "value": 50}]
     order = answer({"done": {"messages": results}})
 "#;
 

@@ -29,6 +29,8 @@ impl Simulator for Faulty {
         match self.fault.as_str() {
             "crash" => panic!("the reference run is to crash"),
             "wrong type" => bus.publish(self.level, "high"),
+            "flood" => (0..1_000_000).for_each(|_| bus.publish(self.level, 1.0)),
+            "early end" if bus.now().seconds() >= 0.5 => return Ok(Progress::Ended),
             "broken requirement" => bus.publish(self.level, 5.0),
             _ => bus.publish(self.level, 1.0),
         }

@@ -22,10 +22,10 @@ const EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// The field names seen last per message type, so that all records of a kind share them.
 #[derive(Default)]
-pub(super) struct Shapes(BTreeMap<MessageId, Arc<Fields>>);
+pub(crate) struct Shapes(BTreeMap<MessageId, Arc<Fields>>);
 
 /// Reads a payload of a declared type.
-pub(super) fn decode(plan: &CampaignPlan, shapes: &mut Shapes, ty: &Type, json: &RawValue) -> Result<Value, Mismatch> {
+pub(crate) fn decode(plan: &CampaignPlan, shapes: &mut Shapes, ty: &Type, json: &RawValue) -> Result<Value, Mismatch> {
     let text = json.get();
     match ty {
         Type::Bool => match text {
@@ -152,7 +152,7 @@ fn mismatch(expected: &'static str, text: &str) -> Mismatch {
 }
 
 /// Writes a payload.
-pub(super) fn encode(value: &Value, out: &mut Vec<u8>) {
+pub(crate) fn encode(value: &Value, out: &mut Vec<u8>) {
     match value {
         Value::Bool(b) => out.extend_from_slice(if *b { b"true" } else { b"false" }),
         Value::Int(n) => write!(out, "{n}").expect("memory takes all that is written"),
@@ -188,7 +188,7 @@ fn row<T>(items: &[T], out: &mut Vec<u8>, each: fn(&T, &mut Vec<u8>)) {
 }
 
 /// Writes a real number, or the text that stands for it.
-pub(super) fn number(x: f64, out: &mut Vec<u8>) {
+pub(crate) fn number(x: f64, out: &mut Vec<u8>) {
     if x.is_finite() {
         serde_json::to_writer(out, &x).expect("memory takes all that is written");
     } else {
@@ -204,7 +204,7 @@ pub(super) fn number(x: f64, out: &mut Vec<u8>) {
 }
 
 /// Writes a text in quotes.
-pub(super) fn quoted(text: &str, out: &mut Vec<u8>) {
+pub(crate) fn quoted(text: &str, out: &mut Vec<u8>) {
     serde_json::to_writer(out, text).expect("memory takes all that is written");
 }
 

@@ -1,0 +1,99 @@
+//! `replay-recording`: metrics fed from a recording, so that hooks are developed without a simulator.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use sesame_plan::CampaignPlan;
+
+use super::{Failure, Format};
+use crate::runner::Runner;
+
+/// Which recording is fed.
+#[derive(Debug, Args)]
+pub(super) struct Options {
+    /// The recording, for example `results/42/traces/T17.mcap`
+    #[arg(value_name = "FILE")]
+    recording: PathBuf,
+    /// How to show what came of it
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+#[cfg(not(feature = "mcap"))]
+pub(super) fn replay_recording(_: &Runner, plan: &CampaignPlan, options: &Options) -> Result<ExitCode, Failure> {
+    let Options { recording, format: _ } = options;
+    Err(Failure(format!(
+        "the runner of a campaign that records nothing cannot read {}: add `record mcap failing` to `{}` and generate it \
+         again",
+        recording.display(),
+        plan.campaign.name
+    )))
+}
+
+#[cfg(feature = "mcap")]
+pub(super) fn replay_recording(runner: &Runner, plan: &CampaignPlan, options: &Options) -> Result<ExitCode, Failure> {
+    use std::panic::{self, AssertUnwindSafe};
+
+    use super::work::refuse_unfilled;
+    use super::{NOT_AS_REQUIRED, print, print_json, text_options};
+    use crate::last_panic;
+    use crate::metric::MetricTable;
+    use crate::report::recording_text;
+    use crate::trace;
+    use crate::wire::WireTable;
+
+    refuse_unfilled(runner, plan, true)?;
+    let wires = WireTable::new(plan);
+    let table = MetricTable::new(plan, &wires, runner.hooks)?;
+    last_panic::listen();
+    let fed = AssertUnwindSafe(|| trace::feed(&options.recording, plan, &wires, &table));
+    let fed = panic::catch_unwind(fed)
+        .map_err(|_| Failure(format!("a hook cannot take this recording: {}", last_panic::take())))??;
+    let replay = compared(plan, options, fed);
+    for warning in &replay.warnings {
+        eprintln!("warning: {warning}");
+    }
+    match options.format {
+        Format::Text => print(&recording_text(&replay, text_options()))?,
+        Format::Json => print_json(&replay)?,
+    };
+    Ok(ExitCode::from(if replay.same { 0 } else { NOT_AS_REQUIRED }))
+}
+
+/// What metrics are now beside what was recorded.
+#[cfg(feature = "mcap")]
+fn compared(plan: &CampaignPlan, options: &Options, fed: crate::trace::Fed) -> crate::report::RecordingReplay {
+    use crate::record::MetricValue;
+    use crate::report::{FedMetric, RecordingReplay, Sameness};
+
+    let recorded = fed.run.as_ref().map_or(&[][..], |run| &run.metrics);
+    let metrics: Vec<FedMetric> = plan
+        .metrics
+        .iter()
+        .zip(&fed.metrics)
+        .map(|(metric, now)| {
+            let before = recorded.iter().find(|recorded| recorded.name == metric.name);
+            let sameness = match before {
+                None => Sameness::NotRecorded,
+                Some(before) if before.value.map(f64::to_bits) == now.value.map(f64::to_bits) => Sameness::Equal,
+                Some(_) => Sameness::Differs,
+            };
+            FedMetric {
+                metric: metric.name.clone(),
+                unit: metric.unit.clone(),
+                now: MetricValue { value: now.value, set: now.set },
+                recorded: before.and_then(|before| before.value),
+                sameness,
+            }
+        })
+        .collect();
+    RecordingReplay {
+        recording: options.recording.clone(),
+        run: fed.run.as_ref().map(|run| format!("{} of {} ({})", run.test, run.campaign, run.outcome)),
+        messages: fed.messages,
+        same: metrics.iter().all(|metric| metric.sameness != Sameness::Differs),
+        metrics,
+        warnings: fed.warnings,
+    }
+}

@@ -1,0 +1,74 @@
+//! What formulas hold of the messages they hear: the last value of each input, of each member of a group.
+
+use sesame_plan::{CampaignPlan, Input, Members, TopicId};
+
+use super::expression::{Held, greatest, least};
+use crate::value::Value;
+
+/// Reads the values of the inputs that a message on a topic has, with their positions. On failure, the field it lacks.
+pub(super) fn hear(
+    inputs: &[Input],
+    topic: TopicId,
+    value: &Value,
+    heard: &mut Vec<(usize, Held)>,
+) -> Result<(), String> {
+    heard.clear();
+    for (at, input) in inputs.iter().enumerate().filter(|(_, input)| input.field.topic == topic) {
+        match value.at(&input.field.path) {
+            Some(Value::Point(point)) => heard.push((at, *point)),
+            Some(Value::Real(x)) => heard.push((at, [*x, 0.0, 0.0])),
+            Some(Value::Int(n)) => heard.push((at, [*n as f64, 0.0, 0.0])),
+            Some(Value::Bool(b)) => heard.push((at, [f64::from(u8::from(*b)), 0.0, 0.0])),
+            _ => return Err(input.field.path.join(".")),
+        }
+    }
+    Ok(())
+}
+
+/// The last values of the inputs of a formula.
+#[derive(Debug, Clone)]
+pub(super) struct HeldInputs {
+    /// Per input: the last value of each member.
+    members: Vec<Vec<Option<Held>>>,
+    /// Per input: what is made of them.
+    inputs: Vec<Held>,
+    /// Per input: whether there was a message at all.
+    known: Vec<bool>,
+}
+
+impl HeldInputs {
+    /// Before the first message.
+    pub(super) fn new(inputs: &[Input], plan: &CampaignPlan) -> Self {
+        HeldInputs {
+            members: inputs.iter().map(|input| vec![None; plan.topic(input.field.topic).paths.len()]).collect(),
+            inputs: vec![[0.0; 3]; inputs.len()],
+            known: vec![false; inputs.len()],
+        }
+    }
+
+    /// Takes what [`hear`] found in a message on the `member`th path of its topic.
+    pub(super) fn hold(&mut self, inputs: &[Input], heard: &[(usize, Held)], member: usize) {
+        for &(at, value) in heard {
+            self.known[at] = true;
+            let members = &mut self.members[at];
+            members[member] = Some(value);
+            let join: fn(f64, f64) -> f64 = match inputs[at].members {
+                Members::Each => {
+                    self.inputs[at] = value;
+                    continue;
+                }
+                Members::Min => least,
+                Members::Max => greatest,
+                Members::Sum => |a, b| a + b,
+            };
+            // A point is never joined: it is that of a single topic.
+            let joined = members.iter().flatten().copied().reduce(|a, b| [join(a[0], b[0]), a[1], a[2]]);
+            self.inputs[at] = joined.unwrap_or(value);
+        }
+    }
+
+    /// What is held of each input, once all had a message.
+    pub(super) fn values(&self) -> Option<&[Held]> {
+        (!self.known.contains(&false)).then_some(&self.inputs)
+    }
+}

@@ -1,0 +1,261 @@
+//! Metrics that are the robustness of a temporal formula: the values of its signals, held, go to a monitor, and the run's
+//! end tells what comes of them.
+
+use sesame_plan::stl::Robustness;
+use sesame_plan::{CampaignPlan, Members, TopicId};
+
+use super::Context;
+use super::expression::{Held, least, number};
+use super::held::{HeldInputs, hear};
+use crate::stl::{FormulaError, Monitor};
+use crate::time::SimTime;
+use crate::value::Value;
+
+/// A robustness in one run.
+pub(super) struct RobustnessState<'p> {
+    robustness: &'p Robustness,
+    /// The group of which each member has a formula of its own.
+    each: Option<TopicId>,
+    /// One for each member of that group; one for a formula without.
+    instances: Vec<Instance>,
+    /// When the last message came.
+    last: SimTime,
+    heard: Vec<(usize, Held)>,
+}
+
+struct Instance {
+    held: HeldInputs,
+    /// None once the run is over.
+    monitor: Option<Monitor>,
+}
+
+impl<'p> RobustnessState<'p> {
+    /// Before the first message. Fails for a formula that the generator would not write.
+    pub(super) fn new(robustness: &'p Robustness, plan: &CampaignPlan) -> Result<Self, FormulaError> {
+        let monitor = Monitor::new(&robustness.formula, robustness.signals.len())?;
+        let each = robustness.inputs.iter().find(|input| input.members == Members::Each).map(|input| input.field.topic);
+        let count = each.map_or(1, |topic| plan.topic(topic).paths.len());
+        let instance = || Instance { held: HeldInputs::new(&robustness.inputs, plan), monitor: Some(monitor.clone()) };
+        let instances = (0..count).map(|_| instance()).collect();
+        Ok(RobustnessState { robustness, each, instances, last: SimTime::ZERO, heard: Vec::new() })
+    }
+
+    /// A message on the `member`th path of a topic, at the context's time.
+    pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) {
+        let Robustness { inputs, signals, .. } = self.robustness;
+        if let Err(lacking) = hear(inputs, topic, value, &mut self.heard) {
+            context.note(format!("a message on `{}` has no value `{lacking}`", context.topic));
+            return;
+        }
+        self.last = context.now;
+        for (at, Instance { held, monitor }) in self.instances.iter_mut().enumerate() {
+            // Where each member has a formula, what is said of all of them goes to all, and what is said of one to its own.
+            let own = self.each != Some(topic) || at == member;
+            for &(input, value) in &self.heard {
+                if own || inputs[input].members != Members::Each {
+                    held.hold(inputs, &[(input, value)], member);
+                }
+            }
+            let (Some(values), Some(monitor)) = (held.values(), monitor) else { continue };
+            for (at, signal) in signals.iter().enumerate() {
+                let value = number(signal, values);
+                // As with other formulas: what is no number says nothing, and what was known goes on.
+                if value.is_finite() {
+                    monitor.push(context.now, at, value);
+                } else {
+                    context.note(format!("refused the value {value} at {}", context.now));
+                }
+            }
+        }
+    }
+
+    /// The run is over, at the context's time: by how much the formula was kept.
+    pub(super) fn end(&mut self, context: &mut Context) {
+        let end = context.now.max(self.last);
+        let monitors = self.instances.iter_mut().filter_map(|instance| instance.monitor.take());
+        let robustness = monitors.filter_map(|monitor| monitor.finish(end)).reduce(least);
+        match robustness {
+            Some(robustness) if robustness.is_finite() => context.set(robustness),
+            Some(_) => context.note("the run ended before the formula says anything of it".to_owned()),
+            None => {}
+        }
+    }
+
+    /// The run broke off, and the end was not told: it is judged up to its last message.
+    pub(super) fn break_off(&mut self, context: &mut Context) {
+        if self.instances.iter().any(|instance| instance.monitor.is_some()) {
+            context.now = self.last;
+            self.end(context);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use sesame_plan::stl::{Comparison, Formula, Interval};
+    use sesame_plan::{Expression, FieldRef, Input, MetricSource, Side};
+
+    use super::*;
+    use crate::fixture::plan;
+    use crate::metric::MetricTable;
+    use crate::value::{Fields, Record};
+    use crate::wire::WireTable;
+
+    /// A message: milliseconds, path, number.
+    type Sent = (i64, usize, f64);
+
+    const PATHS: [&str; 3] = ["arm/command", "zones/Z1", "zones/Z2"];
+
+    fn payload(path: usize, number: f64) -> Value {
+        match path {
+            0 => Value::Real(number),
+            _ => Record::new(&Fields::new(["level"]), vec![Value::Real(number)]).into(),
+        }
+    }
+
+    fn command() -> Input {
+        Input { field: FieldRef { topic: TopicId(0), path: Vec::new() }, members: Members::Min }
+    }
+
+    fn level(members: Members) -> Input {
+        Input { field: FieldRef { topic: TopicId(1), path: vec!["level".into()] }, members }
+    }
+
+    fn above(signal: u32) -> Formula {
+        Formula::Predicate { signal, comparison: Comparison::Above, constant: 0.0 }
+    }
+
+    fn always(of: Formula) -> Formula {
+        Formula::Always { interval: Interval::UNBOUNDED, of: Box::new(of) }
+    }
+
+    fn eventually(from: f64, to: f64, of: Formula) -> Formula {
+        Formula::Eventually { interval: Interval { from, to: Some(to) }, of: Box::new(of) }
+    }
+
+    /// The robustness of a formula the signals of which are the inputs.
+    fn of(inputs: Vec<Input>, formula: Formula) -> Robustness {
+        let signals = (0..inputs.len()).map(|at| Expression::Input(u32::try_from(at).unwrap()));
+        Robustness { signals: signals.collect(), inputs, formula, side: Side::Inbound }
+    }
+
+    /// Value and warnings of a run that ends at this time in milliseconds, or breaks off after its last message.
+    fn measured(robustness: Robustness, sent: &[Sent], end: Option<i64>) -> (Option<f64>, Vec<String>) {
+        let mut plan = plan(Vec::new());
+        plan.metrics.truncate(1);
+        plan.metrics[0].source = MetricSource::Robustness { robustness };
+        let wires = WireTable::new(&plan);
+        let table = MetricTable::new(&plan, &wires, &[]).unwrap();
+        let mut metrics = table.start();
+        metrics.begin();
+        for &(time, path, number) in sent {
+            let wire = wires.find(PATHS[path]).unwrap();
+            metrics.message(SimTime::from_nanos(time * 1_000_000), wire, &payload(path, number));
+        }
+        if let Some(end) = end {
+            metrics.end(SimTime::from_nanos(end * 1_000_000));
+        }
+        let (observed, warnings) = metrics.finish(&[]);
+        (observed[0].value, warnings)
+    }
+
+    fn value(robustness: Robustness, sent: &[Sent]) -> Option<f64> {
+        measured(robustness, sent, Some(10_000)).0
+    }
+
+    #[test]
+    fn a_signal_of_two_topics_jumps_once_where_both_do() {
+        let apart = Expression::Sum(vec![Expression::Input(0), Expression::Negate(Box::new(Expression::Input(1)))]);
+        let mut robustness = of(vec![command(), level(Members::Min)], always(above(0)));
+        robustness.signals = vec![apart];
+        // Between the two messages at 100 ms the difference is 1, for no time at all.
+        let sent = [(0, 0, 9.0), (0, 1, 4.0), (100, 0, 5.0), (100, 1, -1.0)];
+        assert_eq!(value(robustness, &sent), Some(5.0));
+    }
+
+    #[test]
+    fn nothing_is_judged_before_every_topic_had_a_message() {
+        let both = || {
+            let both = Formula::And { left: Box::new(above(0)), right: Box::new(above(1)) };
+            of(vec![command(), level(Members::Min)], always(both))
+        };
+        assert_eq!(value(both(), &[(0, 0, -9.0), (100, 0, 3.0), (200, 1, 7.0)]), Some(3.0));
+        assert_eq!(value(both(), &[(0, 0, -9.0), (100, 0, 3.0)]), None);
+    }
+
+    #[test]
+    fn a_group_is_its_minimum_or_each_member_has_a_formula_of_its_own() {
+        let soon = |members| of(vec![level(members)], always(eventually(0.0, 1.0, above(0))));
+        // Each zone is left by one of them at any time, but both are clear at one time only for a moment.
+        let sent = [(0, 1, 4.0), (0, 2, -2.0), (5_000, 1, -3.0), (5_000, 2, 6.0), (9_900, 2, 1.0)];
+        assert_eq!(value(soon(Members::Max), &sent), Some(1.0));
+        assert_eq!(value(soon(Members::Min), &sent), Some(-3.0));
+        assert_eq!(value(soon(Members::Each), &sent), Some(-3.0));
+        let turns = [
+            (0, 1, 4.0),
+            (0, 2, -2.0),
+            (500, 1, -3.0),
+            (500, 2, 6.0),
+            (1_000, 1, 4.0),
+            (1_000, 2, -2.0),
+            (1_500, 2, 6.0),
+        ];
+        assert_eq!(value(soon(Members::Min), &turns), Some(-2.0));
+        assert_eq!(value(soon(Members::Each), &turns), Some(4.0));
+    }
+
+    #[test]
+    fn a_run_that_breaks_off_is_judged_up_to_its_last_message() {
+        let robustness = || of(vec![level(Members::Min)], always(above(0)));
+        assert_eq!(measured(robustness(), &[(0, 1, 4.0), (100, 1, -2.0)], None).0, Some(-2.0));
+        let answer = || of(vec![level(Members::Min)], eventually(2.0, 3.0, above(0)));
+        assert_eq!(measured(answer(), &[(0, 1, 4.0), (2_000, 1, 1.0)], None).0, Some(1.0));
+    }
+
+    #[test]
+    fn what_the_run_was_too_short_for_is_not_set_and_said() {
+        let late = of(vec![level(Members::Min)], eventually(20.0, 30.0, above(0)));
+        let (value, warnings) = measured(late, &[(0, 1, 4.0)], Some(10_000));
+        assert_eq!(value, None);
+        assert_eq!(warnings, ["metric `fuzzing_time`: the run ended before the formula says anything of it"]);
+    }
+
+    #[test]
+    fn a_value_that_is_no_number_is_refused_and_the_one_before_it_goes_on() {
+        let robustness = of(vec![level(Members::Min)], always(above(0)));
+        let (value, warnings) = measured(robustness, &[(0, 1, 4.0), (100, 1, f64::NAN), (200, 1, 3.0)], Some(300));
+        assert_eq!(value, Some(3.0));
+        assert_eq!(warnings, ["metric `fuzzing_time`: refused the value NaN at 0.100 s"]);
+    }
+
+    #[test]
+    fn a_formula_that_no_generator_writes_is_refused_before_any_run() {
+        let mut plan = plan(Vec::new());
+        let robustness = of(vec![command()], always(above(7)));
+        plan.metrics[0].source = MetricSource::Robustness { robustness };
+        let refused = MetricTable::new(&plan, &WireTable::new(&plan), &[]).err().unwrap().to_string();
+        assert!(refused.starts_with("metric `fuzzing_time`: the formula names signal 7 of 1"), "{refused}");
+    }
+
+    proptest! {
+        // With each message at a time of its own, the least over time is the least over messages.
+        #[test]
+        fn always_is_the_least_of_all_messages(
+            steps in proptest::collection::vec((1..300i64, 1..3usize, -9..9i32), 1..30),
+        ) {
+            let mut now = 0;
+            let sent: Vec<Sent> = steps
+                .into_iter()
+                .map(|(step, path, number)| {
+                    now += step;
+                    (now, path, f64::from(number))
+                })
+                .collect();
+            let least = sent.iter().map(|sent| sent.2).reduce(f64::min);
+            for members in [Members::Min, Members::Each] {
+                prop_assert_eq!(value(of(vec![level(members)], always(above(0))), &sent), least);
+            }
+        }
+    }
+}

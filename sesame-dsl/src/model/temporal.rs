@@ -1,0 +1,59 @@
+//! Metrics that are the robustness of a formula of signal temporal logic, with units resolved.
+
+use super::{Comparison, Expression, Input};
+
+/// By how much a test keeps a temporal formula (positive) or breaks it (negative), in the unit of its comparisons.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Robustness {
+    /// What its signals refer to by position; each once, at least one. Of those that are `each of` a group's members, all
+    /// are of one group: then the formula is that of each member, and the least counts.
+    pub inputs: Vec<Input>,
+    /// What its comparisons refer to by position, all in one unit; each has an input.
+    pub signals: Vec<Expression>,
+    /// What is to hold.
+    pub formula: Temporal,
+    /// Whether it hears messages after operations, as they are delivered, and not as they were published.
+    pub outbound: bool,
+}
+
+/// What holds of signals over time, or does not.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Temporal {
+    /// A signal beside a constant, which is finite.
+    Predicate(usize, Comparison, f64),
+    /// It does not hold.
+    Not(Box<Temporal>),
+    /// All of two or more hold.
+    All(Vec<Temporal>),
+    /// At least one of two or more holds.
+    Any(Vec<Temporal>),
+    /// The second holds, or the first does not.
+    Implies(Box<Temporal>, Box<Temporal>),
+    /// It holds all through the interval.
+    Always(Interval, Box<Temporal>),
+    /// It holds at some time in the interval.
+    Eventually(Interval, Box<Temporal>),
+    /// The second holds at some time in the interval, and the first up to that time and at it.
+    Until(Interval, Box<Temporal>, Box<Temporal>),
+}
+
+impl Temporal {
+    /// How many formulas are inside of each other, this one included.
+    pub fn depth(&self) -> usize {
+        1 + match self {
+            Temporal::Predicate(..) => 0,
+            Temporal::Not(of) | Temporal::Always(_, of) | Temporal::Eventually(_, of) => of.depth(),
+            Temporal::All(of) | Temporal::Any(of) => of.iter().map(Temporal::depth).max().unwrap_or(0),
+            Temporal::Implies(left, right) | Temporal::Until(_, left, right) => left.depth().max(right.depth()),
+        }
+    }
+}
+
+/// A stretch of time from now on, in seconds; `0 <= from <= to`, both included.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interval {
+    /// Where it begins.
+    pub from: f64,
+    /// Where it ends; `None` for one that goes on to the end of the test.
+    pub to: Option<f64>,
+}

@@ -1,0 +1,550 @@
+//! Conditions: those of known tests, what a campaign grows its own from, and what operations ask of these.
+
+use super::{Kind, Resolver, list};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::model::condition::{Comparison, Condition, ConditionSpace, Constraint, Integers, Known, Operand, Variable};
+use crate::model::{Activation, Aggregate, End, Expression, Id as _, Metric, MetricId, MetricSource, Range};
+use crate::span::Span;
+use crate::syntax::ast::{self, ByCondition, Contained, ExpressionKind, Relation, Trigger, TriggerEnd};
+use crate::units::{Unit, convert, dimension};
+
+const EXAMPLE: &str = "expected a comparison such as `near_zone1 > 2`";
+
+impl<'a> Resolver<'a> {
+    // ----- known tests
+
+    pub(super) fn trigger(&mut self, trigger: &'a Trigger) -> Option<Activation> {
+        let start = self.switch(&trigger.start);
+        let end = match &trigger.end {
+            TriggerEnd::Until(condition) => self.switch(condition).map(End::Condition),
+            TriggerEnd::For(length) => self.length(length).map(End::Length),
+        };
+        let times = match trigger.times {
+            Some(times) => self.times_activated(times),
+            None => Some(1),
+        };
+        Some(Activation::Condition { start: start?, end: end?, times: times? })
+    }
+
+    fn length(&mut self, quantity: &ast::Quantity) -> Option<f64> {
+        let seconds = self.value(quantity, Some(&Unit::seconds()), "the length of an activation")?;
+        if seconds > 0.0 {
+            return Some(seconds);
+        }
+        let title = format!("an activation cannot last `{}`", self.text(quantity.span));
+        self.report(Diagnostic::new(Code::OUT_OF_RANGE, quantity.span, title).label("expected more than 0s"));
+        None
+    }
+
+    fn times_activated(&mut self, times: ast::Count) -> Option<u32> {
+        self.count(times, 1, "an operation is activated")
+    }
+
+    /// A whole condition, which switches an operation on or off.
+    fn switch(&mut self, expression: &'a ast::Expression) -> Option<Condition> {
+        let condition = self.condition_over_metrics(expression)?;
+        let depth = condition.depth();
+        if depth > Condition::MAX_DEPTH {
+            let title = format!("this condition has {depth} levels, more than {}", Condition::MAX_DEPTH);
+            let diagnostic = Diagnostic::new(Code::TOO_LARGE, expression.span, title)
+                .label("too long")
+                .note("each `and` and each `or` is a level; a metric can take part of the condition");
+            self.report(diagnostic);
+            return None;
+        }
+        Some(condition)
+    }
+
+    fn condition_over_metrics(&mut self, expression: &'a ast::Expression) -> Option<Condition> {
+        let (parts, all) = match &expression.kind {
+            ExpressionKind::All(parts) => (parts, true),
+            ExpressionKind::Any(parts) => (parts, false),
+            ExpressionKind::Compare(left, by, right) => return self.comparison(expression, left, *by, right),
+            kind => {
+                let written = self.text(expression.span);
+                let title = match kind {
+                    ExpressionKind::Field(_) => format!("`{written}` is not compared with anything"),
+                    _ => format!("`{written}` is no comparison"),
+                };
+                self.report(Diagnostic::new(Code::NOT_A_CONDITION, expression.span, title).label(EXAMPLE));
+                return None;
+            }
+        };
+        // All are looked at, so that a mistake in one does not hide one in another.
+        let parts: Vec<_> = parts.iter().map(|part| self.condition_over_metrics(part)).collect();
+        let parts: Vec<Condition> = parts.into_iter().collect::<Option<_>>()?;
+        let join = if all { Condition::And } else { Condition::Or };
+        parts.into_iter().reduce(|left, right| join(Box::new(left), Box::new(right)))
+    }
+
+    fn comparison(
+        &mut self,
+        whole: &ast::Expression,
+        left: &'a ast::Expression,
+        by: Relation,
+        right: &'a ast::Expression,
+    ) -> Option<Condition> {
+        let by = match by {
+            Relation::Comparison(ast::Comparison::Below) => Some(Comparison::Below),
+            Relation::Comparison(ast::Comparison::Above) => Some(Comparison::Above),
+            Relation::Comparison(ast::Comparison::Equal) => Some(Comparison::Equal),
+            Relation::Comparison(ast::Comparison::AtMost) => self.no_such_comparison(left, right, "<=", Some("<")),
+            Relation::Comparison(ast::Comparison::AtLeast) => self.no_such_comparison(left, right, ">=", Some(">")),
+            Relation::NotEqual => self.no_such_comparison(left, right, "!=", None),
+        };
+        let sides = [left, right].map(|side| self.side(side));
+        let [left_side, right_side] = [sides[0]?, sides[1]?];
+        let by = by?;
+        let compared = match (left_side, right_side) {
+            (Side::Number(left), Side::Number(right)) => {
+                let outcome = match (left.unit.is_none(), right.unit.is_none()) {
+                    (true, true) => Known::exactly(left.value).outcome(by, Known::exactly(right.value)),
+                    _ => None,
+                };
+                let label =
+                    outcome.map_or("always the same", |outcome| if outcome { "always holds" } else { "never holds" });
+                let title = format!("`{}` compares two numbers", self.text(whole.span));
+                self.report(Diagnostic::new(Code::CONSTANT_COMPARISON, whole.span, title).label(label));
+                return None;
+            }
+            (Side::Metric(metric), Side::Metric(other)) if metric == other => {
+                let title = format!("`{}` compares a metric with itself", self.text(whole.span));
+                let label = if by == Comparison::Equal { "always holds" } else { "never holds" };
+                self.report(Diagnostic::new(Code::CONSTANT_COMPARISON, whole.span, title).label(label));
+                return None;
+            }
+            (Side::Metric(metric), Side::Metric(other)) => {
+                self.one_unit(metric, left.span, other, right.span)?;
+                (Operand::Variable(metric), Operand::Variable(other))
+            }
+            (Side::Metric(metric), Side::Number(number)) => {
+                (Operand::Variable(metric), Operand::Number(self.in_unit_of(metric, left.span, number)?))
+            }
+            (Side::Number(number), Side::Metric(metric)) => {
+                (Operand::Number(self.in_unit_of(metric, right.span, number)?), Operand::Variable(metric))
+            }
+        };
+        self.open_outcome(whole.span, compared, by)?;
+        let (left, right) = compared;
+        Some(Condition::Compare { left, by, right })
+    }
+
+    fn no_such_comparison(
+        &mut self,
+        left: &ast::Expression,
+        right: &ast::Expression,
+        sign: &str,
+        near: Option<&str>,
+    ) -> Option<Comparison> {
+        let gap = Span { lo: left.span.hi, hi: right.span.lo, ..left.span };
+        let written = self.text(gap);
+        let mut diagnostic = Diagnostic::new(Code::NOT_A_CONDITION, gap, format!("a condition has no `{sign}`"))
+            .label("expected `<`, `>` or `==`");
+        if let Some(at) = written.find(sign) {
+            let lo = gap.lo + u32::try_from(at).expect("files are small");
+            let hi = lo + u32::try_from(sign.len()).expect("signs are short");
+            let span = Span { lo, hi, ..gap };
+            diagnostic.span = span;
+            // A sign inside of a comment is not the one that is meant.
+            if let Some(near) = near.filter(|_| written.trim() == sign) {
+                diagnostic = diagnostic.suggest(format!("compare with `{near}`"), span, near);
+            }
+        }
+        self.report(diagnostic);
+        None
+    }
+
+    fn side(&mut self, side: &'a ast::Expression) -> Option<Side<'a>> {
+        match &side.kind {
+            ExpressionKind::Number(quantity) => Some(Side::Number(quantity)),
+            ExpressionKind::Field(path) if path.fields.is_empty() => {
+                let index = self.find(&path.topic, Kind::Metric)?;
+                let id = MetricId::from_index(index);
+                self.metrics[index].is_some().then_some(())?;
+                self.known_during_a_test(id, side.span)?;
+                Some(Side::Metric(id))
+            }
+            kind => {
+                let written = self.text(side.span);
+                let title = match kind {
+                    ExpressionKind::Field(_) | ExpressionKind::Members(..) => {
+                        format!("`{written}` is no metric, and a condition compares metrics")
+                    }
+                    ExpressionKind::Truth(_)
+                    | ExpressionKind::Compare(..)
+                    | ExpressionKind::All(_)
+                    | ExpressionKind::Any(_) => {
+                        format!("`{written}` holds or does not, and a condition compares metrics")
+                    }
+                    _ => format!("`{written}` is calculated, and a condition compares metrics as they are"),
+                };
+                let diagnostic = Diagnostic::new(Code::NOT_A_CONDITION, side.span, title)
+                    .label("expected a metric or a number")
+                    .note("a metric can be any formula, for example `metric near = last(near1.level)`");
+                self.report(diagnostic);
+                None
+            }
+        }
+    }
+
+    /// A robustness is known when the test is over: no condition ever sees it.
+    fn known_during_a_test(&mut self, id: MetricId, span: Span) -> Option<()> {
+        let metric = self.metric_of(id);
+        if !matches!(metric.source, MetricSource::Robustness(_)) {
+            return Some(());
+        }
+        let title = format!("`{}` has no value before the test is over", self.text(span));
+        let diagnostic = Diagnostic::new(Code::NOT_A_CONDITION, span, title)
+            .label("a robustness, known at the end")
+            .also(metric.declaration.span, "declared here");
+        self.report(diagnostic);
+        None
+    }
+
+    fn metric_of(&self, id: MetricId) -> &Metric {
+        self.metrics[id.index()].as_ref().expect("a side of a comparison is a metric without mistakes")
+    }
+
+    fn in_unit_of(&mut self, metric: MetricId, span: Span, number: &ast::Quantity) -> Option<f64> {
+        let unit = self.metric_of(metric).unit.clone();
+        self.value(number, unit.as_ref(), &format!("metric `{}`", self.text(span)))
+    }
+
+    /// Two metrics are compared as the numbers they are, so they have one unit.
+    fn one_unit(&mut self, metric: MetricId, span: Span, other: MetricId, other_span: Span) -> Option<()> {
+        let [unit, other_unit] = [metric, other].map(|id| self.metric_of(id).unit.clone());
+        let [unit, other_unit] = [unit.as_ref(), other_unit.as_ref()];
+        let in_words =
+            |unit: Option<&Unit>| unit.map_or("a plain number".to_owned(), |unit| format!("in `{}`", unit.text()));
+        if same_unit(unit, other_unit) {
+            return Some(());
+        }
+        let [name, other_name] = [span, other_span].map(|span| self.text(span));
+        let title = format!("`{other_name}` is {}, but `{name}` is {}", in_words(other_unit), in_words(unit));
+        let mut diagnostic =
+            Diagnostic::new(Code::WRONG_UNIT, span.to(other_span), title).label("metrics are compared in one unit");
+        if dimension(unit) == dimension(other_unit) {
+            diagnostic = diagnostic.note("let one of them be computed in the unit of the other");
+        }
+        self.report(diagnostic);
+        None
+    }
+
+    /// Reports a comparison that what is known of its metrics decides beforehand.
+    fn open_outcome(&mut self, span: Span, (left, right): (Operand, Operand), by: Comparison) -> Option<()> {
+        let known = [left, right].map(|side| match side {
+            Operand::Number(number) => Known::exactly(number),
+            Operand::Variable(metric) => known_of(self.metric_of(metric)),
+        });
+        let Some(outcome) = known[0].outcome(by, known[1]) else { return Some(()) };
+        let mut diagnostic = Diagnostic::new(
+            Code::CONSTANT_COMPARISON,
+            span,
+            format!("`{}` {} holds", self.text(span), if outcome { "always" } else { "never" }),
+        )
+        .label("decided before the test begins");
+        for (side, known) in [left, right].into_iter().zip(known) {
+            if let Operand::Variable(id) = side
+                && known != Known::NOTHING
+            {
+                let declared = &self.metric_of(id).declaration;
+                let label = format!("`{}` is {}", declared.name, in_words(known, self.metric_of(id).unit.as_ref()));
+                diagnostic = diagnostic.also(declared.span, label);
+            }
+        }
+        self.report(diagnostic);
+        None
+    }
+
+    // ----- campaigns
+
+    pub(super) fn condition_space(&mut self, by: &'a ByCondition) -> Option<ConditionSpace> {
+        let found = self.find_all(&by.variables, Kind::Metric);
+        let mut variables = Some(Vec::new());
+        for (name, range) in by.variables.iter().zip(&by.ranges) {
+            let index = self.names.get(name.text.as_str()).filter(|it| it.kind == Kind::Metric).map(|it| it.index);
+            let variable = index.and_then(|index| self.variable(name, MetricId::from_index(index), range.as_ref()));
+            match (&mut variables, variable) {
+                (Some(variables), Some(variable)) => variables.push(variable),
+                _ => variables = None,
+            }
+        }
+        let depth = match self.single(&by.depth, "depth") {
+            Some(&depth) => self.depth(depth),
+            None => Some(ConditionSpace::DEFAULT_DEPTH),
+        };
+        let integers = match self.single(&by.integers, "integers") {
+            Some(range) => self.integers(range, "`integers`"),
+            None => Some(ConditionSpace::DEFAULT_INTEGERS),
+        };
+        let lengths = match self.single(&by.lengths, "for") {
+            Some(range) => self.lengths(range).map(Some),
+            None => Some(None),
+        };
+        let times = match self.single(&by.times, "at most") {
+            Some(&times) => self.times_activated(times),
+            None => Some(1),
+        };
+        found?;
+        let [depth, times] = [depth?, times?];
+        let space = ConditionSpace { variables: variables?, depth, integers: integers?, lengths: lengths?, times };
+        if space.variables.iter().any(|variable| self.is_comparable(&space, variable)) {
+            return Some(space);
+        }
+        let names: Vec<&str> = by.variables.iter().map(|name| name.text.as_str()).collect();
+        let span = by.variables[0].span.to(by.variables[by.variables.len() - 1].span);
+        let diagnostic = Diagnostic::new(Code::NOTHING_TO_GROW, span, "every condition of this campaign is constant")
+            .label(format!(
+                "no whole number from {} to {} lies inside what is known of {}",
+                space.integers.lowest,
+                space.integers.highest,
+                list(&names)
+            ))
+            .note("change `integers`, or measure something that moves among them");
+        self.report(diagnostic);
+        None
+    }
+
+    /// Whether a comparison of this variable may go both ways: with a whole number, or with another variable of its unit.
+    fn is_comparable(&self, space: &ConditionSpace, variable: &Variable) -> bool {
+        let unit = |variable: &Variable| self.metric_of(variable.metric).unit.as_ref();
+        variable.known.meets(space.integers)
+            || space.variables.iter().any(|other| {
+                other.metric != variable.metric
+                    && same_unit(unit(variable), unit(other))
+                    && variable.known.outcome(Comparison::Equal, other.known).is_none()
+            })
+    }
+
+    fn variable(&mut self, name: &'a ast::Name, id: MetricId, range: Option<&'a ast::Range>) -> Option<Variable> {
+        let metric = self.metrics[id.index()].as_ref()?;
+        let own = known_of(metric);
+        self.known_during_a_test(id, name.span)?;
+        let metric = self.metric_of(id);
+        let (unit, initial, declared) = (metric.unit.clone(), metric.initial, metric.declaration.span);
+        let Some(range) = range else { return Some(Variable { metric: id, known: own }) };
+        let what = format!("metric `{}`", name.text);
+        let found = self.range(range, unit.as_ref(), &what)?;
+        if let Some(initial) = initial
+            && !(found.low..=found.high).contains(&initial)
+        {
+            let title = format!("`{}` begins outside of this range", name.text);
+            let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, range.span, title)
+                .label(format!("expected a range that holds its `initial {initial}{}`", unit_text(unit.as_ref())))
+                .also(declared, "declared here");
+            self.report(diagnostic);
+            return None;
+        }
+        let known = Known { low: found.low.max(own.low), high: found.high.min(own.high) };
+        if known.low > known.high {
+            let title = format!("`{}` never lies in this range", name.text);
+            let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, range.span, title)
+                .label(format!("it is {}", in_words(own, unit.as_ref())))
+                .also(declared, "declared here");
+            self.report(diagnostic);
+            return None;
+        }
+        Some(Variable { metric: id, known })
+    }
+
+    fn depth(&mut self, count: ast::Count) -> Option<u32> {
+        let depth = self.count(count, 1, "the depth of a condition is")?;
+        if depth <= ConditionSpace::MAX_DEPTH {
+            return Some(depth);
+        }
+        let title = format!("a condition has at most {} levels, not {depth}", ConditionSpace::MAX_DEPTH);
+        let diagnostic = Diagnostic::new(Code::BAD_COUNT, count.span, title)
+            .label(format!("expected {} or less", ConditionSpace::MAX_DEPTH))
+            .note("a level doubles how many comparisons a condition may have");
+        self.report(diagnostic);
+        None
+    }
+
+    fn integers(&mut self, range: &ast::Range, what: &str) -> Option<Integers> {
+        let found = self.range(range, None, what)?;
+        let low = self.whole(found.low, range.low.span, what);
+        if !self.whole(found.high, range.high.span, what) || !low {
+            return None;
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "they are whole and at most 2^53")]
+        Some(Integers { lowest: found.low as i64, highest: found.high as i64 })
+    }
+
+    fn lengths(&mut self, range: &ast::Range) -> Option<Range> {
+        let found = self.times(range, "the length of an activation")?;
+        if found.low > 0.0 {
+            return Some(found);
+        }
+        let title = format!("an activation cannot last `{}`", self.text(range.low.span));
+        self.report(Diagnostic::new(Code::OUT_OF_RANGE, range.low.span, title).label("expected more than 0s"));
+        None
+    }
+
+    // ----- what operations ask for
+
+    pub(super) fn constraints(&mut self, clauses: &'a [(Span, Vec<Contained>)]) -> Option<Vec<Constraint>> {
+        let mut found: Vec<(Constraint, Span)> = Vec::new();
+        let mut complete = true;
+        for contained in clauses.iter().flat_map(|(_, contained)| contained) {
+            let (constraint, span) = match contained {
+                Contained::Variable(name) => {
+                    let metric = self.find(name, Kind::Metric);
+                    (metric.map(|index| Constraint::Variable(MetricId::from_index(index))), name.span)
+                }
+                Contained::Integer(span, range) => {
+                    (self.integers(range, "an integer of a condition").map(Constraint::Integer), *span)
+                }
+            };
+            let Some(constraint) = constraint else {
+                complete = false;
+                continue;
+            };
+            if let Some((_, before)) = found.iter().find(|(known, _)| *known == constraint) {
+                let title = format!("`{}` is asked for twice", self.text(span));
+                let diagnostic =
+                    Diagnostic::new(Code::LISTED_TWICE, span, title).label("again here").also(*before, "first here");
+                self.report(diagnostic);
+                complete = false;
+                continue;
+            }
+            found.push((constraint, span));
+        }
+        complete.then(|| found.into_iter().map(|(constraint, _)| constraint).collect())
+    }
+
+    /// Checks that conditions of a campaign can contain what an operation of it asks for.
+    pub(super) fn constraints_and_space(
+        &mut self,
+        name: &ast::Name,
+        index: usize,
+        space: &ConditionSpace,
+        campaign: &'a ast::Campaign,
+    ) {
+        let Some(operation) = &self.operations[index] else { return };
+        let constraints = operation.constraints.clone();
+        let Some(body) = &self.file.operations[index].body else { return };
+        let written = body.contains.iter().flat_map(|(_, contained)| contained);
+        let mut failed = false;
+        for (constraint, written) in constraints.iter().zip(written) {
+            let (span, wrong) = match (constraint, written) {
+                (Constraint::Variable(metric), Contained::Variable(variable)) => {
+                    let offered = space.variables.iter().find(|offered| offered.metric == *metric);
+                    let wrong = match offered {
+                        None => format!("`{}` is no variable of campaign `{}`", variable.text, campaign.head.name.text),
+                        Some(offered) if !self.is_comparable(space, offered) => {
+                            format!("no comparison with `{}` may go both ways", variable.text)
+                        }
+                        Some(_) => continue,
+                    };
+                    (variable.span, wrong)
+                }
+                (Constraint::Integer(bounds), Contained::Integer(span, _)) => {
+                    let wrong = match bounds.shared(space.integers) {
+                        None => format!(
+                            "the integers of campaign `{}` are from {} to {}",
+                            campaign.head.name.text, space.integers.lowest, space.integers.highest
+                        ),
+                        Some(shared) if !space.variables.iter().any(|variable| variable.known.meets(shared)) => {
+                            "no variable can be on both sides of such a number".to_owned()
+                        }
+                        Some(_) => continue,
+                    };
+                    (*span, wrong)
+                }
+                _ => continue,
+            };
+            failed = true;
+            let title = format!("no start condition can contain what `{}` asks for", name.text);
+            let diagnostic = Diagnostic::new(Code::CANNOT_CONTAIN, name.span, title).label(wrong);
+            self.report(diagnostic.also(span, "asked for here"));
+        }
+        let (needed, most) = (comparisons_needed(&constraints), 1_usize << (space.depth - 1));
+        if !failed && needed > most {
+            let title =
+                format!("a condition of depth {} cannot contain all that `{}` asks for", space.depth, name.text);
+            let label = format!("needs {needed} comparisons, and there is room for {most}");
+            let mut diagnostic = Diagnostic::new(Code::CANNOT_CONTAIN, name.span, title).label(label);
+            if let Some((clause, _)) = body.contains.first() {
+                diagnostic = diagnostic.also(*clause, "asked for here");
+            }
+            self.report(diagnostic);
+        }
+    }
+}
+
+/// One side of a comparison, as written.
+#[derive(Clone, Copy)]
+enum Side<'a> {
+    Number(&'a ast::Quantity),
+    Metric(MetricId),
+}
+
+/// What is certain of a metric's values before any test, its initial value included.
+fn known_of(metric: &Metric) -> Known {
+    let from_zero = match &metric.source {
+        // It needs no message, so it has a value from the beginning.
+        MetricSource::FuzzingTime => return Known { low: 0.0, high: f64::INFINITY },
+        MetricSource::Formula(formula) => match &formula.aggregate {
+            Aggregate::Count(_) | Aggregate::Duration(_) => true,
+            // Over groups and keys these are the least, the greatest or the sum of values that are not negative.
+            Aggregate::Last(of) | Aggregate::Min(of) | Aggregate::Max(of) | Aggregate::Mean(of) => never_negative(of),
+        },
+        MetricSource::Hook(_) | MetricSource::Last(_) | MetricSource::Robustness(_) => false,
+    };
+    if !from_zero {
+        return Known::NOTHING;
+    }
+    Known { low: metric.initial.map_or(0.0, |initial| initial.min(0.0)), high: f64::INFINITY }
+}
+
+fn never_negative(expression: &Expression) -> bool {
+    match expression {
+        Expression::Constant(value) => *value >= 0.0,
+        Expression::Absolute(_) | Expression::Distance(..) => true,
+        Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) => of.iter().all(never_negative),
+        Expression::Max(of) => of.iter().any(never_negative),
+        Expression::Divide(value, by) => never_negative(value) && never_negative(by),
+        Expression::Input(_) | Expression::Negate(_) => false,
+    }
+}
+
+/// The fewest comparisons that hold these: a comparison has at most two variables, or a variable and a number.
+fn comparisons_needed(constraints: &[Constraint]) -> usize {
+    let variables = constraints.iter().filter(|it| matches!(it, Constraint::Variable(_))).count();
+    let mut bounds: Vec<Integers> = constraints
+        .iter()
+        .filter_map(|it| match it {
+            Constraint::Integer(bounds) => Some(*bounds),
+            Constraint::Variable(_) => None,
+        })
+        .collect();
+    // One number may be enough for several bounds: the greatest of those that end first, then of those it is not in.
+    bounds.sort_by_key(|bounds| bounds.highest);
+    let mut numbers: Vec<i64> = Vec::new();
+    for bounds in bounds {
+        if numbers.last().is_none_or(|&number| number < bounds.lowest) {
+            numbers.push(bounds.highest);
+        }
+    }
+    numbers.len() + variables.saturating_sub(numbers.len()).div_ceil(2)
+}
+
+/// Whether two metrics are in one unit, however it is written.
+fn same_unit(unit: Option<&Unit>, other: Option<&Unit>) -> bool {
+    dimension(unit) == dimension(other) && convert(1.0, other, unit) == 1.0
+}
+
+/// What is known of a number, for example `0s and more`.
+fn in_words(known: Known, unit: Option<&Unit>) -> String {
+    let unit = unit_text(unit);
+    match (known.low.is_finite(), known.high.is_finite()) {
+        (true, true) => format!("from {}{unit} to {}{unit}", known.low, known.high),
+        (true, false) => format!("{}{unit} and more", known.low),
+        (false, true) => format!("{}{unit} and less", known.high),
+        (false, false) => "any number".to_owned(),
+    }
+}
+
+fn unit_text(unit: Option<&Unit>) -> &str {
+    unit.map_or("", Unit::text)
+}

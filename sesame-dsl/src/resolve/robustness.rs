@@ -1,0 +1,367 @@
+//! Metrics that are the robustness of a temporal formula: its signals, their one unit, and how far its operators reach.
+
+use super::Resolver;
+use super::formula::{MAX_DEPTH, scaled};
+use super::truth::relation;
+use crate::diagnostic::{Code, Diagnostic, Suggestion};
+use crate::model::{Comparison, Expression, Input, Interval, Members, MetricSource, Robustness, Temporal};
+use crate::span::Span;
+use crate::syntax::ast::{self, ExpressionKind, Prefix, PrefixWord, Relation};
+use crate::units::{Unit, convert, dimension};
+
+/// By how much what is true is kept and what is false broken, beside numbers that are measured: more than any of them, so
+/// that a truth decides and never limits.
+const DECISIVE: f64 = 1e9;
+
+/// What a formula's comparisons are of.
+#[derive(Default)]
+struct Signals {
+    inputs: Vec<Input>,
+    computed: Vec<Expression>,
+    /// The unit of all comparisons, and the first of them.
+    unit: Option<(Option<Unit>, Span)>,
+    /// Positions of the signals that are true or false.
+    truths: Vec<usize>,
+}
+
+impl Signals {
+    /// The position of a signal, which is added if it is new.
+    fn signal(&mut self, signal: Expression) -> usize {
+        self.computed.iter().position(|known| *known == signal).unwrap_or_else(|| {
+            self.computed.push(signal);
+            self.computed.len() - 1
+        })
+    }
+}
+
+impl<'a> Resolver<'a> {
+    /// The robustness of a formula, with its unit.
+    pub(super) fn robustness(
+        &mut self,
+        formula: &'a ast::Formula,
+        of: &'a ast::Expression,
+    ) -> Option<(MetricSource, Option<Unit>)> {
+        self.no_clauses(formula);
+        self.at_most_one(&formula.outbound, "outbound");
+        let mut parts = Signals::default();
+        let resolved = self.temporal(&mut parts, of)?;
+        let Signals { inputs, computed: mut signals, unit, truths } = parts;
+        let amount = if unit.is_some() { DECISIVE } else { 1.0 };
+        for at in truths {
+            let twice = Expression::Product(vec![signals[at].clone(), Expression::Constant(2.0 * amount)]);
+            signals[at] = Expression::Sum(vec![twice, Expression::Constant(-amount)]);
+        }
+        if signals.iter().map(Expression::depth).max().max(Some(resolved.depth())) > Some(MAX_DEPTH) {
+            self.too_deep(of.span);
+            return None;
+        }
+        let mut each = inputs.iter().filter(|input| input.members == Members::Each).map(|input| input.field.topic);
+        let first = each.next();
+        if each.any(|topic| Some(topic) != first) {
+            let title = "`each of` is of two groups in this formula";
+            let diagnostic = Diagnostic::new(Code::WRONG_TYPE, of.span, title)
+                .label("expected one group at most")
+                .note("the formula is that of each member of the group, and the least counts");
+            self.report(diagnostic);
+            return None;
+        }
+        let outbound = !formula.outbound.is_empty();
+        let robustness = Robustness { inputs, signals, formula: resolved, outbound };
+        Some((MetricSource::Robustness(robustness), unit.and_then(|(unit, _)| unit)))
+    }
+
+    /// A robustness depends on no messages but on what signals are over time.
+    fn no_clauses(&mut self, formula: &'a ast::Formula) {
+        let clauses = [
+            (
+                formula.when.first().map(|(word, when)| word.to(when.span)),
+                "when",
+                "`a implies b` asks for `b` while `a` holds",
+            ),
+            (
+                formula.every.first().map(|(word, every)| word.to(every.span)),
+                "every",
+                "a value counts for the time it is held",
+            ),
+            (
+                formula.per.first().map(|(word, per)| word.to(per.span)),
+                "per",
+                "`each of` tells the members of a group apart",
+            ),
+        ];
+        for (span, word, note) in clauses {
+            let Some(span) = span else { continue };
+            let title = format!("`{word}` does not go with `robustness(…)`");
+            self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("leave it out").note(note));
+        }
+    }
+
+    fn too_deep(&mut self, span: Span) {
+        let title = format!("this formula is nested more than {MAX_DEPTH} deep");
+        self.report(Diagnostic::new(Code::TOO_LARGE, span, title).label("too deep"));
+    }
+
+    fn temporal(&mut self, parts: &mut Signals, expression: &'a ast::Expression) -> Option<Temporal> {
+        match &expression.kind {
+            ExpressionKind::All(of) => self.chain(parts, &of.iter().collect::<Vec<_>>()).map(Temporal::All),
+            ExpressionKind::Any(of) => self.chain(parts, &of.iter().collect::<Vec<_>>()).map(Temporal::Any),
+            ExpressionKind::Implies(premise, conclusion) => {
+                let [premise, conclusion] = self.pair(parts, premise, conclusion)?;
+                Some(Temporal::Implies(Box::new(premise), Box::new(conclusion)))
+            }
+            ExpressionKind::Until(left, until, right) => {
+                let interval = self.interval(until.interval.as_ref());
+                let [left, right] = self.pair(parts, left, right)?;
+                Some(Temporal::Until(interval?, Box::new(left), Box::new(right)))
+            }
+            ExpressionKind::Prefixed(prefixes, of) => self.prefixed(parts, prefixes, of),
+            ExpressionKind::Truth(_) => {
+                self.constant(expression.span);
+                None
+            }
+            ExpressionKind::Compare(left, by, right) => {
+                if self.is_condition(left) || self.is_condition(right) {
+                    return self.compared_truth(parts, expression, left, *by, right);
+                }
+                self.predicate(parts, expression, left, *by, right)
+            }
+            ExpressionKind::Field(_) | ExpressionKind::Members(..) if self.is_condition(expression) => {
+                let input = self.truth(&mut parts.inputs, expression)?;
+                let signal = parts.signal(Expression::Input(input));
+                if !parts.truths.contains(&signal) {
+                    parts.truths.push(signal);
+                }
+                Some(Temporal::Predicate(signal, Comparison::Above, 0.0))
+            }
+            _ => {
+                // It is a number; what is wrong with it is said as of any condition.
+                self.condition(&mut parts.inputs, expression);
+                None
+            }
+        }
+    }
+
+    fn pair(
+        &mut self,
+        parts: &mut Signals,
+        left: &'a ast::Expression,
+        right: &'a ast::Expression,
+    ) -> Option<[Temporal; 2]> {
+        let both = self.chain(parts, &[left, right])?;
+        Some(<[Temporal; 2]>::try_from(both).expect("two parts give two formulas"))
+    }
+
+    fn chain(&mut self, parts: &mut Signals, of: &[&'a ast::Expression]) -> Option<Vec<Temporal>> {
+        let clear = self.reach(of);
+        // All are looked at, so that a mistake in one does not hide one in another.
+        let resolved: Vec<_> = of.iter().map(|part| self.temporal(parts, part)).collect();
+        resolved.into_iter().collect::<Option<Vec<_>>>().filter(|_| clear)
+    }
+
+    /// Whether it is clear how far the temporal words reach in what is joined.
+    fn reach(&mut self, of: &[&'a ast::Expression]) -> bool {
+        let (last, before) = of.split_last().expect("what is joined has parts");
+        let mut clear = true;
+        for part in before {
+            let Some((word, alone, start)) = open_end(part) else { continue };
+            clear = false;
+            let name = self.text(word);
+            let title = format!("how far does `{name}` reach?");
+            let mut diagnostic = Diagnostic::new(Code::TEMPORAL_REACH, word, title)
+                .label("parentheses say so")
+                .also(Span { lo: alone.hi, hi: last.span.hi, ..alone }, "up to here, or over this too?");
+            let parentheses =
+                |from: Span, to: Span| vec![(Span { hi: from.lo, ..from }, "(".to_owned()), (to.end(), ")".to_owned())];
+            diagnostic
+                .suggestions
+                .push(Suggestion { message: "over all of it".to_owned(), edits: parentheses(start, last.span) });
+            diagnostic
+                .suggestions
+                .push(Suggestion { message: "up to here".to_owned(), edits: parentheses(alone, alone) });
+            self.report(diagnostic);
+        }
+        clear
+    }
+
+    fn prefixed(&mut self, parts: &mut Signals, prefixes: &'a [Prefix], of: &'a ast::Expression) -> Option<Temporal> {
+        if prefixes.len() > MAX_DEPTH {
+            self.too_deep(of.span);
+            return None;
+        }
+        let intervals: Vec<_> = prefixes.iter().map(|prefix| self.interval(prefix.interval.as_ref())).collect();
+        let mut of = self.temporal(parts, of)?;
+        for (prefix, interval) in prefixes.iter().zip(intervals).rev() {
+            let inner = Box::new(of);
+            of = match prefix.word {
+                PrefixWord::Not => Temporal::Not(inner),
+                PrefixWord::Always => Temporal::Always(interval?, inner),
+                PrefixWord::Eventually => Temporal::Eventually(interval?, inner),
+            };
+        }
+        Some(of)
+    }
+
+    fn interval(&mut self, range: Option<&ast::Range>) -> Option<Interval> {
+        let Some(range) = range else { return Some(Interval { from: 0.0, to: None }) };
+        let seconds = self.range(range, Some(&Unit::seconds()), "an interval of time")?;
+        if seconds.low < 0.0 {
+            let title = format!("`{}` begins in the past", self.text(range.span));
+            let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, range.low.span, title)
+                .label("expected 0s or more")
+                .note("an interval counts from the moment at which the formula is evaluated, and formulas look ahead");
+            self.report(diagnostic);
+            return None;
+        }
+        Some(Interval { from: seconds.low, to: Some(seconds.high) })
+    }
+
+    /// A comparison with `true` or `false`.
+    fn compared_truth(
+        &mut self,
+        parts: &mut Signals,
+        whole: &'a ast::Expression,
+        left: &'a ast::Expression,
+        by: Relation,
+        right: &'a ast::Expression,
+    ) -> Option<Temporal> {
+        let equal = match relation(by) {
+            Comparison::Equal => Some(true),
+            Comparison::NotEqual => Some(false),
+            _ => None,
+        };
+        let (of, value) = match (&left.kind, &right.kind) {
+            (_, ExpressionKind::Truth(value)) => (left, Some(*value)),
+            (ExpressionKind::Truth(value), _) => (right, Some(*value)),
+            _ => (left, None),
+        };
+        let (Some(equal), Some(value), true) = (equal, value, self.is_condition(of)) else {
+            let title = format!("`{}` has no robustness", self.text(whole.span));
+            let diagnostic = Diagnostic::new(Code::WRONG_TYPE, whole.span, title)
+                .label("what is true or false is compared with `true` or `false` only")
+                .note("say when it holds: by `and`, `or`, `not` and `implies`");
+            self.report(diagnostic);
+            return None;
+        };
+        let of = self.temporal(parts, of)?;
+        Some(if equal == value { of } else { Temporal::Not(Box::new(of)) })
+    }
+
+    /// A comparison of numbers: their difference is the signal, or what is compared with a constant.
+    fn predicate(
+        &mut self,
+        parts: &mut Signals,
+        whole: &'a ast::Expression,
+        left: &'a ast::Expression,
+        by: Relation,
+        right: &'a ast::Expression,
+    ) -> Option<Temporal> {
+        let (sides, unit) = self.common(&mut parts.inputs, &[left, right])?;
+        let [left, right] = <[Expression; 2]>::try_from(sides).expect("two parts give two numbers");
+        if !names_input(&left) && !names_input(&right) {
+            self.constant(whole.span);
+            return None;
+        }
+        let by = relation(by);
+        self.equality(whole.span, by);
+        let scale = self.scale(parts, unit, whole.span)?;
+        let (signal, by, constant) = match (left, right) {
+            (left, Expression::Constant(constant)) => (left, by, constant),
+            (Expression::Constant(constant), right) => (right, turned(by), constant),
+            (left, right) => (Expression::Sum(vec![left, Expression::Negate(Box::new(right))]), by, 0.0),
+        };
+        let constant = constant * scale;
+        if !constant.is_finite() {
+            let title = format!("`{}` has a number that is too large", self.text(whole.span));
+            self.report(Diagnostic::new(Code::BAD_NUMBER, whole.span, title).label("beyond 1.8e308"));
+            return None;
+        }
+        Some(Temporal::Predicate(parts.signal(scaled(signal, scale)), by, constant))
+    }
+
+    /// How many units of the formula one unit of a comparison is.
+    fn scale(&mut self, parts: &mut Signals, unit: Option<Unit>, span: Span) -> Option<f64> {
+        let Some((first, first_span)) = &parts.unit else {
+            parts.unit = Some((unit, span));
+            return Some(1.0);
+        };
+        let [found, wanted] = [dimension(unit.as_ref()), dimension(first.as_ref())];
+        if found == wanted {
+            return Some(convert(1.0, unit.as_ref(), first.as_ref()));
+        }
+        let title = format!(
+            "`{}` compares {}, but `{}` {}",
+            self.text(span),
+            found.name(),
+            self.text(*first_span),
+            wanted.name()
+        );
+        let diagnostic = Diagnostic::new(Code::WRONG_UNIT, span, title)
+            .label(format!("expected {}", wanted.name()))
+            .also(*first_span, "the first comparison gives the unit")
+            .note("by how much a formula is kept is one number: divide both sides of each comparison by what counts as much, such as `zones.level / 300mm > 0`");
+        self.report(diagnostic);
+        None
+    }
+
+    fn constant(&mut self, span: Span) {
+        let title = format!("`{}` is always the same", self.text(span));
+        let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, span, title);
+        self.report(diagnostic.label("expected a comparison of a topic, such as `link0 > 2.5rad`"));
+    }
+
+    fn equality(&mut self, span: Span, by: Comparison) {
+        let (sign, fate) = match by {
+            Comparison::Equal => ("==", "kept by more than 0"),
+            Comparison::NotEqual => ("!=", "broken by more than 0"),
+            _ => return,
+        };
+        let title = format!("`{}` is never {fate}", self.text(span));
+        let diagnostic = Diagnostic::new(Code::EQUALITY_WITHOUT_ROOM, span, title)
+            .label(format!("`{sign}` has no room"))
+            .note("say how far apart the sides may be: `abs(a - b) < 0.1` for example");
+        self.report(diagnostic);
+    }
+}
+
+/// The temporal word that the end of an expression belongs to without parentheses: the word, all from it to that end, and
+/// where what follows it begins.
+fn open_end(expression: &ast::Expression) -> Option<(Span, Span, Span)> {
+    if expression.parenthesised {
+        return None;
+    }
+    match &expression.kind {
+        ExpressionKind::Prefixed(prefixes, of) => {
+            let at = prefixes.iter().position(|prefix| prefix.word != PrefixWord::Not);
+            let Some(at) = at else { return open_end(of) };
+            let start = prefixes.get(at + 1).map_or(of.span, |next| next.span);
+            Some((prefixes[at].span, prefixes[at].span.to(of.span), start))
+        }
+        ExpressionKind::All(parts) | ExpressionKind::Any(parts) => parts.last().and_then(open_end),
+        ExpressionKind::Implies(_, right) | ExpressionKind::Until(_, _, right) => open_end(right),
+        _ => None,
+    }
+}
+
+/// Whether a number changes at all.
+fn names_input(of: &Expression) -> bool {
+    match of {
+        Expression::Constant(_) => false,
+        Expression::Input(_) | Expression::Distance(..) => true,
+        Expression::Negate(of) | Expression::Absolute(of) => names_input(of),
+        Expression::Divide(value, by) => names_input(value) || names_input(by),
+        Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) | Expression::Max(of) => {
+            of.iter().any(names_input)
+        }
+    }
+}
+
+/// A comparison read from right to left.
+fn turned(by: Comparison) -> Comparison {
+    match by {
+        Comparison::AtMost => Comparison::AtLeast,
+        Comparison::Below => Comparison::Above,
+        Comparison::AtLeast => Comparison::AtMost,
+        Comparison::Above => Comparison::Below,
+        Comparison::Equal | Comparison::NotEqual => by,
+    }
+}

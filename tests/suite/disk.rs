@@ -1,0 +1,122 @@
+//! A disk that is full, or read-only: a clear error, nothing that was recorded is lost, and `resume` goes on.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use nix::sys::signal::Signal;
+use sesame_runtime::record::Repository;
+use sesame_tests::{Runner, done};
+
+use crate::faults::recording;
+use crate::interruption::Running;
+
+/// A small disk in memory; gone when dropped.
+struct Disk(PathBuf);
+
+impl Disk {
+    /// `None` where this user may not mount one, which is said.
+    fn mount(runner: &Runner) -> Option<Disk> {
+        let place = runner.folder.join("disk");
+        fs::create_dir_all(&place).unwrap();
+        let mut mount = Command::new("mount");
+        let said = mount.args(["-t", "tmpfs", "-o", "size=16m", "sesame-test"]).arg(&place).output();
+        if said.is_ok_and(|said| said.status.success()) {
+            return Some(Disk(place));
+        }
+        eprintln!("skipped: a small disk can only be mounted by root on Linux");
+        None
+    }
+
+    fn remount(&self, how: &str) {
+        done(Command::new("mount").args(["-o", &format!("remount,{how}")]).arg(&self.0)).expect(0);
+    }
+
+    /// Fills it so that this many bytes are left, and gives the file to be removed.
+    fn leave(&self, bytes: usize) -> PathBuf {
+        let filler = self.0.join("filler");
+        fs::write(&filler, vec![0; (16 << 20) - bytes - (64 << 10)]).unwrap();
+        filler
+    }
+}
+
+impl Drop for Disk {
+    fn drop(&mut self) {
+        Command::new("umount").arg("-l").arg(&self.0).status().ok();
+    }
+}
+
+fn recorded(folder: &Path) -> usize {
+    Repository::open(folder).and_then(|repository| repository.tests()).map_or(0, |tests| tests.len())
+}
+
+/// Runs on disks with less and less room, makes room, and goes on. Gives how many runs broke off in the middle.
+fn filled_up(name: &str, clause: &str, room: &[usize]) -> Option<usize> {
+    let runner = recording(name, "harmless", clause);
+    let whole = runner.run(&["--results", "whole"]).expect(0).digest();
+    let disk = Disk::mount(&runner)?;
+    let mut broke_off = 0;
+    for kilobytes in room {
+        let filler = disk.leave(kilobytes << 10);
+        let results = disk.0.join(format!("r{kilobytes}"));
+        let said = runner.run(&["--results", results.to_str().unwrap()]);
+        fs::remove_file(filler).unwrap();
+        let folder = results.join("3");
+        let tests = recorded(&folder);
+        if said.code == Some(0) {
+            assert_eq!(said.digest(), whole);
+        } else {
+            let said = said.expect(1);
+            let words = ["disk is full", "No space left on device"];
+            assert!(said.err.contains("error: "), "{}", said.err);
+            assert!(words.iter().any(|words| said.err.contains(words)), "{}", said.err);
+            assert!(said.err.contains(results.to_str().unwrap()), "the place is named: {}", said.err);
+            assert!(!said.err.contains("panicked"), "{}", said.err);
+            if tests > 0 {
+                broke_off += 1;
+                let rows = Repository::open(&folder).unwrap().tests().unwrap();
+                assert!(
+                    rows.iter().all(|row| row.outcome.word() == "completed"),
+                    "nothing is taken for a crash: {rows:?}"
+                );
+                assert_eq!(runner.run(&["resume", folder.to_str().unwrap()]).expect(0).digest(), whole);
+                assert_eq!(recorded(&folder), 62);
+            }
+        }
+        fs::remove_dir_all(&results).unwrap();
+    }
+    Some(broke_off)
+}
+
+#[test]
+fn a_full_disk_loses_nothing_that_was_recorded_and_resume_goes_on() {
+    let Some(broke_off) = filled_up("disk_full", "", &[16, 200, 300, 400, 500]) else { return };
+    assert!(broke_off >= 2, "{broke_off} runs broke off in the middle");
+}
+
+#[test]
+fn a_disk_that_traces_fill_loses_nothing_that_was_recorded_and_resume_goes_on() {
+    let Some(broke_off) = filled_up("disk_full_of_traces", "record mcap all", &[600, 1200]) else { return };
+    assert!(broke_off >= 1, "{broke_off} runs broke off in the middle");
+}
+
+#[test]
+fn results_on_a_disk_made_read_only_are_left_alone_and_taken_up_again() {
+    let runner = recording("disk_read_only", "harmless", "");
+    let whole = runner.run(&["--results", "whole"]).expect(0).digest();
+    let Some(disk) = Disk::mount(&runner) else { return };
+    let mut running = Running::start(&runner, "disk/r", "1");
+    running.until_recorded(10);
+    running.signal(Signal::SIGINT);
+    running.ended().1.expect(130);
+    let tests = recorded(&disk.0.join("r/3"));
+    disk.remount("ro");
+    let said = runner.run(&["resume", "disk/r/3"]).expect(1);
+    assert!(said.err.contains("error: cannot lock the results: Read-only file system"), "{}", said.err);
+    assert!(said.err.contains("disk/r/3"), "{}", said.err);
+    let begun = runner.run(&["--results", "disk/other"]).expect(1);
+    assert!(begun.err.contains("Read-only file system") && begun.err.contains("disk/other"), "{}", begun.err);
+    disk.remount("rw");
+    assert_eq!(recorded(&disk.0.join("r/3")), tests);
+    assert_eq!(runner.run(&["resume", "disk/r/3"]).expect(0).digest(), whole);
+}
