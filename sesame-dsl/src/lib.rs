@@ -5,6 +5,7 @@
 
 mod check;
 pub mod diagnostic;
+pub mod format;
 pub mod model;
 mod resolve;
 mod similar;
