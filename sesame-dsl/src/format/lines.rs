@@ -98,7 +98,9 @@ fn blocks_of_several_lines(tokens: &[Token<'_>]) -> Vec<bool> {
     for (at, token) in tokens.iter().enumerate() {
         let empty = token.is("}") && open.last().is_some_and(|&brace| brace + 1 == at);
         if (token.line_ends > 0 || token.is_comment()) && !empty {
-            open.iter().for_each(|&brace| several[brace] = true);
+            for &brace in &open {
+                several[brace] = true;
+            }
         }
         if token.is("{") {
             open.push(at);
