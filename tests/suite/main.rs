@@ -12,3 +12,4 @@ mod regeneration;
 mod search;
 mod stl;
 mod tampering;
+mod vendored;

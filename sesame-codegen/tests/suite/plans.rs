@@ -206,5 +206,6 @@ pub(crate) fn environment() -> Environment {
         lock: None,
         options: [].into(),
         space_folder: "../..".to_owned(),
+        ..Environment::default()
     }
 }

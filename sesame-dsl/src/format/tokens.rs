@@ -193,7 +193,8 @@ impl<'t> Walk<'t> {
         let after_names = kind != Kind::Comment && std::mem::take(&mut self.after_names);
         // A unit may follow a parenthesis, and then belongs to it.
         let closed = self.tokens.last().is_some_and(|last| last.is(")"));
-        let glued = glued || (between.is_empty() && closed && kind == Kind::Word && !is_keyword(text));
+        let unit = closed && between.is_empty() && begins == Begins::Nothing && kind == Kind::Word && !is_keyword(text);
+        let glued = glued || unit;
         self.tokens.push(Token { text, kind, begins, glued, after_names, line_ends, blanks });
     }
 }
