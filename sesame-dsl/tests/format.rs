@@ -183,3 +183,12 @@ proptest! {
         is_formatted_well(&shuffled);
     }
 }
+
+#[test]
+fn examples_and_new_projects_are_in_the_layout() {
+    let template = include_str!("../../templates/project/space.sesame.tera").replace("{{ name }}", "demo");
+    let examples = files().into_iter().filter(|(path, _)| path.to_string_lossy().contains("examples"));
+    for (path, text) in examples.chain([("the space of a new project".into(), template)]) {
+        assert_eq!(formatted(&text).unwrap(), text, "{}: `sesamec fmt` brings it into the layout", path.display());
+    }
+}

@@ -1,7 +1,8 @@
 //! Columns: words that their author aligned in lines that follow each other.
 //!
 //! Whether a word is in a column is told by the blanks before it: two or more in any of the lines. So the author decides,
-//! and what was aligned once stays aligned when a name grows.
+//! and what was aligned once stays aligned when a name grows. How far a column stays away from the longest of what is
+//! before it is the author's too, within reason.
 
 use super::lines::{Line, Placed};
 use super::tokens::Kind;
@@ -28,6 +29,9 @@ const COLUMNS: &[&str] = &[
     "inclusion",
     "seed",
 ];
+
+/// The farthest that a column stays away from what is before it.
+const WIDEST_GAP: usize = 4;
 
 /// Aligns columns, and comments behind lines that follow each other.
 pub(super) fn align(lines: &mut [Line<'_>]) {
@@ -119,13 +123,16 @@ fn positions(tokens: &[Placed<'_>]) -> Vec<Option<usize>> {
 fn align_at(group: &mut [Line<'_>], positions: &[Option<usize>]) {
     let rows: Vec<(usize, usize)> =
         positions.iter().enumerate().filter_map(|(row, position)| Some((row, (*position)?))).collect();
-    if !rows.iter().any(|&(row, at)| group[row].tokens[at].blanks > 1) {
+    let blanks = || rows.iter().map(|&(row, at)| group[row].tokens[at].blanks);
+    if blanks().all(|blanks| blanks < 2) {
         return;
     }
+    // A line on its own is no column, and has nothing to be kept away from.
+    let gap = if rows.len() > 1 { blanks().min().unwrap_or(1).clamp(1, WIDEST_GAP) } else { 1 };
     let widths: Vec<usize> = rows.iter().map(|&(row, at)| width(&group[row].tokens[..at])).collect();
     let widest = widths.iter().copied().max().unwrap_or(0);
     for (&(row, at), width) in rows.iter().zip(widths) {
-        group[row].tokens[at].gap = widest - width + 1;
+        group[row].tokens[at].gap = widest - width + gap;
     }
 }
 
