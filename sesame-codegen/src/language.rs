@@ -3,28 +3,27 @@
 use std::io;
 use std::path::Path;
 
-use sesame_dsl::diagnostic::{Severity, page, render};
+use sesame_dsl::diagnostic::{Diagnostic, Severity, page, render};
 use sesame_dsl::model::Space;
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 
-use crate::cli::{Checked, Language};
+use crate::cli::{Checked, Diagnosed, Language, Look};
 use crate::lower::lower;
 
 /// The language of this version.
-pub const SESAME: Language = Language { check, explain: page };
+pub const SESAME: Language = Language { check, format, explain: page };
 
 /// What the plan names as its generator.
 const GENERATOR: &str = concat!("sesamec ", env!("CARGO_PKG_VERSION"));
 
-fn check(file: &str, text: &str, colour: bool) -> Checked {
+fn check(file: &str, text: &str, look: Look) -> Checked {
     let mut sources = SourceMap::new();
     let root = sources.add(file, text);
     sesame_dsl::load_imports(&mut sources, root, read);
     let analysis = sesame_dsl::analyse(&sources, root);
-    let count = |severity| analysis.diagnostics.iter().filter(|found| found.severity() == severity).count();
-    let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
-    let diagnostics = render::human(&analysis.diagnostics, &sources, colour);
+    let Diagnosed { diagnostics, errors } = diagnosed(&analysis.diagnostics, &sources, look);
+    let warnings = analysis.diagnostics.iter().filter(|found| found.severity() == Severity::Warning).count();
     // A plan names the file without its folder: the same space gives the same plan wherever it lies.
     let source = file.rsplit(['/', std::path::MAIN_SEPARATOR]).next().unwrap_or(file);
     let (summary, plans, notes) = match &analysis.model {
@@ -83,6 +82,23 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
     notes
 }
 
+fn format(file: &str, text: &str, look: Look) -> Result<String, Diagnosed> {
+    let mut sources = SourceMap::new();
+    let root = sources.add(file, text);
+    sesame_dsl::format::format(&sources, root).map_err(|errors| diagnosed(&errors, &sources, look))
+}
+
+fn diagnosed(diagnostics: &[Diagnostic], sources: &SourceMap, look: Look) -> Diagnosed {
+    let text = match look {
+        Look::Human { colour } => render::human(diagnostics, sources, colour),
+        Look::Short => render::short(diagnostics, sources),
+        Look::Json => render::json(diagnostics, sources),
+        Look::Github => render::github(diagnostics, sources),
+    };
+    let errors = diagnostics.iter().filter(|found| found.severity() == Severity::Error).count();
+    Diagnosed { diagnostics: text, errors }
+}
+
 /// What a space holds, for example `4 campaigns, 9 operations, 6 metrics, 2 requirements`.
 fn summary(space: &Space) -> String {
     let counts = [
@@ -99,11 +115,15 @@ fn summary(space: &Space) -> String {
 mod tests {
     use super::*;
 
+    const PLAIN: Look = Look::Human { colour: false };
+
     #[test]
     fn the_space_of_a_new_project_is_correct() {
         let runtime = crate::environment::RuntimeChoice::Version("1.0.0".into());
-        let files = crate::project::files(std::path::Path::new("demo"), Some(&runtime)).unwrap();
-        let checked = check("some/demo.sesame", &files["demo.sesame"], false);
+        let files =
+            crate::project::files(std::path::Path::new("demo"), Some(&runtime), &crate::emit::Templates::default())
+                .unwrap();
+        let checked = check("some/demo.sesame", &files["demo.sesame"], PLAIN);
         assert_eq!((checked.errors, checked.diagnostics.as_str()), (0, ""));
         assert_eq!(checked.summary, "1 campaign, 2 operations, 2 metrics, 1 requirement");
         assert_eq!(checked.plans[0].plan.source, "demo.sesame");
@@ -116,7 +136,7 @@ mod tests {
         for name in ["kuka_cell", "two_robots"] {
             let file = examples.join(name).join(format!("{name}.sesame"));
             let text = std::fs::read_to_string(&file).unwrap();
-            let checked = check(file.to_str().unwrap(), &text, false);
+            let checked = check(file.to_str().unwrap(), &text, PLAIN);
             assert_eq!((checked.diagnostics.as_str(), checked.warnings), ("", 0));
             assert!(checked.notes.is_empty(), "{:?}", checked.notes);
         }
@@ -134,13 +154,13 @@ mod tests {
         let demo = "space demo import \"../cell.sesame\" campaign c { objectives hits  operations cut 1 per test\n\
                     search random { evaluations 3 }  end after 3s }";
         let file = spaces.join("demo.sesame");
-        let checked = check(file.to_str().unwrap(), demo, false);
+        let checked = check(file.to_str().unwrap(), demo, PLAIN);
         assert_eq!(checked.diagnostics, "");
         let runner = &checked.plans[0];
         assert_eq!((runner.hooks[0].source.as_str(), runner.hooks[0].line), ("../cell.sesame", 4));
         assert_eq!(runner.system_folder(), Path::new(".."), "the simulator's crate is beside the file that names it");
         assert_eq!(runner.plan.source, "demo.sesame");
-        let missing = check(file.to_str().unwrap(), "space demo import \"..\" import \"gone.sesame\"", false);
+        let missing = check(file.to_str().unwrap(), "space demo import \"..\" import \"gone.sesame\"", PLAIN);
         assert!(missing.diagnostics.contains("it is not a file"), "{}", missing.diagnostics);
         assert!(missing.diagnostics.contains("there is no such file"), "{}", missing.diagnostics);
     }
@@ -148,7 +168,7 @@ mod tests {
     #[test]
     fn what_no_runner_uses_yet_is_said_with_its_place() {
         let text = include_str!("../../sesame-dsl/tests/good/blocks.sesame");
-        let checked = check("spaces/blocks.sesame", text, false);
+        let checked = check("spaces/blocks.sesame", text, PLAIN);
         assert_eq!(checked.diagnostics, "");
         assert_eq!(
             checked.notes,
@@ -166,7 +186,7 @@ mod tests {
 
     #[test]
     fn mistakes_are_counted_and_nothing_is_planned() {
-        let checked = check("a.sesame", "space a\nmetric", false);
+        let checked = check("a.sesame", "space a\nmetric", PLAIN);
         assert!(checked.errors > 0 && checked.plans.is_empty());
         assert!(checked.diagnostics.contains("a.sesame"), "{}", checked.diagnostics);
     }

@@ -5,6 +5,7 @@
 
 mod check;
 pub mod diagnostic;
+pub mod format;
 mod import;
 pub mod model;
 mod resolve;

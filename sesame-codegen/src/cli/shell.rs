@@ -3,6 +3,8 @@
 use std::fmt::Display;
 use std::io::{self, IsTerminal as _, Write as _};
 
+use super::{Format, Look};
+
 /// Where messages go: standard error, so that standard output is free for what is asked for.
 #[derive(Debug, Clone, Copy)]
 pub struct Shell {
@@ -59,6 +61,25 @@ impl Shell {
         }
     }
 
+    /// How diagnostics are to look.
+    pub(super) fn look(self, format: Format) -> Look {
+        match format {
+            Format::Human => Look::Human { colour: self.colour },
+            Format::Short => Look::Short,
+            Format::Json => Look::Json,
+            Format::Github => Look::Github,
+        }
+    }
+
+    /// Diagnostics: those for programs on standard output.
+    pub(super) fn diagnostics(self, text: &str, format: Format) {
+        match format {
+            _ if text.is_empty() => {}
+            Format::Human | Format::Short => self.text(text),
+            Format::Json | Format::Github => asked_for(text),
+        }
+    }
+
     /// Text as it is.
     pub(super) fn text(self, text: &str) {
         self.line(text.trim_end());
@@ -72,6 +93,12 @@ impl Shell {
     fn painted(self, style: &str, text: &str) -> String {
         if self.colour { format!("\x1b[{style}m{text}\x1b[0m") } else { text.to_owned() }
     }
+}
+
+/// What was asked for, on standard output.
+pub(super) fn asked_for(text: &str) {
+    // A reader that has seen enough, such as `head`, is no failure.
+    let _ = io::stdout().write_all(text.as_bytes());
 }
 
 /// How the user called this command, for hints that can be copied.

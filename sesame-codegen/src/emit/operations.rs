@@ -6,10 +6,11 @@ use quote::quote;
 use serde::Serialize;
 use sesame_plan::{Domain, Moment, Parameter, Topic, Type};
 
+use super::Problem;
 use super::handlers::{self, handlers, paths};
 use super::messages::{self, Messages, Place};
 use super::rust::{self, one_line};
-use super::text;
+use super::text::Templates;
 use crate::names::{self, Scope};
 use crate::plan::{OperationPlan, RunnerPlan};
 
@@ -289,7 +290,12 @@ struct StubMessage {
 }
 
 /// The stub of a hook.
-pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPlan) -> String {
+pub(super) fn stub(
+    templates: &Templates,
+    runner: &RunnerPlan,
+    types: &Messages<'_>,
+    operation: &OperationPlan,
+) -> Result<String, Problem> {
     let (hook_type, hook_trait) = (names::hook_type(&operation.operation), names::hook_trait(&operation.operation));
     let parameters_type = names::parameters_type(&operation.operation);
     let Call { method, message } = call(runner, operation);
@@ -353,5 +359,5 @@ pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, operation: &Operat
         context,
         example,
     };
-    text::render(sesame_templates::runner::OPERATION_HOOK, &stub)
+    templates.render("runner/operation_hook.rs.tera", &stub)
 }

@@ -214,5 +214,6 @@ pub(crate) fn environment() -> Environment {
         options: [].into(),
         space_folder: "../..".to_owned(),
         simulator_folder: "../..".to_owned(),
+        ..Environment::default()
     }
 }

@@ -101,6 +101,7 @@ codes! {
     TWO_PUBLISHERS = "W0013": "Two nodes publish one topic.",
     UNUSED_TOPIC = "W0014": "A topic has no node and no use.",
     UNUSED_EVIDENCE = "W0015": "No guarantee of a monitor needs the evidence or demand.",
+    ONE_OUTCOME = "W0016": "A comparison in a formula goes one way whatever is heard.",
 }
 
 /// The page of a code, found by its text in any case, for example `e0203`.

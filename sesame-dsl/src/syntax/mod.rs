@@ -13,3 +13,4 @@ mod token;
 mod words;
 
 pub(crate) use parse::parse;
+pub(crate) use token::{is_keyword, token_at};
