@@ -17,3 +17,4 @@ mod search;
 mod stl;
 mod tampering;
 mod traces;
+mod vendored;
