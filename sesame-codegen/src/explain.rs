@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
-    ActivationMode, CampaignPlan, Distribution, Domain, Drain, MetricSource, Operation, OperationKind, Parameter,
-    Recorded, Search, Shape,
+    ActivationMode, CampaignPlan, Count, Distribution, Domain, Drain, MetricSource, Operation, OperationKind,
+    Parameter, Recorded, Search, Shape,
 };
 
 /// More whole numbers than these are not written out one by one.
@@ -60,7 +60,12 @@ fn choices(plan: &CampaignPlan) -> Option<String> {
     if chosen.iter().any(|it| it.conditions > 0) {
         parts.push(format!("{} conditions", bounds(|it| it.conditions)));
     }
-    Some(format!("a test chooses {}..{} operations: {}", campaign.count.min, campaign.count.max, parts.join(", ")))
+    let operations = match campaign.count {
+        Count { min: 1, max: 1 } => "1 operation".to_owned(),
+        Count { min, max } if min == max => format!("{min} operations"),
+        Count { min, max } => format!("{min}..{max} operations"),
+    };
+    Some(format!("a test chooses {operations}: {}", parts.join(", ")))
 }
 
 /// What a search chooses for one operation of a test.
