@@ -335,7 +335,7 @@ fn lengths_inside_a_chunk_that_do_not_add_up_are_refused() {
     let chunk = {
         let mut at = 8;
         while whole[at] != mcap::records::op::CHUNK {
-            at += 9 + u64::from_le_bytes(whole[at + 1..at + 9].try_into().unwrap()) as usize;
+            at += 9 + usize::try_from(u64::from_le_bytes(whole[at + 1..at + 9].try_into().unwrap())).unwrap();
         }
         at + 9
     };
