@@ -487,7 +487,10 @@ fn features(runner: &RunnerPlan) -> Vec<&'static str> {
 fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> String {
     let plan = &runner.plan;
     let docs = rust::module_docs([format!("Campaign `{}`, for the runtime.", plan.campaign.name)]);
-    let folder = &environment.space_folder;
+    // A runner that can go elsewhere leads out of itself only for files that operations beside the run work on.
+    let beside = runner.operations.iter().any(|operation| operation.topic.is_none());
+    let folder =
+        if environment.hooks == HooksFolder::Shared || beside { environment.space_folder.as_str() } else { "." };
     let operations = if runner.operations.is_empty() {
         quote! { &[] }
     } else {
