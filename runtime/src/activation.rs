@@ -57,7 +57,8 @@ pub enum Edge {
 }
 
 impl Activity {
-    /// An activity that has not begun. `within` is a hard limit: outside of it the operation is never active.
+    /// An activity that has not begun. `within` is a hard limit: outside of it the operation is never active. An offline
+    /// operation never is.
     pub fn new(activation: &Activation, within: Span) -> Self {
         let (from, to, left, switch) = match activation {
             Activation::Time { start, end } => (start.max(within.start), end.min(within.end), 1, Switch::Time),
@@ -69,6 +70,7 @@ impl Activity {
                 let switch = Switch::Length { start: start.clone(), length: SimTime::from_seconds(*length) };
                 (within.start, within.end, *times, switch)
             }
+            Activation::Offline => (within.start, within.start, 0, Switch::Time),
         };
         let window = (SimTime::from_seconds(from), SimTime::from_seconds(to));
         let phase = if window.0 < window.1 && left > 0 { Phase::Before } else { Phase::Over };

@@ -3,9 +3,10 @@
 use std::panic::{self, AssertUnwindSafe};
 use std::time::Instant;
 
-use sesame_plan::{CampaignPlan, Test};
+use sesame_plan::{CampaignPlan, Moment, Test};
 
-use crate::fuzz::ChoiceError;
+use crate::changed_files::ChangedFiles;
+use crate::fuzz::{ChoiceError, OperationEntry};
 use crate::last_panic;
 use crate::metric::MetricTable;
 use crate::observation::{Observation, Outcome, WallTime};
@@ -18,6 +19,8 @@ use crate::wire::WireTable;
 /// Runs a test and reports what was observed. A simulator that fails, or a panic in it or in a hook, is an observation
 /// too, with what was seen until then; only a test that does not fit the plan is an error. After a crash the transport
 /// is in an unknown state and must not be used again.
+///
+/// Files that operations of the test changed are put back; where that fails, the run counts as a crash.
 pub fn evaluate(
     plan: &CampaignPlan,
     wires: &WireTable,
@@ -25,8 +28,18 @@ pub fn evaluate(
     transport: &mut dyn Transport,
     test: &Test,
     simulator_seed: u64,
+    custom: &mut Custom<'_>,
 ) -> Result<Observation, ChoiceError> {
-    evaluate_tapped(plan, wires, metrics, transport, test, simulator_seed, None)
+    evaluate_tapped(plan, wires, metrics, transport, &Run { test, simulator_seed }, custom, None)
+}
+
+/// What is run.
+#[derive(Debug, Clone, Copy)]
+pub struct Run<'a> {
+    /// The test.
+    pub test: &'a Test,
+    /// The seed of everything random in the simulator.
+    pub simulator_seed: u64,
 }
 
 /// As [`evaluate`], telling a tap what happens.
@@ -35,21 +48,27 @@ pub fn evaluate_tapped(
     wires: &WireTable,
     metrics: &MetricTable<'_>,
     transport: &mut dyn Transport,
-    test: &Test,
-    simulator_seed: u64,
+    &Run { test, simulator_seed }: &Run<'_>,
+    custom: &mut Custom<'_>,
     tap: Option<&mut dyn Tap>,
 ) -> Result<Observation, ChoiceError> {
     let started = Instant::now();
-    let mut relay = Relay::new(plan, wires, test, metrics.start())?;
+    let mut relay = Relay::new(plan, wires, test, metrics.start(), custom.hooks)?;
     if let Some(tap) = tap {
         relay = relay.tapped(tap);
     }
     let until = SimTime::from_seconds(plan.campaign.end_after);
-    let driven = AssertUnwindSafe(|| drive(transport, &mut relay, simulator_seed, until));
-    let failure = match panic::catch_unwind(driven) {
-        Ok(driven) => driven.err().map(|error| error.to_string()),
+    let files = &mut custom.files;
+    let driven = AssertUnwindSafe(|| drive(transport, &mut relay, simulator_seed, until, files));
+    let mut failure = match panic::catch_unwind(driven) {
+        Ok(driven) => driven.err(),
         Err(_) => Some(last_panic::take()),
     };
+    if plan.operations.iter().any(|operation| operation.kind.is_offline())
+        && let Err(error) = custom.files.put_back()
+    {
+        failure.get_or_insert_with(|| error.to_string());
+    }
     let end = transport.now();
     let finished = relay.finish(end);
     let effect = finished.operations.iter().any(|operation| operation.counters.any_effect());
@@ -69,12 +88,37 @@ pub fn evaluate_tapped(
     })
 }
 
-fn drive(transport: &mut dyn Transport, relay: &mut Relay<'_>, seed: u64, end: SimTime) -> Result<(), TransportError> {
+/// What custom operations need: the user's code and the files it may change.
+#[derive(Debug)]
+pub struct Custom<'h> {
+    /// The hooks of the runner.
+    pub hooks: &'h [OperationEntry],
+    /// The files of the space.
+    pub files: ChangedFiles,
+}
+
+impl Custom<'static> {
+    /// For plans without custom operations.
+    pub fn none() -> Self {
+        Custom { hooks: &[], files: ChangedFiles::unlocked(std::path::Path::new(".")) }
+    }
+}
+
+/// The error says what failed.
+fn drive(
+    transport: &mut dyn Transport,
+    relay: &mut Relay<'_>,
+    seed: u64,
+    end: SimTime,
+    files: &mut ChangedFiles,
+) -> Result<(), String> {
+    let words = |error: TransportError| error.to_string();
+    relay.beside_run(Moment::BeforeStart, files)?;
     relay.begin();
-    transport.reset(seed, relay)?;
-    while transport.advance(end, relay)? == Progress::Running {}
+    transport.reset(seed, relay).map_err(words)?;
+    while transport.advance(end, relay).map_err(words)? == Progress::Running {}
     relay.end(transport.now());
-    Ok(())
+    relay.beside_run(Moment::AfterEnd, files)
 }
 
 #[cfg(test)]
@@ -159,7 +203,8 @@ mod tests {
         let wires = WireTable::new(&plan);
         let metrics = MetricTable::new(&plan, &wires, &[HookEntry { metric: "counted", build }]).unwrap();
         let test = test_of(vec![use_of(0, 1.0, 2.0, vec![], 1)]);
-        evaluate(&plan, &wires, &metrics, &mut Ticker { now: SimTime::ZERO, fails_at }, &test, 1).unwrap()
+        evaluate(&plan, &wires, &metrics, &mut Ticker { now: SimTime::ZERO, fails_at }, &test, 1, &mut Custom::none())
+            .unwrap()
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! Small plans for the runtime's own tests.
 
 use sesame_plan::{
-    Activation, ActivationMode, Campaign, CampaignPlan, Choice, Count, Distribution, Drain, Field, FieldRef, MessageId,
-    MessageType, Metric, MetricSource, Operation, OperationId, OperationKind, Parameter, SCHEMA, Search, Shape,
-    Simulator, Span, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode,
+    Activation, ActivationMode, Campaign, CampaignPlan, Choice, Count, Distribution, Domain, Drain, Field, FieldRef,
+    MessageId, MessageType, Metric, MetricSource, Operation, OperationId, OperationKind, Parameter, SCHEMA, Search,
+    Shape, Simulator, Span, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode,
 };
 
 /// Topic `command` of reals, topic `zones` with two members of `Zone { level: real, count: int }`.
@@ -73,10 +73,7 @@ pub(crate) fn operation(topic: u32, kind: OperationKind) -> Operation {
     let parameter = |name: &str, low, high, shape, integer| Parameter {
         name: name.to_owned(),
         unit: None,
-        low,
-        high,
-        shape,
-        integer,
+        domain: Domain::Number { low, high, shape, integer },
     };
     let parameters = match &kind {
         OperationKind::RandomValue { integer, .. } => vec![parameter("offset", -9.0, 9.0, Shape::Range, *integer)],
@@ -85,12 +82,12 @@ pub(crate) fn operation(topic: u32, kind: OperationKind) -> Operation {
             vec![parameter("delay", 0.0, 5.0, Shape::Value, false)]
         }
         OperationKind::Latency { .. } => vec![parameter("delay", 0.0, 5.0, Shape::Range, false)],
-        OperationKind::Blackhole => Vec::new(),
+        OperationKind::Blackhole | OperationKind::Custom { .. } => Vec::new(),
     };
     Operation {
         name: kind.words().replace(' ', "_"),
         doc: String::new(),
-        topic: TopicId(topic),
+        topic: (!kind.is_offline()).then_some(TopicId(topic)),
         kind,
         parameters,
         within: Span { start: 0.0, end: 10.0 },

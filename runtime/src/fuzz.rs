@@ -3,22 +3,29 @@
 //! Draws are keyed by the operation's draw seed and the message's index on its wire, so they do not depend on what
 //! happened before: repeating a test repeats its disturbance, and a shorter window disturbs its messages just the same.
 
+mod custom;
 mod latency;
 mod packet_loss;
+mod probe;
 mod random_value;
 
-use sesame_plan::{Choice, Operation, OperationKind, TestOperation};
+use sesame_plan::{Activation, Choice, Domain, Operation, OperationKind, Shape, TestOperation};
 
 use crate::rng;
 use crate::time::SimTime;
 use crate::value::Value;
 
+pub(crate) use custom::custom_operations;
+pub use custom::{
+    Custom, FromChoice, MessageCall, OperationContext, OperationEntry, OperationHook, RunContext, chosen,
+};
 pub use latency::Latency;
 pub use packet_loss::PacketLoss;
+pub use probe::unimplemented_operations;
 pub use random_value::RandomValue;
 
 /// An operation with the choices of one test.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub enum Disturbance {
     /// Replaces or shifts a number.
     RandomValue(RandomValue),
@@ -28,6 +35,8 @@ pub enum Disturbance {
     Latency(Latency),
     /// Drops all messages.
     Blackhole,
+    /// Calls the user's code.
+    Custom(Custom),
 }
 
 /// What becomes of a message.
@@ -64,23 +73,23 @@ impl Draws {
 }
 
 impl Disturbance {
-    /// Applies a test's choices to an operation of the space. A plan guarantees that they fit; choices read from
-    /// elsewhere are refused with a reason.
-    pub fn new(operation: &Operation, test: &TestOperation) -> Result<Self, ChoiceError> {
+    /// Applies a test's choices to an operation of the space, with the user's code for custom ones. A plan guarantees
+    /// that they fit; choices read from elsewhere are refused with a reason.
+    pub fn new(operation: &Operation, test: &TestOperation, hooks: &[OperationEntry]) -> Result<Self, ChoiceError> {
         let refuse = |reason: String| Err(ChoiceError { operation: operation.name.clone(), reason });
         if operation.parameters.len() != test.parameters.len() {
             return refuse(format!("has {} parameters, not {}", operation.parameters.len(), test.parameters.len()));
         }
         for (parameter, choice) in operation.parameters.iter().zip(&test.parameters) {
-            let (low, high) = bounds(*choice);
-            if !(parameter.low <= low && low <= high && high <= parameter.high) {
-                return refuse(format!(
-                    "`{}` permits [{}, {}], not [{low}, {high}]",
-                    parameter.name, parameter.low, parameter.high
-                ));
+            if let Some(reason) = misfit(&parameter.domain, choice) {
+                return refuse(format!("`{}` {reason}", parameter.name));
             }
         }
-        let range = || test.parameters.first().copied().map_or((0.0, 0.0), bounds);
+        if operation.kind.is_offline() != (test.activation == Activation::Offline) {
+            let when = if operation.kind.is_offline() { "has no activation: it acts beside" } else { "acts during" };
+            return refuse(format!("{when} the run"));
+        }
+        let range = || test.parameters.first().map_or((0.0, 0.0), bounds);
         Ok(match &operation.kind {
             OperationKind::RandomValue { path, mode, integer } => Disturbance::RandomValue(RandomValue {
                 path: path.clone(),
@@ -91,24 +100,51 @@ impl Disturbance {
             OperationKind::PacketLoss => Disturbance::PacketLoss(PacketLoss { loss: range().0 }),
             OperationKind::Latency { drain, .. } => Disturbance::Latency(Latency { delay: range(), drain: *drain }),
             OperationKind::Blackhole => Disturbance::Blackhole,
+            OperationKind::Custom { moment } => match Custom::new(operation, *moment, &test.parameters, hooks) {
+                Some(custom) => Disturbance::Custom(custom),
+                None => return refuse("has no hook in this runner: run `sesamec generate` again".to_owned()),
+            },
         })
     }
 
-    /// What becomes of a message while the operation is active; the message may be changed in place.
+    /// What becomes of a message while the operation is active; the message may be changed in place. A custom operation
+    /// may do more than that, so the relay calls it itself.
     pub fn apply(&self, draws: Draws, value: &mut Value) -> Fate {
         match self {
             Disturbance::RandomValue(operation) => operation.apply(draws, value),
             Disturbance::PacketLoss(operation) => operation.apply(draws),
             Disturbance::Latency(operation) => operation.apply(draws),
             Disturbance::Blackhole => Fate::Dropped,
+            Disturbance::Custom(_) => Fate::Unchanged,
         }
     }
 }
 
-fn bounds(choice: Choice) -> (f64, f64) {
-    match choice {
+/// Why a choice is not one that is permitted; `None` if it is.
+fn misfit(domain: &Domain, choice: &Choice) -> Option<String> {
+    match (domain, choice) {
+        (Domain::Number { low: least, high: most, shape, integer }, Choice::Value { .. } | Choice::Range { .. }) => {
+            let (low, high) = bounds(choice);
+            let fits = *least <= low && low <= high && high <= *most;
+            let whole = !integer || *shape == Shape::Range || libm::trunc(low) == low;
+            (!(fits && whole)).then(|| format!("permits [{least}, {most}], not [{low}, {high}]"))
+        }
+        (Domain::Point { low, high }, Choice::Point { point }) => {
+            let fits = (0..3).all(|axis| low[axis] <= point[axis] && point[axis] <= high[axis]);
+            (!fits).then(|| format!("permits points from {low:?} to {high:?}, not {point:?}"))
+        }
+        (Domain::Texts { texts: items } | Domain::Files { files: items }, Choice::Text { text }) => {
+            (!items.contains(text)).then(|| format!("permits {}, not {text:?}", items.join(", ")))
+        }
+        _ => Some("is of another kind than what is chosen".to_owned()),
+    }
+}
+
+fn bounds(choice: &Choice) -> (f64, f64) {
+    match *choice {
         Choice::Value { value } => (value, value),
         Choice::Range { low, high } => (low, high),
+        Choice::Point { .. } | Choice::Text { .. } => (0.0, 0.0),
     }
 }
 

@@ -7,6 +7,7 @@
 pub mod activation;
 #[cfg(feature = "campaign")]
 pub mod campaign;
+pub mod changed_files;
 #[cfg(feature = "campaign")]
 mod cli;
 pub mod condition;

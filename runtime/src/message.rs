@@ -1,8 +1,8 @@
-//! From dynamic payloads to the typed messages of generated code.
+//! From dynamic payloads to the typed messages of generated code, and back.
 
 use sesame_plan::{CampaignPlan, Type};
 
-use crate::value::{Text, Value};
+use crate::value::{Fields, Record, Text, Value};
 
 /// A type that generated code and hooks see a payload as.
 pub trait FromValue: Sized {
@@ -133,5 +133,133 @@ impl<T: FromValue> FromValue for Vec<T> {
             .enumerate()
             .map(|(at, item)| T::from_value(item).map_err(|mismatch| mismatch.inside(&format!("[{at}]"))))
             .collect()
+    }
+}
+
+/// A type that generated code and hooks make payloads of.
+pub trait ToValue {
+    /// A payload of nothing but this.
+    fn to_value(&self) -> Value;
+
+    /// Puts this into the place of a payload it was read from, and says whether that changed anything. What the
+    /// declared type does not know of stays: further fields of a message, and that a number was written as a whole one.
+    fn write_to(&self, value: &mut Value) -> bool;
+}
+
+/// A message of these fields, in order.
+pub fn record(fields: &[(&str, Value)]) -> Value {
+    let names = Fields::new(fields.iter().map(|(name, _)| *name));
+    Record::new(&names, fields.iter().map(|(_, value)| value.clone()).collect()).into()
+}
+
+/// Writes a field of a message into a payload, as [`ToValue::write_to`] does.
+pub fn write_field(message: &mut Value, name: &str, field: &impl ToValue) -> bool {
+    match message {
+        Value::Record(record) => record.get_mut(name).is_some_and(|value| field.write_to(value)),
+        _ => false,
+    }
+}
+
+fn replace(value: &mut Value, same: bool, new: impl FnOnce() -> Value) -> bool {
+    if !same {
+        *value = new();
+    }
+    !same
+}
+
+impl ToValue for f64 {
+    fn to_value(&self) -> Value {
+        Value::Real(*self)
+    }
+    /// Numbers are compared by their bits: a NaN that is left alone is unchanged.
+    fn write_to(&self, value: &mut Value) -> bool {
+        let same = f64::from_value(value).is_ok_and(|old| old.to_bits() == self.to_bits());
+        replace(value, same, || self.to_value())
+    }
+}
+
+impl ToValue for i64 {
+    fn to_value(&self) -> Value {
+        Value::Int(*self)
+    }
+    fn write_to(&self, value: &mut Value) -> bool {
+        let same = matches!(value, Value::Int(old) if old == self);
+        replace(value, same, || self.to_value())
+    }
+}
+
+impl ToValue for bool {
+    fn to_value(&self) -> Value {
+        Value::Bool(*self)
+    }
+    fn write_to(&self, value: &mut Value) -> bool {
+        let same = matches!(value, Value::Bool(old) if old == self);
+        replace(value, same, || self.to_value())
+    }
+}
+
+impl ToValue for Text {
+    fn to_value(&self) -> Value {
+        Value::Text(self.clone())
+    }
+    fn write_to(&self, value: &mut Value) -> bool {
+        let same = matches!(value, Value::Text(old) if old == self);
+        replace(value, same, || self.to_value())
+    }
+}
+
+impl ToValue for [f64; 3] {
+    fn to_value(&self) -> Value {
+        Value::Point(*self)
+    }
+    fn write_to(&self, value: &mut Value) -> bool {
+        let same = matches!(value, Value::Point(old) if old.map(f64::to_bits) == self.map(f64::to_bits));
+        replace(value, same, || self.to_value())
+    }
+}
+
+impl<T: ToValue> ToValue for Vec<T> {
+    fn to_value(&self) -> Value {
+        Value::List(self.iter().map(T::to_value).collect())
+    }
+    fn write_to(&self, value: &mut Value) -> bool {
+        let Value::List(items) = value else { return replace(value, false, || self.to_value()) };
+        let mut changed = items.len() != self.len();
+        items.truncate(self.len());
+        for (item, new) in items.iter_mut().zip(self) {
+            changed |= new.write_to(item);
+        }
+        let kept = items.len();
+        items.extend(self[kept..].iter().map(T::to_value));
+        changed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn what_the_declared_type_does_not_know_of_stays() {
+        let mut message = record(&[("level", Value::Int(3)), ("more", Value::Bool(true))]);
+        assert!(!write_field(&mut message, "level", &3.0), "3 and 3.0 are one number in JSON");
+        assert_eq!(message, record(&[("level", Value::Int(3)), ("more", Value::Bool(true))]));
+        assert!(write_field(&mut message, "level", &3.5));
+        assert_eq!(message, record(&[("level", Value::Real(3.5)), ("more", Value::Bool(true))]));
+        let mut nan = Value::Real(f64::NAN);
+        assert!(!f64::NAN.write_to(&mut nan), "a NaN that is left alone is unchanged");
+    }
+
+    proptest! {
+        #[test]
+        fn a_list_written_back_is_the_list_and_changed_exactly_if_it_differs(
+            before in proptest::collection::vec(-3i64..3, 0..5), after in proptest::collection::vec(-3i64..3, 0..5),
+        ) {
+            let mut value = before.to_value();
+            prop_assert_eq!(after.write_to(&mut value), before != after);
+            prop_assert_eq!(Vec::<i64>::from_value(&value), Ok(after));
+        }
     }
 }

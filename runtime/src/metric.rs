@@ -15,6 +15,7 @@ mod robustness;
 mod tests;
 
 pub use engine::{MetricError, MetricTable, Metrics};
+pub(crate) use probe::sample;
 pub use probe::unimplemented_hooks;
 
 /// A user's metric hook as the runtime calls it. Generated code implements it around the typed hook trait.

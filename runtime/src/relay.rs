@@ -11,12 +11,14 @@
 mod release;
 mod tap;
 
-use sesame_plan::{CampaignPlan, Drain, Test};
+use sesame_plan::{CampaignPlan, Drain, Moment, Test};
 
 use crate::activation::{Activity, Edge};
-use crate::fuzz::{ChoiceError, Disturbance, Draws, Fate};
+use crate::changed_files::ChangedFiles;
+use crate::fuzz::{ChoiceError, Disturbance, Draws, Fate, OperationEntry, RunContext};
 use crate::metric::Metrics;
 use crate::observation::{Counters, OperationEffect};
+use crate::rng::derive_seed;
 use crate::time::SimTime;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
@@ -52,6 +54,8 @@ pub const HELD_LIMIT: usize = 100_000;
 pub struct Relay<'a> {
     wires: &'a WireTable,
     operations: Vec<Stage>,
+    /// Their positions by priority, then declaration.
+    order: Vec<usize>,
     /// Per wire: the stages a message passes, in order, with the wire's position in the operation's topic.
     pipelines: Vec<Vec<(usize, u64)>>,
     /// Per wire: messages published so far.
@@ -74,6 +78,7 @@ pub struct Relay<'a> {
 
 /// One operation of the test.
 struct Stage {
+    name: String,
     disturbance: Disturbance,
     activity: Activity,
     draw_seed: u64,
@@ -100,6 +105,7 @@ impl<'a> Relay<'a> {
         wires: &'a WireTable,
         test: &Test,
         metrics: Metrics<'a>,
+        hooks: &[OperationEntry],
     ) -> Result<Self, ChoiceError> {
         let mut order: Vec<usize> = (0..test.operations.len()).collect();
         order.sort_by_key(|&at| {
@@ -110,7 +116,8 @@ impl<'a> Relay<'a> {
         for choice in &test.operations {
             let operation = plan.operation(choice.operation);
             operations.push(Stage {
-                disturbance: Disturbance::new(operation, choice)?,
+                name: operation.name.clone(),
+                disturbance: Disturbance::new(operation, choice, hooks)?,
                 activity: Activity::new(&choice.activation, operation.within),
                 draw_seed: choice.draw_seed,
                 counters: Counters::default(),
@@ -124,7 +131,8 @@ impl<'a> Relay<'a> {
             let topic = wires.topic(wire);
             let member = members[topic.index()];
             members[topic.index()] += 1;
-            let touched = order.iter().filter(|&&at| plan.operation(test.operations[at].operation).topic == topic);
+            let touched =
+                order.iter().filter(|&&at| plan.operation(test.operations[at].operation).topic == Some(topic));
             pipelines[wire.index()].extend(touched.map(|&at| (at, member)));
         }
         let conditional = (0..operations.len()).filter(|&at| operations[at].activity.is_conditional()).collect();
@@ -134,6 +142,7 @@ impl<'a> Relay<'a> {
             ended: Vec::with_capacity(operations.len()),
             step: 0,
             operations,
+            order,
             pipelines,
             published: vec![0; wires.len()],
             queue: ReleaseQueue::new(test.operations.len(), wires.len()),
@@ -182,6 +191,13 @@ impl<'a> Relay<'a> {
             })
             .collect();
         let (metrics, mut warnings) = self.metrics.finish(&operations);
+        for stage in &self.operations {
+            if let Disturbance::Custom(custom) = &stage.disturbance
+                && let Some(mismatch) = &custom.mismatch
+            {
+                warnings.push(format!("operation `{}`: {mismatch}", stage.name));
+            }
+        }
         if self.overflowed {
             warnings
                 .push(format!("more than {HELD_LIMIT} messages were held back at once; the oldest were let go early"));
@@ -283,6 +299,9 @@ impl<'a> Relay<'a> {
             if active {
                 stage.counters.seen += 1;
             }
+            if active && matches!(stage.disturbance, Disturbance::Custom(_)) {
+                return self.pass_custom(now, at, member, message, deliveries);
+            }
             let fate = if active {
                 stage.disturbance.apply(Draws::new(stage.draw_seed, member, message.index), &mut message.value)
             } else {
@@ -322,10 +341,65 @@ impl<'a> Relay<'a> {
         if !self.over {
             self.metrics.delivered(now, message.wire, &message.value);
             if let Some(tap) = &mut self.tap {
-                tap.delivered(now, message.wire, message.index, &message.value);
+                tap.delivered(now, message.wire, message.published, &message.value);
             }
         }
         deliveries.push(Delivery { wire: message.wire, value: message.value });
+    }
+}
+
+/// What the user's code does.
+impl Relay<'_> {
+    /// Calls the custom operations of the test before the start, or those after the end, in priority, then declaration
+    /// order. The error says which could not do what.
+    pub fn beside_run(&mut self, moment: Moment, files: &mut ChangedFiles) -> Result<(), String> {
+        for at in self.order.clone() {
+            let stage = &mut self.operations[at];
+            let Disturbance::Custom(custom) = &mut stage.disturbance else { continue };
+            if custom.moment != moment {
+                continue;
+            }
+            let mut ctx = RunContext::new(files, Draws::new(stage.draw_seed, 0, 0));
+            custom.hook.beside_run(&mut ctx);
+            stage.counters.side_effects += ctx.side_effects;
+            if let Some(failure) = ctx.failure {
+                return Err(format!("operation `{}`: {failure}", stage.name));
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes a message through a custom operation and on, then what the operation made up.
+    fn pass_custom(&mut self, now: SimTime, at: usize, member: u64, mut message: Held, deliveries: &mut Vec<Delivery>) {
+        let stage = &mut self.operations[at];
+        let Disturbance::Custom(custom) = &mut stage.disturbance else {
+            unreachable!("only custom operations come here")
+        };
+        let draws = Draws::new(stage.draw_seed, member, message.index);
+        let call = custom.on_message(now, self.wires.path(message.wire), draws, &mut message.value);
+        stage.counters.injected += call.injected.len() as u64;
+        stage.counters.changed += u64::from(call.changed && !call.dropped);
+        stage.counters.dropped += u64::from(call.dropped);
+        if call.changed || call.dropped || !call.injected.is_empty() {
+            stage.touch(now);
+        }
+        if call.dropped {
+            self.tell(now, at, Deed::Dropped(message.touched()));
+        } else if call.changed {
+            self.tell(now, at, Deed::Changed(message.touched()));
+        }
+        for _ in &call.injected {
+            self.tell(now, at, Deed::Injected(message.touched()));
+        }
+        let Held { wire, published, index, next_stage, .. } = message;
+        if !call.dropped {
+            self.pass(now, message, deliveries);
+        }
+        for (number, value) in (0u64..).zip(call.injected) {
+            // An index of its own, so that later operations draw for it apart from the message it came with.
+            let index = derive_seed(index, "injected", &[at as u64, number]);
+            self.pass(now, Held { wire, published, index, value, next_stage }, deliveries);
+        }
     }
 }
 
@@ -357,7 +431,7 @@ impl Exchange for Relay<'_> {
         }
         self.metrics.message(self.now, wire, &value);
         self.weigh_conditions(self.now, deliveries);
-        self.pass(self.now, Held { wire, index, value, next_stage: 0 }, deliveries);
+        self.pass(self.now, Held { wire, published: index, index, value, next_stage: 0 }, deliveries);
     }
 }
 

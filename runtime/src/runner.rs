@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use crate::fuzz::OperationEntry;
 use crate::metric::HookEntry;
 use crate::transport::Connect;
 
@@ -12,8 +13,12 @@ pub struct Runner {
     pub plan: &'static str,
     /// Folder of the runner's crate; results go into `results/` inside it.
     pub directory: &'static str,
-    /// The hooks this campaign uses.
+    /// Folder of the `.sesame` file, as seen from there.
+    pub space: &'static str,
+    /// The metric hooks this campaign uses.
     pub hooks: &'static [HookEntry],
+    /// The operation hooks this campaign uses.
+    pub operations: &'static [OperationEntry],
     /// How the simulator is reached.
     pub connect: Connect,
 }

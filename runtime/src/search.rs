@@ -6,6 +6,7 @@
 //!
 //! Objectives are oriented once, in [`fitness`]: from there on smaller is better, in fronts and hypervolumes too.
 
+pub mod choice;
 pub mod condition;
 pub mod crowding;
 pub mod dominance;

@@ -6,6 +6,7 @@
 mod handlers;
 mod messages;
 mod metrics;
+mod operations;
 mod package;
 mod rust;
 mod stub;
@@ -112,7 +113,7 @@ fn problems(plans: &[RunnerPlan], environment: &Environment) -> Vec<Problem> {
             }
         }
     };
-    for RunnerPlan { plan, hooks, .. } in plans {
+    for RunnerPlan { plan, hooks, operations, .. } in plans {
         check("space", &plan.space);
         check("campaign", &plan.campaign.name);
         for message in &plan.messages {
@@ -123,6 +124,12 @@ fn problems(plans: &[RunnerPlan], environment: &Environment) -> Vec<Problem> {
         }
         for topic in &plan.topics {
             check("topic", &topic.name);
+        }
+        for operation in operations {
+            check("operation", &operation.operation);
+            for (parameter, _) in &operation.parameters {
+                check("parameter", &parameter.name);
+            }
         }
         for metric in plan.metrics.iter().map(|metric| &metric.name).chain(hooks.iter().map(|hook| &hook.metric)) {
             check("metric", metric);
@@ -146,10 +153,15 @@ fn problems(plans: &[RunnerPlan], environment: &Environment) -> Vec<Problem> {
     for name in environment.dependencies.keys().filter(|name| !package::is_dependency(name)) {
         problems.push(Problem::Dependency { name: name.clone() });
     }
-    let hooks = || plans.iter().take(1).flat_map(|runner| &runner.hooks).map(|hook| hook.metric.as_str());
-    let mut shared = shared_names("metric", hooks(), names::snake);
+    let first = || plans.iter().take(1);
+    let hooks = || {
+        let metrics = first().flat_map(|runner| &runner.hooks).map(|hook| hook.metric.as_str());
+        metrics.chain(first().flat_map(|runner| &runner.operations).map(|it| it.operation.as_str()))
+    };
+    let what = if first().any(|runner| !runner.operations.is_empty()) { "metric or operation" } else { "metric" };
+    let mut shared = shared_names(what, hooks(), names::snake);
     if shared.is_empty() {
-        shared = shared_names("metric", hooks(), names::hook_type);
+        shared = shared_names(what, hooks(), names::hook_type);
     }
     problems.extend(shared);
     // Some file systems do not tell `Jitter` from `jitter`.
@@ -192,7 +204,8 @@ struct SharedReadme {
 #[derive(Serialize)]
 struct ReadmeHook {
     file: String,
-    metric: String,
+    /// What it is of, for example ``metric `speed` ``.
+    of: String,
     line: u32,
     doc: String,
 }
@@ -215,14 +228,19 @@ struct RunnerReadme {
     seed: u64,
 }
 
-fn readme_hooks<'a>(hooks: impl Iterator<Item = &'a crate::plan::HookPlan>) -> Vec<ReadmeHook> {
-    hooks
-        .map(|hook| ReadmeHook {
-            file: format!("{}.rs", names::snake(&hook.metric)),
-            metric: hook.metric.clone(),
-            line: hook.line,
-            doc: rust::one_line(hook.doc.lines().next().unwrap_or_default()),
-        })
+/// The hooks of a space, metrics first; if `used`, only those that this campaign uses.
+fn readme_hooks(runner: &RunnerPlan, used: bool) -> Vec<ReadmeHook> {
+    let entry = |what: &str, name: &str, line: u32, doc: &str| ReadmeHook {
+        file: format!("{}.rs", names::snake(name)),
+        of: format!("{what} `{name}`"),
+        line,
+        doc: rust::one_line(doc.lines().next().unwrap_or_default()),
+    };
+    let metrics = runner.hooks.iter().filter(|hook| !used || runner.uses(hook));
+    let operations = runner.operations.iter().filter(|operation| !used || runner.applies(operation));
+    metrics
+        .map(|hook| entry("metric", &hook.metric, hook.line, &hook.doc))
+        .chain(operations.map(|it| entry("operation", &it.operation, it.line, &it.doc)))
         .collect()
 }
 
@@ -261,7 +279,7 @@ fn shared(plans: &[RunnerPlan], environment: &Environment) -> Tree {
         space: first.plan.space.clone(),
         source: rust::one_line(&first.plan.source),
         doc: doc_lines(&first.plan.doc),
-        hooks: readme_hooks(first.hooks.iter()),
+        hooks: readme_hooks(first, false),
         campaigns: plans
             .iter()
             .map(|runner| ReadmeCampaign {
@@ -277,8 +295,14 @@ fn shared(plans: &[RunnerPlan], environment: &Environment) -> Tree {
     for hook in &first.hooks {
         let path = format!("hooks/{}.rs", names::snake(&hook.metric));
         tree.add(&path, Owner::User, stub::stub(first, &types, hook));
-        let inputs = handlers::inputs(&first.plan, &types, hook);
-        tree.hooks.insert(path, Hook { metric: hook.metric.clone(), inputs });
+        let inputs = handlers::inputs(&first.plan, &types, &hook.inputs);
+        tree.hooks.insert(path, Hook { of: format!("metric `{}`", hook.metric), inputs });
+    }
+    for operation in &first.operations {
+        let path = format!("hooks/{}.rs", names::snake(&operation.operation));
+        tree.add(&path, Owner::User, operations::stub(first, &types, operation));
+        let inputs = operations::inputs(first, &types, operation);
+        tree.hooks.insert(path, Hook { of: format!("operation `{}`", operation.operation), inputs });
     }
     tree
 }
@@ -304,7 +328,7 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Tree {
         source: rust::one_line(&plan.source),
         campaign: plan.campaign.name.clone(),
         doc: doc_lines(&plan.campaign.doc),
-        hooks: readme_hooks(runner.hooks.iter().filter(|hook| runner.uses(hook))),
+        hooks: readme_hooks(runner, true),
         evaluations: plan.campaign.search.evaluations(),
         seed: plan.campaign.seed,
     };
@@ -324,6 +348,8 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Tree {
     );
     tree.add("src/main.rs", Owner::Machine, main);
     let docs = rust::module_docs([format!("What `{}` says, as Rust.", plan.source)]);
+    let custom = !runner.operations.is_empty();
+    let operations = custom.then(|| quote! { mod operation_registry; pub mod operations; });
     let modules = rust::file(
         &header,
         quote! {
@@ -331,17 +357,23 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Tree {
             pub mod campaign;
             pub mod messages;
             pub mod metrics;
+            #operations
             mod registry;
         },
     );
     tree.add("src/generated/mod.rs", Owner::Machine, modules);
     tree.add("src/generated/campaign.rs", Owner::Machine, campaign(runner, environment, &header));
     let types = Messages::new(plan);
-    tree.add("src/generated/messages.rs", Owner::Machine, types.file(&header));
+    tree.add("src/generated/messages.rs", Owner::Machine, types.file(&header, custom));
     tree.add("src/generated/metrics.rs", Owner::Machine, metrics::traits(runner, &types, &header));
     // From src/generated/ of a runner to the folder beside it.
     let hooks = "../../../hooks";
     tree.add("src/generated/registry.rs", Owner::Machine, metrics::registry(runner, &types, &header, hooks));
+    if custom {
+        tree.add("src/generated/operations.rs", Owner::Machine, operations::traits(runner, &types, &header));
+        let registry = operations::registry(runner, &types, &header, hooks);
+        tree.add("src/generated/operation_registry.rs", Owner::Machine, registry);
+    }
     tree
 }
 
@@ -362,6 +394,12 @@ fn features(runner: &RunnerPlan) -> Vec<&'static str> {
 fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> String {
     let plan = &runner.plan;
     let docs = rust::module_docs([format!("Campaign `{}`, for the runtime.", plan.campaign.name)]);
+    let folder = &environment.space_folder;
+    let operations = if runner.operations.is_empty() {
+        quote! { &[] }
+    } else {
+        quote! { super::operation_registry::OPERATIONS }
+    };
     let abi = proc_macro2::Literal::u32_unsuffixed(ABI);
     let (simulator, connect) = if let Some(path) = simulator_path(&plan.simulator.transport) {
         let path = path.into_iter().map(names::ident);
@@ -371,11 +409,7 @@ fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> Str
         };
         (simulator, quote! { ::sesame_runtime::transport::in_process::<Simulator>() })
     } else {
-        let folder = &environment.space_folder;
-        let simulator = quote! {
-            /// The folder that the simulator runs in, as seen from this crate's.
-            const SPACE: &str = #folder;
-        };
+        let simulator = quote! {};
         let connect = quote! {
             ::sesame_runtime::transport::process(::core::env!("CARGO_MANIFEST_DIR"), SPACE)
         };
@@ -389,12 +423,17 @@ fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> Str
 
             #simulator
 
+            /// The folder of the `.sesame` file, as seen from this crate's.
+            const SPACE: &str = #folder;
+
             /// Everything the runtime is told.
             pub fn runner() -> ::sesame_runtime::Runner {
                 ::sesame_runtime::Runner {
                     plan: ::core::include_str!("../../campaign.plan.json"),
                     directory: ::core::env!("CARGO_MANIFEST_DIR"),
+                    space: SPACE,
                     hooks: super::registry::HOOKS,
+                    operations: #operations,
                     connect: #connect,
                 }
             }

@@ -7,7 +7,8 @@ use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
-    ActivationMode, CampaignPlan, Distribution, Drain, MetricSource, Operation, OperationKind, Search, ValueMode,
+    ActivationMode, CampaignPlan, Distribution, Domain, Drain, MetricSource, Operation, OperationKind, Parameter,
+    Search,
 };
 
 /// More whole numbers than these are not written out one by one.
@@ -96,27 +97,29 @@ fn activation(plan: &CampaignPlan, mode: &ActivationMode) -> String {
 }
 
 fn operation_line(plan: &CampaignPlan, operation: &Operation) -> String {
-    let topic = &plan.topics[operation.topic.index()].name;
-    let (path, kind) = match &operation.kind {
-        OperationKind::RandomValue { path, mode, .. } => {
-            let mode = match mode {
-                ValueMode::Absolute => "absolute",
-                ValueMode::Offset => "offset",
-            };
-            (path.as_slice(), format!("random {mode}"))
-        }
-        OperationKind::PacketLoss => (&[][..], "packet loss".to_owned()),
-        OperationKind::Latency { .. } => (&[][..], "latency".to_owned()),
-        OperationKind::Blackhole => (&[][..], "blackhole".to_owned()),
-    };
-    let target: Vec<&str> = std::iter::once(topic.as_str()).chain(path.iter().map(String::as_str)).collect();
-    let mut line = format!("operation {} on {} = {kind}", operation.name, target.join("."));
-    for parameter in &operation.parameters {
-        let permitted = match operation.kind {
-            OperationKind::PacketLoss => format!("[{}%, {}%]", percent(parameter.low), percent(parameter.high)),
-            _ => range(parameter.low, parameter.high, parameter.unit.as_deref()),
+    let mut line = format!("operation {}", operation.name);
+    if let Some(topic) = operation.topic {
+        let fields = match &operation.kind {
+            OperationKind::RandomValue { path, .. } => path.as_slice(),
+            _ => &[],
         };
-        line = format!("{line} {permitted}");
+        let topic = plan.topic(topic).name.as_str();
+        let target: Vec<&str> = std::iter::once(topic).chain(fields.iter().map(String::as_str)).collect();
+        line = format!("{line} on {}", target.join("."));
+    }
+    line = format!("{line} = {}", operation.kind.words());
+    if let OperationKind::Custom { .. } = operation.kind {
+        let parameters = operation.parameters.iter().map(|it| format!("{}: {}  ", it.name, domain(it)));
+        line = format!("{line} {{ {}}}", parameters.collect::<String>());
+    } else {
+        for parameter in &operation.parameters {
+            let Domain::Number { low, high, .. } = parameter.domain else { continue };
+            let permitted = match operation.kind {
+                OperationKind::PacketLoss => format!("[{}%, {}%]", percent(low), percent(high)),
+                _ => range(low, high, parameter.unit.as_deref()),
+            };
+            line = format!("{line} {permitted}");
+        }
     }
     if let OperationKind::Latency { distribution, drain } = operation.kind {
         let uniform = if distribution == Distribution::Uniform { " uniform" } else { "" };
@@ -127,13 +130,36 @@ fn operation_line(plan: &CampaignPlan, operation: &Operation) -> String {
         };
         line = format!("{line}{uniform} drain {drain}");
     }
-    let within = range(operation.within.start, operation.within.end, Some("s"));
-    line =
-        format!("{line} within {within} priority {} inclusion {}%", operation.priority, percent(operation.inclusion));
+    if !operation.kind.is_offline() {
+        let within = range(operation.within.start, operation.within.end, Some("s"));
+        line = format!("{line} within {within}");
+    }
+    line = format!("{line} priority {} inclusion {}%", operation.priority, percent(operation.inclusion));
     if !operation.constraints.is_empty() {
         line = format!("{line} start contains {}", contained(plan, operation).join(", "));
     }
     line
+}
+
+/// What a parameter of a custom operation permits.
+fn domain(parameter: &Parameter) -> String {
+    let unit = parameter.unit.as_deref().unwrap_or_default();
+    let list = |items: &[String]| {
+        let quoted = items.iter().map(|item| format!("\"{}\"", item.replace('\\', "\\\\").replace('"', "\\\"")));
+        quoted.collect::<Vec<_>>().join(", ")
+    };
+    match &parameter.domain {
+        Domain::Number { low, high, integer, .. } => {
+            let word = if *integer { "int" } else { "real" };
+            format!("{word} {}", range(*low, *high, parameter.unit.as_deref()))
+        }
+        Domain::Point { low, high } => {
+            let point = |[x, y, z]: [f64; 3]| format!("({x}, {y}, {z}){unit}");
+            format!("point [{}, {}]", point(*low), point(*high))
+        }
+        Domain::Texts { texts } => format!("one of {}", list(texts)),
+        Domain::Files { files } => format!("file one of {}", list(files)),
+    }
 }
 
 fn contained(plan: &CampaignPlan, operation: &Operation) -> Vec<String> {
@@ -250,12 +276,19 @@ mod tests {
         operation lag on link = latency [0ms, 300ms] uniform drain drop
         operation late on link = latency [0.1s, 0.7s]
         operation cut on zones = blackhole
+        operation bend on link = custom {
+          points: int [3, 20]  gain: real [0.5, 2]  reach: real[mm] [-10cm, 1m]
+          shift: point [(-2, -2, 0)m, (2, 2, 0.5)m]  frame: one of \"a \\\"b\\\"\", \"c\"
+          map: file one of \"maps/hall.yaml\", \"other.yaml\"
+        } within [1s, 50s] start contains near
+        operation spoil = custom before start { file: file one of \"a.yaml\" } inclusion 30%
+        operation tidy = custom after end { } priority 2
     ";
     const EVERYTHING: &str = "
         /// Of two
         ///
         /// paragraphs.
-        campaign all { objectives time, collisions  operations swing, level, lose, lag, late, cut 1..3 per test
+        campaign all { objectives time, collisions  operations swing, level, lose, lag, late, cut, bend, spoil, tidy 1..3 per test
           activate by condition over near in [0, 10], pace in [-1km/h, 36km/h], time { integers [-3, 30] }
             for [1s, 15s] at most 3 times
           search nsga2 { population 4  evaluations 8 }  end after 1min }";

@@ -50,8 +50,8 @@ pub struct Tree {
 /// What is remembered of a user's hook, to be able to say later what changed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hook {
-    /// The metric's name.
-    pub metric: String,
+    /// What it is of, for example ``metric `speed` ``.
+    pub of: String,
     /// What the hook is given: one line for each handler, and one for each field of the messages they take.
     pub inputs: Vec<String>,
 }

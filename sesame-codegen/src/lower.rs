@@ -16,7 +16,7 @@ use sesame_dsl::model::{self, CampaignId, Id as _, Space};
 use sesame_dsl::units::Unit;
 use sesame_plan as plan;
 
-use crate::plan::{HookPlan, RunnerPlan};
+use crate::plan::{HookPlan, OperationPlan, RunnerPlan};
 
 /// The plan of a campaign's runner. `source` is the `.sesame` file's name without its folder, `generator` the name and
 /// version of what generates.
@@ -52,7 +52,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
         tests: selection.tests.iter().map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect(),
         campaign: selection.campaign(space, declared),
     };
-    RunnerPlan { plan, hooks: hooks(space), simulator_crate }
+    RunnerPlan { plan, hooks: hooks(space), operations: custom_operations(space), simulator_crate }
 }
 
 /// The parts of a space that are in a campaign's plan, in declaration order: a position here is the id there.
@@ -74,6 +74,7 @@ impl Selection {
         operations.dedup();
         let begins = |it: &model::TestOperation| match &it.activation {
             model::Activation::Window(window) => window.low,
+            model::Activation::Offline => 0.0,
             model::Activation::Condition { .. } => {
                 space.operations[it.operation].within.map_or(0.0, |within| within.low)
             }
@@ -128,7 +129,7 @@ impl Selection {
             plan::TestOperation {
                 operation: self.operation(it.operation),
                 activation: self.activation(&it.activation, within.end),
-                parameters: it.choice.iter().map(choice).collect(),
+                parameters: it.choices.iter().map(choice).collect(),
                 draw_seed: it.draw_seed,
             }
         });
@@ -228,6 +229,50 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
     hooks.collect()
 }
 
+fn custom_operations(space: &Space) -> Vec<OperationPlan> {
+    let operations = space.operations.values().filter_map(|operation| match &operation.kind {
+        model::OperationKind::Custom { moment: when, parameters } => Some(OperationPlan {
+            operation: operation.declaration.name.clone(),
+            doc: operation.declaration.doc.clone(),
+            line: operation.declaration.line,
+            topic: operation.topic().map(topic_id),
+            moment: moment(*when),
+            parameters: parameters.iter().map(|it| (parameter(it), it.doc.clone())).collect(),
+        }),
+        _ => None,
+    });
+    operations.collect()
+}
+
+fn moment(moment: model::Moment) -> plan::Moment {
+    match moment {
+        model::Moment::OnMessage => plan::Moment::OnMessage,
+        model::Moment::BeforeStart => plan::Moment::BeforeStart,
+        model::Moment::AfterEnd => plan::Moment::AfterEnd,
+    }
+}
+
+fn parameter(parameter: &model::Parameter) -> plan::Parameter {
+    plan::Parameter {
+        name: parameter.name.clone(),
+        unit: unit(parameter.unit.as_ref()),
+        domain: match &parameter.domain {
+            model::Domain::Number { range, shape, integer } => plan::Domain::Number {
+                low: range.low,
+                high: range.high,
+                shape: match shape {
+                    model::Shape::Value => plan::Shape::Value,
+                    model::Shape::Range => plan::Shape::Range,
+                },
+                integer: *integer,
+            },
+            model::Domain::Point { low, high } => plan::Domain::Point { low: *low, high: *high },
+            model::Domain::Texts(texts) => plan::Domain::Texts { texts: texts.clone() },
+            model::Domain::Files(files) => plan::Domain::Files { files: files.clone() },
+        },
+    }
+}
+
 fn message(message: &model::Message) -> plan::MessageType {
     let fields = message.fields.iter().map(|field| plan::Field {
         name: field.declaration.name.clone(),
@@ -301,7 +346,7 @@ fn operation(
 ) -> plan::Operation {
     let kind = match &operation.kind {
         model::OperationKind::RandomValue { mode, integer, .. } => plan::OperationKind::RandomValue {
-            path: operation.target.fields.clone(),
+            path: operation.target.as_ref().map_or_else(Vec::new, |target| target.fields.clone()),
             mode: match mode {
                 model::ValueMode::Absolute => plan::ValueMode::Absolute,
                 model::ValueMode::Offset => plan::ValueMode::Offset,
@@ -321,24 +366,14 @@ fn operation(
             },
         },
         model::OperationKind::Blackhole => plan::OperationKind::Blackhole,
+        model::OperationKind::Custom { moment: when, .. } => plan::OperationKind::Custom { moment: moment(*when) },
     };
-    let parameters = operation.parameter().into_iter().map(|parameter| plan::Parameter {
-        name: parameter.name.to_owned(),
-        unit: unit(parameter.unit.as_ref()),
-        low: parameter.range.low,
-        high: parameter.range.high,
-        shape: match parameter.shape {
-            model::Shape::Value => plan::Shape::Value,
-            model::Shape::Range => plan::Shape::Range,
-        },
-        integer: parameter.integer,
-    });
     plan::Operation {
         name: operation.declaration.name.clone(),
         doc: operation.declaration.doc.clone(),
-        topic: topic_id(operation.topic()),
+        topic: operation.topic().map(topic_id),
         kind,
-        parameters: parameters.collect(),
+        parameters: operation.parameters().iter().map(parameter).collect(),
         within: within(operation, end_after),
         priority: operation.priority,
         inclusion: operation.inclusion,
@@ -355,9 +390,11 @@ fn within(operation: &model::Operation, end_after: f64) -> plan::Span {
 }
 
 fn choice(choice: &model::Choice) -> plan::Choice {
-    match *choice {
-        model::Choice::Value(value) => plan::Choice::Value { value },
+    match choice {
+        model::Choice::Value(value) => plan::Choice::Value { value: *value },
         model::Choice::Range(range) => plan::Choice::Range { low: range.low, high: range.high },
+        model::Choice::Point(point) => plan::Choice::Point { point: *point },
+        model::Choice::Text(text) => plan::Choice::Text { text: text.clone() },
     }
 }
 
@@ -433,7 +470,7 @@ mod tests {
 
     #[test]
     fn a_search_has_the_parts_it_needs_and_all_hooks() {
-        let RunnerPlan { plan, hooks, simulator_crate } = lowered("look");
+        let RunnerPlan { plan, hooks, simulator_crate, .. } = lowered("look");
         let names: Vec<&str> = plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
         assert_eq!(names, ["collisions", "time"]);
         assert_eq!(plan.campaign.objectives, [plan::MetricId(1), plan::MetricId(0)]);
@@ -508,10 +545,11 @@ mod tests {
     fn quantities_arrive_in_the_units_of_the_wire() {
         let RunnerPlan { plan, .. } = lowered("look");
         let swing = &plan.operations[0];
-        assert_eq!(swing.parameters[0].high, std::f64::consts::PI / 10.0);
+        let plan::Domain::Number { high, .. } = swing.parameters[0].domain else { panic!("an offset is a number") };
+        assert_eq!(high, std::f64::consts::PI / 10.0);
         assert_eq!(swing.within, plan::Span { start: 0.0, end: 60.0 });
         assert_eq!(plan.operations[1].inclusion, 0.4);
-        assert!(plan.operations[1].parameters[0].integer);
+        assert!(matches!(plan.operations[1].parameters[0].domain, plan::Domain::Number { integer: true, .. }));
     }
 
     #[test]

@@ -75,8 +75,22 @@ impl Scope {
 /// It depends on the metric's name alone: a hook file is the user's, so nothing added to the space may rename it.
 pub fn hook_type(metric: &str) -> String {
     // What a stub, or code a user is likely to write in it, speaks of.
-    const SPOKEN_OF: [&str; 14] = [
-        "Box", "Context", "Default", "Drop", "Err", "Hook", "None", "Ok", "Option", "Result", "Some", "String", "Text",
+    const SPOKEN_OF: [&str; 16] = [
+        "Box",
+        "Context",
+        "Default",
+        "Drop",
+        "Err",
+        "Hook",
+        "None",
+        "Ok",
+        "OperationContext",
+        "Option",
+        "Result",
+        "RunContext",
+        "Some",
+        "String",
+        "Text",
         "Vec",
     ];
     let name = metric.to_upper_camel_case();
@@ -90,6 +104,11 @@ pub fn hook_type(metric: &str) -> String {
 /// The trait that a metric's hook implements, for example `CollisionOccurrenceHook`.
 pub fn hook_trait(metric: &str) -> String {
     hook_type(metric) + "Hook"
+}
+
+/// The struct of a custom operation's parameters, for example `BendPathParameters`.
+pub fn parameters_type(operation: &str) -> String {
+    hook_type(operation) + "Parameters"
 }
 
 /// The folder of a campaign inside the output folder; never that of the hooks or of what cargo builds.

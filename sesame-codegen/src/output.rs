@@ -55,12 +55,12 @@ pub struct FileReport {
 /// Something that is left in the output folder although the space has no use for it any more.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Orphan {
-    /// The hook of a metric that is gone: its file, and the metric's name.
+    /// The hook of a metric or operation that is gone: its file, and what it was of.
     Hook {
         /// Path relative to the output folder.
         path: String,
-        /// The metric.
-        metric: String,
+        /// What it was of, for example ``metric `speed` ``.
+        of: String,
     },
     /// A machine file that was edited by hand.
     Edited {
@@ -74,13 +74,13 @@ pub enum Orphan {
     },
 }
 
-/// A user's hook whose metric is given something else than when the hook was last generated for.
+/// A user's hook whose metric or operation is given something else than when the hook was last generated for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ChangedHook {
     /// The hook's file, relative to the output folder.
     pub path: String,
-    /// The metric.
-    pub metric: String,
+    /// What it is of, for example ``metric `speed` ``.
+    pub of: String,
     /// What it was given and is not any more.
     pub gone: Vec<String>,
     /// What it is given now and was not.
@@ -328,7 +328,7 @@ fn survey(
     Ok(())
 }
 
-/// Hooks on disk whose metric is now given something else.
+/// Hooks on disk whose metric or operation is now given something else.
 fn compare_hooks(old: &Manifest, new: &Manifest, shown: &dyn Fn(&str) -> String, root: &Path, report: &mut Report) {
     for (path, hook) in &new.hooks {
         let Some(before) = old.hooks.get(path) else { continue };
@@ -338,7 +338,7 @@ fn compare_hooks(old: &Manifest, new: &Manifest, shown: &dyn Fn(&str) -> String,
         let missing = |from: &[String], of: &[String]| of.iter().filter(|line| !from.contains(line)).cloned().collect();
         report.changed_hooks.push(ChangedHook {
             path: shown(path),
-            metric: hook.metric.clone(),
+            of: hook.of.clone(),
             gone: missing(&hook.inputs, &before.inputs),
             new: missing(&before.inputs, &hook.inputs),
         });
@@ -370,9 +370,9 @@ fn leftovers(
             }
             (Owner::User, _) => {
                 let hook = old.hooks.get(path);
-                let metric = hook.map(|hook| hook.metric.clone()).unwrap_or_default();
+                let of = hook.map(|hook| hook.of.clone()).unwrap_or_default();
                 new.hooks.extend(hook.map(|hook| (path.clone(), hook.clone())));
-                report.orphans.push(Orphan::Hook { path: shown(path), metric });
+                report.orphans.push(Orphan::Hook { path: shown(path), of });
             }
             _ => report.orphans.push(Orphan::Edited { path: shown(path) }),
         }

@@ -3,7 +3,7 @@
 //! `lower` makes it from the language's model. Everything a runner needs at run time is in the
 //! [`CampaignPlan`]; beside it stands only what decides the generated code.
 
-use sesame_plan::{CampaignPlan, Direction, MetricSource, TopicId};
+use sesame_plan::{CampaignPlan, Direction, MetricSource, Moment, Parameter, TopicId};
 
 /// The plan of one runner crate.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +13,8 @@ pub struct RunnerPlan {
     /// Every hook metric of the space in declaration order, measured by this campaign or not: the traits of all are
     /// generated, so that a hook file shared by several campaigns compiles in each of them.
     pub hooks: Vec<HookPlan>,
+    /// Every custom operation of the space in declaration order, used by this campaign or not, for the same reason.
+    pub operations: Vec<OperationPlan>,
     /// Folder of the simulator's crate as the `.sesame` file has it (`crate "simulator"`), relative to that file.
     /// `None` when the file names none: the crate of an in-process simulator then comes from `[dependencies]` in
     /// `sesame.toml`.
@@ -36,7 +38,29 @@ pub struct HookPlan {
     pub inputs: Vec<TopicId>,
 }
 
+/// An operation that the user writes in Rust.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OperationPlan {
+    /// The operation's name in the space.
+    pub operation: String,
+    /// Its doc comment, lines joined by `\n`; empty when there is none.
+    pub doc: String,
+    /// Line of its declaration, from 1.
+    pub line: u32,
+    /// The topic whose messages it takes: `Some` exactly if it is called on messages.
+    pub topic: Option<TopicId>,
+    /// When it is called.
+    pub moment: Moment,
+    /// Its parameters, in declaration order, with their doc comments.
+    pub parameters: Vec<(Parameter, String)>,
+}
+
 impl RunnerPlan {
+    /// Whether a test of this campaign may hold a custom operation, and so needs its hook to be compiled.
+    pub fn applies(&self, operation: &OperationPlan) -> bool {
+        self.plan.operations.iter().any(|used| used.name == operation.operation)
+    }
+
     /// Whether this campaign measures a hook metric, and so needs its hook to be compiled.
     pub fn uses(&self, hook: &HookPlan) -> bool {
         self.plan

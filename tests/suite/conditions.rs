@@ -32,7 +32,7 @@ fn conditions(records: &[TestRecord]) -> Vec<&Condition> {
         .flat_map(|operation| match &operation.activation {
             Activation::Condition { start, end, .. } => vec![start, end],
             Activation::ConditionFor { start, .. } => vec![start],
-            Activation::Time { .. } => panic!("a test by time in a campaign by condition"),
+            Activation::Time { .. } | Activation::Offline => panic!("{operation:?} in a campaign by condition"),
         })
         .collect()
 }

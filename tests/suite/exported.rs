@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use sesame_dsl::analyse;
 use sesame_dsl::source::SourceMap;
-use sesame_plan::{Activation, Bound, CampaignPlan, Choice, OperationId, Test, TestOperation};
+use sesame_plan::{Activation, Bound, CampaignPlan, Choice, Domain, OperationId, Test, TestOperation};
 use sesame_runtime::observation::{MetricObservation, Observation, Outcome, WallTime};
 use sesame_runtime::record::{Origin, Recorder, TestRecord};
 use sesame_runtime::report::export;
@@ -37,9 +37,15 @@ const SPACE: &str = r#"
     operation lag on link = latency [0ms, 500ms]
     operation wobble on speed = latency [0ms, 500ms] uniform
     operation cut on plain = blackhole
+    operation bend on link = custom {
+      points: int [-3, 20]  gain: real [0.1, 0.7]  tilt: real[deg] [-0.3rad, 0.3rad]
+      shift: point [(-2, -2.5, 0)m, (2, 200, 1e-9)m]  frame: one of "frame \"B\" \\ 0", "frameB_1"
+    } priority 3
+    operation spoil = custom before start { file: file one of "calibration.yaml", "maps/hall.yaml" }
+    operation tidy = custom after end { }
     campaign look {
       objectives time, collisions, distance, share, fastest
-      operations swing, rush, recount, shift, level, fill, lose, lose_some, lag, wobble, cut   1..11 per test
+      operations swing, rush, recount, shift, level, fill, lose, lose_some, lag, wobble, cut, bend, spoil, tidy   1..14 per test
       activate by time
       search random { evaluations 100 }
       end after 70s
@@ -117,10 +123,20 @@ fn the_ends_of_what_is_permitted_read_back_as_they_are() {
                 .parameters
                 .iter()
                 .map(|parameter| {
-                    let end = if share == 0.0 { parameter.low } else { parameter.high };
-                    match parameter.shape {
-                        sesame_plan::Shape::Value => Choice::Value { value: end },
-                        sesame_plan::Shape::Range => Choice::Range { low: end, high: end },
+                    let first = share == 0.0;
+                    match &parameter.domain {
+                        Domain::Number { low, high, shape, .. } => {
+                            let end = if first { *low } else { *high };
+                            match shape {
+                                sesame_plan::Shape::Value => Choice::Value { value: end },
+                                sesame_plan::Shape::Range => Choice::Range { low: end, high: end },
+                            }
+                        }
+                        Domain::Point { low, high } => Choice::Point { point: if first { *low } else { *high } },
+                        Domain::Texts { texts: items } | Domain::Files { files: items } => {
+                            let text = if first { items.first() } else { items.last() };
+                            Choice::Text { text: text.unwrap().clone() }
+                        }
                     }
                 })
                 .collect(),

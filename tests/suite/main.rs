@@ -3,6 +3,7 @@
 
 mod commands;
 mod conditions;
+mod custom;
 mod declarative;
 mod disk;
 mod exported;

@@ -355,13 +355,14 @@ pub struct Operation {
     pub name: String,
     /// Its doc comment.
     pub doc: String,
-    /// The topic whose messages it disturbs.
-    pub topic: TopicId,
+    /// The topic whose messages it disturbs; `None` exactly for a custom operation before the start or after the end.
+    pub topic: Option<TopicId>,
     /// What it does to them.
     pub kind: OperationKind,
     /// The parameters a test chooses, in the order that [`OperationKind`] documents.
     pub parameters: Vec<Parameter>,
-    /// The time outside of which it is never active (`within`); seconds, `start < end`.
+    /// The time outside of which it is never active (`within`); seconds, `start < end`. Of an offline operation, which is
+    /// never active, the whole run.
     pub within: Span,
     /// Operations of a higher priority come first on a message; equal ones in declaration order. Default 0.
     pub priority: i32,
@@ -391,8 +392,8 @@ impl Span {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum OperationKind {
-    /// Replaces or shifts a number by a fresh uniform draw per message. One parameter: a sub-range ([`Parameter`] of
-    /// shape [`Shape::Range`]) in the field's unit.
+    /// Replaces or shifts a number by a fresh uniform draw per message. One parameter: a sub-range
+    /// ([`Shape::Range`]) in the field's unit.
     RandomValue {
         /// Field names from the message inwards; empty for a topic that carries the number itself.
         path: Vec<String>,
@@ -412,9 +413,32 @@ pub enum OperationKind {
     },
     /// Drops every message. No parameters.
     Blackhole,
+    /// The user's Rust code, with parameters as declared.
+    Custom {
+        /// When it is called.
+        moment: Moment,
+    },
+}
+
+/// When the code of a custom operation is called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Moment {
+    /// With each message of its topic while the operation is active.
+    OnMessage,
+    /// Once, before the simulator starts afresh for the test.
+    BeforeStart,
+    /// Once, after a run that came to its end.
+    AfterEnd,
 }
 
 impl OperationKind {
+    /// Whether it acts beside the run, before its start or after its end: its activation in a test is then
+    /// [`crate::Activation::Offline`], and it has no observed intervals.
+    pub fn is_offline(&self) -> bool {
+        matches!(self, OperationKind::Custom { moment: Moment::BeforeStart | Moment::AfterEnd })
+    }
+
     /// The kind in words, as the `.sesame` file has it.
     pub fn words(&self) -> &'static str {
         match self {
@@ -423,6 +447,9 @@ impl OperationKind {
             OperationKind::PacketLoss => "packet loss",
             OperationKind::Latency { .. } => "latency",
             OperationKind::Blackhole => "blackhole",
+            OperationKind::Custom { moment: Moment::OnMessage } => "custom",
+            OperationKind::Custom { moment: Moment::BeforeStart } => "custom before start",
+            OperationKind::Custom { moment: Moment::AfterEnd } => "custom after end",
         }
     }
 }
@@ -460,21 +487,60 @@ pub enum Drain {
     Drop,
 }
 
-/// A parameter of an operation: its permitted range in the space, and what a test makes of it.
+/// A parameter of an operation: what is permitted in the space, and what a test makes of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// Its name in a test, for example `offset`, `loss`, `delay`.
     pub name: String,
-    /// Its unit; `None` for probabilities and plain numbers.
+    /// Its unit; `None` for probabilities, plain numbers, texts and files.
     pub unit: Option<String>,
-    /// Lower end of what is permitted.
-    pub low: f64,
-    /// Upper end of what is permitted.
-    pub high: f64,
-    /// What a test chooses.
-    pub shape: Shape,
-    /// Whether only whole numbers are permitted.
-    pub integer: bool,
+    /// What is permitted.
+    pub domain: Domain,
+}
+
+/// What a test may choose for a parameter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Domain {
+    /// Numbers of a range.
+    Number {
+        /// Lower end of what is permitted.
+        low: f64,
+        /// Upper end of what is permitted.
+        high: f64,
+        /// What a test chooses.
+        shape: Shape,
+        /// Whether only whole numbers are permitted.
+        integer: bool,
+    },
+    /// A point of a box, both corners included; `low <= high` on each axis.
+    Point {
+        /// Lower corner: x, y, z.
+        low: [f64; 3],
+        /// Upper corner.
+        high: [f64; 3],
+    },
+    /// One of these texts: at least one, none twice.
+    Texts {
+        /// The texts, in declaration order.
+        texts: Vec<String>,
+    },
+    /// One of these files: at least one, none twice. Paths are relative to the folder of the `.sesame` file, with `/`.
+    Files {
+        /// The paths, in declaration order.
+        files: Vec<String>,
+    },
+}
+
+impl Domain {
+    /// The texts or paths to choose from; `None` for numbers and points.
+    pub fn items(&self) -> Option<&[String]> {
+        match self {
+            Domain::Texts { texts } => Some(texts),
+            Domain::Files { files } => Some(files),
+            Domain::Number { .. } | Domain::Point { .. } => None,
+        }
+    }
 }
 
 /// What a test chooses of a permitted range.

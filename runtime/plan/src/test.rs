@@ -25,7 +25,8 @@ pub struct TestOperation {
     pub draw_seed: u64,
 }
 
-/// When an operation of a test is active.
+/// When an operation of a test is active. [`Activation::Offline`] is that of the operations that are
+/// [offline](crate::OperationKind::is_offline), and of no others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Activation {
@@ -54,10 +55,12 @@ pub enum Activation {
         /// How often at most in one run, from 1.
         times: u32,
     },
+    /// Never during the run: it acts before the start or after the end, and has no window.
+    Offline,
 }
 
 /// What a test chose for one parameter, in the parameter's unit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Choice {
     /// One value ([`crate::Shape::Value`]).
@@ -71,6 +74,16 @@ pub enum Choice {
         low: f64,
         /// Upper end.
         high: f64,
+    },
+    /// A point ([`crate::Domain::Point`]).
+    Point {
+        /// Its x, y and z.
+        point: [f64; 3],
+    },
+    /// One of the texts, or the path of one of the files ([`crate::Domain::Texts`], [`crate::Domain::Files`]).
+    Text {
+        /// The text or path.
+        text: String,
     },
 }
 

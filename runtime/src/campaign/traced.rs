@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sesame_plan::{CampaignPlan, Recorded};
 
-use crate::evaluate::evaluate_tapped;
+use crate::evaluate::{Custom, Run, evaluate_tapped};
 use crate::metric::MetricTable;
 use crate::observation::{Observation, Outcome};
 use crate::transport::Transport;
@@ -39,10 +39,12 @@ pub(super) fn run(
     transport: &mut dyn Transport,
     job: &Job,
     directory: &Path,
+    custom: &mut Custom<'_>,
 ) -> (Observation, Option<String>) {
     let Job { test, simulator_seed, .. } = job;
+    let what = Run { test, simulator_seed: *simulator_seed };
     let Some(order) = &job.trace else {
-        let observed = evaluate_tapped(plan, wires, metrics, transport, test, *simulator_seed, None);
+        let observed = evaluate_tapped(plan, wires, metrics, transport, &what, custom, None);
         return (observed.unwrap_or_else(|misfit| crashed(misfit.to_string())), None);
     };
     #[cfg(feature = "mcap")]
@@ -54,7 +56,7 @@ pub(super) fn run(
             Ok(writer) => writer,
             Err(error) => return (crashed("there was no trace to write to".to_owned()), Some(error.to_string())),
         };
-        let observed = evaluate_tapped(plan, wires, metrics, transport, test, *simulator_seed, Some(&mut writer));
+        let observed = evaluate_tapped(plan, wires, metrics, transport, &what, custom, Some(&mut writer));
         let observation = observed.unwrap_or_else(|misfit| crashed(misfit.to_string()));
         let settled = if is_kept(plan, order.keep, &observation) {
             writer.keep(&observation, &order.file).map_err(|error| error.to_string())

@@ -2,6 +2,7 @@
 
 use std::io;
 use std::net::{SocketAddr, TcpStream};
+use std::path::Path;
 use std::sync::mpsc;
 use std::thread;
 
@@ -9,6 +10,8 @@ use sesame_plan::CampaignPlan;
 
 use super::frames::{self, Hello, Job, Reply};
 use super::traced;
+use crate::changed_files::ChangedFiles;
+use crate::evaluate::Custom;
 use crate::last_panic;
 use crate::metric::MetricTable;
 use crate::observation::{Observation, Outcome, WallTime};
@@ -28,11 +31,16 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: SocketAddr, token
     let wires = WireTable::new(plan);
     let metrics = MetricTable::new(plan, &wires, runner.hooks).map_err(io::Error::other)?;
     let jobs = read_jobs(stream.try_clone()?);
+    let space = Path::new(runner.directory).join(runner.space);
+    let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
+    let files = if may_change { ChangedFiles::for_worker(&space) } else { Ok(ChangedFiles::unlocked(&space)) };
+    let mut custom = Custom { hooks: runner.operations, files: files.map_err(io::Error::other)? };
     let mut transport = None;
     let directory = std::env::current_dir()?;
     for job in jobs {
         let simulator = transport.get_or_insert_with(|| runner.connect.transport(plan));
-        let (observation, trace_failure) = traced::run(plan, &wires, &metrics, simulator.as_mut(), &job, &directory);
+        let (observation, trace_failure) =
+            traced::run(plan, &wires, &metrics, simulator.as_mut(), &job, &directory, &mut custom);
         if matches!(observation.outcome, Outcome::Crash { .. }) {
             transport = None;
         }

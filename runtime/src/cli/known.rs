@@ -7,7 +7,7 @@ use clap::Args;
 use sesame_plan::{CampaignPlan, KnownTestId, Search};
 
 use super::Failure;
-use super::work::{Ending, Work, begin, carry_out, refuse_unfilled};
+use super::work::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled};
 use crate::runner::Runner;
 
 /// Which known tests are run, and how.
@@ -39,11 +39,12 @@ pub(super) fn known(
     plan.campaign.search = Search::Known { tests };
     // Nothing is sought, so there is no front.
     plan.campaign.objectives.clear();
+    let files = claim_files(runner, &plan)?;
     refuse_unfilled(runner, &plan, true)?;
     let seed = options.seed.unwrap_or(plan.campaign.seed);
     let results = options.results.as_deref().unwrap_or(results);
     let (recorder, folder) = begin(results, "known", &plan, seed, &options.work)?;
-    carry_out(&plan, recorder, &folder, seed, &options.work, &options.ending)
+    carry_out(&plan, recorder, &folder, seed, &options.work, &options.ending, files)
 }
 
 /// The known tests of these names, each once and in the space's order; all of them when no name is given.

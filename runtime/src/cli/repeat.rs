@@ -8,7 +8,7 @@ use sesame_plan::{CampaignPlan, KnownTest, KnownTestId, Search, Test};
 
 use super::Failure;
 use super::recorded::{open, refuse_changed};
-use super::work::{Ending, Work, begin, carry_out, refuse_unfilled};
+use super::work::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled};
 use crate::rng::derive_seed;
 use crate::runner::Runner;
 
@@ -65,10 +65,11 @@ pub(super) fn repeat(
     };
     let seed = options.seed.unwrap_or_else(|| derive_seed(seed, &format!("repeat {name}"), &[]));
     repeating(&mut plan, &name, test, options.times);
+    let files = claim_files(runner, &plan)?;
     refuse_unfilled(runner, &plan, true)?;
     let results = options.into.as_deref().unwrap_or(&results);
     let (recorder, folder) = begin(results, &format!("repeat-{name}"), &plan, seed, &options.work)?;
-    carry_out(&plan, recorder, &folder, seed, &options.work, &options.ending)
+    carry_out(&plan, recorder, &folder, seed, &options.work, &options.ending, files)
 }
 
 fn recorded(plan: &CampaignPlan, results: &Path, options: &Options) -> Result<Repeated, Failure> {

@@ -8,7 +8,7 @@ use clap::Args;
 use sesame_plan::CampaignPlan;
 
 use super::recorded::{open, refuse_changed};
-use super::work::{interruptible, refuse_unfilled, seconds};
+use super::work::{claim_files, interruptible, refuse_unfilled, seconds};
 use super::{Failure, Format, NOT_AS_REQUIRED, STOPPED, Which, print, print_json, text_options};
 use crate::campaign::{AloneSettings, Ended, Job, patience, run_alone};
 use crate::observation::Outcome;
@@ -37,6 +37,7 @@ pub(super) fn replay(
     let repository = open(results, options.which.results.as_deref())?;
     let record = repository.test(repository.find(&options.test)?)?;
     refuse_changed(&repository, plan, record.number)?;
+    let files = claim_files(runner, plan)?;
     refuse_unfilled(runner, plan, true)?;
     let interrupted = interruptible()?;
     let folder = Scratch::new()?;
@@ -47,7 +48,9 @@ pub(super) fn replay(
     };
     let job =
         Job { number: record.number, test: record.test.clone(), simulator_seed: record.simulator_seed, trace: None };
-    let Some(Ended { observation: again, last_words, .. }) = run_alone(job, &settings, &interrupted)? else {
+    let ended = run_alone(job, &settings, &interrupted);
+    files.finish()?;
+    let Some(Ended { observation: again, last_words, .. }) = ended? else {
         eprintln!("stopped; a replay leaves nothing behind");
         return Ok(ExitCode::from(STOPPED));
     };

@@ -8,7 +8,7 @@ use sesame_plan::{CampaignPlan, Search};
 
 use super::Failure;
 use super::recorded::same_model;
-use super::work::{Ending, Work, begin, carry_out, refuse_unfilled, shown};
+use super::work::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled, shown};
 use crate::record::{self, Recorder};
 use crate::runner::Runner;
 
@@ -59,11 +59,12 @@ pub(super) fn run(
             Search::Known { tests } => tests.truncate(usize::try_from(wanted).unwrap_or(usize::MAX)),
         }
     }
+    let files = claim_files(runner, &plan)?;
     refuse_unfilled(runner, &plan, options.allow_unimplemented)?;
     let seed = options.seed.unwrap_or(plan.campaign.seed);
     let results = options.results.as_deref().unwrap_or(results);
     let (recorder, folder) = begin(results, &seed.to_string(), &plan, seed, &options.work)?;
-    carry_out(&plan, recorder, &folder, seed, &options.work, &options.ending)
+    carry_out(&plan, recorder, &folder, seed, &options.work, &options.ending, files)
 }
 
 pub(super) fn resume(
@@ -86,6 +87,7 @@ pub(super) fn resume(
             shown(&folder)
         )));
     }
+    let files = claim_files(runner, plan)?;
     refuse_unfilled(runner, plan, true)?;
-    carry_out(&recorded, recorder, &folder, seed, &options.work, &options.ending)
+    carry_out(&recorded, recorder, &folder, seed, &options.work, &options.ending, files)
 }

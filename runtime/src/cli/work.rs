@@ -9,11 +9,13 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde::Serialize;
-use sesame_plan::{CampaignPlan, Search};
+use sesame_plan::{CampaignPlan, Domain, Search};
 
 use super::progress::{Display, wait};
 use super::{Failure, Format, NOT_AS_REQUIRED, STOPPED, print, print_json, text_options};
 use crate::campaign::{Conducted, Settings, conduct};
+use crate::changed_files::ChangedFiles;
+use crate::fuzz::unimplemented_operations;
 use crate::metric::unimplemented_hooks;
 use crate::record::{self, Claim, Recorder, Repository, Verdict};
 use crate::report::{self, Summary};
@@ -77,6 +79,12 @@ pub(super) fn refuse_unfilled(runner: &Runner, plan: &CampaignPlan, allowed: boo
             eprintln!("warning: the hook of metric `{name}` is not filled in yet");
         }
     }
+    for id in unimplemented_operations(plan, runner.operations) {
+        eprintln!(
+            "warning: the hook of operation `{}` is not filled in yet: it disturbs nothing",
+            plan.operation(id).name
+        );
+    }
     if objectives.is_empty() {
         return Ok(());
     }
@@ -88,6 +96,49 @@ pub(super) fn refuse_unfilled(runner: &Runner, plan: &CampaignPlan, allowed: boo
         objectives.join(" and "),
         shown(&hooks)
     )))
+}
+
+/// Puts back files of the space that an earlier run left changed, and keeps other runners of the space out if tests may
+/// change files. A file that a test may choose and that is not there ends the run before it starts.
+pub(super) fn claim_files(runner: &Runner, plan: &CampaignPlan) -> Result<Files, Failure> {
+    let space = Path::new(runner.directory).join(runner.space);
+    let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
+    let (files, put_back) = ChangedFiles::for_supervisor(&space, may_change)?;
+    for path in put_back {
+        eprintln!("note: an earlier run was ended while {} was changed; it is put back", path.display());
+    }
+    for operation in &plan.operations {
+        for parameter in &operation.parameters {
+            let Domain::Files { files: paths } = &parameter.domain else { continue };
+            for path in paths {
+                if !files.resolve(Path::new(path))?.is_file() {
+                    return Err(Failure(format!(
+                        "operation `{}` may choose the file `{path}`, which is not in {}: put it there, or leave it out",
+                        operation.name,
+                        shown(files.folder())
+                    )));
+                }
+            }
+        }
+    }
+    Ok(Files { files, may_change })
+}
+
+/// The files of the space while a command runs tests.
+#[derive(Debug)]
+pub(super) struct Files {
+    files: ChangedFiles,
+    may_change: bool,
+}
+
+impl Files {
+    /// Puts back what the last worker could not; workers have ended by then.
+    pub(super) fn finish(mut self) -> Result<(), Failure> {
+        if self.may_change {
+            self.files.put_back()?;
+        }
+        Ok(())
+    }
 }
 
 /// Begins the results of a run in a fresh folder of this name.
@@ -113,9 +164,14 @@ pub(super) fn carry_out(
     seed: u64,
     work: &Work,
     ending: &Ending,
+    files: Files,
 ) -> Result<ExitCode, Failure> {
-    let settings =
-        Settings { seed, workers: work.processes(), timeout: work.timeout, program: std::env::current_exe()? };
+    // A file that is changed is changed for every simulator.
+    let workers = if files.may_change { 1 } else { work.processes() };
+    if work.workers.is_some_and(|asked| asked.get() > workers) {
+        eprintln!("note: tests run one at a time, since operations may change files");
+    }
+    let settings = Settings { seed, workers, timeout: work.timeout, program: std::env::current_exe()? };
     let interrupted = interruptible()?;
     let started = Instant::now();
     let mut display = Display::new(plan, seed);
@@ -123,6 +179,7 @@ pub(super) fn carry_out(
         display.update(progress);
     });
     display.finish();
+    files.finish()?;
     match conducted? {
         Conducted::Finished(repository) => {
             let code = conclude(&repository, folder, &folder.join("report.html"), ending)?;

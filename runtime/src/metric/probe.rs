@@ -40,7 +40,7 @@ pub fn unimplemented_hooks(plan: &CampaignPlan, hooks: &[HookEntry]) -> Vec<Metr
 }
 
 /// A message of a type: zeros, empty texts and lists.
-fn sample(plan: &CampaignPlan, ty: &Type) -> Value {
+pub(crate) fn sample(plan: &CampaignPlan, ty: &Type) -> Value {
     match ty {
         Type::Bool => Value::Bool(false),
         Type::Int { .. } => Value::Int(0),

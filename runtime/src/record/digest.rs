@@ -35,7 +35,7 @@ const CONTENT: &[(&str, &str)] = &[
     ),
     (
         "choices",
-        "SELECT test, operation, position, parameter, unit, value, low, high FROM choices \
+        "SELECT test, operation, position, parameter, unit, value, low, high, x, y, z, text FROM choices \
          ORDER BY test, operation, position",
     ),
     ("intervals", "SELECT test, operation, position, start_s, end_s FROM intervals ORDER BY test, operation, position"),

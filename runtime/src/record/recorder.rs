@@ -210,11 +210,14 @@ fn unrecordable(record: &TestRecord) -> Option<String> {
                 numbers.push(("the length of an activation", *length));
                 numbers_of(start, &mut |number| numbers.push(("a number in a condition", number)));
             }
+            Activation::Offline => {}
         }
         for choice in &operation.parameters {
-            match *choice {
-                Choice::Value { value } => numbers.push(("a parameter", value)),
-                Choice::Range { low, high } => numbers.extend([("a parameter", low), ("a parameter", high)]),
+            match choice {
+                Choice::Value { value } => numbers.push(("a parameter", *value)),
+                Choice::Range { low, high } => numbers.extend([("a parameter", *low), ("a parameter", *high)]),
+                Choice::Point { point } => numbers.extend(point.map(|coordinate| ("a parameter", coordinate))),
+                Choice::Text { .. } => {}
             }
         }
     }
@@ -271,6 +274,7 @@ fn switched(activation: &Activation, plan: &CampaignPlan) -> Switched {
         Activation::ConditionFor { start, length, times } => {
             (None, None, text(start), None, Some(*length), Some(*times))
         }
+        Activation::Offline => (None, None, None, None, None, None),
     }
 }
 
@@ -375,14 +379,18 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
                 effect.and_then(|effect| effect.last_touch),
             ])?;
         for (at, (choice, parameter)) in operation.parameters.iter().zip(&kind.parameters).enumerate() {
-            let (value, low, high) = match *choice {
-                Choice::Value { value } => (Some(value), None, None),
-                Choice::Range { low, high } => (None, Some(low), Some(high)),
-            };
+            let (mut value, mut low, mut high, mut point, mut text) = (None, None, None, None, None);
+            match choice {
+                Choice::Value { value: chosen } => value = Some(*chosen),
+                Choice::Range { low: from, high: to } => (low, high) = (Some(*from), Some(*to)),
+                Choice::Point { point: chosen } => point = Some(*chosen),
+                Choice::Text { text: chosen } => text = Some(chosen.as_str()),
+            }
+            let axis = |axis: usize| point.map(|point| point[axis]);
             transaction
                 .prepare_cached(
-                    "INSERT INTO choices (test, operation, position, parameter, unit, value, low, high) \
-                     VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+                    "INSERT INTO choices (test, operation, position, parameter, unit, value, low, high, x, y, z, text) \
+                     VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
                 )?
                 .execute(params![
                     number,
@@ -392,7 +400,11 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
                     parameter.unit,
                     value,
                     low,
-                    high
+                    high,
+                    axis(0),
+                    axis(1),
+                    axis(2),
+                    text
                 ])?;
         }
         for (at, span) in effect.into_iter().flat_map(|effect| &effect.intervals).enumerate() {

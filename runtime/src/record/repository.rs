@@ -272,13 +272,16 @@ impl Repository {
 
     fn operations(&self, only: Option<u32>) -> Result<BTreeMap<i64, Vec<TestOperation>>, RecordError> {
         let choices = self.read(
-            "SELECT test, operation, value, low, high FROM choices WHERE ?1 IS NULL OR test = ?1 \
+            "SELECT test, operation, value, low, high, x, y, z, text FROM choices WHERE ?1 IS NULL OR test = ?1 \
              ORDER BY test, operation, position",
             params![only],
             |row| {
-                let choice = match (row.get(2)?, row.get(3)?, row.get(4)?) {
-                    (Some(value), None, None) => Some(Choice::Value { value }),
-                    (None, Some(low), Some(high)) => Some(Choice::Range { low, high }),
+                let point: [Option<f64>; 3] = [row.get(5)?, row.get(6)?, row.get(7)?];
+                let choice = match (row.get(2)?, row.get(3)?, row.get(4)?, point, row.get(8)?) {
+                    (Some(value), None, None, [None, None, None], None) => Some(Choice::Value { value }),
+                    (None, Some(low), Some(high), [None, None, None], None) => Some(Choice::Range { low, high }),
+                    (None, None, None, [Some(x), Some(y), Some(z)], None) => Some(Choice::Point { point: [x, y, z] }),
+                    (None, None, None, [None, None, None], Some(text)) => Some(Choice::Text { text }),
                     _ => None,
                 };
                 Ok(((row.get(0)?, row.get(1)?), choice))
@@ -287,7 +290,10 @@ impl Repository {
         let mut parameters: BTreeMap<At, Vec<Choice>> = BTreeMap::new();
         for (at, choice) in choices {
             let choice = choice.ok_or_else(|| {
-                RecordError::damaged(&self.path, format!("T{} has a choice that is neither value nor range", at.0))
+                RecordError::damaged(
+                    &self.path,
+                    format!("T{} has a choice that is neither value, range, point nor text", at.0),
+                )
             })?;
             parameters.entry(at).or_default().push(choice);
         }
@@ -313,7 +319,7 @@ impl Repository {
             })?;
             tests.entry(at.0).or_default().push(TestOperation {
                 operation,
-                activation: self.activation(at.0, window, conditions)?,
+                activation: self.activation(at.0, operation, window, conditions)?,
                 parameters: parameters.remove(&at).unwrap_or_default(),
                 draw_seed: self.seed(&draw_seed)?,
             });
@@ -321,12 +327,24 @@ impl Repository {
         Ok(tests)
     }
 
-    fn activation(&self, test: i64, window: Window, conditions: Conditions) -> Result<Activation, RecordError> {
+    fn activation(
+        &self,
+        test: i64,
+        operation: OperationId,
+        window: Window,
+        conditions: Conditions,
+    ) -> Result<Activation, RecordError> {
+        let operation = self.plan().operation(operation);
         let read = |text: String| {
             condition::text::read(&text, &self.plan().metrics)
                 .map_err(|problem| RecordError::damaged(&self.path, format!("a condition of T{test}: {problem}")))
         };
         match (window, conditions) {
+            ((None, None), (None, None, None, None)) if operation.kind.is_offline() => Ok(Activation::Offline),
+            _ if operation.kind.is_offline() => Err(RecordError::damaged(
+                &self.path,
+                format!("T{test} has `{}` during the run, which acts before or after it", operation.name),
+            )),
             ((Some(start), Some(end)), (None, None, None, None)) => Ok(Activation::Time { start, end }),
             ((None, None), (Some(start), Some(end), None, Some(times))) => {
                 Ok(Activation::Condition { start: read(start)?, end: read(end)?, times })

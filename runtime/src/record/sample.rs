@@ -27,7 +27,7 @@ fn operation(name: &str, topic: u32, kind: OperationKind, parameters: Vec<Parame
     Operation {
         name: name.to_owned(),
         doc: String::new(),
-        topic: TopicId(topic),
+        topic: Some(TopicId(topic)),
         kind,
         parameters,
         within: Span { start: 0.0, end: 65.0 },
@@ -43,13 +43,13 @@ pub(crate) fn plan() -> CampaignPlan {
     let offset = Parameter {
         name: "offset".to_owned(),
         unit: Some("rad".to_owned()),
-        low: -0.3,
-        high: 0.3,
-        shape: Shape::Range,
-        integer: false,
+        domain: Domain::Number { low: -0.3, high: 0.3, shape: Shape::Range, integer: false },
     };
-    let loss =
-        Parameter { name: "loss".to_owned(), unit: None, low: 0.0, high: 1.0, shape: Shape::Value, ..offset.clone() };
+    let loss = Parameter {
+        name: "loss".to_owned(),
+        unit: None,
+        domain: Domain::Number { low: 0.0, high: 1.0, shape: Shape::Value, integer: false },
+    };
     let jitter = || OperationKind::RandomValue { path: vec![], mode: ValueMode::Offset, integer: false };
     let topic = |name: &str, path: &str| Topic {
         name: name.to_owned(),
@@ -133,6 +133,7 @@ fn window(operation: &TestOperation) -> (f64, f64) {
         Activation::Time { start, end } => (start, end),
         Activation::Condition { .. } => (12.0, 33.0),
         Activation::ConditionFor { length, .. } => (30.0, 30.0 + length),
+        Activation::Offline => (0.0, 0.0),
     }
 }
 
@@ -152,7 +153,7 @@ pub(crate) fn conditional_test() -> Test {
     let offset = Choice::Range { low: -0.1, high: 0.2 };
     Test {
         operations: vec![
-            use_of(0, Activation::Condition { start, end: fast(), times: 1 }, vec![offset]),
+            use_of(0, Activation::Condition { start, end: fast(), times: 1 }, vec![offset.clone()]),
             use_of(1, Activation::Time { start: 1.5, end: 20.0 }, vec![offset]),
             use_of(3, Activation::ConditionFor { start: fast(), length: 0.1 + 0.2, times: 3 }, vec![]),
         ],
@@ -194,9 +195,10 @@ pub(crate) fn observe(plan: &CampaignPlan, test: &Test, seed: u64) -> Observatio
                 if time < start || time >= end {
                     0.0
                 } else {
-                    operation.parameters.first().map_or(0.2, |&choice| match choice {
+                    operation.parameters.first().map_or(0.2, |choice| match choice {
                         Choice::Range { low, high } => (low + (high - low) * stream.unit()).abs(),
                         Choice::Value { value } => value * 0.2,
+                        other => panic!("{other:?} is none of this plan's"),
                     })
                 }
             })
@@ -261,9 +263,11 @@ fn random_test(plan: &CampaignPlan, seed: u64, number: u32) -> Test {
                 .parameters
                 .iter()
                 .map(|parameter| {
-                    let (a, b) =
-                        (stream.uniform(parameter.low, parameter.high), stream.uniform(parameter.low, parameter.high));
-                    match parameter.shape {
+                    let Domain::Number { low, high, shape, .. } = parameter.domain else {
+                        panic!("this plan has numbers only")
+                    };
+                    let (a, b) = (stream.uniform(low, high), stream.uniform(low, high));
+                    match shape {
                         Shape::Value => Choice::Value { value: a },
                         Shape::Range => Choice::Range { low: a.min(b), high: a.max(b) },
                     }

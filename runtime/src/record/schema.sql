@@ -68,8 +68,8 @@ CREATE TABLE operations (
     test            INTEGER NOT NULL REFERENCES tests,
     position        INTEGER NOT NULL, -- in the test, from 0
     operation       TEXT NOT NULL,
-    start_s         REAL,           -- planned; NULL where a condition starts it
-    end_s           REAL,           -- planned, excluded; NULL where a condition starts it
+    start_s         REAL,           -- planned; NULL where a condition starts it, and for an operation before the start or after the end
+    end_s           REAL,           -- planned, excluded; NULL likewise
     start_condition TEXT,           -- what starts it, in the words of the language; NULL where time does
     end_condition   TEXT,           -- what ends it, likewise; NULL where it has a length
     length_s        REAL,           -- how long each activation by condition is; NULL where a condition ends it
@@ -96,6 +96,10 @@ CREATE TABLE choices (
     value           REAL,
     low             REAL,
     high            REAL,
+    x               REAL,           -- a point has x, y and z
+    y               REAL,
+    z               REAL,
+    text            TEXT,           -- a text, or the path of a file
     PRIMARY KEY (test, operation, position)
 ) STRICT, WITHOUT ROWID;
 

@@ -423,6 +423,8 @@ fn change(record: &mut TestRecord, kind: usize) {
         20 => match &mut record.test.operations[0].parameters[0] {
             sesame_plan::Choice::Range { high, .. } => next_up(high),
             sesame_plan::Choice::Value { value } => next_up(value),
+            sesame_plan::Choice::Point { point } => next_up(&mut point[1]),
+            sesame_plan::Choice::Text { text } => text.push('.'),
         },
         _ => observation.operations.clear(),
     }

@@ -12,7 +12,9 @@ use crate::wire::Wire;
 #[derive(Debug)]
 pub(super) struct Held {
     pub(super) wire: Wire,
-    /// Its index among the messages published on its wire.
+    /// Its index among the messages published on its wire; of an injected one, that of the message it came with.
+    pub(super) published: u64,
+    /// What its draws are keyed by: its index, or of an injected one a number of its own.
     pub(super) index: u64,
     pub(super) value: Value,
     /// The position in its wire's pipeline at which it goes on.
@@ -22,7 +24,7 @@ pub(super) struct Held {
 impl Held {
     /// Which message it is, for a tap.
     pub(super) fn touched(&self) -> Touched {
-        Touched { wire: self.wire, index: self.index }
+        Touched { wire: self.wire, index: self.published }
     }
 }
 

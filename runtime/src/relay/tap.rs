@@ -25,6 +25,8 @@ pub enum Deed {
     Changed(Touched),
     /// It dropped a message, or one that it held back when it ended.
     Dropped(Touched),
+    /// It made up a message, which goes on after this one.
+    Injected(Touched),
     /// It holds a message back until then.
     Delayed(Touched, SimTime),
 }

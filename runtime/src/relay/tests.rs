@@ -34,7 +34,7 @@ fn relayed(
     let plan = plan(operations);
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-    let mut relay = Relay::new(&plan, &wires, &test_of(test.to_vec()), metrics.start()).unwrap();
+    let mut relay = Relay::new(&plan, &wires, &test_of(test.to_vec()), metrics.start(), &[]).unwrap();
     let mut delivered = Vec::new();
     let mut messages = messages.iter().peekable();
     for tick in 0..=100 {
@@ -216,7 +216,7 @@ fn choices_outside_what_is_permitted_are_refused() {
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     let test: Test = test_of(vec![use_of(0, 0.0, 1.0, one(1.5), 1)]);
-    let refused = Relay::new(&plan, &wires, &test, metrics.start()).err().map(|error| error.to_string());
+    let refused = Relay::new(&plan, &wires, &test, metrics.start(), &[]).err().map(|error| error.to_string());
     assert_eq!(refused.as_deref(), Some("operation `packet_loss` `loss` permits [0, 1], not [1.5, 1.5]"));
 }
 
@@ -278,7 +278,7 @@ fn an_outbound_metric_hears_what_operations_made_of_a_message_and_an_inbound_one
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     // From 1 s to 2 s all is lost; what is sent from 3 s on is delayed by 5 s, and the run ends at 8 s.
     let test = test_of(vec![use_of(0, 1.0, 2.0, vec![], 1), use_of(1, 3.0, 10.0, one(5.0), 1)]);
-    let mut relay = Relay::new(&plan, &wires, &test, metrics.start()).unwrap();
+    let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).unwrap();
     let command = wires.find(COMMAND).unwrap();
     for tenth in 0..80 {
         relay.message(SimTime::from_nanos(tenth * 100_000_000), command, Value::Real(0.0), &mut Vec::new());
@@ -375,7 +375,7 @@ fn a_variable_has_its_initial_value_before_its_first_and_without_one_its_compari
         let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
         let until = Activation::Condition { start: below(1, 1.0), end: above(1, 1.0), times: 1 };
         let mut relay =
-            Relay::new(&plan, &wires, &test_of(vec![by_condition(0, until, vec![])]), metrics.start()).unwrap();
+            Relay::new(&plan, &wires, &test_of(vec![by_condition(0, until, vec![])]), metrics.start(), &[]).unwrap();
         relay.advance(SimTime::from_seconds(1.0), &mut Vec::new());
         relay.message(SimTime::from_seconds(2.0), wires.find(COMMAND).unwrap(), Value::Real(0.0), &mut Vec::new());
         relay.message(SimTime::from_seconds(3.0), wires.find(COMMAND).unwrap(), Value::Real(2.0), &mut Vec::new());
@@ -402,7 +402,8 @@ fn what_an_outbound_metric_shows_counts_from_the_next_event_on() {
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     let until = Activation::Condition { start: above(1, 2.5), end: above(1, 100.0), times: 1 };
-    let mut relay = Relay::new(&plan, &wires, &test_of(vec![by_condition(0, until, vec![])]), metrics.start()).unwrap();
+    let mut relay =
+        Relay::new(&plan, &wires, &test_of(vec![by_condition(0, until, vec![])]), metrics.start(), &[]).unwrap();
     for second in 1..=5 {
         let now = SimTime::from_seconds(f64::from(second));
         relay.message(now, wires.find(COMMAND).unwrap(), Value::Real(0.0), &mut Vec::new());

@@ -6,7 +6,7 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use sesame_plan::{Activation, CampaignPlan, Choice, MetricId, OperationKind};
+use sesame_plan::{Activation, CampaignPlan, Choice, MetricId, Moment, OperationKind, TestOperation};
 
 use crate::condition;
 use crate::decimal::{decimal, quantity};
@@ -62,14 +62,23 @@ fn block(plan: &CampaignPlan, seed: u64, record: &TestRecord, name: &str) -> Str
                 (OperationKind::PacketLoss, _) => format!("{}%", decimal(x, 2)),
                 (_, unit) => quantity(x, unit.as_deref()),
             };
-            let _ = match *choice {
-                Choice::Value { value } => write!(text, " {} {}", parameter.name, written(value)),
+            let _ = match choice {
+                Choice::Value { value } => write!(text, " {} {}", parameter.name, written(*value)),
                 Choice::Range { low, high } => {
-                    write!(text, " {} [{}, {}]", parameter.name, written(low), written(high))
+                    write!(text, " {} [{}, {}]", parameter.name, written(*low), written(*high))
+                }
+                Choice::Point { point } => {
+                    let [x, y, z] = point.map(|coordinate| decimal(coordinate, 0));
+                    let unit = parameter.unit.as_deref().unwrap_or_default();
+                    write!(text, " {} ({x}, {y}, {z}){unit}", parameter.name)
+                }
+                Choice::Text { text: chosen } => {
+                    let escaped = chosen.replace('\\', "\\\\").replace('"', "\\\"");
+                    write!(text, " {} \"{escaped}\"", parameter.name)
                 }
             };
         }
-        let _ = writeln!(text, " {} seed {}", activation(plan, &used.activation), used.draw_seed);
+        let _ = writeln!(text, " {} seed {}", activation(plan, used), used.draw_seed);
     }
     expectations(&mut text, plan, record);
     text.push_str("}\n");
@@ -77,11 +86,11 @@ fn block(plan: &CampaignPlan, seed: u64, record: &TestRecord, name: &str) -> Str
 }
 
 /// When an operation is active, in the words of the language.
-pub(super) fn activation(plan: &CampaignPlan, activation: &Activation) -> String {
+pub(super) fn activation(plan: &CampaignPlan, used: &TestOperation) -> String {
     let seconds = |time: &f64| quantity(*time, Some("s"));
     let words = |condition| condition::text::write(condition, &plan.metrics);
     let often = |times: &u32| if *times == 1 { String::new() } else { format!(" at most {times} times") };
-    match activation {
+    match &used.activation {
         Activation::Time { start, end } => format!("from {} to {}", seconds(start), seconds(end)),
         Activation::Condition { start, end, times } => {
             format!("when {} until {}{}", words(start), words(end), often(times))
@@ -89,6 +98,10 @@ pub(super) fn activation(plan: &CampaignPlan, activation: &Activation) -> String
         Activation::ConditionFor { start, length, times } => {
             format!("when {} for {}{}", words(start), seconds(length), often(times))
         }
+        Activation::Offline => match plan.operation(used.operation).kind {
+            OperationKind::Custom { moment: Moment::AfterEnd } => "after end".to_owned(),
+            _ => "before start".to_owned(),
+        },
     }
 }
 

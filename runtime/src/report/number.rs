@@ -85,10 +85,16 @@ fn range(low: f64, high: f64) -> String {
 }
 
 /// What a test chose, as in `offset 0.27…0.29 rad`, `loss 40 %`, `delay 20…100 ms`.
-pub(crate) fn choice(kind: &OperationKind, parameter: &Parameter, choice: Choice) -> String {
+pub(crate) fn choice(kind: &OperationKind, parameter: &Parameter, choice: &Choice) -> String {
     let (low, high) = match choice {
-        Choice::Value { value } => (value, value),
-        Choice::Range { low, high } => (low, high),
+        Choice::Value { value } => (*value, *value),
+        Choice::Range { low, high } => (*low, *high),
+        Choice::Point { point } => {
+            let decimals = decimals(*point);
+            let point = point.map(|coordinate| fixed(coordinate, decimals)).join(", ");
+            return format!("{} {}", parameter.name, with_unit(format!("({point})"), parameter.unit.as_deref()));
+        }
+        Choice::Text { text } => return format!("{} {text}", parameter.name),
     };
     let (factor, unit) = match kind {
         OperationKind::PacketLoss => (100.0, Some("%")),
@@ -97,8 +103,8 @@ pub(crate) fn choice(kind: &OperationKind, parameter: &Parameter, choice: Choice
         _ => (1.0, parameter.unit.as_deref()),
     };
     let text = match choice {
-        Choice::Value { value } => number(value * factor),
-        Choice::Range { .. } => range(low * factor, high * factor),
+        Choice::Value { .. } => number(low * factor),
+        _ => range(low * factor, high * factor),
     };
     format!("{} {}", parameter.name, with_unit(text, unit))
 }

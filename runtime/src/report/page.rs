@@ -516,7 +516,7 @@ fn figures(body: &mut Markup, report: &TestReport) {
                 let observed = operation.observed.as_deref().map_or("unknown".to_owned(), spans_text);
                 let cells = [
                     operation.kind.clone(),
-                    operation.topic.clone(),
+                    operation.topic.clone().unwrap_or_default(),
                     choices_text(operation),
                     planned_text(operation),
                     observed,

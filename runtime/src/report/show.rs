@@ -94,11 +94,13 @@ pub struct OperationReport {
     pub operation: String,
     /// Its kind in words.
     pub kind: String,
-    /// The topic it disturbs.
-    pub topic: String,
-    /// When it was to be active, in seconds; `None` where conditions decide that.
+    /// The topic it disturbs; `None` for one that acts before the start or after the end.
+    pub topic: Option<String>,
+    /// When it was to be active, in seconds; `None` where conditions decide that, and for one that acts before the start or
+    /// after the end.
     pub planned: Option<Span>,
-    /// What switched it on and off, in the words of the language; `None` where a planned window did.
+    /// What switched it on and off, in the words of the language; `None` where a planned window did, and for one that acts
+    /// before the start or after the end.
     pub conditions: Option<String>,
     /// When it was seen to be active, in seconds; `None` where the run could not report it.
     pub observed: Option<Vec<Span>>,
@@ -121,7 +123,7 @@ pub struct ChoiceReport {
     pub parameter: String,
     /// Its unit; `None` for probabilities and plain numbers.
     pub unit: Option<String>,
-    /// The value or sub-range.
+    /// The value, sub-range, point or text.
     pub choice: Choice,
     /// Both in words, as in `offset 0.27…0.29 rad`.
     pub text: String,
@@ -251,12 +253,15 @@ fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> 
         let effect = record.observation.operations.get(position);
         let (planned, conditions) = match used.activation {
             Activation::Time { start, end } => (Some(Span { start, end }), None),
-            _ => (None, Some(export::activation(plan, &used.activation))),
+            Activation::Condition { .. } | Activation::ConditionFor { .. } => {
+                (None, Some(export::activation(plan, used)))
+            }
+            Activation::Offline => (None, None),
         };
         OperationReport {
             operation: operation.name.clone(),
             kind: operation.kind.words().to_owned(),
-            topic: plan.topic(operation.topic).name.clone(),
+            topic: operation.topic.map(|topic| plan.topic(topic).name.clone()),
             planned,
             conditions,
             observed: effect.map(|effect| effect.intervals.clone()),
@@ -264,10 +269,10 @@ fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> 
                 .parameters
                 .iter()
                 .zip(&used.parameters)
-                .map(|(parameter, &choice)| ChoiceReport {
+                .map(|(parameter, choice)| ChoiceReport {
                     parameter: parameter.name.clone(),
                     unit: parameter.unit.clone(),
-                    choice,
+                    choice: choice.clone(),
                     text: number::choice(&operation.kind, parameter, choice),
                 })
                 .collect(),

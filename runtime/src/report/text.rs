@@ -295,7 +295,7 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
             table.row([
                 operation.operation.clone(),
                 operation.kind.clone(),
-                operation.topic.clone(),
+                operation.topic.clone().unwrap_or_default(),
                 planned_text(operation),
                 operation.observed.as_deref().map_or("unknown".to_owned(), spans_text),
                 choices_text(operation),
@@ -366,7 +366,7 @@ pub(crate) fn outcome_sentence(test: &TestReport) -> String {
     sentence
 }
 
-/// When an operation was to be active: its window, or the conditions that switched it.
+/// When an operation was to be active: its window, or the conditions that switched it; a dash for an offline one.
 pub(crate) fn planned_text(operation: &OperationReport) -> String {
     match (&operation.conditions, operation.planned) {
         (Some(conditions), _) => conditions.clone(),

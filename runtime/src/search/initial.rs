@@ -13,8 +13,8 @@ use sesame_plan::{Activation, Test, TestOperation};
 
 use crate::rng::Stream;
 use crate::search::condition::grown;
-use crate::search::permitted::{Permitted, PermittedOperation};
-use crate::search::range::{Range, fresh_choice};
+use crate::search::permitted::{Permitted, PermittedActivation, PermittedOperation};
+use crate::search::range::Range;
 
 /// A fresh test; one that the campaign permits.
 pub fn fresh_test(permitted: &Permitted, stream: &mut Stream) -> Test {
@@ -32,31 +32,37 @@ pub fn fresh_test(permitted: &Permitted, stream: &mut Stream) -> Test {
         let kind = kinds[stream.below(kinds.len())];
         places.insert(stream.below(places.len() + 1), kind);
     }
-    Test { operations: places.into_iter().map(|kind| fresh_operation(kind, permitted, stream)).collect() }
+    Test { operations: places.into_iter().map(|kind| fresh_operation(kind, stream)).collect() }
 }
 
 /// A fresh instance of an operation, with a draw seed of its own.
-pub fn fresh_operation(kind: &PermittedOperation, permitted: &Permitted, stream: &mut Stream) -> TestOperation {
-    let activation = fresh_activation(kind, permitted, stream);
-    let parameters = kind.parameters.iter().map(|&(range, shape)| fresh_choice(range, shape, stream)).collect();
+pub fn fresh_operation(kind: &PermittedOperation, stream: &mut Stream) -> TestOperation {
+    let activation = fresh_activation(&kind.activation, stream);
+    let parameters = kind.parameters.iter().map(|permitted| permitted.fresh(stream)).collect();
     TestOperation { operation: kind.operation, activation, parameters, draw_seed: stream.bits() }
 }
 
-/// A fresh window, or fresh conditions.
-fn fresh_activation(kind: &PermittedOperation, permitted: &Permitted, stream: &mut Stream) -> Activation {
-    let (Some(space), Some([first_start, first_end])) = (permitted.conditions(), &kind.first) else {
-        let (start, end) = kind.window.interval(stream);
-        return Activation::Time { start, end };
-    };
-    let start = grown(space, &kind.constraints, stream).unwrap_or_else(|| first_start.clone());
-    match space.end {
-        ConditionEnd::Condition => {
-            let end = grown(space, &[], stream).unwrap_or_else(|| first_end.clone());
-            Activation::Condition { start, end, times: space.times }
+/// A fresh window, or fresh conditions; of an offline operation there is nothing to choose.
+fn fresh_activation(activation: &PermittedActivation, stream: &mut Stream) -> Activation {
+    match activation {
+        PermittedActivation::Offline => Activation::Offline,
+        PermittedActivation::Time(window) => {
+            let (start, end) = window.interval(stream);
+            Activation::Time { start, end }
         }
-        ConditionEnd::Length { low, high } => {
-            let length = Range::between(low, high).number(stream);
-            Activation::ConditionFor { start, length, times: space.times }
+        PermittedActivation::Condition { space, constraints, first } => {
+            let [first_start, first_end] = &**first;
+            let start = grown(space, constraints, stream).unwrap_or_else(|| first_start.clone());
+            match space.end {
+                ConditionEnd::Condition => {
+                    let end = grown(space, &[], stream).unwrap_or_else(|| first_end.clone());
+                    Activation::Condition { start, end, times: space.times }
+                }
+                ConditionEnd::Length { low, high } => {
+                    let length = Range::between(low, high).number(stream);
+                    Activation::ConditionFor { start, length, times: space.times }
+                }
+            }
         }
     }
 }

@@ -6,9 +6,9 @@
 
 use sesame_plan::condition::{ConditionEnd, ConditionSpace, Integers, Variable};
 use sesame_plan::{
-    Activation, ActivationMode, Campaign, CampaignPlan, Choice, Count, Direction, Metric, MetricId, MetricSource,
-    Operation, OperationId, OperationKind, Parameter, SCHEMA, Search, Shape, Simulator, Span, Test, TestOperation,
-    TopicId, Transport, ValueMode,
+    Activation, ActivationMode, Campaign, CampaignPlan, Choice, Count, Direction, Domain, Metric, MetricId,
+    MetricSource, Operation, OperationId, OperationKind, Parameter, SCHEMA, Search, Shape, Simulator, Span, Test,
+    TestOperation, TopicId, Transport, ValueMode,
 };
 
 use crate::activation::Activity;
@@ -77,15 +77,12 @@ impl Landscape {
         let operation = |k: usize| Operation {
             name: format!("jitter{k}"),
             doc: String::new(),
-            topic: TopicId(0),
+            topic: Some(TopicId(0)),
             kind: OperationKind::RandomValue { path: Vec::new(), mode: ValueMode::Offset, integer: false },
             parameters: vec![Parameter {
                 name: "offset".to_owned(),
                 unit: Some("rad".to_owned()),
-                low: -0.3,
-                high: 0.3,
-                shape: Shape::Range,
-                integer: false,
+                domain: Domain::Number { low: -0.3, high: 0.3, shape: Shape::Range, integer: false },
             }],
             within: Span { start: 0.0, end: 65.0 },
             priority: 0,

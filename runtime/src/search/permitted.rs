@@ -1,10 +1,11 @@
 //! What a campaign permits its tests: which operations, how many, when, and how strong.
 
 use sesame_plan::condition::{Condition, ConditionSpace, Constraint};
-use sesame_plan::{ActivationMode, CampaignPlan, Count, OperationId, Shape};
+use sesame_plan::{ActivationMode, CampaignPlan, Count, OperationId};
 use thiserror::Error;
 
 use crate::rng::Stream;
+use crate::search::choice::PermittedChoice;
 use crate::search::condition::grown;
 use crate::search::range::Range;
 
@@ -71,17 +72,40 @@ pub struct Permitted {
 pub struct PermittedOperation {
     /// Which.
     pub operation: OperationId,
-    /// Its windows: inside `within` and the campaign.
-    pub window: Range,
+    /// When it may be active.
+    pub activation: PermittedActivation,
     /// Its parameters, in the operation's order.
-    pub parameters: Vec<(Range, Shape)>,
+    pub parameters: Vec<PermittedChoice>,
     /// Probability that a fresh test includes it.
     pub inclusion: f64,
-    /// What its start conditions contain.
-    pub constraints: Vec<Constraint>,
-    /// A start condition and an end condition that are permitted, for when many tries give no others. Only where conditions
-    /// switch.
-    pub(crate) first: Option<[Condition; 2]>,
+}
+
+/// When a campaign permits an operation to be active.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PermittedActivation {
+    /// Never, as it acts before the start or after the end: there is nothing to choose.
+    Offline,
+    /// In a window of time inside this range, which lies in `within` and the campaign.
+    Time(Range),
+    /// As conditions say.
+    Condition {
+        /// What they are grown from.
+        space: ConditionSpace,
+        /// What the start conditions contain.
+        constraints: Vec<Constraint>,
+        /// A start condition and an end condition that are permitted, for when many tries give no others.
+        first: Box<[Condition; 2]>,
+    },
+}
+
+impl PermittedActivation {
+    /// What the start conditions of an operation contain.
+    pub fn constraints(&self) -> &[Constraint] {
+        match self {
+            PermittedActivation::Condition { constraints, .. } => constraints,
+            PermittedActivation::Offline | PermittedActivation::Time(_) => &[],
+        }
+    }
 }
 
 impl Permitted {
@@ -100,31 +124,35 @@ impl Permitted {
         let mut operations = Vec::new();
         for &id in &campaign.operations {
             let operation = plan.operation(id);
+            let offline = operation.kind.is_offline();
             let end = operation.within.end.min(campaign.end_after);
-            if operation.within.start >= end {
+            if !offline && operation.within.start >= end {
                 continue;
             }
             let mut parameters = Vec::new();
             for parameter in &operation.parameters {
-                let range = Range::parameter(parameter).ok_or_else(|| SearchError::NoWholeNumber {
+                let permitted = PermittedChoice::of(&parameter.domain).ok_or_else(|| SearchError::NoWholeNumber {
                     operation: operation.name.clone(),
                     parameter: parameter.name.clone(),
                 })?;
-                parameters.push((range, parameter.shape));
+                parameters.push(permitted);
             }
             operations.push(PermittedOperation {
                 operation: id,
-                window: Range::window(operation.within.start, end),
-                parameters,
-                inclusion: operation.inclusion,
-                constraints: operation.constraints.clone(),
-                first: match &conditions {
-                    None => None,
+                activation: match &conditions {
+                    _ if offline => PermittedActivation::Offline,
+                    None => PermittedActivation::Time(Range::window(operation.within.start, end)),
                     Some(space) => {
                         let none = || SearchError::NoCondition { campaign: name(), operation: operation.name.clone() };
-                        Some(first_conditions(space, &operation.constraints).ok_or_else(none)?)
+                        PermittedActivation::Condition {
+                            space: space.clone(),
+                            constraints: operation.constraints.clone(),
+                            first: Box::new(first_conditions(space, &operation.constraints).ok_or_else(none)?),
+                        }
                     }
                 },
+                parameters,
+                inclusion: operation.inclusion,
             });
         }
         if operations.is_empty() {
@@ -172,7 +200,9 @@ fn first_conditions(space: &ConditionSpace, constraints: &[Constraint]) -> Optio
 pub(crate) mod tests {
     use proptest::prelude::*;
     use sesame_plan::condition::{ConditionEnd, Integers};
-    use sesame_plan::{Activation, Choice, Drain, Operation, OperationKind, Parameter, Search, Span, Test};
+    use sesame_plan::{
+        Activation, Choice, Domain, Drain, Operation, OperationKind, Parameter, Search, Shape, Span, Test,
+    };
 
     use super::*;
     use crate::condition::constant::has_constant_part;
@@ -185,9 +215,7 @@ pub(crate) mod tests {
         let ends = || (0.0..100.0f64, 0.0..100.0f64).prop_map(|(a, b)| (a.min(b), a.max(b)));
         let parameter =
             (ends(), any::<bool>(), any::<bool>(), any::<bool>()).prop_map(|((a, b), value, integer, fixed)| {
-                Parameter {
-                    name: "p".to_owned(),
-                    unit: None,
+                Domain::Number {
                     low: if integer { libm::floor(a) - 50.0 } else { a - 50.0 },
                     high: if fixed {
                         if integer { libm::floor(a) - 50.0 } else { a - 50.0 }
@@ -198,13 +226,24 @@ pub(crate) mod tests {
                     integer,
                 }
             });
-        let operation = (ends(), proptest::collection::vec(parameter, 0..4), 0.0..=1.0f64).prop_map(
-            |((start, end), parameters, inclusion)| Operation {
+        let point = (ends(), ends(), -9.0..9.0f64)
+            .prop_map(|(x, y, z)| Domain::Point { low: [x.0, y.0, z], high: [x.1, y.1, z] });
+        let items = |n: usize| (0..n).map(|item| format!("item {item}")).collect();
+        let texts = (1usize..4).prop_map(move |n| Domain::Texts { texts: items(n) });
+        let files = (1usize..3).prop_map(move |n| Domain::Files { files: items(n) });
+        let domain = prop_oneof![4 => parameter, 1 => point, 1 => texts, 1 => files];
+        let parameter = domain.prop_map(|domain| Parameter { name: "p".to_owned(), unit: None, domain });
+        let operation = (ends(), proptest::collection::vec(parameter, 0..4), 0.0..=1.0f64, 0u32..5).prop_map(
+            |((start, end), parameters, inclusion, kind)| Operation {
                 name: "o".to_owned(),
                 doc: String::new(),
-                topic: sesame_plan::TopicId(0),
-                // What is varied follows from the parameters alone, whatever the kind.
-                kind: OperationKind::Latency { distribution: sesame_plan::Distribution::Fixed, drain: Drain::Finish },
+                topic: (kind > 0).then_some(sesame_plan::TopicId(0)),
+                // What is varied follows from the parameters, and from the kind only whether there is a window.
+                kind: if kind == 0 {
+                    OperationKind::Custom { moment: sesame_plan::Moment::BeforeStart }
+                } else {
+                    OperationKind::Latency { distribution: sesame_plan::Distribution::Fixed, drain: Drain::Finish }
+                },
                 parameters,
                 within: Span { start, end: end + 0.01 },
                 priority: 0,
@@ -219,6 +258,9 @@ pub(crate) mod tests {
                 plan.campaign.count = Count { min, max: min + more };
                 plan.campaign.end_after = end_after;
                 plan.operations = operations;
+                for operation in plan.operations.iter_mut().filter(|operation| operation.kind.is_offline()) {
+                    operation.within = Span { start: 0.0, end: end_after };
+                }
                 plan.operations[0].within.start = plan.operations[0].within.start.min(end_after / 2.0);
                 plan
             },
@@ -275,6 +317,10 @@ pub(crate) mod tests {
         for applied in &test.operations {
             let operation = plan.operation(applied.operation);
             match (&applied.activation, &plan.campaign.activation) {
+                (Activation::Offline, _) if operation.kind.is_offline() => {}
+                (activation, _) if operation.kind.is_offline() => {
+                    return Some(format!("{activation:?} of an offline operation"));
+                }
                 (&Activation::Time { start, end }, ActivationMode::Time) => {
                     let within = operation.within;
                     if !(within.start <= start && start < end && end <= within.end && start < plan.campaign.end_after) {
@@ -293,14 +339,26 @@ pub(crate) mod tests {
                 return Some("number of parameters".to_owned());
             }
             for (choice, parameter) in applied.parameters.iter().zip(&operation.parameters) {
-                let (low, high) = match (*choice, parameter.shape) {
-                    (Choice::Value { value }, Shape::Value) => (value, value),
-                    (Choice::Range { low, high }, Shape::Range) => (low, high),
-                    _ => return Some("shape of a parameter".to_owned()),
+                let fits = match (&parameter.domain, choice) {
+                    (Domain::Point { low, high }, Choice::Point { point }) => {
+                        (0..3).all(|axis| (low[axis]..=high[axis]).contains(&point[axis]))
+                    }
+                    (Domain::Texts { texts: items } | Domain::Files { files: items }, Choice::Text { text }) => {
+                        items.contains(text)
+                    }
+                    (Domain::Number { low: least, high: most, shape, integer }, choice) => {
+                        let (low, high) = match (choice, shape) {
+                            (Choice::Value { value }, Shape::Value) => (*value, *value),
+                            (Choice::Range { low, high }, Shape::Range) => (*low, *high),
+                            _ => return Some("shape of a parameter".to_owned()),
+                        };
+                        let whole = !integer || (libm::trunc(low) == low && libm::trunc(high) == high);
+                        *least <= low && low <= high && high <= *most && whole
+                    }
+                    _ => false,
                 };
-                let whole = !parameter.integer || (libm::trunc(low) == low && libm::trunc(high) == high);
-                if !(parameter.low <= low && low <= high && high <= parameter.high && whole) {
-                    return Some(format!("choice {low} to {high} of {parameter:?}"));
+                if !fits {
+                    return Some(format!("choice {choice:?} of {parameter:?}"));
                 }
             }
         }
@@ -322,7 +380,7 @@ pub(crate) mod tests {
 
         let mut no_number = plan();
         let offset = &mut no_number.operations[1].parameters[0];
-        (offset.integer, offset.low, offset.high) = (true, 0.2, 0.8);
+        offset.domain = Domain::Number { low: 0.2, high: 0.8, shape: Shape::Range, integer: true };
         assert!(refusal(&no_number).contains("`jitter1` permits no whole number for `offset`"));
 
         let mut unreachable =
@@ -339,6 +397,7 @@ pub(crate) mod tests {
         plan.operations[1].within = Span { start: 60.0, end: 90.0 };
         let permitted = Permitted::of(&plan).unwrap();
         let [only] = permitted.operations() else { panic!("{permitted:?}") };
-        assert_eq!((only.operation, only.window.low, only.window.high), (OperationId(1), 60.0, 70.0));
+        let PermittedActivation::Time(window) = only.activation else { panic!("{only:?}") };
+        assert_eq!((only.operation, window.low, window.high), (OperationId(1), 60.0, 70.0));
     }
 }

@@ -1,7 +1,5 @@
 //! Drawing and moving numbers and intervals inside what is permitted: windows, sub-ranges and single values alike.
 
-use sesame_plan::{Parameter, Shape};
-
 use crate::rng::Stream;
 
 /// The share of a permitted window that a test's window has at least: shorter ones rarely meet a message, so trying
@@ -42,17 +40,13 @@ impl Range {
         Range { low, high, shortest: 0.0, integer: false }
     }
 
-    /// The permitted range of a parameter; `None` where it must be whole and no whole number is in it.
-    pub fn parameter(parameter: &Parameter) -> Option<Self> {
-        let (low, high) = if parameter.integer {
-            (libm::ceil(parameter.low), libm::floor(parameter.high))
-        } else {
-            (parameter.low, parameter.high)
-        };
-        (low <= high).then_some(Range { low, high, shortest: 0.0, integer: parameter.integer })
+    /// A range of numbers; `None` where they must be whole and no whole number is in it.
+    pub fn numbers(low: f64, high: f64, integer: bool) -> Option<Self> {
+        let (low, high) = if integer { (libm::ceil(low), libm::floor(high)) } else { (low, high) };
+        (low <= high).then_some(Range { low, high, shortest: 0.0, integer })
     }
 
-    /// Whether a test has anything to choose.
+    /// Whether a test has no number to choose.
     pub fn is_fixed(self) -> bool {
         self.low == self.high
     }
@@ -112,17 +106,6 @@ impl Range {
             true if step < 0.0 => libm::floor(step),
             true => libm::ceil(step),
             false => step,
-        }
-    }
-}
-
-/// How a parameter of this shape is chosen anew.
-pub(crate) fn fresh_choice(range: Range, shape: Shape, stream: &mut Stream) -> sesame_plan::Choice {
-    match shape {
-        Shape::Value => sesame_plan::Choice::Value { value: range.number(stream) },
-        Shape::Range => {
-            let (low, high) = range.interval(stream);
-            sesame_plan::Choice::Range { low, high }
         }
     }
 }

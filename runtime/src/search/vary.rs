@@ -40,14 +40,14 @@
 use std::collections::BTreeSet;
 
 use sesame_plan::condition::{Condition, ConditionEnd, ConditionSpace, Constraint};
-use sesame_plan::{Activation, Choice, Shape, Test, TestOperation};
+use sesame_plan::{Activation, Choice, Test, TestOperation};
 
 use crate::rng::Stream;
 use crate::search::condition::{self, contains};
 use crate::search::initial::{fresh_operation, fresh_test};
 use crate::search::nsga2::{Child, Heritage, Variation};
-use crate::search::permitted::{Permitted, PermittedOperation};
-use crate::search::range::{Range, StepSizes, fresh_choice};
+use crate::search::permitted::{Permitted, PermittedActivation, PermittedOperation};
+use crate::search::range::{Range, StepSizes};
 
 /// How often what is varied. All are probabilities except `steps` and `tries`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -152,7 +152,7 @@ impl Variation for TestVariation {
                     break;
                 }
                 let k = stream.below(genome.operations.len());
-                change_activation(&mut genome.operations[k], &self.permitted, &self.rates, &mut stream);
+                change_somehow(&mut genome.operations[k], &self.permitted, &self.rates, &mut stream);
             }
             self.made.insert(identity(&genome));
             Child { genome, heritage }
@@ -178,11 +178,17 @@ fn identity(test: &Test) -> Vec<Vec<u64>> {
                     numbers.extend([2, u64::from(*times), length.to_bits()]);
                     numbers.extend(condition::identity(start));
                 }
+                Activation::Offline => numbers.push(3),
             }
             for choice in &operation.parameters {
-                match *choice {
+                match choice {
                     Choice::Value { value } => numbers.push(value.to_bits()),
                     Choice::Range { low, high } => numbers.extend([low.to_bits(), high.to_bits()]),
+                    Choice::Point { point } => numbers.extend(point.map(f64::to_bits)),
+                    Choice::Text { text } => {
+                        numbers.push(text.len() as u64);
+                        numbers.extend(text.bytes().map(u64::from));
+                    }
                 }
             }
             numbers
@@ -230,7 +236,7 @@ fn exchange_conditions(
     for (a, b) in a.operations.iter_mut().zip(&mut b.operations) {
         // Both are decided by draws of their own, whatever becomes of them.
         let [starts, ends] = [(); 2].map(|()| stream.chance(rates.exchange));
-        let (of_a, of_b) = (&kind_of(a, permitted).constraints, &kind_of(b, permitted).constraints);
+        let [of_a, of_b] = [&*a, &*b].map(|operation| kind_of(operation, permitted).activation.constraints());
         match (&mut a.activation, &mut b.activation) {
             (Activation::Condition { start: c, end: e, .. }, Activation::Condition { start: d, end: f, .. }) => {
                 changed |= starts && condition::exchange([(c, of_a), (d, of_b)], space, stream);
@@ -258,13 +264,13 @@ pub fn mutate(test: &mut Test, permitted: &Permitted, rates: &Rates, stream: &mu
     }
     if duplicate && operations.len() < permitted.most() {
         let mut copy = operations[stream.below(operations.len())].clone();
-        change_activation(&mut copy, permitted, rates, stream);
+        change_somehow(&mut copy, permitted, rates, stream);
         operations.insert(stream.below(operations.len() + 1), copy);
     }
     if add && operations.len() < permitted.most() {
         let kind = &permitted.operations()[stream.below(permitted.operations().len())];
         let place = stream.below(operations.len() + 1);
-        operations.insert(place, fresh_operation(kind, permitted, stream));
+        operations.insert(place, fresh_operation(kind, stream));
     }
 }
 
@@ -276,9 +282,13 @@ fn mutate_operation(operation: &mut TestOperation, permitted: &Permitted, rates:
         change_activation(operation, permitted, rates, stream);
     }
     let kind = kind_of(operation, permitted);
-    for (choice, &(range, shape)) in operation.parameters.iter_mut().zip(&kind.parameters) {
-        if !range.is_fixed() && stream.chance(rates.parameter) {
-            *choice = changed_choice(*choice, range, shape, rates, stream);
+    for (choice, permitted) in operation.parameters.iter_mut().zip(&kind.parameters) {
+        if !permitted.is_fixed() && stream.chance(rates.parameter) {
+            *choice = if stream.chance(rates.fresh) {
+                permitted.fresh(stream)
+            } else {
+                permitted.near(choice, rates.steps, stream)
+            };
             operation.draw_seed = stream.bits();
         }
     }
@@ -289,45 +299,60 @@ fn mutate_operation(operation: &mut TestOperation, permitted: &Permitted, rates:
 fn retarget(operation: &mut TestOperation, permitted: &Permitted, stream: &mut Stream) {
     let others: Vec<_> = permitted.operations().iter().filter(|kind| kind.operation != operation.operation).collect();
     let kind = others[stream.below(others.len())];
-    let mut fresh = fresh_operation(kind, permitted, stream);
-    match &operation.activation {
-        &Activation::Time { start, end } => {
-            let (start, end) = (start.max(kind.window.low), end.min(kind.window.high));
-            if end - start >= kind.window.shortest {
+    let mut fresh = fresh_operation(kind, stream);
+    match (&operation.activation, &kind.activation) {
+        (&Activation::Time { start, end }, PermittedActivation::Time(window)) => {
+            let (start, end) = (start.max(window.low), end.min(window.high));
+            if end - start >= window.shortest {
                 fresh.activation = Activation::Time { start, end };
             }
         }
-        kept @ (Activation::Condition { start, .. } | Activation::ConditionFor { start, .. }) => {
-            if kind.constraints.iter().all(|constraint| contains(start, constraint)) {
-                fresh.activation = kept.clone();
-            }
-        }
+        (
+            kept @ (Activation::Condition { start, .. } | Activation::ConditionFor { start, .. }),
+            PermittedActivation::Condition { constraints, .. },
+        ) if constraints.iter().all(|constraint| contains(start, constraint)) => fresh.activation = kept.clone(),
+        // Of an offline operation there is no activation to keep, and none to give it.
+        _ => {}
     }
     *operation = fresh;
 }
 
-/// Changes a window, or one of what takes its place: a start condition, an end condition, a length, each alike.
+/// Changes the activation, or, of an offline operation, which has none to choose, each parameter.
+fn change_somehow(operation: &mut TestOperation, permitted: &Permitted, rates: &Rates, stream: &mut Stream) {
+    let kind = kind_of(operation, permitted);
+    if kind.activation != PermittedActivation::Offline {
+        return change_activation(operation, permitted, rates, stream);
+    }
+    for (choice, permitted) in operation.parameters.iter_mut().zip(&kind.parameters) {
+        if !permitted.is_fixed() {
+            *choice = permitted.near(choice, rates.steps, stream);
+            operation.draw_seed = stream.bits();
+        }
+    }
+}
+
+/// Changes a window, or one of what takes its place: a start condition, an end condition, a length, each alike; if there
+/// is one to choose.
 fn change_activation(operation: &mut TestOperation, permitted: &Permitted, rates: &Rates, stream: &mut Stream) {
     let kind = kind_of(operation, permitted);
-    match (&mut operation.activation, permitted.conditions()) {
-        (Activation::Time { start, end }, _) => {
+    match (&mut operation.activation, &kind.activation) {
+        (Activation::Offline, PermittedActivation::Offline) => return,
+        (Activation::Time { start, end }, PermittedActivation::Time(window)) => {
             (*start, *end) = if stream.chance(rates.fresh) {
-                kind.window.interval(stream)
+                window.interval(stream)
             } else {
-                kind.window.interval_near((*start, *end), rates.steps, stream)
+                window.interval_near((*start, *end), rates.steps, stream)
             };
         }
-        (Activation::Condition { start, end, .. }, Some(space)) => {
+        (Activation::Condition { start, end, .. }, PermittedActivation::Condition { space, constraints, .. }) => {
             let (condition, constraints) =
-                if stream.chance(0.5) { (start, kind.constraints.as_slice()) } else { (end, [].as_slice()) };
+                if stream.chance(0.5) { (start, constraints.as_slice()) } else { (end, [].as_slice()) };
             *condition = condition::changed(condition, space, constraints, (rates.fresh, rates.steps), stream);
         }
-        (Activation::ConditionFor { start, length, .. }, Some(space)) => {
-            change_start_or_length((start, length), &kind.constraints, space, rates, stream);
+        (Activation::ConditionFor { start, length, .. }, PermittedActivation::Condition { space, constraints, .. }) => {
+            change_start_or_length((start, length), constraints, space, rates, stream);
         }
-        (Activation::Condition { .. } | Activation::ConditionFor { .. }, None) => {
-            unreachable!("a search by time makes no conditions")
-        }
+        (activation, permitted) => unreachable!("{permitted:?} gives no {activation:?}"),
     }
     operation.draw_seed = stream.bits();
 }
@@ -349,19 +374,6 @@ fn change_start_or_length(
         *length = range.number(stream);
     } else {
         *length = range.number_near(*length, rates.steps, stream);
-    }
-}
-
-fn changed_choice(choice: Choice, range: Range, shape: Shape, rates: &Rates, stream: &mut Stream) -> Choice {
-    if stream.chance(rates.fresh) {
-        return fresh_choice(range, shape, stream);
-    }
-    match choice {
-        Choice::Value { value } => Choice::Value { value: range.number_near(value, rates.steps, stream) },
-        Choice::Range { low, high } => {
-            let (low, high) = range.interval_near((low, high), rates.steps, stream);
-            Choice::Range { low, high }
-        }
     }
 }
 
@@ -419,9 +431,7 @@ mod tests {
             if let Some([c, d]) = crossover([&a, &b], &permitted, &mut stream) {
                 prop_assert_eq!(broken_rule(&plan, &c), None);
                 prop_assert_eq!(broken_rule(&plan, &d), None);
-                // Of a small grammar, operations without parameters are easily the same.
-                let by_time = permitted.conditions().is_none();
-                prop_assert!(!by_time || identity(&c) != identity(&a) && identity(&c) != identity(&b));
+                prop_assert!(seeds(&c) != seeds(&a) && seeds(&c) != seeds(&b));
                 let both = |x: &Test, y: &Test| identity(&Test { operations: [&x.operations[..], &y.operations].concat() });
                 prop_assert_eq!(both(&c, &d), both(&a, &b));
                 prop_assert_eq!(&seeds(&c) | &seeds(&d), &seeds(&a) | &seeds(&b));

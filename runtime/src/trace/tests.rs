@@ -11,7 +11,8 @@ use proptest::prelude::*;
 use sesame_plan::{Choice, Distribution, Drain, OperationKind, Test, ValueMode};
 
 use super::*;
-use crate::evaluate::evaluate_tapped;
+use crate::changed_files::ChangedFiles;
+use crate::evaluate::{Custom, Run, evaluate_tapped};
 use crate::fixture::{latency, offset, operation, plan, test_of, use_of};
 use crate::metric::MetricTable;
 use crate::relay::Exchange;
@@ -76,7 +77,9 @@ fn traced(folder: &Path, plan: &CampaignPlan, test: &Test) -> Observation {
     let subject = Subject { plan, number: 1, test, simulator_seed: u64::MAX };
     let mut writer = TraceWriter::create(&folder.join("unfinished"), subject, &wires).unwrap();
     let mut transport = Awkward(SimTime::ZERO);
-    let observed = evaluate_tapped(plan, &wires, &table, &mut transport, test, 1, Some(&mut writer)).unwrap();
+    let run = Run { test, simulator_seed: 1 };
+    let mut custom = Custom { hooks: &[], files: ChangedFiles::unlocked(folder) };
+    let observed = evaluate_tapped(plan, &wires, &table, &mut transport, &run, &mut custom, Some(&mut writer)).unwrap();
     assert!(!folder.join("T1.mcap").exists(), "it has its name only when it is complete");
     writer.keep(&observed, &folder.join("T1.mcap")).unwrap();
     assert!(!folder.join("unfinished").exists());

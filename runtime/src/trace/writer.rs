@@ -208,7 +208,7 @@ fn write_out(shared: &Shared) {
 
 impl Channels {
     fn declare(writer: &mut Writer<BufWriter<File>>, plan: &CampaignPlan, wires: &WireTable) -> McapResult<Self> {
-        let disturbed: BTreeSet<TopicId> = plan.operations.iter().map(|operation| operation.topic).collect();
+        let disturbed: BTreeSet<TopicId> = plan.operations.iter().filter_map(|operation| operation.topic).collect();
         let mut channels = Channels {
             published: Vec::with_capacity(wires.len()),
             delivered: Vec::with_capacity(wires.len()),
@@ -273,6 +273,7 @@ impl Tap for TraceWriter<'_> {
             Deed::Ended => ("ended", None, None),
             Deed::Changed(touched) => ("changed", Some(touched), None),
             Deed::Dropped(touched) => ("dropped", Some(touched), None),
+            Deed::Injected(touched) => ("injected", Some(touched), None),
             Deed::Delayed(touched, until) => ("delayed", Some(touched), Some(until)),
         };
         let payload = &mut self.payload;

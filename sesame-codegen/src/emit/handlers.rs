@@ -1,11 +1,10 @@
 //! What a hook is called with: a handler for each input topic of its metric.
 
 use heck::ToSnakeCase;
-use sesame_plan::{CampaignPlan, MessageId, Topic, Type};
+use sesame_plan::{CampaignPlan, MessageId, Topic, TopicId, Type};
 
 use super::messages::{self, Messages, Place};
 use crate::names::{self, Scope};
-use crate::plan::HookPlan;
 
 /// One handler of a hook.
 pub(super) struct Handler<'a> {
@@ -18,10 +17,10 @@ pub(super) struct Handler<'a> {
 }
 
 /// The handlers of a hook, in the order of its inputs.
-pub(super) fn handlers<'a>(plan: &'a CampaignPlan, hook: &HookPlan) -> Vec<Handler<'a>> {
+pub(super) fn handlers<'a>(plan: &'a CampaignPlan, inputs: &[TopicId]) -> Vec<Handler<'a>> {
     // A hook is also told when a run starts and ends.
     let mut scope = Scope::reserving(&["on_start", "on_end"]);
-    hook.inputs
+    inputs
         .iter()
         .map(|&input| {
             let topic = plan.topic(input);
@@ -43,19 +42,23 @@ fn parameter(plan: &CampaignPlan, topic: &Topic) -> String {
         _ => names::snake(&topic.name),
     };
     // Not the hook itself, nor its context, nor a word that would need escaping in every line the user writes.
-    if name == "ctx" || names::written(&name) != name || name.starts_with("self") { "message".to_owned() } else { name }
+    if name == "ctx" || name == "parameters" || names::written(&name) != name || name.starts_with("self") {
+        "message".to_owned()
+    } else {
+        name
+    }
 }
 
 /// What a hook is given, one line for each handler and for each field of a message it takes, messages inside messages
 /// included. When these lines change, a hook may have to.
-pub(super) fn inputs(plan: &CampaignPlan, types: &Messages<'_>, hook: &HookPlan) -> Vec<String> {
+pub(super) fn inputs(plan: &CampaignPlan, types: &Messages<'_>, inputs: &[TopicId]) -> Vec<String> {
     let mut lines = Vec::new();
     let mut reached: Vec<MessageId> = Vec::new();
     let described = |ty: &Type| {
         let unit = messages::unit(ty).map(|unit| format!(" in {unit}")).unwrap_or_default();
         types.owned(ty, Place::IMPORTED) + &unit
     };
-    for handler in handlers(plan, hook) {
+    for handler in handlers(plan, inputs) {
         lines.push(format!("{}({}: {})", handler.method, handler.parameter, described(&handler.topic.ty)));
         reached.extend(messages::named_message(&handler.topic.ty));
     }

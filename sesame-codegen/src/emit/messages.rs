@@ -2,7 +2,7 @@
 
 use proc_macro2::TokenStream;
 use quote::quote;
-use sesame_plan::{CampaignPlan, Field, MessageId, Type};
+use sesame_plan::{CampaignPlan, Field, MessageId, MessageType, Type};
 
 use super::rust;
 use crate::names::{self, Scope};
@@ -75,8 +75,39 @@ impl<'a> Messages<'a> {
         }
     }
 
+    /// What makes a payload of a message.
+    fn to_value(&self, id: MessageId, message: &MessageType) -> TokenStream {
+        let name = names::ident(self.struct_name(id));
+        let made = self.fields(id).map(|(field, rust_name)| {
+            let (name, wire) = (names::ident(rust_name), &field.name);
+            quote! { (#wire, ::sesame_runtime::message::ToValue::to_value(&self.#name)) }
+        });
+        let put = self.fields(id).map(|(field, rust_name)| {
+            let (name, wire) = (names::ident(rust_name), &field.name);
+            quote! { changed |= ::sesame_runtime::message::write_field(value, #wire, &self.#name); }
+        });
+        let write = if message.fields.is_empty() {
+            quote! { let _ = value; false }
+        } else {
+            quote! { let mut changed = false; #(#put)* changed }
+        };
+        quote! {
+            impl ::sesame_runtime::message::ToValue for #name {
+                fn to_value(&self) -> ::sesame_runtime::value::Value {
+                    ::sesame_runtime::message::record(&[#(#made),*])
+                }
+
+                fn write_to(&self, value: &mut ::sesame_runtime::value::Value) -> bool {
+                    #write
+                }
+            }
+        }
+    }
+
     /// The file.
-    pub(super) fn file(&self, header: &str) -> String {
+    ///
+    /// Only hooks of operations make payloads of messages; `written` says whether there are any.
+    pub(super) fn file(&self, header: &str, written: bool) -> String {
         let structs = (0..).map(MessageId).zip(&self.plan.messages).map(|(id, message)| {
             let name = names::ident(self.struct_name(id));
             let docs = rust::docs(message.doc.lines());
@@ -91,10 +122,13 @@ impl<'a> Messages<'a> {
             });
             // A message without fields still has to be a message.
             let value = if message.fields.is_empty() { quote!(_value) } else { quote!(value) };
+            let to_value = written.then(|| self.to_value(id, message));
             quote! {
                 #docs
                 #[derive(Debug, Clone, PartialEq)]
                 pub struct #name { #(#fields,)* }
+
+                #to_value
 
                 impl ::sesame_runtime::message::FromValue for #name {
                     fn from_value(

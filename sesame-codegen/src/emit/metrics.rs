@@ -72,7 +72,7 @@ fn hook_trait(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -> Tok
     doc.extend(meaning(hook));
     let docs = rust::docs(doc);
 
-    let handlers = handlers(&runner.plan, hook).into_iter().map(|handler| {
+    let handlers = handlers(&runner.plan, &hook.inputs).into_iter().map(|handler| {
         let mut doc = vec![format!("A message on `{}` (\"{}\").", handler.topic.name, paths(handler.topic))];
         doc.extend(messages::unit(&handler.topic.ty).map(|unit| format!("In {unit}.")));
         if !handler.topic.doc.is_empty() {
@@ -154,7 +154,7 @@ fn adapter(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -> TokenS
     let hook_trait = names::ident(&names::hook_trait(&hook.metric));
     let hook_trait = quote! { crate::generated::metrics::#hook_trait };
     let build = build(hook);
-    let arms = (0_usize..).zip(handlers(&runner.plan, hook)).map(|(input, handler)| {
+    let arms = (0_usize..).zip(handlers(&runner.plan, &hook.inputs)).map(|(input, handler)| {
         let method = names::ident(&handler.method);
         let argument = match &handler.topic.ty {
             Type::Bool | Type::Int { .. } | Type::Real { .. } | Type::Point { .. } => quote! { message },

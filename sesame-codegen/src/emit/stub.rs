@@ -42,7 +42,7 @@ struct StubHandler {
 pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -> String {
     let hook_type = names::hook_type(&hook.metric);
     let hook_trait = names::hook_trait(&hook.metric);
-    let handlers = handlers(&runner.plan, hook);
+    let handlers = handlers(&runner.plan, &hook.inputs);
     let inputs: Vec<&Type> = handlers.iter().map(|handler| &handler.topic.ty).collect();
     let structs: BTreeSet<&str> =
         inputs.iter().filter_map(|ty| messages::named_message(ty)).map(|id| types.struct_name(id)).collect();

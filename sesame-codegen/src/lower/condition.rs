@@ -15,6 +15,7 @@ impl Selection {
             model::Activation::Window(window) => {
                 plan::Activation::Time { start: window.low, end: window.high.min(last) }
             }
+            model::Activation::Offline => plan::Activation::Offline,
             model::Activation::Condition { start, end, times } => match end {
                 model::End::Condition(end) => plan::Activation::Condition {
                     start: self.condition(start),

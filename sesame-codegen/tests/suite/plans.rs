@@ -103,6 +103,7 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 record: None,
             },
         },
+        operations: vec![],
         hooks: vec![
             HookPlan {
                 doc: "R1: intervals of 0.2 s in which the gripper was inside a safety zone.".into(),

@@ -139,7 +139,7 @@ fn a_hook_without_a_metric_and_a_runner_without_a_campaign_are_reported_and_kept
         assert_eq!(
             report.orphans,
             [
-                Orphan::Hook { path: "hooks/top_speed.rs".into(), metric: "top_speed".into() },
+                Orphan::Hook { path: "hooks/top_speed.rs".into(), of: "metric `top_speed`".into() },
                 Orphan::Runner { folder: "b".into() }
             ]
         );

@@ -9,8 +9,9 @@ use crate::units::Unit;
 pub struct Operation {
     /// Its name and doc comment.
     pub declaration: Declaration,
-    /// What it disturbs. Operations on whole messages have no fields.
-    pub target: FieldPath,
+    /// What it disturbs. Operations on whole messages have no fields; `None` exactly for a custom one before the start or
+    /// after the end.
+    pub target: Option<FieldPath>,
     /// What it does.
     pub kind: OperationKind,
     /// The time outside of which it is never active, in seconds; `None` is the whole test, from 0 to the campaign's end.
@@ -25,37 +26,39 @@ pub struct Operation {
 
 impl Operation {
     /// The topic whose messages it disturbs.
-    pub fn topic(&self) -> TopicId {
-        self.target.topic
+    pub fn topic(&self) -> Option<TopicId> {
+        self.target.as_ref().map(|target| target.topic)
     }
 
-    /// The parameter a test chooses; `None` for a kind without parameters.
-    pub fn parameter(&self) -> Option<Parameter> {
+    /// Whether it acts before the start or after the end: a test then chooses no window for it.
+    pub fn is_offline(&self) -> bool {
+        matches!(&self.kind, OperationKind::Custom { moment: Moment::BeforeStart | Moment::AfterEnd, .. })
+    }
+
+    /// The parameters a test chooses, in the order in which a plan has them.
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let number = |name: &str, unit, range, shape, integer| {
+            let domain = Domain::Number { range, shape, integer };
+            vec![Parameter { name: name.to_owned(), doc: String::new(), unit, domain }]
+        };
         match &self.kind {
-            OperationKind::RandomValue { mode, range, integer, unit } => Some(Parameter {
-                name: match mode {
+            OperationKind::RandomValue { mode, range, integer, unit } => {
+                let name = match mode {
                     ValueMode::Absolute => "value",
                     ValueMode::Offset => "offset",
-                },
-                unit: unit.clone(),
-                range: *range,
-                shape: Shape::Range,
-                integer: *integer,
-            }),
-            OperationKind::PacketLoss { loss } => {
-                Some(Parameter { name: "loss", unit: None, range: *loss, shape: Shape::Value, integer: false })
+                };
+                number(name, unit.clone(), *range, Shape::Range, *integer)
             }
-            OperationKind::Latency { delay, distribution, .. } => Some(Parameter {
-                name: "delay",
-                unit: Some(Unit::seconds()),
-                range: *delay,
-                shape: match distribution {
+            OperationKind::PacketLoss { loss } => number("loss", None, *loss, Shape::Value, false),
+            OperationKind::Latency { delay, distribution, .. } => {
+                let shape = match distribution {
                     Distribution::Fixed => Shape::Value,
                     Distribution::Uniform => Shape::Range,
-                },
-                integer: false,
-            }),
-            OperationKind::Blackhole => None,
+                };
+                number("delay", Some(Unit::seconds()), *delay, shape, false)
+            }
+            OperationKind::Blackhole => Vec::new(),
+            OperationKind::Custom { parameters, .. } => parameters.clone(),
         }
     }
 }
@@ -90,6 +93,24 @@ pub enum OperationKind {
     },
     /// Drops every message.
     Blackhole,
+    /// Calls the user's code.
+    Custom {
+        /// When.
+        moment: Moment,
+        /// Its parameters in declaration order; names are distinct.
+        parameters: Vec<Parameter>,
+    },
+}
+
+/// When the code of a custom operation is called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Moment {
+    /// With each message while the operation is active.
+    OnMessage,
+    /// Before the simulator starts.
+    BeforeStart,
+    /// After the run has come to its end.
+    AfterEnd,
 }
 
 /// Whether a random value replaces or shifts the original.
@@ -121,19 +142,42 @@ pub enum Drain {
     Drop,
 }
 
-/// A parameter of an operation: its permitted range, and what a test makes of it.
+/// A parameter of an operation: what is permitted, and what a test makes of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
     /// Its name in a test.
-    pub name: &'static str,
-    /// Its unit; `None` for probabilities and plain numbers.
+    pub name: String,
+    /// The doc comment of a custom operation's parameter.
+    pub doc: String,
+    /// Its unit; `None` for probabilities, plain numbers, texts and files.
     pub unit: Option<Unit>,
     /// What is permitted.
-    pub range: Range,
-    /// What a test chooses.
-    pub shape: Shape,
-    /// Whether only whole numbers are permitted.
-    pub integer: bool,
+    pub domain: Domain,
+}
+
+/// What a test may choose for a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Domain {
+    /// Numbers of a range.
+    Number {
+        /// What is permitted.
+        range: Range,
+        /// What a test chooses.
+        shape: Shape,
+        /// Whether only whole numbers are permitted; the ends of the range then are whole as well.
+        integer: bool,
+    },
+    /// Points of a box, `low <= high` on each axis.
+    Point {
+        /// Lower corner.
+        low: [f64; 3],
+        /// Upper corner.
+        high: [f64; 3],
+    },
+    /// One of these texts, at least one, none twice.
+    Texts(Vec<String>),
+    /// One of these files, at least one, none twice: paths relative to the folder of the `.sesame` file.
+    Files(Vec<String>),
 }
 
 /// What a test chooses of a permitted range.
@@ -161,9 +205,9 @@ pub struct Test {
 pub struct TestOperation {
     /// Which.
     pub operation: OperationId,
-    /// The choice for the operation's parameter: `Some` exactly if it has one, and inside its permitted range.
-    pub choice: Option<Choice>,
-    /// When it is active.
+    /// A choice for each of the operation's parameters, in their order, and permitted.
+    pub choices: Vec<Choice>,
+    /// When it is active: [`Activation::Offline`] exactly for an operation that acts before the start or after the end.
     pub activation: Activation,
     /// Seed of its draws: as written, else [`draw_seed`].
     pub draw_seed: u64,
@@ -183,6 +227,8 @@ pub enum Activation {
         /// How often at most in one run, at least 1. Default 1.
         times: u32,
     },
+    /// Never during the run: it acts before the start or after the end, and has no window.
+    Offline,
 }
 
 /// What ends an activation by condition.
@@ -198,7 +244,7 @@ impl Activation {
     /// The conditions it depends on.
     pub fn conditions(&self) -> impl Iterator<Item = &Condition> {
         let (start, end) = match self {
-            Activation::Window(_) => (None, None),
+            Activation::Window(_) | Activation::Offline => (None, None),
             Activation::Condition { start, end: End::Length(_), .. } => (Some(start), None),
             Activation::Condition { start, end: End::Condition(end), .. } => (Some(start), Some(end)),
         };
@@ -207,12 +253,16 @@ impl Activation {
 }
 
 /// What a test chose for a parameter, in the parameter's unit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Choice {
     /// One value.
     Value(f64),
     /// A sub-range.
     Range(Range),
+    /// A point.
+    Point([f64; 3]),
+    /// One of the texts or files.
+    Text(String),
 }
 
 /// What must come out of a known test.

@@ -7,7 +7,7 @@ use heck::{ToSnakeCase as _, ToUpperCamelCase as _};
 use super::{Definition, Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::Span;
-use crate::syntax::ast::{Head, Simulator, System};
+use crate::syntax::ast::{self, Head, Simulator, System};
 
 impl<'a> Resolver<'a> {
     pub(super) fn collect(&mut self) {
@@ -59,19 +59,26 @@ impl<'a> Resolver<'a> {
     /// Names that differ in the file but meet in the generated code or on a disk.
     fn collisions(&mut self, heads: &[(Kind, usize, &'a Head)]) {
         let mut taken: BTreeMap<(&str, String), (&str, Span)> = BTreeMap::new();
-        for (kind, _, head) in heads {
+        for (kind, index, head) in heads {
             let name = head.name.text.as_str();
+            let custom = *kind == Kind::Operation
+                && matches!(
+                    self.file.operations[*index].body.as_ref().map(|body| &body.kind),
+                    Some(ast::OperationKind::Custom(_))
+                );
             let (what, generated) = match kind {
                 // A metric is a module and a file as well as a type; equal camel case implies the others' equality but
                 // for digits, so both are looked at.
                 Kind::Metric => ("file and module", name.to_snake_case()),
+                // The hooks of operations lie beside those of metrics.
+                Kind::Operation if custom => ("file and module", name.to_snake_case()),
                 Kind::Message => ("type", name.to_upper_camel_case()),
                 Kind::Topic => ("function suffix", name.to_snake_case()),
                 Kind::Campaign => ("folder", name.to_ascii_lowercase()),
                 _ => continue,
             };
             let mut keys = vec![(what, generated)];
-            if *kind == Kind::Metric {
+            if *kind == Kind::Metric || custom {
                 keys.push(("hook type", name.to_upper_camel_case()));
             }
             for (what, generated) in keys {

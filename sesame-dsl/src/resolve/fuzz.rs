@@ -4,7 +4,7 @@ use super::quantity::percent;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
-    self, Activation, Choice, Distribution, Drain, Id as _, OperationId, OperationKind, Parameter, Range, Shape,
+    self, Activation, Choice, Distribution, Domain, Drain, Id as _, OperationId, OperationKind, Parameter, Range, Shape,
 };
 use crate::span::Span;
 use crate::syntax::ast;
@@ -46,11 +46,24 @@ impl<'a> Resolver<'a> {
         })
     }
 
-    fn target_and_kind(&mut self, body: &'a ast::OperationBody) -> Option<(model::FieldPath, OperationKind)> {
+    fn target_and_kind(&mut self, body: &'a ast::OperationBody) -> Option<(Option<model::FieldPath>, OperationKind)> {
+        if let ast::OperationKind::Custom(custom) = &body.kind {
+            return self.custom(custom, body);
+        }
+        let target = body.target.as_ref().expect("the grammar gives all kinds but custom ones a topic");
+        let (target, kind) = self.disturbance(target, body)?;
+        Some((Some(target), kind))
+    }
+
+    fn disturbance(
+        &mut self,
+        target: &'a ast::Path,
+        body: &'a ast::OperationBody,
+    ) -> Option<(model::FieldPath, OperationKind)> {
         match &body.kind {
             ast::OperationKind::Random { absolute, range } => {
-                let (target, unit, integer) = self.number_field(&body.target, "a random value")?;
-                let what = format!("`{}`", self.text(body.target.span));
+                let (field, unit, integer) = self.number_field(target, "a random value")?;
+                let what = format!("`{}`", self.text(target.span));
                 let permitted = self.range(range, unit.as_ref(), &what)?;
                 if integer {
                     let low = self.whole(permitted.low, range.low.span, &what);
@@ -59,15 +72,15 @@ impl<'a> Resolver<'a> {
                     }
                 }
                 let mode = if *absolute { model::ValueMode::Absolute } else { model::ValueMode::Offset };
-                Some((target, OperationKind::RandomValue { mode, range: permitted, integer, unit }))
+                Some((field, OperationKind::RandomValue { mode, range: permitted, integer, unit }))
             }
             ast::OperationKind::PacketLoss(range) => {
-                let target = self.whole_messages(&body.target, "packet loss drops");
+                let field = self.whole_messages(target, "packet loss drops");
                 let loss = self.probabilities(range, "the loss")?;
-                Some((target?, OperationKind::PacketLoss { loss }))
+                Some((field?, OperationKind::PacketLoss { loss }))
             }
             ast::OperationKind::Latency { range, uniform, drain } => {
-                let target = self.whole_messages(&body.target, "latency delays");
+                let field = self.whole_messages(target, "latency delays");
                 self.at_most_one(uniform, "uniform");
                 let drain = match self.single(drain, "drain") {
                     None | Some(ast::Drain::Finish) => Drain::Finish,
@@ -76,15 +89,16 @@ impl<'a> Resolver<'a> {
                 };
                 let distribution = if uniform.is_empty() { Distribution::Fixed } else { Distribution::Uniform };
                 let delay = self.times(range, "the delay")?;
-                Some((target?, OperationKind::Latency { delay, distribution, drain }))
+                Some((field?, OperationKind::Latency { delay, distribution, drain }))
             }
             ast::OperationKind::Blackhole => {
-                Some((self.whole_messages(&body.target, "a blackhole drops")?, OperationKind::Blackhole))
+                Some((self.whole_messages(target, "a blackhole drops")?, OperationKind::Blackhole))
             }
+            ast::OperationKind::Custom(_) => unreachable!("custom operations are resolved apart"),
         }
     }
 
-    fn whole_messages(&mut self, path: &'a ast::Path, does: &str) -> Option<model::FieldPath> {
+    pub(super) fn whole_messages(&mut self, path: &'a ast::Path, does: &str) -> Option<model::FieldPath> {
         let (target, _) = self.field(path)?;
         if target.fields.is_empty() {
             return Some(target);
@@ -146,9 +160,9 @@ impl<'a> Resolver<'a> {
         let mut operations = Vec::new();
         for (position, operation) in test.operations.iter().enumerate() {
             match self.test_operation(operation) {
-                Some((id, choice, activation)) => operations.push(model::TestOperation {
+                Some((id, choices, activation)) => operations.push(model::TestOperation {
                     operation: id,
-                    choice,
+                    choices,
                     activation,
                     draw_seed: match operation.seed {
                         Some(seed) => seed.value?,
@@ -168,15 +182,19 @@ impl<'a> Resolver<'a> {
         complete.then(|| model::Test { declaration: self.declaration(&test.head), operations, expectations })
     }
 
-    fn test_operation(&mut self, test: &'a ast::TestOperation) -> Option<(OperationId, Option<Choice>, Activation)> {
+    fn test_operation(&mut self, test: &'a ast::TestOperation) -> Option<(OperationId, Vec<Choice>, Activation)> {
         let index = self.find(&test.operation, Kind::Operation);
         let activation = match &test.activation {
             ast::Activation::Window(window) => self.test_window(window).map(Activation::Window),
             ast::Activation::Trigger(trigger) => self.trigger(trigger),
+            ast::Activation::Moment(..) => Some(Activation::Offline),
         };
         let index = index?;
         let operation = self.operations[index].clone()?;
-        let choice = self.choice(test, index, &operation);
+        let choices = self.choices(test, index, &operation);
+        if !self.fits_moment(test, index, &operation) {
+            return None;
+        }
         if let (Some(Activation::Window(window)), Some(within), ast::Activation::Window(written)) =
             (&activation, operation.within, &test.activation)
             && !within.contains(*window)
@@ -194,7 +212,7 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         }
-        Some((OperationId::from_index(index), choice?, activation?))
+        Some((OperationId::from_index(index), choices?, activation?))
     }
 
     fn test_window(&mut self, window: &ast::Range) -> Option<Range> {
@@ -215,65 +233,134 @@ impl<'a> Resolver<'a> {
         Some(Range { low, high })
     }
 
-    /// The choice for the operation's parameter.
-    #[expect(clippy::option_option, reason = "the outer says whether it was in order, the inner is the model's")]
-    fn choice(
+    /// A choice for each of the operation's parameters.
+    fn choices(
         &mut self,
         test: &'a ast::TestOperation,
         index: usize,
         operation: &model::Operation,
-    ) -> Option<Option<Choice>> {
+    ) -> Option<Vec<Choice>> {
         let name = &test.operation.text;
-        let Some(parameter) = operation.parameter() else {
-            let Some((word, choice)) = test.choices.first() else { return Some(None) };
+        let parameters = operation.parameters();
+        if parameters.is_empty() {
+            let Some((word, choice)) = test.choices.first() else { return Some(Vec::new()) };
             let title = format!("`{name}` has no parameter to choose");
             let span = word.span.to(choice.span());
             self.report(Diagnostic::new(Code::WRONG_CHOICE, span, title).label("leave this out"));
             return None;
-        };
-        let example = match parameter.shape {
-            Shape::Value => format!("{} {}", parameter.name, in_unit(parameter.range.low, &parameter)),
-            Shape::Range => format!(
-                "{} [{}, {}]",
-                parameter.name,
-                in_unit(parameter.range.low, &parameter),
-                in_unit(parameter.range.high, &parameter)
-            ),
-        };
-        let Some((word, choice)) = test.choices.iter().find(|(word, _)| word.text == parameter.name) else {
-            let (span, title) = match test.choices.first() {
-                Some((word, _)) => (word.span, format!("`{name}` has no parameter named `{}`", word.text)),
-                None => (test.operation.span, format!("no `{}` is chosen for `{name}`", parameter.name)),
-            };
-            let mut diagnostic =
-                Diagnostic::new(Code::WRONG_CHOICE, span, title).label(format!("expected for example `{example}`"));
-            if !test.choices.is_empty() {
-                diagnostic = diagnostic.suggest("its parameter is", span, parameter.name);
-            }
-            self.report(diagnostic);
-            return None;
-        };
-        for (other, _) in &test.choices {
-            if !std::ptr::eq(other, word) {
-                let (code, title) = if other.text == word.text {
-                    (Code::CLAUSE_TWICE, format!("`{}` is chosen twice", other.text))
-                } else {
-                    (Code::WRONG_CHOICE, format!("`{name}` has no parameter named `{}`", other.text))
+        }
+        let named = |name: &str| parameters.iter().any(|parameter| parameter.name == name);
+        let mut unknown = test.choices.iter().filter(|(word, _)| !named(&word.text));
+        let mut choices = Vec::new();
+        for parameter in &parameters {
+            let example = example(parameter, &operation.kind);
+            let mut written = test.choices.iter().filter(|(word, _)| word.text == parameter.name);
+            let Some((_, choice)) = written.next() else {
+                // A name that no parameter has was meant for this one.
+                let meant = unknown.next().map(|(word, _)| word);
+                let (span, title) = match meant {
+                    Some(word) => (word.span, format!("`{name}` has no parameter named `{}`", word.text)),
+                    None => (test.operation.span, format!("no `{}` is chosen for `{name}`", parameter.name)),
                 };
-                let label = format!("its only parameter is `{}`", parameter.name);
-                self.report(Diagnostic::new(code, other.span, title).label(label));
+                let mut diagnostic =
+                    Diagnostic::new(Code::WRONG_CHOICE, span, title).label(format!("expected for example `{example}`"));
+                if meant.is_some() {
+                    let what = if parameters.len() == 1 { "its parameter is" } else { "a parameter it has is" };
+                    diagnostic = diagnostic.suggest(what, span, parameter.name.clone());
+                }
+                self.report(diagnostic);
+                continue;
+            };
+            for (again, _) in written {
+                let title = format!("`{}` is chosen twice", again.text);
+                let label = self.has_parameters(&parameters);
+                self.report(Diagnostic::new(Code::CLAUSE_TWICE, again.span, title).label(label));
+            }
+            choices.extend(self.chosen(choice, index, parameter, &example));
+        }
+        for (other, _) in unknown {
+            let title = format!("`{name}` has no parameter named `{}`", other.text);
+            let label = self.has_parameters(&parameters);
+            self.report(Diagnostic::new(Code::WRONG_CHOICE, other.span, title).label(label));
+        }
+        (choices.len() == parameters.len()).then_some(choices)
+    }
+
+    #[expect(clippy::unused_self, reason = "it reads as one of the resolver's sentences")]
+    fn has_parameters(&self, parameters: &[Parameter]) -> String {
+        match parameters {
+            [only] => format!("its only parameter is `{}`", only.name),
+            several => {
+                let names: Vec<String> = several.iter().map(|parameter| format!("`{}`", parameter.name)).collect();
+                format!("its parameters are {}", names.join(", "))
             }
         }
-        self.chosen(choice, index, &parameter, &example).map(Some)
     }
 
     fn chosen(&mut self, choice: &ast::Choice, index: usize, parameter: &Parameter, example: &str) -> Option<Choice> {
+        let what = format!("`{}`", parameter.name);
+        let span = choice.span();
+        match (choice, &parameter.domain) {
+            (ast::Choice::Point(point), Domain::Point { low, high }) => {
+                let chosen = self.coordinates(point, parameter.unit.as_ref(), &what)?;
+                let declared = self.declared(index, parameter);
+                let permitted = declared.map_or(String::new(), |declared| format!("`{}`", self.text(declared)));
+                for axis in 0..3 {
+                    let found = Range { low: chosen[axis], high: chosen[axis] };
+                    let all = Range { low: low[axis], high: high[axis] };
+                    let place = point.coordinates[axis].span;
+                    if !self.inside(found, place, all, &what, &permitted, declared) {
+                        return None;
+                    }
+                }
+                Some(Choice::Point(chosen))
+            }
+            (ast::Choice::Text(text), Domain::Texts(items) | Domain::Files(items)) => {
+                if items.contains(&text.text) {
+                    return Some(Choice::Text(text.text.clone()));
+                }
+                let title = format!("`{}` is none of what {what} may be", self.text(text.span));
+                let listed: Vec<String> = items.iter().map(|item| quoted(item)).collect();
+                let mut diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, text.span, title)
+                    .label(format!("permitted is {}", listed.join(", ")));
+                if let Some(declared) = self.declared(index, parameter) {
+                    diagnostic = diagnostic.also(declared, "by this declaration");
+                }
+                self.report(diagnostic);
+                None
+            }
+            (ast::Choice::Value(_) | ast::Choice::Range(_), Domain::Number { range, shape, integer }) => {
+                self.chosen_number(choice, index, parameter, (*range, *shape, *integer), example)
+            }
+            (_, domain) => {
+                let kind = match domain {
+                    Domain::Number { .. } => "a number",
+                    Domain::Point { .. } => "a point",
+                    Domain::Texts(_) | Domain::Files(_) => "a text in double quotes",
+                };
+                let diagnostic = Diagnostic::new(Code::WRONG_CHOICE, span, format!("{what} is {kind}"))
+                    .label(format!("expected for example `{example}`"));
+                self.report(diagnostic);
+                None
+            }
+        }
+    }
+
+    fn chosen_number(
+        &mut self,
+        choice: &ast::Choice,
+        index: usize,
+        parameter: &Parameter,
+        (permitted_range, shape, integer): (Range, Shape, bool),
+        example: &str,
+    ) -> Option<Choice> {
         // Probabilities are percentages in the language and fractions in the model.
         let probability = matches!(self.file.operations[index].body.as_ref()?.kind, ast::OperationKind::PacketLoss(_));
         let hundred = percent();
         let unit = if probability { Some(&hundred) } else { parameter.unit.as_ref() };
         let what = format!("`{}`", parameter.name);
-        let (found, chosen) = match (choice, parameter.shape) {
+        let span = choice.span();
+        let (found, chosen) = match (choice, shape) {
             (ast::Choice::Value(quantity), Shape::Value) => {
                 let value = self.value(quantity, unit, &what)?;
                 let value = if probability { self.probability(quantity, value) } else { value };
@@ -283,53 +370,68 @@ impl<'a> Resolver<'a> {
                 let range = self.range(range, unit, &what)?;
                 (range, Choice::Range(range))
             }
-            (ast::Choice::Value(quantity), Shape::Range) => {
-                let written = self.text(quantity.span);
+            (_, Shape::Range) => {
+                let written = self.text(span);
                 let diagnostic = Diagnostic::new(
                     Code::WRONG_CHOICE,
-                    quantity.span,
+                    span,
                     format!("{what} is a range, from which each message draws anew"),
                 )
                 .label(format!("expected a range, for example `{example}`"))
-                .suggest("always draw this value", quantity.span, format!("[{written}, {written}]"));
+                .suggest("always draw this value", span, format!("[{written}, {written}]"));
                 self.report(diagnostic);
                 return None;
             }
-            (ast::Choice::Range(range), Shape::Value) => {
-                let diagnostic = Diagnostic::new(
-                    Code::WRONG_CHOICE,
-                    range.span,
-                    format!("{what} is one value in a test, not a range"),
-                )
-                .label(format!("expected one value, for example `{example}`"));
+            (_, Shape::Value) => {
+                let diagnostic =
+                    Diagnostic::new(Code::WRONG_CHOICE, span, format!("{what} is one value in a test, not a range"))
+                        .label(format!("expected one value, for example `{example}`"));
                 self.report(diagnostic);
                 return None;
             }
         };
-        let span = choice.span();
-        let body = self.file.operations[index].body.as_ref()?;
-        let declared = match &body.kind {
-            ast::OperationKind::Random { range, .. }
-            | ast::OperationKind::PacketLoss(range)
-            | ast::OperationKind::Latency { range, .. } => Some(range.span),
-            ast::OperationKind::Blackhole => None,
-        };
+        let declared = self.declared(index, parameter);
         let permitted = declared.map_or(String::new(), |declared| format!("`{}`", self.text(declared)));
-        if !self.inside(found, span, parameter.range, &what, &permitted, declared) {
+        if !self.inside(found, span, permitted_range, &what, &permitted, declared) {
             return None;
         }
-        if parameter.integer && !(self.whole(found.low, span, &what) && self.whole(found.high, span, &what)) {
+        if integer && !(self.whole(found.low, span, &what) && self.whole(found.high, span, &what)) {
             return None;
         }
         Some(chosen)
     }
+
+    /// Where it is written what a parameter of an operation may be.
+    fn declared(&self, index: usize, parameter: &Parameter) -> Option<Span> {
+        match &self.file.operations[index].body.as_ref()?.kind {
+            ast::OperationKind::Random { range, .. }
+            | ast::OperationKind::PacketLoss(range)
+            | ast::OperationKind::Latency { range, .. } => Some(range.span),
+            ast::OperationKind::Blackhole => None,
+            ast::OperationKind::Custom(custom) => {
+                custom.parameters.iter().find(|written| written.name.text == parameter.name).map(|written| written.span)
+            }
+        }
+    }
 }
 
-/// A value of a parameter as the language writes it.
-fn in_unit(value: f64, parameter: &Parameter) -> String {
-    match &parameter.unit {
-        Some(unit) => format!("{value}{}", unit.text()),
-        None if parameter.name == "loss" => format!("{}%", convert(value, None, Some(&percent()))),
-        None => value.to_string(),
-    }
+/// A choice as the language writes it.
+fn example(parameter: &Parameter, kind: &OperationKind) -> String {
+    let probability = matches!(kind, OperationKind::PacketLoss { .. });
+    let unit = parameter.unit.as_ref().map_or("", Unit::text);
+    let number = |value: f64| {
+        if probability { format!("{}%", convert(value, None, Some(&percent()))) } else { format!("{value}{unit}") }
+    };
+    let chosen = match &parameter.domain {
+        Domain::Number { range, shape: Shape::Value, .. } => number(range.low),
+        Domain::Number { range, shape: Shape::Range, .. } => format!("[{}, {}]", number(range.low), number(range.high)),
+        Domain::Point { low: [x, y, z], .. } => format!("({x}, {y}, {z}){unit}"),
+        Domain::Texts(items) | Domain::Files(items) => quoted(items.first().map_or("", String::as_str)),
+    };
+    format!("{} {chosen}", parameter.name)
+}
+
+/// A text as the language writes it.
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }

@@ -12,6 +12,7 @@
 mod campaign;
 mod collect;
 mod condition;
+mod custom;
 mod formula;
 mod fuzz;
 mod measure;

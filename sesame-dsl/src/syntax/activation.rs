@@ -4,7 +4,7 @@ use sesame_grammar::Rule;
 
 use super::ast::{Activation, ByCondition, Choice, Contained, Count, Name, Range, TestOperation, Trigger, TriggerEnd};
 use super::explain::Place;
-use super::parse::{Pair, Reader, child, children, expect_child};
+use super::parse::{Pair, Reader, child, children, expect_child, first_of};
 
 impl Reader<'_> {
     pub(super) fn test_operation(&mut self, pair: &Pair<'_>) -> TestOperation {
@@ -13,16 +13,25 @@ impl Reader<'_> {
             .map(|choice| {
                 let word = expect_child(&choice, Rule::parameter_name);
                 let name = Name { text: word.as_str().to_owned(), span: self.span(&word) };
-                let value = match child(&choice, Rule::range) {
-                    Some(range) => Choice::Range(self.range(&range)),
-                    None => Choice::Value(self.signed(&expect_child(&choice, Rule::signed))),
+                let values = [Rule::range, Rule::signed, Rule::point, Rule::text];
+                let value = first_of(&choice, &values).expect("a choice has a value");
+                let value = match value.as_rule() {
+                    Rule::range => Choice::Range(self.range(&value)),
+                    Rule::signed => Choice::Value(self.signed(&value)),
+                    Rule::point => Choice::Point(self.point(&value)),
+                    _ => Choice::Text(self.text_of(&value)),
                 };
                 (name, value)
             })
             .collect();
-        let activation = match child(pair, Rule::window) {
-            Some(window) => Activation::Window(self.window(&window)),
-            None => Activation::Trigger(Box::new(self.trigger(&expect_child(pair, Rule::trigger)))),
+        let activation = first_of(pair, &[Rule::window, Rule::moment, Rule::trigger]).expect("an operation has one");
+        let activation = match activation.as_rule() {
+            Rule::window => Activation::Window(self.window(&activation)),
+            Rule::moment => {
+                let (span, moment) = self.moment(&activation);
+                Activation::Moment(span, moment)
+            }
+            _ => Activation::Trigger(Box::new(self.trigger(&activation))),
         };
         let seed = child(pair, Rule::draw_seed).map(|seed| self.count(&expect_child(&seed, Rule::number)));
         TestOperation { operation, choices, activation, seed }

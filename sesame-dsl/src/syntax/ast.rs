@@ -307,7 +307,8 @@ pub(crate) struct Operation {
 
 #[derive(Debug)]
 pub(crate) struct OperationBody {
-    pub(crate) target: Path,
+    /// `None` for an operation on no topic.
+    pub(crate) target: Option<Path>,
     pub(crate) kind: OperationKind,
     pub(crate) within: Vec<(Span, Range)>,
     pub(crate) priority: Vec<(Span, Quantity)>,
@@ -329,6 +330,56 @@ pub(crate) enum OperationKind {
     PacketLoss(Range),
     Latency { range: Range, uniform: Vec<Span>, drain: Vec<(Span, Drain)> },
     Blackhole,
+    Custom(Custom),
+}
+
+/// The user's code.
+#[derive(Debug)]
+pub(crate) struct Custom {
+    /// The word `custom`.
+    pub(crate) span: Span,
+    pub(crate) moment: Option<(Span, Moment)>,
+    pub(crate) parameters: Vec<CustomParameter>,
+    pub(crate) damaged: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Moment {
+    BeforeStart,
+    AfterEnd,
+}
+
+#[derive(Debug)]
+pub(crate) struct CustomParameter {
+    pub(crate) name: Name,
+    pub(crate) doc: String,
+    pub(crate) domain: Domain,
+    /// The domain as written.
+    pub(crate) span: Span,
+}
+
+#[derive(Debug)]
+pub(crate) enum Domain {
+    Number {
+        integer: bool,
+        unit: Option<UnitName>,
+        range: Range,
+    },
+    /// Two opposite corners.
+    Point {
+        unit: Option<UnitName>,
+        corners: Box<[Point; 2]>,
+    },
+    Texts(Vec<Text>),
+    Files(Vec<Text>),
+}
+
+/// Three numbers of one unit.
+#[derive(Debug)]
+pub(crate) struct Point {
+    /// Each with the point's unit.
+    pub(crate) coordinates: [Quantity; 3],
+    pub(crate) span: Span,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -359,6 +410,8 @@ pub(crate) struct TestOperation {
 pub(crate) enum Activation {
     Window(Range),
     Trigger(Box<Trigger>),
+    /// In the place of a window.
+    Moment(Span, Moment),
 }
 
 /// Activation by condition. What the conditions may hold, is for resolution to say.
@@ -379,6 +432,8 @@ pub(crate) enum TriggerEnd {
 pub(crate) enum Choice {
     Value(Quantity),
     Range(Range),
+    Point(Point),
+    Text(Text),
 }
 
 impl Choice {
@@ -386,6 +441,8 @@ impl Choice {
         match self {
             Choice::Value(quantity) => quantity.span,
             Choice::Range(range) => range.span,
+            Choice::Point(point) => point.span,
+            Choice::Text(text) => text.span,
         }
     }
 }

@@ -25,6 +25,7 @@ pub(super) enum Place {
     Message,
     Node,
     Hook,
+    Custom,
     Test,
     Campaign,
     Condition,
@@ -42,6 +43,7 @@ impl Place {
             Place::Message => Rule::error_field,
             Place::Node => Rule::error_node_member,
             Place::Hook => Rule::error_hook_member,
+            Place::Custom => Rule::error_custom_parameter,
             Place::Test => Rule::error_test_member,
             Place::Campaign => Rule::error_campaign_member,
             Place::Condition => Rule::error_condition_setting,
@@ -70,6 +72,7 @@ impl Place {
             Place::Message => &[Rule::field],
             Place::Node => &[Rule::publishes, Rule::subscribes],
             Place::Hook => &[Rule::hook_on],
+            Place::Custom => &[Rule::custom_parameter],
             Place::Test => &[Rule::expectation, Rule::test_operation],
             Place::Campaign => &[
                 Rule::objectives,
@@ -97,6 +100,7 @@ impl Place {
             Place::Message => Rule::one_field,
             Place::Node => Rule::one_node_member,
             Place::Hook => Rule::one_hook_member,
+            Place::Custom => Rule::one_custom_parameter,
             Place::Test => Rule::one_test_member,
             Place::Campaign => Rule::one_campaign_member,
             Place::Condition => Rule::one_condition_setting,
@@ -117,6 +121,7 @@ impl Place {
             Place::Message => "a field such as `level: real[mm]`",
             Place::Node => "`publishes` or `subscribes`",
             Place::Hook => "`hook on` and topics",
+            Place::Custom => "a parameter such as `points: int [3, 20]`",
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
             Place::Campaign => {
                 "`objectives`, `operations`, `observes`, `activate`, `search`, `repeat`, `record` or `end after`"
@@ -134,7 +139,7 @@ impl Place {
             Place::System => &["simulator", "message", "topic", "node"],
             Place::Simulator => &["crate", "step"],
             Place::Process => &["step"],
-            Place::Message => &[],
+            Place::Message | Place::Custom => &[],
             Place::Node => &["publishes", "subscribes"],
             Place::Hook => &["hook"],
             Place::Test => &["expect"],
@@ -188,7 +193,8 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
         return Diagnostic::new(Code::NOT_CLOSED, span_of(first), title).label("no block is open here");
     }
 
-    let begins = place.starters().contains(&first.text) || matches!(place, Place::Message | Place::Test);
+    let begins =
+        place.starters().contains(&first.text) || matches!(place, Place::Message | Place::Custom | Place::Test);
     let continued = previous
         .and_then(|previous| read(text, previous.lo as usize, hi, place.one_rule()))
         .filter(|failure| token_at(text, failure.at).lo >= first.lo);
@@ -318,10 +324,11 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::comma => "`,`",
         Rule::dots => "`..`",
         Rule::paren_open => "`(`",
-        Rule::paren_close => "`)`",
+        Rule::paren_close | Rule::point_end => "`)`",
         Rule::bracket_open => "`[`",
         Rule::bracket_close => "`]`",
         Rule::open
+        | Rule::custom_parameters
         | Rule::hook_block
         | Rule::simulator_settings
         | Rule::process_settings
@@ -330,7 +337,7 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::close => "`}`",
         Rule::name | Rule::names | Rule::path | Rule::identifier | Rule::condition_variable => "a name",
         Rule::field_name | Rule::field => "a field such as `level: real[mm]`",
-        Rule::text => "a text in double quotes",
+        Rule::text | Rule::texts => "a text in double quotes",
         Rule::number | Rule::count => "a number",
         Rule::signed | Rule::quantity => "a quantity such as `20ms`",
         Rule::range => "a range such as `[0s, 65s]`",
@@ -347,6 +354,7 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::bound_within => "`in`",
         Rule::parameter_name | Rule::choice => "a parameter such as `offset`, `value`, `loss` or `delay`",
         Rule::window => "`from`",
+        Rule::moment => "`before start`",
         Rule::until_condition => "`until`",
         Rule::for_length | Rule::for_lengths => "`for`",
         Rule::at_most_times => "`at most`",
@@ -354,6 +362,13 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::start_contains => "`start contains`",
         Rule::contained_integer => "`integer`",
         Rule::initial_value => "`initial`",
+        Rule::custom => "`custom`",
+        Rule::custom_parameter => "a parameter such as `points: int [3, 20]`",
+        Rule::domain | Rule::number_domain | Rule::point_domain | Rule::text_domain | Rule::file_domain => {
+            "what is permitted, such as `int [3, 20]`"
+        }
+        Rule::point => "a point such as `(1, 0, -0.5)m`",
+        Rule::coordinate => "a number without unit",
         Rule::draw_seed | Rule::setting_seed => "`seed`",
         Rule::within => "`within`",
         Rule::priority => "`priority`",
@@ -405,7 +420,6 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::k_relay
         | Rule::k_coverage
         | Rule::k_boost
-        | Rule::k_custom
         | Rule::k_node
         | Rule::k_parameter => return None,
         _ => return keyword_of(rule).map(|word| format!("`{word}`")),

@@ -5,9 +5,10 @@ use pest::iterators::Pair as PestPair;
 use sesame_grammar::{Rule, SesameParser};
 
 use super::ast::{
-    ActivationMode, Bound, Campaign, Comparison, Count, Direction, Drain, Expectation, Field, File, Head, InProcess,
-    Message, Metric, MetricSource, Name, Node, Operation, OperationBody, OperationKind, Operations, Process, Record,
-    Repeat, Requirement, Search, Simulator, Strategy, System, Test, Topic, Transport, Type, TypeKind,
+    ActivationMode, Bound, Campaign, Comparison, Count, Custom, CustomParameter, Direction, Domain, Drain, Expectation,
+    Field, File, Head, InProcess, Message, Metric, MetricSource, Moment, Name, Node, Operation, OperationBody,
+    OperationKind, Operations, Process, Record, Repeat, Requirement, Search, Simulator, Strategy, System, Test, Topic,
+    Transport, Type, TypeKind,
 };
 use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, MAX_CALLS, too_deep};
@@ -69,7 +70,7 @@ pub(super) fn children<'i>(pair: &Pair<'i>, rule: Rule) -> impl Iterator<Item = 
     pair.clone().into_inner().filter(move |inner| inner.as_rule() == rule)
 }
 
-fn first_of<'i>(pair: &Pair<'i>, rules: &[Rule]) -> Option<Pair<'i>> {
+pub(super) fn first_of<'i>(pair: &Pair<'i>, rules: &[Rule]) -> Option<Pair<'i>> {
     pair.clone().into_inner().find(|inner| rules.contains(&inner.as_rule()))
 }
 
@@ -164,6 +165,7 @@ impl Reader<'_> {
         let span = self.span_of(at.lo, at.hi());
         let what = match block.as_rule() {
             Rule::hook_block => "metric".to_owned(),
+            Rule::custom_parameters => "operation".to_owned(),
             rule => format!("{rule:?}").replace("_settings", ""),
         };
         let label = if at.text.is_empty() {
@@ -220,13 +222,13 @@ impl Reader<'_> {
 
     /// Says that a construct belongs to a later version. Its first word decides where; its rule decides what it is called.
     fn unsupported(&mut self, pair: &Pair<'_>) {
-        let words = [Rule::k_node, Rule::k_parameter, Rule::k_custom, Rule::kind_name];
+        let words = [Rule::k_node, Rule::k_parameter, Rule::kind_name];
         let span = first_of(pair, &words).map_or_else(|| self.keyword_span(pair), |word| self.span(&word));
         let word = &self.text[span.range()];
         let what = match pair.as_rule() {
             Rule::unsupported_transport => format!("simulator kind `{word}`"),
-            Rule::unsupported_operation if word != "custom" => format!("an operation on a `{word}`"),
-            Rule::unsupported_operation | Rule::unsupported_kind => format!("operation kind `{word}`"),
+            Rule::unsupported_operation => format!("an operation on a `{word}`"),
+            Rule::unsupported_kind => format!("operation kind `{word}`"),
             Rule::unsupported_from => "a campaign `from` another".to_owned(),
             Rule::unsupported_strategy => format!("search strategy `{word}`"),
             _ => format!("`{word}`"),
@@ -455,7 +457,7 @@ impl Reader<'_> {
             self.unsupported(&unsupported);
             return Operation { head, body: None };
         }
-        let kinds = [Rule::random_value, Rule::packet_loss, Rule::latency, Rule::blackhole];
+        let kinds = [Rule::random_value, Rule::packet_loss, Rule::latency, Rule::blackhole, Rule::custom];
         let kind = first_of(pair, &kinds).expect("an operation has a kind");
         let kind = match kind.as_rule() {
             Rule::random_value => OperationKind::Random {
@@ -479,6 +481,7 @@ impl Reader<'_> {
                     })
                     .collect(),
             },
+            Rule::custom => OperationKind::Custom(self.custom(&kind)),
             _ => OperationKind::Blackhole,
         };
         let mut signed = |rule| {
@@ -493,8 +496,54 @@ impl Reader<'_> {
         let contains = children(pair, Rule::start_contains)
             .map(|clause| (self.keyword_span(&clause), self.contained(&clause)))
             .collect();
-        let target = self.path(&expect_child(pair, Rule::path));
+        let target = child(pair, Rule::path).map(|path| self.path(&path));
         Operation { head, body: Some(OperationBody { target, kind, within, priority, inclusion, contains }) }
+    }
+
+    fn custom(&mut self, pair: &Pair<'_>) -> Custom {
+        let span = self.keyword_span(pair);
+        let moment = child(pair, Rule::moment).map(|moment| self.moment(&moment));
+        let mut custom = Custom { span, moment, parameters: vec![], damaged: false };
+        let block = expect_child(pair, Rule::custom_parameters);
+        custom.damaged = self.members(&block, Place::Custom, |reader, member| {
+            let word = expect_child(&member, Rule::parameter_name);
+            let domains = [Rule::number_domain, Rule::point_domain, Rule::text_domain, Rule::file_domain];
+            let domain = first_of(&member, &domains).expect("a parameter has a domain");
+            custom.parameters.push(CustomParameter {
+                name: reader.name(&word),
+                doc: Self::doc(&member),
+                span: reader.span(&domain),
+                domain: reader.domain(&domain),
+            });
+        });
+        custom
+    }
+
+    pub(super) fn moment(&mut self, pair: &Pair<'_>) -> (Span, Moment) {
+        let moment = if child(pair, Rule::k_before).is_some() { Moment::BeforeStart } else { Moment::AfterEnd };
+        (self.span(pair), moment)
+    }
+
+    fn domain(&mut self, pair: &Pair<'_>) -> Domain {
+        let unit = child(pair, Rule::unit_in_brackets).map(|unit| self.unit(&expect_child(&unit, Rule::unit)));
+        match pair.as_rule() {
+            Rule::number_domain => Domain::Number {
+                integer: child(pair, Rule::k_int).is_some(),
+                unit,
+                range: self.range(&expect_child(pair, Rule::range)),
+            },
+            Rule::point_domain => {
+                let mut corners = children(pair, Rule::point).map(|point| self.point(&point)).collect::<Vec<_>>();
+                let high = corners.pop().expect("a box has two corners");
+                let low = corners.pop().expect("a box has two corners");
+                Domain::Point { unit, corners: Box::new([low, high]) }
+            }
+            rule => {
+                let texts = expect_child(pair, Rule::texts);
+                let texts = children(&texts, Rule::text).map(|text| self.text_of(&text)).collect();
+                if rule == Rule::file_domain { Domain::Files(texts) } else { Domain::Texts(texts) }
+            }
+        }
     }
 
     fn test(&mut self, pair: &Pair<'_>) -> Test {

@@ -2,7 +2,7 @@
 
 use sesame_grammar::Rule;
 
-use super::ast::{Count, Head, Name, Path, Quantity, Range, Text, UnitName};
+use super::ast::{Count, Head, Name, Path, Point, Quantity, Range, Text, UnitName};
 use super::parse::{Pair, Reader, child, children, expect_child};
 use crate::diagnostic::{Code, Diagnostic};
 
@@ -70,6 +70,20 @@ impl Reader<'_> {
         let high = ends.pop().expect("a range has two ends");
         let low = ends.pop().expect("a range has two ends");
         Range { low, high, span: self.span(pair) }
+    }
+
+    pub(super) fn point(&mut self, pair: &Pair<'_>) -> Point {
+        let unit = child(&expect_child(pair, Rule::point_end), Rule::unit).map(|unit| self.unit(&unit));
+        let mut coordinates = children(pair, Rule::coordinate).map(|coordinate| {
+            let mut quantity = self.quantity(&coordinate);
+            if child(&coordinate, Rule::minus).is_some() && quantity.value != 0.0 {
+                quantity.value = -quantity.value;
+            }
+            Quantity { unit: unit.clone(), ..quantity }
+        });
+        let mut next = || coordinates.next().expect("a point has three coordinates");
+        let coordinates = [next(), next(), next()];
+        Point { coordinates, span: self.span(pair) }
     }
 
     pub(super) fn signed(&mut self, pair: &Pair<'_>) -> Quantity {

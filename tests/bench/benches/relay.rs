@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use sesame_plan::condition::{Comparison, Condition, Operand};
-use sesame_plan::{Activation, CampaignPlan, Choice, MetricId, OperationId, Shape, Test, TestOperation};
+use sesame_plan::{Activation, CampaignPlan, Choice, Domain, MetricId, OperationId, Shape, Test, TestOperation};
 use sesame_runtime::metric::MetricTable;
 use sesame_runtime::relay::{Exchange as _, Relay};
 use sesame_runtime::time::SimTime;
@@ -18,9 +18,9 @@ fn active(plan: &CampaignPlan, names: &[&str]) -> Test {
     let operation = |name: &&str| {
         let at = plan.operations.iter().position(|operation| operation.name == **name).expect("it is declared");
         let parameters = plan.operations[at].parameters.iter().map(|parameter| {
-            let (low, high) =
-                (parameter.low * 0.75 + parameter.high * 0.25, parameter.high * 0.75 + parameter.low * 0.25);
-            match parameter.shape {
+            let Domain::Number { low, high, shape, .. } = parameter.domain else { panic!("these have numbers only") };
+            let (low, high) = (low * 0.75 + high * 0.25, high * 0.75 + low * 0.25);
+            match shape {
                 Shape::Value => Choice::Value { value: f64::midpoint(low, high) },
                 Shape::Range => Choice::Range { low, high },
             }
@@ -75,7 +75,7 @@ fn relay(criterion: &mut Criterion) {
         let test = if name.ends_with("by condition") { by_condition(timed) } else { timed };
         group.bench_function(BenchmarkId::new("relay", name), |bencher| {
             bencher.iter(|| {
-                let mut relay = Relay::new(&plan, &wires, &test, metrics.start()).expect("the test fits");
+                let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).expect("the test fits");
                 let mut deliveries = Vec::new();
                 for step in 0..MESSAGES {
                     let now = SimTime::from_nanos(i64::from(step) * 1_000_000);

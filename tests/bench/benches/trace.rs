@@ -31,7 +31,7 @@ fn trace(criterion: &mut Criterion) {
                 let subject = Subject { plan: &plan, number: 1, test: &test, simulator_seed: 1 };
                 let mut writer =
                     recorded.then(|| TraceWriter::create(&file, subject, &wires).expect("there is room for a trace"));
-                let mut relay = Relay::new(&plan, &wires, &test, metrics.start()).expect("the test fits");
+                let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).expect("the test fits");
                 if let Some(writer) = &mut writer {
                     relay = relay.tapped(writer);
                 }

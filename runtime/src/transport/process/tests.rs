@@ -7,7 +7,7 @@ use std::sync::Arc;
 use sesame_plan::{CampaignPlan, Transport as Declared};
 
 use super::*;
-use crate::evaluate::evaluate;
+use crate::evaluate::{Custom, evaluate};
 use crate::fixture::{plan, test_of};
 use crate::metric::MetricTable;
 use crate::observation::{Observation, Outcome};
@@ -60,7 +60,7 @@ fn run(transport: &mut Process, seed: u64) -> Observation {
     let plan = transport.plan.clone();
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-    evaluate(&plan, &wires, &metrics, transport, &test_of(Vec::new()), seed).unwrap()
+    evaluate(&plan, &wires, &metrics, transport, &test_of(Vec::new()), seed, &mut Custom::none()).unwrap()
 }
 
 /// A Python program as the simulator, in a folder of its own.

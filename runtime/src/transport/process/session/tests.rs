@@ -36,7 +36,7 @@ fn talk_about(operations: Vec<Operation>, test: &Test, steps: u32, said: &str) -
     let plan = plan(operations);
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-    let mut relay = Relay::new(&plan, &wires, test, metrics.start()).unwrap();
+    let mut relay = Relay::new(&plan, &wires, test, metrics.start(), &[]).unwrap();
     let mut session = Session::with_limit(said.as_bytes(), Vec::new(), 1000);
     let mut now = SimTime::ZERO;
     let end = (|| {
@@ -178,7 +178,7 @@ fn text_that_is_not_utf8_is_named() {
     let plan = plan(Vec::new());
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-    let mut relay = Relay::new(&plan, &wires, &test_of(Vec::new()), metrics.start()).unwrap();
+    let mut relay = Relay::new(&plan, &wires, &test_of(Vec::new()), metrics.start(), &[]).unwrap();
     let mut session = Session::new(&b"\xff\n"[..], Vec::new());
     match session.reset(&plan, 7, STEP, &mut relay) {
         Err(Fault::Wrong(error)) => assert!(error.to_string().contains("is not UTF-8"), "{error}"),
@@ -199,7 +199,7 @@ fn a_flood_of_messages_is_stopped() {
     let plan = plan(Vec::new());
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-    let mut relay = Relay::new(&plan, &wires, &test_of(Vec::new()), metrics.start()).unwrap();
+    let mut relay = Relay::new(&plan, &wires, &test_of(Vec::new()), metrics.start(), &[]).unwrap();
     let message = r#"{"topic":"own","value":1}"#;
     let many = vec![message; 10_000].join(",");
     let publish = format!("{{\"publish\":[{many}]}}\n");
@@ -220,7 +220,7 @@ fn lines_are_counted_from_the_last_reset() {
     let said = format!("{READY}\n{{\"done\":{{}}}}\n{READY}\nhello\n");
     let mut session = Session::new(said.as_bytes(), Vec::new());
     for last in [false, true] {
-        let mut relay = Relay::new(&plan, &wires, &test_of(Vec::new()), metrics.start()).unwrap();
+        let mut relay = Relay::new(&plan, &wires, &test_of(Vec::new()), metrics.start(), &[]).unwrap();
         session.reset(&plan, 7, STEP, &mut relay).unwrap();
         match session.step(&plan, STEP, &mut relay) {
             Ok(Progress::Running) if !last => {}

@@ -1,0 +1,357 @@
+//! `operations.rs` (parameters and a trait for each custom operation of the space), `operation_registry.rs` (the hooks of
+//! a campaign for the runtime), and the stubs of these hooks.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+use serde::Serialize;
+use sesame_plan::{Domain, Moment, Parameter, Topic, Type};
+
+use super::handlers::{self, handlers, paths};
+use super::messages::{self, Messages, Place};
+use super::rust::{self, one_line};
+use super::text;
+use crate::names::{self, Scope};
+use crate::plan::{OperationPlan, RunnerPlan};
+
+/// Where an operation is declared, for example ``operation `bend_path` (kuka_cell.sesame:41)``.
+fn declared(runner: &RunnerPlan, operation: &OperationPlan) -> String {
+    format!("operation `{}` ({}:{})", operation.operation, runner.plan.source, operation.line)
+}
+
+/// The function of a hook, with the topic and the name of its message if it takes one.
+struct Call<'a> {
+    method: String,
+    message: Option<(&'a Topic, String)>,
+}
+
+fn call<'a>(runner: &'a RunnerPlan, operation: &OperationPlan) -> Call<'a> {
+    let handler = handlers(&runner.plan, operation.topic.as_slice()).into_iter().next();
+    match (handler, operation.moment) {
+        (Some(handler), _) => Call { method: handler.method, message: Some((handler.topic, handler.parameter)) },
+        (None, Moment::AfterEnd) => Call { method: "after_end".to_owned(), message: None },
+        (None, _) => Call { method: "before_start".to_owned(), message: None },
+    }
+}
+
+/// The type of a parameter in Rust.
+fn parameter_type(parameter: &Parameter, text: &str) -> String {
+    match &parameter.domain {
+        Domain::Number { integer: true, .. } => "i64".to_owned(),
+        Domain::Number { integer: false, .. } => "f64".to_owned(),
+        Domain::Point { .. } => "[f64; 3]".to_owned(),
+        Domain::Texts { .. } | Domain::Files { .. } => format!("{text}Text"),
+    }
+}
+
+/// Parameters with their names in Rust.
+fn fields(operation: &OperationPlan) -> Vec<(&Parameter, &str, String)> {
+    let mut scope = Scope::default();
+    let named = operation
+        .parameters
+        .iter()
+        .map(|(parameter, doc)| (parameter, doc.as_str(), scope.take(names::snake(&parameter.name), "_")));
+    named.collect()
+}
+
+/// What a parameter may be, in a sentence.
+fn permitted(parameter: &Parameter) -> String {
+    let unit = parameter.unit.as_ref().map(|unit| format!(" In {unit}.")).unwrap_or_default();
+    match &parameter.domain {
+        Domain::Number { low, high, .. } => format!("From {low} to {high}.{unit}"),
+        Domain::Point { low, high } => format!("From {low:?} to {high:?}.{unit}"),
+        Domain::Texts { texts } => format!("One of {}.", texts.join(", ")),
+        Domain::Files { files } => {
+            format!("One of the files {}; relative to the folder of the space.", files.join(", "))
+        }
+    }
+}
+
+/// What a hook is given, as [`handlers::inputs`] says it.
+pub(super) fn inputs(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPlan) -> Vec<String> {
+    let mut lines = handlers::inputs(&runner.plan, types, operation.topic.as_slice());
+    if lines.is_empty() {
+        lines.push(call(runner, operation).method);
+    }
+    for (parameter, _, name) in fields(operation) {
+        let unit = parameter.unit.as_ref().map(|unit| format!(" in {unit}")).unwrap_or_default();
+        lines.push(format!("parameters.{name}: {}{unit}", parameter_type(parameter, "")));
+    }
+    lines
+}
+
+/// The parameters and traits.
+pub(super) fn traits(runner: &RunnerPlan, types: &Messages<'_>, header: &str) -> String {
+    let traits = runner.operations.iter().map(|operation| hook_trait(runner, types, operation));
+    let docs = rust::module_docs([format!("What the operation hooks of `{}` implement.", runner.plan.space)]);
+    rust::file(
+        header,
+        quote! {
+            #docs
+            #![allow(dead_code, reason = "a campaign need not use all operations of its space")]
+            #(#traits)*
+        },
+    )
+}
+
+fn hook_trait(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPlan) -> TokenStream {
+    let (hook_type, file) = (names::hook_type(&operation.operation), names::snake(&operation.operation));
+    let name = names::ident(&names::hook_trait(&operation.operation));
+    let parameters = names::ident(&names::parameters_type(&operation.operation));
+    let declared = declared(runner, operation);
+    let message = format!("{declared} has no hook");
+    let label = format!("`{hook_type}` does not implement `{name}`");
+    let note = format!(
+        "hooks/{file}.rs holds the hook: write `impl {name} for {hook_type}` there, \
+         or move the file away and run `sesamec generate {}` for a fresh stub",
+        runner.plan.source
+    );
+    let mut doc: Vec<String> = operation.doc.lines().map(str::to_owned).collect();
+    if !doc.is_empty() {
+        doc.push(String::new());
+    }
+    doc.push(format!("The hook of {declared}; one is made for each use in a test, and for each run."));
+    let docs = rust::docs(doc);
+    let parameter_docs = rust::docs([format!("What a test chose for `{}`.", operation.operation)]);
+    let struct_fields = fields(operation).into_iter().map(|(parameter, doc, name)| {
+        let docs = rust::docs(doc.lines().map(str::to_owned).chain([permitted(parameter)]));
+        let (name, ty) =
+            (names::ident(&name), messages::tokens(&parameter_type(parameter, "::sesame_runtime::value::")));
+        quote! { #docs pub #name: #ty }
+    });
+    let Call { method, message: taken } = call(runner, operation);
+    let method = names::ident(&method);
+    let method = if let Some((topic, parameter)) = taken {
+        let mut doc = vec![format!("A message on `{}` (\"{}\"), to be changed.", topic.name, paths(topic))];
+        doc.extend(messages::unit(&topic.ty).map(|unit| format!("In {unit}.")));
+        let docs = rust::docs(doc);
+        let parameter = names::ident(&parameter);
+        let ty = messages::tokens(&types.owned(&topic.ty, Place::WHOLE));
+        quote! {
+            #docs
+            fn #method(
+                &mut self,
+                #parameter: &mut #ty,
+                parameters: &#parameters,
+                ctx: &mut ::sesame_runtime::fuzz::OperationContext<'_, #ty>,
+            );
+        }
+    } else {
+        let docs = rust::docs([match operation.moment {
+            Moment::AfterEnd => "After the last message of a run that came to its end.",
+            _ => "Before the simulator starts afresh for the run.",
+        }]);
+        quote! {
+            #docs
+            fn #method(&mut self, parameters: &#parameters, ctx: &mut ::sesame_runtime::fuzz::RunContext<'_>);
+        }
+    };
+    quote! {
+        #parameter_docs
+        #[derive(Debug, Clone, PartialEq)]
+        pub struct #parameters { #(#struct_fields,)* }
+
+        #docs
+        #[diagnostic::on_unimplemented(message = #message, label = #label, note = #note)]
+        pub trait #name: ::core::default::Default {
+            #method
+        }
+    }
+}
+
+/// The hooks this campaign uses: their files, and what makes the runtime call them.
+///
+/// `hooks` is where the hook files are, as seen from the file's folder.
+pub(super) fn registry(runner: &RunnerPlan, types: &Messages<'_>, header: &str, hooks: &str) -> String {
+    let used: Vec<&OperationPlan> = runner.operations.iter().filter(|operation| runner.applies(operation)).collect();
+    let module = |operation: &OperationPlan| names::ident(&names::snake(&operation.operation));
+    let modules = used.iter().map(|operation| {
+        let file = format!("{hooks}/{}.rs", names::snake(&operation.operation));
+        let module = module(operation);
+        quote! { #[path = #file] mod #module; }
+    });
+    let here = |at: usize| quote::format_ident!("Hook{at}");
+    let imports = used.iter().enumerate().map(|(at, operation)| {
+        let (module, user, here) = (module(operation), names::ident(&names::hook_type(&operation.operation)), here(at));
+        quote! { use self::#module::#user as #here; }
+    });
+    let notes: Vec<(String, String)> = used
+        .iter()
+        .map(|operation| {
+            let module = names::written(&names::snake(&operation.operation));
+            (format!("use self::{module}::"), declared(runner, operation))
+        })
+        .collect();
+    let entries = used.iter().enumerate().map(|(at, operation)| {
+        let (name, build, here) = (&operation.operation, build(operation), here(at));
+        quote! { ::sesame_runtime::fuzz::OperationEntry { operation: #name, build: #build::<#here> } }
+    });
+    let adapters = used.iter().map(|operation| adapter(runner, types, operation));
+    let docs = rust::module_docs([format!("The operation hooks of `{}`, for the runtime.", runner.plan.campaign.name)]);
+    let source = rust::file(
+        header,
+        quote! {
+            #docs
+            #(#modules)*
+            #(#imports)*
+            /// One entry for each custom operation of this campaign.
+            pub(super) static OPERATIONS: &[::sesame_runtime::fuzz::OperationEntry] = &[#(#entries),*];
+            #(#adapters)*
+        },
+    );
+    rust::note_lines(&source, &notes)
+}
+
+fn build(operation: &OperationPlan) -> proc_macro2::Ident {
+    quote::format_ident!("build_{}", names::snake(&operation.operation))
+}
+
+/// Turns choices into typed parameters and dynamic messages into typed ones for a hook.
+fn adapter(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPlan) -> TokenStream {
+    let adapter = quote::format_ident!("{}Adapter", names::hook_type(&operation.operation));
+    let hook_trait = names::ident(&names::hook_trait(&operation.operation));
+    let hook_trait = quote! { crate::generated::operations::#hook_trait };
+    let parameters = names::ident(&names::parameters_type(&operation.operation));
+    let parameters = quote! { crate::generated::operations::#parameters };
+    let build = build(operation);
+    let read = (0_usize..).zip(fields(operation)).map(|(position, (_, _, name))| {
+        let name = names::ident(&name);
+        quote! { #name: ::sesame_runtime::fuzz::chosen(choices, #position) }
+    });
+    let unused = operation.parameters.is_empty().then(|| quote! { let _ = choices; });
+    let Call { method, message } = call(runner, operation);
+    let method = names::ident(&method);
+    let called = if let Some((topic, _)) = message {
+        let ty = messages::tokens(&types.owned(&topic.ty, Place::WHOLE));
+        quote! {
+            fn on_message(
+                &mut self,
+                message: &mut ::sesame_runtime::value::Value,
+                call: &mut ::sesame_runtime::fuzz::MessageCall<'_>,
+            ) {
+                call.typed::<#ty>(message, |message, ctx| {
+                    #hook_trait::#method(&mut self.hook, message, &self.parameters, ctx);
+                });
+            }
+        }
+    } else {
+        quote! {
+            fn beside_run(&mut self, ctx: &mut ::sesame_runtime::fuzz::RunContext<'_>) {
+                #hook_trait::#method(&mut self.hook, &self.parameters, ctx);
+            }
+        }
+    };
+    quote! {
+        struct #adapter<H> {
+            hook: H,
+            parameters: #parameters,
+        }
+
+        fn #build<H: #hook_trait + 'static>(
+            choices: &[::sesame_runtime::plan::Choice],
+        ) -> ::std::boxed::Box<dyn ::sesame_runtime::fuzz::OperationHook> {
+            #unused
+            ::std::boxed::Box::new(#adapter {
+                hook: <H as ::core::default::Default>::default(),
+                parameters: #parameters { #(#read,)* },
+            })
+        }
+
+        impl<H: #hook_trait> ::sesame_runtime::fuzz::OperationHook for #adapter<H> {
+            #called
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Stub {
+    doc: Vec<String>,
+    operation: String,
+    space: String,
+    source: String,
+    line: u32,
+    imports: Vec<String>,
+    hook_type: String,
+    hook_trait: String,
+    parameters_type: String,
+    method: String,
+    /// Said of the function.
+    when: String,
+    /// The message's name and type, with `: &mut` between; none beside the run.
+    message: Option<StubMessage>,
+    context: String,
+    example: String,
+}
+
+#[derive(Serialize)]
+struct StubMessage {
+    name: String,
+    ty: String,
+}
+
+/// The stub of a hook.
+pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPlan) -> String {
+    let (hook_type, hook_trait) = (names::hook_type(&operation.operation), names::hook_trait(&operation.operation));
+    let parameters_type = names::parameters_type(&operation.operation);
+    let Call { method, message } = call(runner, operation);
+    let mut own = [names::written(&hook_trait), parameters_type.clone()];
+    own.sort();
+    let mut imports = vec![format!("crate::generated::operations::{{{}}}", own.join(", "))];
+    let message = message.map(|(topic, name)| {
+        let of = messages::named_message(&topic.ty).map(|id| types.struct_name(id).to_owned());
+        // A message called like the hook or its parameters is reached through its module.
+        let clash = of.as_ref().is_some_and(|of| [&hook_type, &hook_trait, &parameters_type].contains(&of));
+        imports.extend(of.map(|of| {
+            if clash {
+                "crate::generated::messages".to_owned()
+            } else {
+                format!("crate::generated::messages::{}", names::written(&of))
+            }
+        }));
+        imports.push("sesame_runtime::fuzz::OperationContext".to_owned());
+        if messages::holds_text(&topic.ty) {
+            imports.push("sesame_runtime::value::Text".to_owned());
+        }
+        let ty = types.owned(&topic.ty, if clash { Place::BY_MODULE } else { Place::IMPORTED });
+        (topic, StubMessage { name: names::written(&name), ty })
+    });
+    if message.is_none() {
+        imports.push("sesame_runtime::fuzz::RunContext".to_owned());
+    }
+    imports.sort();
+    let (when, context, example) = match (&message, operation.moment) {
+        (Some((topic, message)), _) => {
+            let unit = messages::unit(&topic.ty).map(|unit| format!("; in {unit}")).unwrap_or_default();
+            let when = format!("A message on `{}` (\"{}\"), to be changed{unit}.", topic.name, paths(topic));
+            let example = match &topic.ty {
+                Type::Real { .. } => format!("*{} += ctx.draw_between(-0.1, 0.1);", message.name),
+                _ => format!("if ctx.draw() < 0.1 {{ ctx.inject({}.clone()); }}", message.name),
+            };
+            (when, format!("OperationContext<'_, {}>", message.ty), example)
+        }
+        (None, moment) => {
+            let when = match moment {
+                Moment::AfterEnd => "After the last message of a run that came to its end.",
+                _ => "Before the simulator starts afresh for the run. Changed files are put back after it.",
+            };
+            let example = "ctx.edit_file(\"config.yaml\", |text| text.replace(\"gain: 1\", \"gain: 2\"));";
+            (when.to_owned(), "RunContext<'_>".to_owned(), example.to_owned())
+        }
+    };
+    let stub = Stub {
+        doc: operation.doc.lines().map(one_line).collect(),
+        operation: operation.operation.clone(),
+        space: runner.plan.space.clone(),
+        source: one_line(&runner.plan.source),
+        line: operation.line,
+        imports,
+        hook_type: names::written(&hook_type),
+        hook_trait: names::written(&hook_trait),
+        parameters_type,
+        method: names::written(&method),
+        when: one_line(&when),
+        message: message.map(|(_, message)| message),
+        context,
+        example,
+    };
+    text::render(sesame_templates::runner::OPERATION_HOOK, &stub)
+}

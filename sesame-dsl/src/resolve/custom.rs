@@ -1,0 +1,214 @@
+//! Custom operations: what their parameters permit, and when their code is called.
+
+use std::collections::BTreeMap;
+
+use super::Resolver;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::model::{self, Domain, FieldPath, Moment, OperationKind, Parameter, Shape};
+use crate::span::Span;
+use crate::syntax::ast;
+use crate::units::Unit;
+
+impl<'a> Resolver<'a> {
+    pub(super) fn custom(
+        &mut self,
+        custom: &'a ast::Custom,
+        body: &'a ast::OperationBody,
+    ) -> Option<(Option<FieldPath>, OperationKind)> {
+        let parameters = self.custom_parameters(custom);
+        let (target, moment) = match (&body.target, custom.moment) {
+            (Some(topic), None) => (Some(self.whole_messages(topic, "a custom operation takes")?), Moment::OnMessage),
+            (None, Some((_, ast::Moment::BeforeStart))) => (None, Moment::BeforeStart),
+            (None, Some((_, ast::Moment::AfterEnd))) => (None, Moment::AfterEnd),
+            (Some(topic), Some((moment, _))) => {
+                let title = format!("an operation {} has no topic: there are no messages then", self.text(moment));
+                let diagnostic = Diagnostic::new(Code::WRONG_TYPE, topic.span, title)
+                    .label("leave `on` and the topic out")
+                    .also(moment, "not during the run");
+                self.report(diagnostic);
+                return None;
+            }
+            (None, None) => {
+                let title = "a custom operation says when its code is called";
+                let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, custom.span, title).label(
+                    "expected `on` and a topic before the `=`, or `before start` or `after end` after this word",
+                );
+                self.report(diagnostic);
+                return None;
+            }
+        };
+        if let (None, Some((span, _))) = (&target, body.within.first()) {
+            let title = "`within` means nothing for an operation that acts before the start or after the end";
+            self.report(Diagnostic::new(Code::BAD_WINDOW, *span, title).label("leave this out"));
+            return None;
+        }
+        if let (None, Some((span, _))) = (&target, body.contains.first()) {
+            let title = "no condition activates an operation that acts before the start or after the end";
+            self.report(Diagnostic::new(Code::BAD_WINDOW, *span, title).label("leave this out"));
+            return None;
+        }
+        Some((target, OperationKind::Custom { moment, parameters: parameters? }))
+    }
+
+    fn custom_parameters(&mut self, custom: &'a ast::Custom) -> Option<Vec<Parameter>> {
+        let mut first: BTreeMap<&str, Span> = BTreeMap::new();
+        let mut parameters = Vec::new();
+        for written in &custom.parameters {
+            let name = &written.name;
+            if let Some(&before) = first.get(name.text.as_str()) {
+                let title = format!("parameter `{}` is defined twice", name.text);
+                let diagnostic = Diagnostic::new(Code::DEFINED_TWICE, name.span, title)
+                    .label("again here")
+                    .also(before, "first defined here");
+                self.report(diagnostic);
+                continue;
+            }
+            first.insert(&name.text, name.span);
+            let resolved = self.domain(&written.domain, &format!("`{}`", name.text));
+            parameters.extend(resolved.map(|(unit, domain)| Parameter {
+                name: name.text.clone(),
+                doc: written.doc.clone(),
+                unit,
+                domain,
+            }));
+        }
+        (parameters.len() == custom.parameters.len() && !custom.damaged).then_some(parameters)
+    }
+
+    fn domain(&mut self, domain: &'a ast::Domain, what: &str) -> Option<(Option<Unit>, Domain)> {
+        match domain {
+            ast::Domain::Number { integer, unit, range } => {
+                let unit = self.declared_unit([unit.as_ref(), range.low.unit.as_ref(), range.high.unit.as_ref()])?;
+                let permitted = self.range(range, unit.as_ref(), what)?;
+                if *integer {
+                    let low = self.whole(permitted.low, range.low.span, what);
+                    if !self.whole(permitted.high, range.high.span, what) || !low {
+                        return None;
+                    }
+                }
+                Some((unit, Domain::Number { range: permitted, shape: Shape::Value, integer: *integer }))
+            }
+            ast::Domain::Point { unit, corners } => {
+                let [low, high] = &**corners;
+                let [of_low, of_high] = [low, high].map(|point| point.coordinates[0].unit.as_ref());
+                let unit = self.declared_unit([unit.as_ref(), of_low, of_high])?;
+                let from = self.coordinates(low, unit.as_ref(), what);
+                let to = self.coordinates(high, unit.as_ref(), what);
+                let [from, to] = [from?, to?];
+                for axis in 0..3 {
+                    if from[axis] > to[axis] {
+                        let [a, b] = [low, high].map(|point| self.text(point.coordinates[axis].span).to_owned());
+                        let title = format!("this box is reversed on its {} axis", ["x", "y", "z"][axis]);
+                        let diagnostic =
+                            Diagnostic::new(Code::REVERSED_RANGE, low.coordinates[axis].span.to(high.span), title)
+                                .label(format!("`{a}` is more than `{b}`"));
+                        self.report(diagnostic);
+                        return None;
+                    }
+                }
+                Some((unit, Domain::Point { low: from, high: to }))
+            }
+            ast::Domain::Texts(texts) => Some((None, Domain::Texts(self.items(texts)?))),
+            ast::Domain::Files(texts) => {
+                let paths = self.items(texts)?;
+                let good = texts.iter().filter(|text| self.is_path(text)).count();
+                (good == texts.len()).then_some((None, Domain::Files(paths)))
+            }
+        }
+    }
+
+    /// The first unit that is written, if any is; the outer `None` for one that does not exist.
+    #[expect(clippy::option_option, reason = "the outer says whether it was in order")]
+    fn declared_unit(&mut self, written: [Option<&ast::UnitName>; 3]) -> Option<Option<Unit>> {
+        match written.into_iter().flatten().next() {
+            Some(name) => self.unit(name).map(Some),
+            None => Some(None),
+        }
+    }
+
+    /// The coordinates of a point in a unit.
+    pub(super) fn coordinates(&mut self, point: &ast::Point, unit: Option<&Unit>, what: &str) -> Option<[f64; 3]> {
+        if let (None, Some(unit)) = (&point.coordinates[0].unit, unit) {
+            let title = format!("`{}` lacks its unit", self.text(point.span));
+            let diagnostic = Diagnostic::new(Code::WRONG_UNIT, point.span, title)
+                .label(format!("{what} is in `{}`", unit.text()))
+                .suggest(format!("write it in `{}`", unit.text()), point.span.end(), unit.text());
+            self.report(diagnostic);
+            return None;
+        }
+        let mut coordinates = [0.0; 3];
+        for (coordinate, written) in coordinates.iter_mut().zip(&point.coordinates) {
+            // One unit for all three: a mistake in it is reported once.
+            *coordinate = self.value(written, unit, what)?;
+        }
+        Some(coordinates)
+    }
+
+    fn items(&mut self, texts: &'a [ast::Text]) -> Option<Vec<String>> {
+        let mut first: BTreeMap<&str, Span> = BTreeMap::new();
+        let mut complete = true;
+        for text in texts {
+            if let Some(before) = first.insert(&text.text, text.span) {
+                let title = format!("`{}` stands twice in this list", self.text(text.span));
+                let diagnostic = Diagnostic::new(Code::LISTED_TWICE, text.span, title)
+                    .label("again here")
+                    .also(before, "first here");
+                self.report(diagnostic);
+                complete = false;
+            }
+        }
+        complete.then(|| texts.iter().map(|text| text.text.clone()).collect())
+    }
+
+    /// Whether a text is the path of a file below the space's folder.
+    fn is_path(&mut self, text: &ast::Text) -> bool {
+        let plain = |part: &str| !part.is_empty() && part != "." && part != "..";
+        let good = text.text.split('/').all(plain) && !text.text.contains(['\\', ':', '\0']);
+        if !good {
+            let title = format!("`{}` is no path of a file below the folder of the space", self.text(text.span));
+            let diagnostic = Diagnostic::new(Code::BAD_PATH, text.span, title)
+                .label("expected a path such as `config/calibration.yaml`");
+            self.report(diagnostic);
+        }
+        good
+    }
+
+    /// Whether a test gives a moment to an operation that acts then, and a window or conditions to any other.
+    pub(super) fn fits_moment(
+        &mut self,
+        test: &'a ast::TestOperation,
+        index: usize,
+        operation: &model::Operation,
+    ) -> bool {
+        let OperationKind::Custom { moment, .. } = &operation.kind else {
+            return self.no_moment(test, index);
+        };
+        let declared = match moment {
+            Moment::OnMessage => return self.no_moment(test, index),
+            Moment::BeforeStart => ast::Moment::BeforeStart,
+            Moment::AfterEnd => ast::Moment::AfterEnd,
+        };
+        let span = match &test.activation {
+            ast::Activation::Moment(_, written) if *written == declared => return true,
+            ast::Activation::Moment(span, _) => *span,
+            ast::Activation::Window(window) => window.span,
+            ast::Activation::Trigger(trigger) => trigger.start.span,
+        };
+        let words = if declared == ast::Moment::BeforeStart { "before start" } else { "after end" };
+        let title = format!("`{}` acts {words}", test.operation.text);
+        let diagnostic = Diagnostic::new(Code::BAD_WINDOW, span, title).label(format!("expected `{words}`"));
+        self.report(diagnostic);
+        false
+    }
+
+    fn no_moment(&mut self, test: &'a ast::TestOperation, index: usize) -> bool {
+        let ast::Activation::Moment(span, _) = test.activation else { return true };
+        let title = format!("`{}` acts during the run", test.operation.text);
+        let declared = self.file.operations[index].head.name.span;
+        let diagnostic = Diagnostic::new(Code::BAD_WINDOW, span, title)
+            .label("expected a window such as `from 8s to 57s`, or `when` and a condition")
+            .also(declared, "declared here");
+        self.report(diagnostic);
+        false
+    }
+}
