@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use nix::sys::signal::Signal;
+use rusqlite::Connection;
 use sesame_runtime::record::Repository;
 use sesame_tests::{Runner, done};
 
@@ -119,4 +120,26 @@ fn results_on_a_disk_made_read_only_are_left_alone_and_taken_up_again() {
     disk.remount("rw");
     assert_eq!(recorded(&disk.0.join("r/3")), tests);
     assert_eq!(runner.run(&["resume", "disk/r/3"]).expect(0).digest(), whole);
+}
+
+#[test]
+fn results_left_in_the_middle_of_writing_are_put_right_where_something_may_be_written() {
+    let runner = recording("disk_unsettled", "harmless", "");
+    let whole = runner.run(&["--results", "whole"]).expect(0).digest();
+    let Some(disk) = Disk::mount(&runner) else { return };
+    let (from, to) = (runner.folder.join("whole/3"), disk.0.join("3"));
+    fs::create_dir(&to).unwrap();
+    // What a kill leaves of a transaction that has begun to overwrite the file.
+    let database = Connection::open(from.join("results.sqlite")).unwrap();
+    database.pragma_update(None, "cache_size", 1).unwrap();
+    database.execute_batch("BEGIN IMMEDIATE; UPDATE change_points SET value = value + 1").unwrap();
+    for name in ["results.sqlite", "results.sqlite-journal"] {
+        fs::copy(from.join(name), to.join(name)).unwrap();
+    }
+    disk.remount("ro");
+    let refused = runner.run(&["digest", "--results", "disk/3"]).expect(1);
+    assert!(refused.err.contains("a run that broke off left these results unsettled"), "{}", refused.err);
+    assert!(refused.err.contains("disk/3"), "{}", refused.err);
+    disk.remount("rw");
+    assert_eq!(runner.run(&["digest", "--results", "disk/3"]).expect(0).out.trim(), whole);
 }

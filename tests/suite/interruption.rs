@@ -163,10 +163,7 @@ fn killed_at(runner: &Runner, moment: f64, whole: &str, takes: Duration) -> Prog
     let (status, said) = running.ended();
     no_worker_is_left(runner);
     let folder = format!("{results}/3");
-    let progress = if status.signal() != Some(9) {
-        assert_eq!(said.expect(0).digest(), whole);
-        Progress::Ended
-    } else {
+    let progress = if status.signal() == Some(9) {
         match Repository::open(&runner.folder.join(&folder)) {
             Err(error) => {
                 // There is nothing yet, and nothing half done either.
@@ -188,6 +185,9 @@ fn killed_at(runner: &Runner, moment: f64, whole: &str, takes: Duration) -> Prog
                 Progress::Recorded(tests)
             }
         }
+    } else {
+        assert_eq!(said.expect(0).digest(), whole);
+        Progress::Ended
     };
     fs::remove_dir_all(runner.folder.join(&results)).unwrap();
     progress
