@@ -13,7 +13,7 @@ use nix::unistd::Pid;
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
 use sesame_runtime::observation::Outcome;
-use sesame_runtime::record::Repository;
+use sesame_runtime::record::{RecordError, Repository};
 use sesame_tests::{Done, Runner};
 
 use crate::faults::faulty;
@@ -166,8 +166,9 @@ fn killed_at(runner: &Runner, moment: f64, whole: &str, takes: Duration) -> Prog
     let progress = if status.signal() == Some(9) {
         match Repository::open(&runner.folder.join(&folder)) {
             Err(error) => {
-                // There is nothing yet, and nothing half done either.
-                assert!(moment < 0.3, "killed after {moment} of its time and cannot be read: {error}");
+                // There is nothing yet, and nothing half done either: no test can have ended.
+                assert!(matches!(error, RecordError::Missing { .. }), "killed after {moment} of its time: {error}");
+                assert!(!said.err.contains("harmless "), "killed after {moment} of its time: {}", said.err);
                 runner.run(&["resume", &folder]).expect(1);
                 Progress::HardlyBegun
             }

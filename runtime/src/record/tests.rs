@@ -143,6 +143,24 @@ fn results_whose_run_was_killed_while_it_wrote_its_end_are_read_as_they_were() {
 }
 
 #[test]
+fn a_run_killed_before_its_results_had_all_tables_has_none_and_the_folder_can_be_used() {
+    let results = folder();
+    let run = results.path().join("7");
+    std::fs::create_dir(&run).unwrap();
+    let database = Connection::open(run.join("results.sqlite.begun")).unwrap();
+    database.execute_batch("CREATE TABLE tests (number INTEGER)").unwrap();
+    drop(database);
+    std::fs::write(run.join("results.sqlite.begun-journal"), "half a journal").unwrap();
+    assert!(matches!(Repository::open(&run), Err(RecordError::Missing { .. })));
+    assert_eq!(latest_folder(results.path()).unwrap(), None);
+    let whole = sample::campaign(&run, &sample::plan(), 5).digest().unwrap();
+    assert_eq!(Repository::open(&run).unwrap().digest().unwrap(), whole);
+    let mut left: Vec<_> = std::fs::read_dir(&run).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    left.sort();
+    assert_eq!(left, ["results.lock", "results.sqlite"]);
+}
+
+#[test]
 fn what_broke_off_in_the_file_of_another_program_is_left_to_that_program() {
     let (folder, killed) = (folder(), tempfile::tempdir().unwrap());
     let other = Connection::open(folder.path().join(DATABASE)).unwrap();

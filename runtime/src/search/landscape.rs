@@ -189,7 +189,9 @@ impl Landscape {
                 active.map(move |(start, end)| (operation.operation.index(), start, end, f64::midpoint(low, high)))
             })
             .collect();
-        let time = active.iter().map(|(_, start, end, _)| end - start).sum();
+        // As the relay sums it: active equally long is equal.
+        let length = |&(_, start, end, _): &_| SimTime::from_seconds(end) - SimTime::from_seconds(start);
+        let time = active.iter().map(length).fold(SimTime::ZERO, |sum, length| sum + length).seconds();
         let hit = |phase: &Phase, t: f64| {
             phase.thresholds.iter().all(|&(signal, threshold)| {
                 let on = active.iter().filter(|(s, start, end, _)| *s == signal && *start <= t && t < *end);
