@@ -153,7 +153,7 @@ fn a_run_killed_before_its_results_had_all_tables_has_none_and_the_folder_can_be
     std::fs::write(run.join("results.sqlite.begun-journal"), "half a journal").unwrap();
     assert!(matches!(Repository::open(&run), Err(RecordError::Missing { .. })));
     assert_eq!(latest_folder(results.path()).unwrap(), None);
-    let whole = sample::campaign(&run, &sample::plan(), 5).digest().unwrap();
+    let whole = sample::campaign(&run, &sample::plan(), 60).digest().unwrap();
     assert_eq!(Repository::open(&run).unwrap().digest().unwrap(), whole);
     let mut left: Vec<_> = std::fs::read_dir(&run).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     left.sort();
