@@ -84,12 +84,15 @@ fn processes() -> Vec<(i32, String)> {
     said.lines().filter_map(split).collect()
 }
 
-/// Insists that all workers are gone, which may take them a moment.
+/// Insists that all processes of a runner's program are gone, which may take workers a moment. One that was only just
+/// being started has its supervisor's command line yet, and its lock.
 #[track_caller]
 fn no_worker_is_left(runner: &Runner) {
+    let program = format!("{} ", runner.program.display());
+    let left = || processes().into_iter().filter(|(_, words)| words.starts_with(&program)).collect::<Vec<_>>();
     let patience = Instant::now();
-    while !workers(runner).is_empty() {
-        assert!(patience.elapsed() < Duration::from_secs(20), "left behind: {:?}", workers(runner));
+    while !left().is_empty() {
+        assert!(patience.elapsed() < Duration::from_secs(20), "left behind: {:?}", left());
         sleep(Duration::from_millis(10));
     }
 }
