@@ -31,6 +31,7 @@ pub(crate) mod landscape;
 use sesame_plan::{ActivationMode, CampaignPlan, Direction, KnownTestId, MetricId, Search, Test};
 
 use crate::observation::{Observation, Outcome};
+use crate::search::nsga2::Survival;
 
 pub use dominance::{Fitness, Unfit};
 pub use front::Front;
@@ -84,12 +85,13 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
             return Err(SearchError::NoPopulation { campaign: plan.campaign.name.clone() });
         }
         &Search::Nsga2 { population, evaluations } => {
-            let rates = match plan.campaign.activation {
-                ActivationMode::Time => vary::Rates::default(),
-                ActivationMode::Condition { .. } => vary::Rates::by_condition(),
+            // Conditions hold or not: many tests are active equally long, and change nothing that is measured.
+            let (rates, survival) = match plan.campaign.activation {
+                ActivationMode::Time => (vary::Rates::default(), Survival::Crowded),
+                ActivationMode::Condition { .. } => (vary::Rates::by_condition(), Survival::Distinct),
             };
             let variation = TestVariation::new(Permitted::of(plan)?, rates, seed);
-            Box::new(Nsga2::new(nsga2::Settings { population, evaluations, seed }, variation))
+            Box::new(Nsga2::new(nsga2::Settings { population, evaluations, seed, survival }, variation))
         }
         &Search::Random { evaluations } => Box::new(Random::new(Permitted::of(plan)?, evaluations, seed)),
         &Search::Repeat { test, times } => Box::new(Repeat::new(plan.test(test).test.clone(), times)),

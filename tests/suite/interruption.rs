@@ -1,5 +1,6 @@
 //! A run that is stopped, in good order or not, goes on to what it would have been.
 
+use std::cell::RefCell;
 use std::fs;
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::path::Path;
@@ -12,7 +13,7 @@ use nix::unistd::Pid;
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
 use sesame_runtime::observation::Outcome;
-use sesame_runtime::record::Repository;
+use sesame_runtime::record::{RecordError, Repository};
 use sesame_tests::{Done, Runner};
 
 use crate::faults::faulty;
@@ -83,12 +84,15 @@ fn processes() -> Vec<(i32, String)> {
     said.lines().filter_map(split).collect()
 }
 
-/// Insists that all workers are gone, which may take them a moment.
+/// Insists that all processes of a runner's program are gone, which may take workers a moment. One that was only just
+/// being started has its supervisor's command line yet, and its lock.
 #[track_caller]
 fn no_worker_is_left(runner: &Runner) {
+    let program = format!("{} ", runner.program.display());
+    let left = || processes().into_iter().filter(|(_, words)| words.starts_with(&program)).collect::<Vec<_>>();
     let patience = Instant::now();
-    while !workers(runner).is_empty() {
-        assert!(patience.elapsed() < Duration::from_secs(20), "left behind: {:?}", workers(runner));
+    while !left().is_empty() {
+        assert!(patience.elapsed() < Duration::from_secs(20), "left behind: {:?}", left());
         sleep(Duration::from_millis(10));
     }
 }
@@ -140,33 +144,57 @@ fn a_run_in_progress_is_not_resumed_by_another_process_but_can_be_read() {
     assert!(status.success());
 }
 
+/// How far a run was when it was killed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Progress {
+    /// It had no results yet.
+    HardlyBegun,
+    /// With so many tests recorded.
+    Recorded(usize),
+    /// All was recorded but the page.
+    AllButThePage,
+    /// The kill came too late.
+    Ended,
+}
+
 /// Kills the supervisor after this share of what a run takes, and resumes.
-fn killed_at(runner: &Runner, moment: f64, whole: &str, takes: Duration) {
+fn killed_at(runner: &Runner, moment: f64, whole: &str, takes: Duration) -> Progress {
     let results = format!("killed{moment:.6}");
     let running = Running::start(runner, &results, "2");
     sleep(takes.mul_f64(moment));
     kill(running.pid(), Signal::SIGKILL).unwrap();
-    let (status, _) = running.ended();
+    let (status, said) = running.ended();
     no_worker_is_left(runner);
-    if status.signal() == Some(9) {
-        let folder = runner.folder.join(&results).join("3");
-        if recorded(&folder) == 0 && Repository::open(&folder).is_err() {
-            // It had hardly begun: there is nothing yet, and nothing half done either.
-            runner.run(&["resume", &format!("{results}/3")]).expect(1);
-            return;
+    let folder = format!("{results}/3");
+    let progress = if status.signal() == Some(9) {
+        match Repository::open(&runner.folder.join(&folder)) {
+            Err(error) => {
+                // There is nothing yet, and nothing half done either: no test can have ended.
+                assert!(matches!(error, RecordError::Missing { .. }), "killed after {moment} of its time: {error}");
+                assert!(!said.err.contains("harmless "), "killed after {moment} of its time: {}", said.err);
+                runner.run(&["resume", &folder]).expect(1);
+                Progress::HardlyBegun
+            }
+            Ok(repository) if repository.campaign().stop.is_some() => {
+                // There is nothing to go on with, and nothing is missing.
+                assert_eq!(runner.run(&["report", "--results", &folder]).expect(0).digest(), whole);
+                Progress::AllButThePage
+            }
+            Ok(repository) => {
+                let tests = repository.tests().unwrap().len();
+                drop(repository);
+                let next = runner.run(&["--results", &results, "--evaluations", "1"]).expect(0);
+                assert!(next.err.contains("an earlier run is unfinished"), "{}", next.err);
+                assert_eq!(resumed(runner, &results), whole, "killed with {tests} tests recorded");
+                Progress::Recorded(tests)
+            }
         }
-        let tests = recorded(&folder);
-        if Repository::open(&folder).unwrap().campaign().stop.is_some() {
-            // All was done but the page: there is nothing to go on with, and nothing is missing.
-            assert_eq!(runner.run(&["report", "--results", &format!("{results}/3")]).expect(0).digest(), whole);
-            fs::remove_dir_all(runner.folder.join(&results)).unwrap();
-            return;
-        }
-        let next = runner.run(&["--results", &results, "--evaluations", "1"]).expect(0);
-        assert!(next.err.contains("an earlier run is unfinished"), "{}", next.err);
-        assert_eq!(resumed(runner, &results), whole, "killed with {tests} tests recorded");
-    }
+    } else {
+        assert_eq!(said.expect(0).digest(), whole);
+        Progress::Ended
+    };
     fs::remove_dir_all(runner.folder.join(&results)).unwrap();
+    progress
 }
 
 fn killed_at_random_moments(name: &str, moments: u32) {
@@ -179,12 +207,20 @@ fn killed_at_random_moments(name: &str, moments: u32) {
     let takes = started.elapsed();
     let config =
         ProptestConfig { cases: moments, failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..Default::default() };
+    let kills = RefCell::new(Vec::new());
     TestRunner::new(config)
         .run(&(0.0..1.0f64), |moment| {
-            killed_at(&runner, moment, &whole, takes);
+            let progress = killed_at(&runner, moment, &whole, takes);
+            eprintln!("killed after {:.0} % of {takes:.1?}: {progress:?}", moment * 100.0);
+            kills.borrow_mut().push(progress);
             Ok(())
         })
         .unwrap();
+    let mut kills = kills.into_inner();
+    kills.sort_unstable();
+    eprintln!("{kills:?}");
+    let middle = kills.iter().filter(|progress| matches!(progress, Progress::Recorded(1..))).count();
+    assert!(2 * middle > kills.len(), "most kills are in the middle of a run: {kills:?}");
 }
 
 #[test]

@@ -227,8 +227,8 @@ impl Metrics<'_> {
             }
             if matches!(metric.source, MetricSource::FuzzingTime) {
                 for (time, total) in fuzzing_time(active) {
-                    context.now = SimTime::from_seconds(time);
-                    context.set(total);
+                    context.now = time;
+                    context.set(total.seconds());
                 }
             }
             warnings.extend(context.problem.take().map(|problem| format!("metric `{}`: {problem}", metric.name)));
@@ -244,27 +244,66 @@ impl Metrics<'_> {
     }
 }
 
-/// Total active time so far, at the end of each observed interval.
-fn fuzzing_time(active: &[Span]) -> Vec<(f64, f64)> {
-    let mut intervals = active.to_vec();
-    intervals.sort_by(|a, b| a.end.total_cmp(&b.end));
-    let mut total = 0.0;
-    std::iter::once((0.0, 0.0))
-        .chain(intervals.into_iter().map(|interval| {
-            total += interval.length();
-            (interval.end, total)
+/// Total active time so far, at the end of each observed interval. It is summed in whole nanoseconds, so that tests which
+/// were active equally long are equal, however their intervals lie.
+fn fuzzing_time(active: &[Span]) -> Vec<(SimTime, SimTime)> {
+    let mut intervals: Vec<(SimTime, SimTime)> =
+        active.iter().map(|span| (SimTime::from_seconds(span.start), SimTime::from_seconds(span.end))).collect();
+    intervals.sort_by_key(|&(_, end)| end);
+    let mut total = SimTime::ZERO;
+    std::iter::once((SimTime::ZERO, total))
+        .chain(intervals.into_iter().map(|(start, end)| {
+            total = total + (end - start);
+            (end, total)
         }))
         .collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    /// The last of it, in seconds.
+    fn total(intervals: &[(f64, f64)]) -> f64 {
+        fuzzing_time(&spans(intervals)).last().unwrap().1.seconds()
+    }
+
+    fn spans(intervals: &[(f64, f64)]) -> Vec<Span> {
+        intervals.iter().map(|&(start, end)| Span { start, end }).collect()
+    }
 
     #[test]
     fn fuzzing_time_adds_up_over_operations_even_where_they_overlap() {
-        let active = [(1.0, 5.0), (6.0, 7.0), (2.0, 3.5)].map(|(start, end)| Span { start, end });
-        let points = fuzzing_time(&active);
+        let points = fuzzing_time(&spans(&[(1.0, 5.0), (6.0, 7.0), (2.0, 3.5)]));
+        let points: Vec<(f64, f64)> = points.iter().map(|(time, total)| (time.seconds(), total.seconds())).collect();
         assert_eq!(points, [(0.0, 0.0), (3.5, 1.5), (5.0, 5.5), (7.0, 6.5)]);
+    }
+
+    proptest! {
+        #[test]
+        fn equal_activity_is_equal_fuzzing_time(
+            mut intervals in prop::collection::vec((0i64..70_000_000_000, 0i64..9_000_000_000), 1..20),
+            moved in prop::collection::vec(0i64..70_000_000_000, 20),
+        ) {
+            let seconds = |intervals: &[(i64, i64)]| {
+                let of = |nanos| SimTime::from_nanos(nanos).seconds();
+                intervals.iter().map(|&(start, length)| (of(start), of(start + length))).collect::<Vec<_>>()
+            };
+            let before = total(&seconds(&intervals));
+            let nanos: i64 = intervals.iter().map(|(_, length)| length).sum();
+            prop_assert_eq!(before, SimTime::from_nanos(nanos).seconds());
+            for (interval, start) in intervals.iter_mut().zip(moved) {
+                interval.0 = start;
+            }
+            prop_assert_eq!(total(&seconds(&intervals)), before);
+        }
+    }
+
+    #[test]
+    fn intervals_that_seconds_cannot_hold_exactly_add_up_all_the_same() {
+        assert_ne!((0.3 - 0.2) + (0.6 - 0.5), 0.2, "floating point would tell them apart");
+        assert_eq!(total(&[(0.2, 0.3), (0.5, 0.6)]), total(&[(0.0, 0.2)]));
     }
 }

@@ -9,7 +9,7 @@ use sesame_plan::{Activation, CampaignPlan, Choice};
 
 use crate::condition;
 use crate::observation::{Observation, Outcome};
-use crate::record::folder::{DATABASE, Lock};
+use crate::record::folder::{BEGUN, DATABASE, Lock};
 use crate::record::schema::{self, index};
 use crate::record::{Event, EventKind, GenerationCoverage, Origin, RecordError, Repository, ResultSet, TestRecord};
 
@@ -33,12 +33,24 @@ impl Recorder {
         if path.exists() {
             return Err(RecordError::Exists { path });
         }
-        let made = Connection::open(&path).and_then(|mut connection| {
-            tune(&connection)?;
-            schema::install(&mut connection, plan, seed)?;
-            Ok(connection)
-        });
-        let connection = made.map_err(|e| RecordError::database("begin the results", &path, e))?;
+        // Whole before it has its name: a run that is killed as it begins leaves no results, rather than some that are
+        // none. What an earlier one left under the other name is not worth keeping.
+        let begun = folder.join(BEGUN);
+        for leftover in [begun.clone(), folder.join(format!("{BEGUN}-journal"))] {
+            match std::fs::remove_file(&leftover) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(RecordError::io("remove what a broken-off run left", &leftover, error));
+                }
+                _ => {}
+            }
+        }
+        let failed = |error| RecordError::database("begin the results", &path, error);
+        let mut connection = Connection::open(&begun).map_err(failed)?;
+        schema::install(&mut connection, plan, seed).map_err(failed)?;
+        connection.close().map_err(|(_, error)| failed(error))?;
+        std::fs::rename(&begun, &path).map_err(|e| RecordError::io("begin the results", &path, e))?;
+        let connection = Connection::open(&path).map_err(failed)?;
+        tune(&connection).map_err(failed)?;
         Recorder::begin_session(Repository::from_connection(connection, path)?, lock, workers)
     }
 

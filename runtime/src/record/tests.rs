@@ -115,6 +115,71 @@ fn a_run_that_was_killed_keeps_every_committed_test_and_can_be_resumed() {
     assert_eq!(repository.digest().unwrap(), whole, "going on gives what an unbroken run gives");
 }
 
+/// What a kill in the middle of a transaction without write-ahead log leaves behind, as the end of a run has it: half of
+/// the file overwritten, and a journal with what was there before. Gives the database.
+fn broken_off(folder: &Path, into: &Path, change: &str) -> std::path::PathBuf {
+    let writer = Connection::open(folder.join(DATABASE)).unwrap();
+    // With next to no memory pages are written before the commit.
+    let mode: String = writer.query_row("PRAGMA journal_mode = DELETE", [], |row| row.get(0)).unwrap();
+    assert_eq!(mode, "delete");
+    writer.pragma_update(None, "cache_size", 1).unwrap();
+    writer.execute_batch(&format!("BEGIN IMMEDIATE; {change}")).unwrap();
+    for name in [DATABASE.to_owned(), format!("{DATABASE}-journal")] {
+        std::fs::copy(folder.join(&name), into.join(&name)).unwrap();
+    }
+    into.join(DATABASE)
+}
+
+#[test]
+fn results_whose_run_was_killed_while_it_wrote_its_end_are_read_as_they_were() {
+    let (folder, killed) = (folder(), tempfile::tempdir().unwrap());
+    let whole = sample::campaign(folder.path(), &sample::plan(), 60).digest().unwrap();
+    let before = std::fs::read(folder.path().join(DATABASE)).unwrap();
+    let copy = broken_off(folder.path(), killed.path(), "UPDATE change_points SET value = value + 1");
+    assert_ne!(std::fs::read(&copy).unwrap(), before, "it was half overwritten");
+    let raw = Connection::open_with_flags(&copy, rusqlite::OpenFlags::SQLITE_OPEN_READ_ONLY).unwrap();
+    let refused = raw.query_row("SELECT count(*) FROM tests", [], |row| row.get::<_, i64>(0)).unwrap_err();
+    assert_eq!(refused.sqlite_error().unwrap().extended_code, rusqlite::ffi::SQLITE_READONLY_ROLLBACK);
+    drop(raw);
+    assert_eq!(Repository::open(killed.path()).unwrap().digest().unwrap(), whole);
+    assert_eq!(std::fs::read(&copy).unwrap(), before);
+    assert!(!killed.path().join(format!("{DATABASE}-journal")).exists());
+}
+
+#[test]
+fn a_run_killed_before_its_results_had_all_tables_has_none_and_the_folder_can_be_used() {
+    let results = folder();
+    let run = results.path().join("7");
+    std::fs::create_dir(&run).unwrap();
+    let database = Connection::open(run.join("results.sqlite.begun")).unwrap();
+    database.execute_batch("CREATE TABLE tests (number INTEGER)").unwrap();
+    drop(database);
+    std::fs::write(run.join("results.sqlite.begun-journal"), "half a journal").unwrap();
+    assert!(matches!(Repository::open(&run), Err(RecordError::Missing { .. })));
+    assert_eq!(latest_folder(results.path()).unwrap(), None);
+    let whole = sample::campaign(&run, &sample::plan(), 60).digest().unwrap();
+    assert_eq!(Repository::open(&run).unwrap().digest().unwrap(), whole);
+    let mut left: Vec<_> = std::fs::read_dir(&run).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    left.sort();
+    assert_eq!(left, ["results.lock", "results.sqlite"]);
+}
+
+#[test]
+fn what_broke_off_in_the_file_of_another_program_is_left_to_that_program() {
+    let (folder, killed) = (folder(), tempfile::tempdir().unwrap());
+    let other = Connection::open(folder.path().join(DATABASE)).unwrap();
+    let fill = "INSERT INTO t WITH RECURSIVE n(i) AS (SELECT 1 UNION SELECT i + 1 FROM n WHERE i < 999) \
+                SELECT i, hex(zeroblob(200)) FROM n";
+    other.execute_batch(&format!("CREATE TABLE t (a, b); {fill}")).unwrap();
+    drop(other);
+    let copy = broken_off(folder.path(), killed.path(), "UPDATE t SET a = a + 1");
+    let journal = killed.path().join(format!("{DATABASE}-journal"));
+    let before = (std::fs::read(&copy).unwrap(), std::fs::read(&journal).unwrap());
+    let error = Repository::open(killed.path()).unwrap_err();
+    assert!(matches!(error, RecordError::Foreign { .. }), "{error}");
+    assert_eq!((std::fs::read(&copy).unwrap(), std::fs::read(&journal).unwrap()), before);
+}
+
 #[test]
 fn a_test_that_cannot_be_recorded_leaves_nothing_behind() {
     let folder = folder();

@@ -129,10 +129,10 @@ mod tests {
     use super::*;
     use crate::search::dominance::Fitness;
     use crate::search::hypervolume::hypervolume;
-    use crate::search::nsga2::{Nsga2, Settings, Told};
+    use crate::search::nsga2::{Nsga2, Settings, Survival, Told};
 
     fn zdt1_hypervolume(evaluations: u32, seed: u64) -> f64 {
-        let settings = Settings { population: 100, evaluations, seed };
+        let settings = Settings { population: 100, evaluations, seed, survival: Survival::Crowded };
         let mut search = Nsga2::new(settings, RealVariation::usual(30, seed));
         let mut number = 0;
         loop {

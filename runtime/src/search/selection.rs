@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use crate::rng::Stream;
 use crate::search::crowding::distances;
-use crate::search::dominance::Fitness;
+use crate::search::dominance::{Fitness, lexicographic};
 use crate::search::sorting::fronts;
 
 /// Where a solution stands in its population.
@@ -70,6 +70,36 @@ pub fn survivors(fitness: &[&Fitness], n: usize) -> Vec<usize> {
     chosen
 }
 
+/// As [`survivors`], but a measured solution whose objective values an earlier one has comes after all that bring values
+/// of their own, however good these are, and before what is not measured. It tells the search nothing new, where a worse
+/// one may be on a way to something.
+pub fn distinct_survivors(fitness: &[&Fitness], n: usize) -> Vec<usize> {
+    let mut measured: Vec<(&[f64], usize)> = Vec::with_capacity(fitness.len());
+    let mut others = Vec::new();
+    for (position, solution) in fitness.iter().enumerate() {
+        match solution.objectives() {
+            Some(objectives) => measured.push((objectives, position)),
+            None => others.push(position),
+        }
+    }
+    // Stable, so that the first of equals is the earliest.
+    measured.sort_by(|a, b| lexicographic(a.0, b.0));
+    let (mut distinct, mut repeated) = (Vec::new(), Vec::new());
+    for equals in measured.chunk_by(|a, b| lexicographic(a.0, b.0).is_eq()) {
+        distinct.push(equals[0].1);
+        repeated.extend(equals[1..].iter().map(|&(_, position)| position));
+    }
+    let mut chosen: Vec<usize> = Vec::with_capacity(n.min(fitness.len()));
+    for mut group in [distinct, repeated, others] {
+        group.sort_unstable();
+        let members: Vec<&Fitness> = group.iter().map(|&position| fitness[position]).collect();
+        let best = survivors(&members, n - chosen.len());
+        chosen.extend(best.into_iter().map(|k| group[k]));
+    }
+    chosen.sort_unstable();
+    chosen
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -87,6 +117,27 @@ mod tests {
             order.truncate(n);
             order.sort_unstable();
             prop_assert_eq!(survivors(&all, n), order);
+        }
+
+        #[test]
+        fn distinct_survivors_are_values_of_their_own_first(population in any_population(), n in 0usize..40) {
+            let all: Vec<&Fitness> = population.iter().collect();
+            // By pairs: 0 brings values of its own, 1 repeats an earlier one's, 2 is not measured.
+            let group = |i: usize| match all[i].objectives() {
+                None => 2,
+                Some(objectives) => i32::from(all[..i].iter().any(|earlier| earlier.objectives() == Some(objectives))),
+            };
+            let mut expected = Vec::new();
+            for wanted in 0..3 {
+                let members: Vec<usize> = (0..all.len()).filter(|&i| group(i) == wanted).collect();
+                let standings = standings(&members.iter().map(|&i| all[i]).collect::<Vec<_>>());
+                let mut order: Vec<usize> = (0..members.len()).collect();
+                order.sort_by(|&a, &b| standings[a].compare(standings[b]).then(a.cmp(&b)));
+                expected.extend(order.into_iter().map(|k| members[k]));
+            }
+            expected.truncate(n);
+            expected.sort_unstable();
+            prop_assert_eq!(distinct_survivors(&all, n), expected);
         }
 
         #[test]
