@@ -105,23 +105,16 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_test_lies_inside_and_some_come_near_the_ends(plan in any_timed_plan(), seed: u64) {
+        fn every_test_lies_inside(plan in any_timed_plan(), seed: u64) {
             let permitted = Permitted::of(&plan).unwrap();
-            let mut found = [(f64::INFINITY, f64::NEG_INFINITY); 9];
             for n in 0..60 {
                 let test = fresh_test(&permitted, &mut Stream::derive(seed, "test", &[n]));
                 let Some(point) = Point::of(&planned(&plan, &test).unwrap(), Convention::Ours) else { continue };
-                for (at, dimension) in Dimension::ALL.into_iter().enumerate() {
+                for dimension in Dimension::ALL {
                     let Some(value) = point.get(dimension) else { continue };
                     let (low, high) = extent(&plan, &permitted, dimension).unwrap();
                     prop_assert!(low - 1e-9 <= value && value <= high + 1e-9, "{dimension:?}: {value} in {low}..{high}");
-                    found[at] = (found[at].0.min(value), found[at].1.max(value));
                 }
-            }
-            // Lengths of windows are spread over all that is permitted, so the extent of T2 is not an idle bound.
-            if let Some((low, high)) = extent(&plan, &permitted, Dimension::T2) {
-                let (least, greatest) = found[1];
-                prop_assert!(high - low < 1e-6 || greatest - least > (high - low) / 50.0, "{least}..{greatest} of {low}..{high}");
             }
         }
     }
