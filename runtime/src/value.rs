@@ -170,6 +170,22 @@ impl Value {
         }
     }
 
+    /// Whether it is the same in every bit. It is equal to another then, or both hold NaNs in the same places.
+    pub(crate) fn is_same(&self, other: &Value) -> bool {
+        let all = |left: &[Value], right: &[Value]| {
+            left.len() == right.len() && left.iter().zip(right).all(|(left, right)| left.is_same(right))
+        };
+        match (self, other) {
+            (Value::Real(left), Value::Real(right)) => left.to_bits() == right.to_bits(),
+            (Value::Point(left), Value::Point(right)) => left.map(f64::to_bits) == right.map(f64::to_bits),
+            (Value::List(left), Value::List(right)) => all(left, right),
+            (Value::Record(left), Value::Record(right)) => {
+                left.fields == right.fields && all(&left.values, &right.values)
+            }
+            _ => self == other,
+        }
+    }
+
     /// What kind of value this is, in the words of the language.
     pub fn kind(&self) -> &'static str {
         match self {
