@@ -99,13 +99,13 @@ fn activation(plan: &CampaignPlan, mode: &ActivationMode) -> String {
 fn operation_line(plan: &CampaignPlan, operation: &Operation) -> String {
     let mut line = format!("operation {}", operation.name);
     if let Some(topic) = operation.topic {
-        let fields = match &operation.kind {
-            OperationKind::RandomValue { path, .. } => path.as_slice(),
-            _ => &[],
-        };
         let topic = plan.topic(topic).name.as_str();
-        let target: Vec<&str> = std::iter::once(topic).chain(fields.iter().map(String::as_str)).collect();
-        line = format!("{line} on {}", target.join("."));
+        let mut targets: Vec<String> =
+            operation.places.iter().map(|place| format!("{topic}{}", place_in_words(place))).collect();
+        if targets.is_empty() {
+            targets.push(topic.to_owned());
+        }
+        line = format!("{line} on {}", targets.join(", "));
     }
     line = format!("{line} = {}", operation.kind.words());
     if let OperationKind::Custom { .. } = operation.kind {

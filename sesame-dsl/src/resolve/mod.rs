@@ -3,7 +3,8 @@
 //! 1. [`collect`] has who is called what, doubles, and what a space cannot do without
 //! 2. [`system`] has message types (in an order in which each follows those it contains), topics, nodes, the simulator
 //! 3. [`measure`] has metrics (their formulas in [`formula`]) and requirements
-//! 4. [`fuzz`] has operations and known tests
+//! 4. [`fuzz`] has operations ([`disturbance`] what they disturb and permit, [`custom`] those in the user's code) and known
+//!    tests
 //! 5. [`campaign`] has campaigns; [`condition`] the conditions of tests and what those of campaigns are made of
 //!
 //! Each pass reports all it finds. A declaration with a mistake is `None` from then on, and whoever mentions it says
@@ -13,6 +14,7 @@ mod campaign;
 mod collect;
 mod condition;
 mod custom;
+mod disturbance;
 mod formula;
 mod fuzz;
 mod measure;

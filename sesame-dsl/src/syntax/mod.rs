@@ -5,6 +5,7 @@ pub(crate) mod ast;
 mod explain;
 mod formula;
 mod limits;
+mod operation;
 mod parse;
 mod token;
 mod words;
