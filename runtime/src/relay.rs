@@ -503,4 +503,6 @@ pub struct Finished {
 }
 
 #[cfg(test)]
+mod matrix;
+#[cfg(test)]
 mod tests;

@@ -114,6 +114,12 @@ impl Record {
         self.fields.position(name).map(|at| &mut self.values[at])
     }
 
+    /// Names and values to be changed, in order.
+    #[cfg(test)]
+    pub(crate) fn each_mut(&mut self) -> impl Iterator<Item = (&str, &mut Value)> {
+        self.fields.names().iter().map(Text::as_str).zip(&mut self.values)
+    }
+
     /// Names and values, in order.
     pub fn iter(&self) -> impl Iterator<Item = (&Text, &Value)> {
         self.fields.names().iter().zip(&self.values)

@@ -119,9 +119,8 @@ impl<'a> Resolver<'a> {
             if from[axis] > to[axis] {
                 let [a, b] = [low, high].map(|point| self.text(point.coordinates[axis].span).to_owned());
                 let title = format!("this box is reversed on its {} axis", ["x", "y", "z"][axis]);
-                let diagnostic =
-                    Diagnostic::new(Code::REVERSED_RANGE, low.coordinates[axis].span.to(high.span), title)
-                        .label(format!("`{a}` is more than `{b}`"));
+                let diagnostic = Diagnostic::new(Code::REVERSED_RANGE, low.coordinates[axis].span.to(high.span), title)
+                    .label(format!("`{a}` is more than `{b}`"));
                 self.report(diagnostic);
                 return None;
             }

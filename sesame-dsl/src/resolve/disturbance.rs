@@ -4,8 +4,8 @@ use super::Resolver;
 use super::system::type_in_words;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
-    Distribution, Domain, Drain, Id as _, NotFinite, OperationKind, Parameter, Range, Shape, Step, Target, TopicId, Type,
-    ValueMode,
+    Distribution, Domain, Drain, Id as _, NotFinite, OperationKind, Parameter, Range, Shape, Step, Target, TopicId,
+    Type, ValueMode,
 };
 use crate::span::Span;
 use crate::syntax::ast;
@@ -187,15 +187,9 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    fn random_value(
-        &mut self,
-        target: &'a ast::Target,
-        absolute: bool,
-        amounts: &'a ast::Amounts,
-    ) -> Option<Resolved> {
+    fn random_value(&mut self, target: &'a ast::Target, absolute: bool, amounts: &'a ast::Amounts) -> Option<Resolved> {
         let (target, held) = self.amounts_of(target, "a random value")?;
-        let (mode, name) =
-            if absolute { (ValueMode::Absolute, "value") } else { (ValueMode::Offset, "offset") };
+        let (mode, name) = if absolute { (ValueMode::Absolute, "value") } else { (ValueMode::Offset, "offset") };
         let permitted = self.one_amount(name, amounts, &held, target.span)?;
         let sub_range = |name: &str, range, integer| Parameter {
             name: name.to_owned(),
@@ -271,13 +265,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// A parameter for one amount of what is held: a range of numbers, or a box of points.
-    fn one_amount(
-        &mut self,
-        name: &str,
-        amounts: &'a ast::Amounts,
-        held: &Held,
-        target: Span,
-    ) -> Option<Parameter> {
+    fn one_amount(&mut self, name: &str, amounts: &'a ast::Amounts, held: &Held, target: Span) -> Option<Parameter> {
         let what = format!("`{name}`");
         let (unit, domain) = match (held, amounts) {
             (Held::Number { unit, integer }, ast::Amounts::Range(range)) => {
@@ -330,9 +318,11 @@ impl<'a> Resolver<'a> {
         }
         let parts = Span { lo: place.topic.span.hi, ..place.span };
         let title = format!("{does} whole messages, not a part of them");
-        let diagnostic = Diagnostic::new(Code::WRONG_TYPE, parts, title)
-            .label("expected a topic")
-            .suggest("leave this out", parts, "");
+        let diagnostic = Diagnostic::new(Code::WRONG_TYPE, parts, title).label("expected a topic").suggest(
+            "leave this out",
+            parts,
+            "",
+        );
         self.report(diagnostic);
         None
     }
@@ -354,13 +344,21 @@ impl<'a> Resolver<'a> {
                 let first = target.places[0].span;
                 let first_words = self.text(first);
                 let wrong = if *first_topic != topic {
-                    Some((Code::WRONG_TYPE, format!("`{written}` is of another topic than `{first_words}`"),
-                        "an operation disturbs one topic: declare another one for this".to_owned()))
+                    Some((
+                        Code::WRONG_TYPE,
+                        format!("`{written}` is of another topic than `{first_words}`"),
+                        "an operation disturbs one topic: declare another one for this".to_owned(),
+                    ))
                 } else if *first_type != ty {
-                    let label = format!("it is {}, and `{first_words}` is {}", type_in_words(&ty), type_in_words(first_type));
+                    let label =
+                        format!("it is {}, and `{first_words}` is {}", type_in_words(&ty), type_in_words(first_type));
                     Some((Code::WRONG_TYPE, format!("`{written}` is of another type than `{first_words}`"), label))
                 } else if found.iter().any(|(_, before, _)| *before == steps) {
-                    Some((Code::LISTED_TWICE, format!("`{written}` stands twice in this list"), "again here".to_owned()))
+                    Some((
+                        Code::LISTED_TWICE,
+                        format!("`{written}` stands twice in this list"),
+                        "again here".to_owned(),
+                    ))
                 } else {
                     None
                 };

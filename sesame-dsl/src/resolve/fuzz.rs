@@ -3,9 +3,7 @@
 use super::quantity::percent;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{
-    self, Activation, Choice, Domain, Id as _, OperationId, OperationKind, Parameter, Range, Shape,
-};
+use crate::model::{self, Activation, Choice, Domain, Id as _, OperationId, OperationKind, Parameter, Range, Shape};
 use crate::span::Span;
 use crate::syntax::ast;
 use crate::units::{Unit, convert};

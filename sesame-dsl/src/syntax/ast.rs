@@ -319,8 +319,6 @@ pub(crate) struct OperationBody {
 /// What an operation disturbs.
 #[derive(Debug)]
 pub(crate) struct Target {
-    /// The topic of the first place.
-    pub(crate) topic: Name,
     /// At least one.
     pub(crate) places: Vec<Place>,
     pub(crate) span: Span,

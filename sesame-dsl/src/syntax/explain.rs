@@ -205,10 +205,9 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
     let found = token_at(text, failure.at);
     let span = span_of(found);
     let words: BTreeSet<&'static str> = failure.expected.iter().filter_map(|&rule| keyword_of(rule)).collect();
-    let wants_name = failure
-        .expected
-        .iter()
-        .any(|&rule| matches!(rule, Rule::name | Rule::names | Rule::path | Rule::target | Rule::targets | Rule::condition_variable));
+    let wants_name = failure.expected.iter().any(|&rule| {
+        matches!(rule, Rule::name | Rule::names | Rule::path | Rule::target | Rule::targets | Rule::condition_variable)
+    });
     let expected = describe(&failure, place, found.lo == first.lo);
 
     let before = text[..found.lo].chars().next_back();

@@ -6,7 +6,6 @@ use super::ast::{Amounts, Distribution, Drain, NotFinite, OperationKind, Place, 
 use super::parse::{Pair, Reader, child, children, expect_child, first_of};
 use crate::span::Span;
 
-/// The kinds that say no more than their words.
 const KINDS: [Rule; 18] = [
     Rule::random_value,
     Rule::stuck_at,
@@ -30,9 +29,8 @@ const KINDS: [Rule; 18] = [
 
 impl Reader<'_> {
     pub(super) fn target(&mut self, pair: &Pair<'_>) -> Target {
-        let places: Vec<Place> = children(pair, Rule::target).map(|place| self.place(&place)).collect();
-        let topic = places.first().expect("an operation has a target").topic.clone();
-        Target { topic, places, span: self.span(pair) }
+        let places = children(pair, Rule::target).map(|place| self.place(&place)).collect();
+        Target { places, span: self.span(pair) }
     }
 
     fn place(&mut self, pair: &Pair<'_>) -> Place {
@@ -58,20 +56,24 @@ impl Reader<'_> {
                 },
                 None => OperationKind::RandomText(self.listed(&expect_child(&kind, Rule::text_domain))),
             },
-            Rule::stuck_at => OperationKind::StuckAt(match (child(&kind, Rule::text_domain), child(&kind, Rule::truth)) {
-                (Some(texts), _) => Stuck::Texts(self.listed(&texts)),
-                (_, Some(truth)) => Stuck::Truth(child(&truth, Rule::k_true).is_some(), self.span(&truth)),
-                _ => Stuck::Amounts(self.amounts(&kind).expect("a value is stuck at something")),
-            }),
+            Rule::stuck_at => {
+                OperationKind::StuckAt(match (child(&kind, Rule::text_domain), child(&kind, Rule::truth)) {
+                    (Some(texts), _) => Stuck::Texts(self.listed(&texts)),
+                    (_, Some(truth)) => Stuck::Truth(child(&truth, Rule::k_true).is_some(), self.span(&truth)),
+                    _ => Stuck::Amounts(self.amounts(&kind).expect("a value is stuck at something")),
+                })
+            }
             Rule::bias => OperationKind::Bias(self.amounts(&kind).expect("a bias has a range")),
             Rule::drift => OperationKind::Drift(self.amounts(&kind).expect("a drift has a range")),
             Rule::noise => OperationKind::Noise(self.only_range(&kind)),
             Rule::scale => OperationKind::Scale(self.only_range(&kind)),
-            Rule::not_finite => OperationKind::NotFinite(match (child(&kind, Rule::k_nan), child(&kind, Rule::minus)) {
-                (Some(_), _) => NotFinite::Nan,
-                (None, None) => NotFinite::Infinity,
-                (None, Some(_)) => NotFinite::MinusInfinity,
-            }),
+            Rule::not_finite => {
+                OperationKind::NotFinite(match (child(&kind, Rule::k_nan), child(&kind, Rule::minus)) {
+                    (Some(_), _) => NotFinite::Nan,
+                    (None, None) => NotFinite::Infinity,
+                    (None, Some(_)) => NotFinite::MinusInfinity,
+                })
+            }
             Rule::freeze => OperationKind::Freeze,
             Rule::stale => OperationKind::Stale(self.only_range(&kind)),
             Rule::clock_skew => OperationKind::ClockSkew(self.only_range(&kind)),

@@ -5,10 +5,9 @@ use pest::iterators::Pair as PestPair;
 use sesame_grammar::{Rule, SesameParser};
 
 use super::ast::{
-    ActivationMode, Bound, Campaign, Comparison, Count, Custom, CustomParameter, Direction, Domain, Drain, Expectation,
-    Field, File, Head, InProcess, Message, Metric, MetricSource, Moment, Name, Node, Operation, OperationBody,
-    OperationKind, Operations, Process, Record, Repeat, Requirement, Search, Simulator, Strategy, System, Test, Topic,
-    Transport, Type, TypeKind,
+    ActivationMode, Bound, Campaign, Comparison, Count, Custom, CustomParameter, Direction, Domain, Expectation, Field,
+    File, Head, InProcess, Message, Metric, MetricSource, Moment, Name, Node, Operation, OperationBody, Operations,
+    Process, Record, Repeat, Requirement, Search, Simulator, Strategy, System, Test, Topic, Transport, Type, TypeKind,
 };
 use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, MAX_CALLS, too_deep};
