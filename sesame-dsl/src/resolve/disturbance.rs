@@ -36,7 +36,7 @@ impl<'a> Resolver<'a> {
             ast::OperationKind::StuckAt(at) => self.stuck_at(target, at),
             ast::OperationKind::Bias(amounts) => {
                 let (target, held) = self.amounts_of(target, "a bias")?;
-                let parameter = self.one_amount("bias", amounts, &held, target.span)?;
+                let parameter = self.one_amount("bias", amounts, &held, &target)?;
                 Some((target.found, OperationKind::Bias, vec![parameter]))
             }
             ast::OperationKind::Drift(amounts) => {
@@ -49,7 +49,7 @@ impl<'a> Resolver<'a> {
                     Held::Number { unit, .. } => Held::Number { unit: per_second(unit), integer: false },
                     Held::Point { unit } => Held::Point { unit: per_second(unit) },
                 };
-                let parameter = self.one_amount("rate", amounts, &rate, target.span)?;
+                let parameter = self.one_amount("rate", amounts, &rate, &target)?;
                 Some((target.found, OperationKind::Drift, vec![parameter]))
             }
             ast::OperationKind::Noise(range) => {
@@ -142,10 +142,17 @@ impl<'a> Resolver<'a> {
             }
             ast::OperationKind::Latency { range, distribution, drain } => {
                 let target = self.whole_messages(target, "latency delays");
-                let (distribution, shape) = match self.single(distribution, "a distribution") {
-                    None | Some(ast::Distribution::Fixed) => (Distribution::Fixed, Shape::Value),
-                    Some(ast::Distribution::Uniform) => (Distribution::Uniform, Shape::Range),
-                    Some(ast::Distribution::Normal) => (Distribution::Normal, Shape::Range),
+                if let [(first, _), (again, _), ..] = distribution.as_slice() {
+                    let title = "a latency has one distribution";
+                    let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, *again, title)
+                        .label("remove this one or the other")
+                        .also(*first, "first here");
+                    self.report(diagnostic);
+                }
+                let (distribution, shape) = match distribution.first() {
+                    None | Some((_, ast::Distribution::Fixed)) => (Distribution::Fixed, Shape::Value),
+                    Some((_, ast::Distribution::Uniform)) => (Distribution::Uniform, Shape::Range),
+                    Some((_, ast::Distribution::Normal)) => (Distribution::Normal, Shape::Range),
                 };
                 let drain = self.drain(drain);
                 let domain = Domain::Number { range: self.times(range, "the delay")?, shape, integer: false };
@@ -190,7 +197,7 @@ impl<'a> Resolver<'a> {
     fn random_value(&mut self, target: &'a ast::Target, absolute: bool, amounts: &'a ast::Amounts) -> Option<Resolved> {
         let (target, held) = self.amounts_of(target, "a random value")?;
         let (mode, name) = if absolute { (ValueMode::Absolute, "value") } else { (ValueMode::Offset, "offset") };
-        let permitted = self.one_amount(name, amounts, &held, target.span)?;
+        let permitted = self.one_amount(name, amounts, &held, &target)?;
         let sub_range = |name: &str, range, integer| Parameter {
             name: name.to_owned(),
             doc: String::new(),
@@ -213,7 +220,7 @@ impl<'a> Resolver<'a> {
         match at {
             ast::Stuck::Amounts(amounts) => {
                 let (target, held) = self.amounts_of(target, "`stuck at` a range")?;
-                let parameter = self.one_amount("value", amounts, &held, target.span)?;
+                let parameter = self.one_amount("value", amounts, &held, &target)?;
                 Some((target.found, OperationKind::StuckAt { truth: None }, vec![parameter]))
             }
             ast::Stuck::Texts(texts) => {
@@ -261,12 +268,13 @@ impl<'a> Resolver<'a> {
             Type::Point(unit) => Held::Point { unit },
             _ => unreachable!("it is a number or a point"),
         };
-        Some((Amounted { found, span: target.span }, held))
+        Some((Amounted { found, first: target.places[0].span }, held))
     }
 
     /// A parameter for one amount of what is held: a range of numbers, or a box of points.
     fn one_amount(&mut self, name: &str, amounts: &'a ast::Amounts, held: &Held, target: Span) -> Option<Parameter> {
-        let what = format!("`{name}`");
+        // A rate is in another unit than what it is a rate of.
+        let what = if name == "rate" { "the rate".to_owned() } else { format!("`{}`", self.text(target.first)) };
         let (unit, domain) = match (held, amounts) {
             (Held::Number { unit, integer }, ast::Amounts::Range(range)) => {
                 let permitted = self.range(range, unit.as_ref(), &what)?;
@@ -287,7 +295,7 @@ impl<'a> Resolver<'a> {
                     Held::Point { .. } => ("is a point, so", format!("[(0, 0, 0){unit}, (1, 1, 1){unit}]")),
                 };
                 let permits = if matches!(held, Held::Point { .. }) { "a box between two points" } else { "a range" };
-                let title = format!("`{}` {title} {what} is permitted in {permits}", self.text(target));
+                let title = format!("`{}` {title} its `{name}` is permitted in {permits}", self.text(target.first));
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, amounts.span(), title)
                     .label(format!("expected for example `{example}`"));
                 self.report(diagnostic);
@@ -442,10 +450,10 @@ impl<'a> Resolver<'a> {
     }
 }
 
-/// A target with where it is written.
+/// A target with where its first place is written.
 struct Amounted {
     found: Target,
-    span: Span,
+    first: Span,
 }
 
 /// A target that is one whole message has no places.

@@ -402,9 +402,8 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::rate_limit | Rule::k_rate => "`rate limit`",
         Rule::reorder => "`reorder`",
         Rule::duplicate => "`duplicate`",
-        Rule::distribution => "`fixed`, `uniform` or `normal`",
+        Rule::distribution => "a distribution such as `uniform`",
         Rule::corners => "a box such as `[(0, 0, 0)m, (1, 1, 1)m]`",
-        Rule::element => "an element such as `[3]` or `[*]`",
         Rule::each_element => "`*`",
         Rule::latency => "`latency`",
         Rule::blackhole => "`blackhole`",
@@ -446,7 +445,8 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::k_coverage
         | Rule::k_boost
         | Rule::k_node
-        | Rule::k_parameter => return None,
+        | Rule::k_parameter
+        | Rule::element => return None,
         _ => return keyword_of(rule).map(|word| format!("`{word}`")),
     };
     Some(words.to_owned())
