@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 use sesame_dsl::diagnostic::{Diagnostic, render};
+use sesame_dsl::format::format;
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::{FileId, Span};
 use sesame_dsl::{Analysis, analyse};
@@ -11,6 +12,7 @@ const SAMPLES: &[&str] = &[
     include_str!("good/conditions.sesame"),
     include_str!("bad/ten_mistakes.sesame"),
     include_str!("bad/e0104_later_constructs.sesame"),
+    include_str!("good/blocks.sesame"),
 ];
 
 /// Pieces that mean something somewhere.
@@ -56,6 +58,11 @@ const PIECES: &[&str] = &[
     "to",
     "within",
     "search",
+    "import \"a.sesame\"",
+    "eddi a publishes b {",
+    "from eddi",
+    "physical lab {",
+    "passive 3 times",
     "seed",
     "end after",
     "when",
@@ -67,9 +74,14 @@ const PIECES: &[&str] = &[
     " ",
 ];
 
-fn analyse_text(text: &str) -> (SourceMap, FileId, Analysis) {
+fn sources_of(text: &str) -> (SourceMap, FileId) {
     let mut sources = SourceMap::new();
     let file = sources.add("a.sesame", text);
+    (sources, file)
+}
+
+fn analyse_text(text: &str) -> (SourceMap, FileId, Analysis) {
+    let (sources, file) = sources_of(text);
     let analysis = analyse(&sources, file);
     (sources, file, analysis)
 }
@@ -89,6 +101,12 @@ fn has_a_sound_answer(text: &str) {
     render::human(&analysis.diagnostics, &sources, true);
     assert_eq!(render::short(&analysis.diagnostics, &sources).lines().count(), analysis.diagnostics.len());
     assert_eq!(render::json(&analysis.diagnostics, &sources).lines().count(), analysis.diagnostics.len());
+    assert_eq!(render::github(&analysis.diagnostics, &sources).lines().count(), analysis.diagnostics.len());
+    // Formatting is refused or leaves a text that is formatted already.
+    if let Ok(formatted) = format(&sources, file) {
+        let again = sources_of(&formatted);
+        assert_eq!(format(&again.0, again.1).as_ref(), Ok(&formatted));
+    }
 }
 
 /// A byte offset near a fraction of the text, on a character boundary.

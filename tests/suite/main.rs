@@ -16,3 +16,4 @@ mod search;
 mod stl;
 mod tampering;
 mod traces;
+mod vendored;

@@ -34,6 +34,7 @@ fn operation(name: &str, topic: u32, kind: OperationKind, parameters: Vec<Parame
         priority: 0,
         inclusion: 1.0,
         places: Vec::new(),
+        timed: true,
         constraints: Vec::new(),
     }
 }

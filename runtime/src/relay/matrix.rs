@@ -248,6 +248,7 @@ fn plan_of(payload: Payload, case: &Case) -> CampaignPlan {
         within: Span { start: 0.0, end: 10.0 },
         priority: 0,
         inclusion: 1.0,
+        timed: true,
         constraints: Vec::new(),
     };
     let mut plan = plan(vec![operation]);
@@ -469,19 +470,21 @@ fn expected(payload: Payload, case: &Case) -> Expected {
             }
         }
     }
-    released.sort_by_key(|&(release, n, _)| (release, n));
-    // Flushed messages go at the end of the window, in the order in which they would have gone.
+    // Flushed messages go at the end of the window, in the order in which they would have gone, and before what is published
+    // then.
     let flushes = |n: u32| {
         let (OperationKind::Latency { drain, .. } | OperationKind::Reorder { drain }) = case.kind else { return false };
         active(n) && drain == Drain::Flush
     };
+    released.sort_by_key(|&(release, n, _)| {
+        let goes = if flushes(n) { release.min(nanos(50)) } else { release };
+        (goes, !flushes(n), release, n)
+    });
     for (release, n, message) in released {
         let release = if flushes(n) { release.min(nanos(50)) } else { release };
         let tenth = u32::try_from((release + 99_999_999) / 100_000_000).unwrap();
         expected.delivered.push((tenth, message));
     }
-    // What is flushed at 5 s goes before what is published then.
-    expected.delivered.sort_by_key(|(tenth, _)| *tenth);
     expected
 }
 

@@ -88,6 +88,7 @@ impl Landscape {
             priority: 0,
             inclusion: 1.0,
             places: Vec::new(),
+            timed: true,
             constraints: Vec::new(),
         };
         let metric = |name: &str, direction| Metric {

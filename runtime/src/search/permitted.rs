@@ -249,6 +249,7 @@ pub(crate) mod tests {
                 priority: 0,
                 inclusion,
                 places: Vec::new(),
+                timed: true,
                 constraints: Vec::new(),
             },
         );

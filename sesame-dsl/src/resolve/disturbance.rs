@@ -272,7 +272,13 @@ impl<'a> Resolver<'a> {
     }
 
     /// A parameter for one amount of what is held: a range of numbers, or a box of points.
-    fn one_amount(&mut self, name: &str, amounts: &'a ast::Amounts, held: &Held, target: Span) -> Option<Parameter> {
+    fn one_amount(
+        &mut self,
+        name: &str,
+        amounts: &'a ast::Amounts,
+        held: &Held,
+        target: &Amounted,
+    ) -> Option<Parameter> {
         // A rate is in another unit than what it is a rate of.
         let what = if name == "rate" { "the rate".to_owned() } else { format!("`{}`", self.text(target.first)) };
         let (unit, domain) = match (held, amounts) {

@@ -31,6 +31,8 @@ impl<'a> Resolver<'a> {
             Some(quantity) => self.inclusion(quantity),
             None => Some(1.0),
         };
+        self.at_most_one(&body.untimed, "untimed");
+        self.between_nodes(body);
         let constraints = self.constraints(&body.contains);
         let (target, kind, parameters) = what?;
         Some(model::Operation {
@@ -41,6 +43,7 @@ impl<'a> Resolver<'a> {
             within: within?,
             priority: priority?,
             inclusion: inclusion?,
+            timed: body.untimed.is_empty(),
             constraints: constraints?,
         })
     }
@@ -54,7 +57,29 @@ impl<'a> Resolver<'a> {
         }
         let target = body.target.as_ref().expect("the grammar gives all kinds but custom ones a topic");
         let (target, kind, parameters) = self.disturbance(target, &body.kind)?;
+        let mut said: Vec<Span> = Vec::new();
+        for parameter in &parameters {
+            let (Domain::Number { range, .. }, Some(span)) = (&parameter.domain, body.kind.written(&parameter.name))
+            else {
+                continue;
+            };
+            // The axes of a box may be fixed, as long as one is not.
+            let of_box = |it: &Parameter| matches!(&it.domain, Domain::Number { range, .. } if range.low < range.high);
+            if !said.contains(&span) && (parameter.name != "x" || !parameters.iter().any(of_box)) {
+                self.one_value(*range, span);
+            }
+            said.push(span);
+        }
         Some((Some(target), kind, parameters))
+    }
+
+    /// A range without width leaves nothing to choose.
+    pub(super) fn one_value(&mut self, found: Range, span: Span) {
+        if found.low == found.high {
+            let title = "this range has one value only";
+            let diagnostic = Diagnostic::new(Code::ONE_VALUE, span, title);
+            self.report(diagnostic.label("tests have nothing to choose here"));
+        }
     }
 
     fn within(&mut self, range: &ast::Range) -> Option<Range> {

@@ -15,7 +15,7 @@ const KINDS: [Rule; 18] = [
     Rule::scale,
     Rule::not_finite,
     Rule::freeze,
-    Rule::stale,
+    Rule::stale_value,
     Rule::clock_skew,
     Rule::packet_loss,
     Rule::burst_loss,
@@ -29,8 +29,9 @@ const KINDS: [Rule; 18] = [
 
 impl Reader<'_> {
     pub(super) fn target(&mut self, pair: &Pair<'_>) -> Target {
-        let places = children(pair, Rule::target).map(|place| self.place(&place)).collect();
-        Target { places, span: self.span(pair) }
+        let places: Vec<Place> = children(pair, Rule::target).map(|place| self.place(&place)).collect();
+        let topic = places.first().expect("an operation has a target").topic.clone();
+        Target { topic, places, span: self.span(pair) }
     }
 
     fn place(&mut self, pair: &Pair<'_>) -> Place {
@@ -75,7 +76,7 @@ impl Reader<'_> {
                 })
             }
             Rule::freeze => OperationKind::Freeze,
-            Rule::stale => OperationKind::Stale(self.only_range(&kind)),
+            Rule::stale_value => OperationKind::Stale(self.only_range(&kind)),
             Rule::clock_skew => OperationKind::ClockSkew(self.only_range(&kind)),
             Rule::packet_loss => OperationKind::PacketLoss(self.only_range(&kind)),
             Rule::burst_loss => OperationKind::BurstLoss {
