@@ -509,6 +509,8 @@ pub struct Finished {
 }
 
 #[cfg(test)]
+mod behaviour;
+#[cfg(test)]
 mod matrix;
 #[cfg(test)]
 mod tests;
