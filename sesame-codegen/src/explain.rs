@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
-    ActivationMode, CampaignPlan, Distribution, Domain, Drain, MetricSource, Operation, OperationKind, Parameter,
-    Recorded, Search, place_in_words,
+    ActivationMode, CampaignPlan, Count, Distribution, Domain, Drain, MetricSource, Operation, OperationKind,
+    Parameter, Recorded, Search, Shape, place_in_words,
 };
 
 /// More whole numbers than these are not written out one by one.
@@ -17,6 +17,9 @@ const INTEGERS_SHOWN: i128 = 40;
 /// The campaign of a plan with its defaults and its operations, and the grammar of its conditions if it has one.
 pub fn campaign(plan: &CampaignPlan) -> String {
     let mut out = format!("// {}, with every default written out\n", plan.source);
+    for line in choices(plan).into_iter().chain([cost(plan)]) {
+        writeln!(out, "// {line}").expect("a string takes all text");
+    }
     for operation in &plan.operations {
         writeln!(out, "{}", operation_line(plan, operation)).expect("a string takes all text");
     }
@@ -34,6 +37,77 @@ pub fn campaign(plan: &CampaignPlan) -> String {
         out.push_str(&grammar(plan, space));
     }
     out
+}
+
+/// How much a search has to choose in one test; nothing for a campaign that does not search.
+fn choices(plan: &CampaignPlan) -> Option<String> {
+    let campaign = &plan.campaign;
+    if !matches!(campaign.search, Search::Nsga2 { .. } | Search::Random { .. }) {
+        return None;
+    }
+    let chosen = campaign.operations.iter().map(|id| chosen(&plan.operations[id.index()], &campaign.activation));
+    let chosen: Vec<Chosen> = chosen.collect();
+    let bounds = |what: fn(&Chosen) -> u64| {
+        let each = || chosen.iter().map(what);
+        let low = u64::from(campaign.count.min) * each().min().unwrap_or(0);
+        let high = u64::from(campaign.count.max) * each().max().unwrap_or(0);
+        if low == high { low.to_string() } else { format!("{low}..{high}") }
+    };
+    let mut parts = vec![format!("{} numbers", bounds(|it| it.numbers))];
+    if chosen.iter().any(|it| it.items > 0) {
+        parts.push(format!("{} items of lists", bounds(|it| it.items)));
+    }
+    if chosen.iter().any(|it| it.conditions > 0) {
+        parts.push(format!("{} conditions", bounds(|it| it.conditions)));
+    }
+    let operations = match campaign.count {
+        Count { min: 1, max: 1 } => "1 operation".to_owned(),
+        Count { min, max } if min == max => format!("{min} operations"),
+        Count { min, max } => format!("{min}..{max} operations"),
+    };
+    Some(format!("a test chooses {operations}: {}", parts.join(", ")))
+}
+
+/// What a search chooses for one operation of a test.
+struct Chosen {
+    numbers: u64,
+    /// Of lists of texts or files.
+    items: u64,
+    conditions: u64,
+}
+
+fn chosen(operation: &Operation, activation: &ActivationMode) -> Chosen {
+    let mut chosen = match activation {
+        _ if operation.kind.is_offline() => Chosen { numbers: 0, items: 0, conditions: 0 },
+        // Where its window begins and ends.
+        ActivationMode::Time => Chosen { numbers: 2, items: 0, conditions: 0 },
+        ActivationMode::Condition { space } => match space.end {
+            ConditionEnd::Condition => Chosen { numbers: 0, items: 0, conditions: 2 },
+            ConditionEnd::Length { .. } => Chosen { numbers: 1, items: 0, conditions: 1 },
+        },
+    };
+    for parameter in &operation.parameters {
+        match parameter.domain {
+            Domain::Number { shape: Shape::Range, .. } => chosen.numbers += 2,
+            Domain::Number { shape: Shape::Value, .. } => chosen.numbers += 1,
+            Domain::Point { .. } => chosen.numbers += 3,
+            Domain::Texts { .. } | Domain::Files { .. } => chosen.items += 1,
+        }
+    }
+    chosen
+}
+
+/// What a campaign costs at most, in simulation time.
+fn cost(plan: &CampaignPlan) -> String {
+    let (tests, end) = (plan.campaign.search.evaluations(), plan.campaign.end_after);
+    let seconds = f64::from(tests) * end;
+    let total = match seconds {
+        long if long >= 3600.0 => format!("{:.1}h", long / 3600.0),
+        middle if middle >= 60.0 => format!("{:.1}min", middle / 60.0),
+        short => format!("{short}s"),
+    };
+    let tests = if tests == 1 { "1 test".to_owned() } else { format!("{tests} tests") };
+    format!("{tests} of at most {end}s: {total} of simulation time, besides the undisturbed runs")
 }
 
 fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {

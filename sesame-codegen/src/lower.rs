@@ -464,7 +464,7 @@ mod tests {
         campaign look { objectives time, collisions  operations recount, swing 1..3 per test
                         search nsga2 { population 4  evaluations 8 }  end after 10s }
         campaign again { repeat early 3 times { seed 9 }  observes time  end after 10s }
-        campaign watch from again { passive 4 times { seed 2 }  observes seen }
+        campaign guard from again { passive 4 times { seed 2 }  observes seen }
     "#;
 
     fn lowered(campaign: &str) -> RunnerPlan {
@@ -506,7 +506,7 @@ mod tests {
 
     #[test]
     fn a_campaign_that_only_observes_repeats_a_test_without_operations() {
-        let RunnerPlan { plan, hooks, .. } = lowered("watch");
+        let RunnerPlan { plan, hooks, .. } = lowered("guard");
         assert!(plan.operations.is_empty() && plan.campaign.operations.is_empty());
         assert_eq!(plan.campaign.search, plan::Search::Repeat { test: plan::KnownTestId(0), times: 4 });
         assert_eq!((plan.campaign.seed, plan.campaign.end_after), (2, 10.0));

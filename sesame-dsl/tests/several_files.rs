@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use sesame_dsl::diagnostic::render;
-use sesame_dsl::model::{Search, Space};
+use sesame_dsl::model::{ActivationMode, Recorded, Search, Space};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::{Analysis, analyse, load_imports};
 
@@ -174,4 +174,46 @@ fn a_mistake_in_a_clause_is_reported_once_however_often_it_is_inherited() {
     let main = format!("{main}campaign d from c {{ }} campaign e from d {{ end after 3s }}");
     let said = said(&[("demo.sesame", &main), ("shared/cell.sesame", CELL)]);
     assert_eq!(said.matches("error[").count(), 1, "{said}");
+}
+
+/// A campaign by condition with an operation of the user's and traces, to be imported.
+const GROWN: &str = r"
+metric near = last(link0)
+operation bend on link0 = custom { points: int [3, 20] } start contains near
+campaign base { objectives fuzzing_time  operations bend 1 per test  activate by condition over high, near
+  search random { evaluations 10 }  end after 70s  record mcap failing }
+";
+
+#[test]
+fn conditions_traces_and_custom_operations_come_from_imports_and_other_campaigns() {
+    let cell = format!("{CELL}{GROWN}");
+    let main = "space demo import \"cell.sesame\"
+        metric gap = last(spare)
+        campaign more from base { search random { evaluations 20 } }
+        campaign watch from base { passive 3 times  observes high }
+        campaign all from more { record mcap all  activate by condition over gap, near }";
+    let files = [("demo.sesame", main), ("cell.sesame", cell.as_str())];
+    let space = space(&files);
+    let campaign = |name| &space.campaigns[space.campaign(name).unwrap()];
+    let variables = |name| {
+        let Search::Random { content, .. } = &campaign(name).search else { panic!("{name} searches") };
+        let ActivationMode::Condition(grown) = &content.activation else { panic!("{name} grows conditions") };
+        let names = grown.variables.iter().map(|it| space.metrics[it.metric].declaration.name.as_str());
+        names.collect::<Vec<_>>()
+    };
+    assert_eq!((variables("more"), variables("all")), (vec!["high", "near"], vec!["gap", "near"]));
+    assert_eq!(campaign("watch").search, Search::Passive { times: 3 });
+    let recorded = ["more", "watch", "all"].map(|name| campaign(name).record);
+    assert_eq!(recorded, [Some(Recorded::Failing), Some(Recorded::Failing), Some(Recorded::All)]);
+    assert_eq!(said(&files), "", "a metric that conditions compare is measured");
+}
+
+#[test]
+fn what_inherited_conditions_cannot_contain_is_said_of_the_campaign_that_wrote_them() {
+    let cell = format!("{CELL}{}", GROWN.replace("over high, near", "over high"));
+    let main =
+        "space demo import \"cell.sesame\" campaign more from base { end after 60s } campaign most from more { }";
+    let said = said(&[("demo.sesame", main), ("cell.sesame", &cell)]);
+    assert_eq!(said.matches("error[E0505]").count(), 1, "{said}");
+    assert!(said.contains("no variable of campaign `base`"), "{said}");
 }

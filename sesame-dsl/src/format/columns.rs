@@ -14,6 +14,7 @@ const COLUMNS: &[&str] = &[
     "maximise",
     "minimise",
     "default",
+    "initial",
     "=",
     ":",
     "then",
@@ -27,6 +28,7 @@ const COLUMNS: &[&str] = &[
     "within",
     "priority",
     "inclusion",
+    "untimed",
     "seed",
 ];
 
@@ -60,7 +62,9 @@ fn group_end(lines: &[Line<'_>], start: usize) -> usize {
     let mut end = start;
     for (at, line) in lines.iter().enumerate().skip(start) {
         let opens = line.tokens.last().is_some_and(|last| last.text == "{");
-        if line.indent != indent || opens || !(line.begins || line.only_comment) || (line.after_empty && at > start) {
+        let goes_on = at > start && goes_on(line) && line.indent > indent;
+        let fits = goes_on || line.indent == indent && !self::goes_on(line);
+        if !fits || opens || (line.after_empty && at > start) {
             break;
         }
         end = at + 1;
@@ -68,23 +72,32 @@ fn group_end(lines: &[Line<'_>], start: usize) -> usize {
     end
 }
 
+/// Whether it goes on with what the line before it began. Such a line has no columns, and takes none from others.
+fn goes_on(line: &Line<'_>) -> bool {
+    !line.begins && !line.only_comment
+}
+
 /// Lines are of one kind when they begin with the same word, or with names: names stand where no keyword is needed. A
 /// comment is of the kind of the line it is above.
 fn kind_of_line<'t>(group: &[Line<'t>], at: usize) -> Option<&'t str> {
-    let line = group[at..].iter().find(|line| !line.only_comment)?;
+    let line = group[at..].iter().find(|line| line.begins)?;
     let first = line.tokens.first()?.text;
     crate::syntax::is_keyword(first).then_some(first)
 }
 
 /// Clauses that follow each other, one per line: what stands behind their first words.
 fn second_words(group: &mut [Line<'_>]) {
-    let second = |line: &Line<'_>| (line.tokens.get(1)?.gap == 1 && line.tokens[1].text != "{").then_some(1);
+    let second =
+        |line: &Line<'_>| (!goes_on(line) && line.tokens.get(1)?.gap == 1 && line.tokens[1].text != "{").then_some(1);
     align_at(group, &group.iter().map(second).collect::<Vec<_>>());
 }
 
 fn columns(group: &mut [Line<'_>]) {
     // Found before anything is moved: where columns are does not depend on which of them are aligned.
-    let found: Vec<Vec<Option<usize>>> = group.iter().map(|line| positions(&line.tokens)).collect();
+    let found: Vec<Vec<Option<usize>>> = group
+        .iter()
+        .map(|line| if goes_on(line) { vec![None; COLUMNS.len()] } else { positions(&line.tokens) })
+        .collect();
     for column in 0..COLUMNS.len() {
         align_at(group, &found.iter().map(|positions| positions[column]).collect::<Vec<_>>());
     }

@@ -181,7 +181,12 @@ impl<'a> Resolver<'a> {
 
     fn evidence(&mut self, evidence: &'a written::Evidence) -> Option<Evidence> {
         let mut inputs = Vec::new();
+        let before = self.diagnostics.len();
         let condition = self.condition(&mut inputs, &evidence.condition);
+        if condition.is_some() && inputs.is_empty() {
+            // That its comparisons have one outcome is the same mistake as the one below.
+            self.diagnostics.truncate(before);
+        }
         let seconds = Unit::seconds();
         let held = match self.single(&evidence.held, "held") {
             Some(held) => self.positive(held, &seconds, "the time that evidence holds"),
