@@ -64,7 +64,7 @@ impl Payload {
         match self {
             Payload::Real => Value::Real(x),
             Payload::Int => Value::Int(i64::from(n)),
-            Payload::Bool => Value::Bool(n % 2 == 0),
+            Payload::Bool => Value::Bool(n % 3 == 0),
             Payload::Text => Value::Text(format!("text {n}").into()),
             Payload::Point => Value::Point([x, -x, x / 2.0]),
             Payload::Nested => {
