@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
     ActivationMode, CampaignPlan, CoverageGoal, Distribution, Domain, Drain, MetricSource, Operation, OperationKind,
-    Parameter, Recorded, Search,
+    Parameter, Recorded, Search, place_in_words,
 };
 
 /// More whole numbers than these are not written out one by one.
@@ -126,37 +126,15 @@ fn activation(plan: &CampaignPlan, mode: &ActivationMode) -> String {
 fn operation_line(plan: &CampaignPlan, operation: &Operation) -> String {
     let mut line = format!("operation {}", operation.name);
     if let Some(topic) = operation.topic {
-        let fields = match &operation.kind {
-            OperationKind::RandomValue { path, .. } => path.as_slice(),
-            _ => &[],
-        };
         let topic = plan.topic(topic).name.as_str();
-        let target: Vec<&str> = std::iter::once(topic).chain(fields.iter().map(String::as_str)).collect();
-        line = format!("{line} on {}", target.join("."));
-    }
-    line = format!("{line} = {}", operation.kind.words());
-    if let OperationKind::Custom { .. } = operation.kind {
-        let parameters = operation.parameters.iter().map(|it| format!("{}: {}  ", it.name, domain(it)));
-        line = format!("{line} {{ {}}}", parameters.collect::<String>());
-    } else {
-        for parameter in &operation.parameters {
-            let Domain::Number { low, high, .. } = parameter.domain else { continue };
-            let permitted = match operation.kind {
-                OperationKind::PacketLoss => format!("[{}%, {}%]", percent(low), percent(high)),
-                _ => range(low, high, parameter.unit.as_deref()),
-            };
-            line = format!("{line} {permitted}");
+        let mut targets: Vec<String> =
+            operation.places.iter().map(|place| format!("{topic}{}", place_in_words(place))).collect();
+        if targets.is_empty() {
+            targets.push(topic.to_owned());
         }
+        line = format!("{line} on {}", targets.join(", "));
     }
-    if let OperationKind::Latency { distribution, drain } = operation.kind {
-        let uniform = if distribution == Distribution::Uniform { " uniform" } else { "" };
-        let drain = match drain {
-            Drain::Finish => "finish",
-            Drain::Flush => "flush",
-            Drain::Drop => "drop",
-        };
-        line = format!("{line}{uniform} drain {drain}");
-    }
+    line = format!("{line} = {}", disturbance(operation));
     if !operation.kind.is_offline() {
         let within = range(operation.within.start, operation.within.end, Some("s"));
         line = format!("{line} within {within}");
@@ -171,13 +149,79 @@ fn operation_line(plan: &CampaignPlan, operation: &Operation) -> String {
     line
 }
 
+/// What an operation does and permits, as the language has it.
+fn disturbance(operation: &Operation) -> String {
+    let words = operation.kind.words();
+    let probability = operation.kind.has_probabilities();
+    let permitted: Vec<String> = operation.parameters.iter().map(|it| permitted(it, probability)).collect();
+    match &operation.kind {
+        OperationKind::Custom { .. } => {
+            let parameters = operation.parameters.iter().map(|it| format!("{}: {}  ", it.name, domain(it)));
+            format!("{words} {{ {}}}", parameters.collect::<String>())
+        }
+        OperationKind::RandomText { texts } => format!("{words} {}", quoted(texts)),
+        OperationKind::RandomValue { .. } if operation.parameters.len() == 3 => {
+            let ends = |high: bool| {
+                let end = |it: &Parameter| match it.domain {
+                    Domain::Number { low, high: most, .. } => if high { most } else { low }.to_string(),
+                    _ => String::new(),
+                };
+                let [x, y, z] = [0, 1, 2].map(|axis| end(&operation.parameters[axis]));
+                format!("({x}, {y}, {z}){}", operation.parameters[0].unit.as_deref().unwrap_or_default())
+            };
+            format!("{words} [{}, {}]", ends(false), ends(true))
+        }
+        OperationKind::BurstLoss => {
+            let clauses =
+                operation.parameters.iter().zip(&permitted).map(|(it, range)| format!("{} {range}  ", it.name));
+            let whole = operation.parameters.iter().all(|it| it.name != "loss");
+            let loss = if whole { "loss [100%, 100%]  " } else { "" };
+            format!("{words} {{ {}{loss}}}", clauses.collect::<String>())
+        }
+        OperationKind::Latency { distribution, drain } => {
+            let distribution = match distribution {
+                Distribution::Fixed => "fixed",
+                Distribution::Uniform => "uniform",
+                Distribution::Normal => "normal",
+            };
+            format!("{words} {} {distribution} drain {}", permitted.join(" "), drain_word(*drain))
+        }
+        OperationKind::Reorder { drain } => format!("{words} {} drain {}", permitted.join(" "), drain_word(*drain)),
+        _ if permitted.is_empty() => words.to_owned(),
+        _ => format!("{words} {}", permitted.join(" ")),
+    }
+}
+
+fn drain_word(drain: Drain) -> &'static str {
+    match drain {
+        Drain::Finish => "finish",
+        Drain::Flush => "flush",
+        Drain::Drop => "drop",
+    }
+}
+
+/// What is permitted for a parameter of any operation but a custom one.
+fn permitted(parameter: &Parameter, probability: bool) -> String {
+    let unit = parameter.unit.as_deref();
+    match &parameter.domain {
+        Domain::Number { low, high, .. } if probability => format!("[{}%, {}%]", percent(*low), percent(*high)),
+        Domain::Number { low, high, .. } => range(*low, *high, unit),
+        Domain::Point { low, high } => {
+            let point = |[x, y, z]: [f64; 3]| format!("({x}, {y}, {z}){}", unit.unwrap_or_default());
+            format!("[{}, {}]", point(*low), point(*high))
+        }
+        Domain::Texts { texts: items } | Domain::Files { files: items } => format!("one of {}", quoted(items)),
+    }
+}
+
+fn quoted(items: &[String]) -> String {
+    let quoted = items.iter().map(|item| format!("\"{}\"", item.replace('\\', "\\\\").replace('"', "\\\"")));
+    quoted.collect::<Vec<_>>().join(", ")
+}
+
 /// What a parameter of a custom operation permits.
 fn domain(parameter: &Parameter) -> String {
     let unit = parameter.unit.as_deref().unwrap_or_default();
-    let list = |items: &[String]| {
-        let quoted = items.iter().map(|item| format!("\"{}\"", item.replace('\\', "\\\\").replace('"', "\\\"")));
-        quoted.collect::<Vec<_>>().join(", ")
-    };
     match &parameter.domain {
         Domain::Number { low, high, integer, .. } => {
             let word = if *integer { "int" } else { "real" };
@@ -187,8 +231,8 @@ fn domain(parameter: &Parameter) -> String {
             let point = |[x, y, z]: [f64; 3]| format!("({x}, {y}, {z}){unit}");
             format!("point [{}, {}]", point(*low), point(*high))
         }
-        Domain::Texts { texts } => format!("one of {}", list(texts)),
-        Domain::Files { files } => format!("file one of {}", list(files)),
+        Domain::Texts { texts } => format!("one of {}", quoted(texts)),
+        Domain::Files { files } => format!("file one of {}", quoted(files)),
     }
 }
 

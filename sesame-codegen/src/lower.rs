@@ -10,6 +10,7 @@
 //!   conditions and expectations of these tests.
 
 mod condition;
+mod disturbance;
 mod formula;
 mod robustness;
 
@@ -260,26 +261,18 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
 
 fn custom_operations(space: &Space) -> Vec<OperationPlan> {
     let operations = space.operations.values().filter_map(|operation| match &operation.kind {
-        model::OperationKind::Custom { moment: when, parameters } => Some(OperationPlan {
+        model::OperationKind::Custom { moment: when } => Some(OperationPlan {
             operation: operation.declaration.name.clone(),
             doc: operation.declaration.doc.clone(),
             source: space.file_of(&operation.declaration).to_owned(),
             line: operation.declaration.line,
             topic: operation.topic().map(topic_id),
-            moment: moment(*when),
-            parameters: parameters.iter().map(|it| (parameter(it), it.doc.clone())).collect(),
+            moment: disturbance::moment(*when),
+            parameters: operation.parameters.iter().map(|it| (parameter(it), it.doc.clone())).collect(),
         }),
         _ => None,
     });
     operations.collect()
-}
-
-fn moment(moment: model::Moment) -> plan::Moment {
-    match moment {
-        model::Moment::OnMessage => plan::Moment::OnMessage,
-        model::Moment::BeforeStart => plan::Moment::BeforeStart,
-        model::Moment::AfterEnd => plan::Moment::AfterEnd,
-    }
 }
 
 fn parameter(parameter: &model::Parameter) -> plan::Parameter {
@@ -374,36 +367,13 @@ fn operation(
     end_after: f64,
     constraints: Vec<plan::condition::Constraint>,
 ) -> plan::Operation {
-    let kind = match &operation.kind {
-        model::OperationKind::RandomValue { mode, integer, .. } => plan::OperationKind::RandomValue {
-            path: operation.target.as_ref().map_or_else(Vec::new, |target| target.fields.clone()),
-            mode: match mode {
-                model::ValueMode::Absolute => plan::ValueMode::Absolute,
-                model::ValueMode::Offset => plan::ValueMode::Offset,
-            },
-            integer: *integer,
-        },
-        model::OperationKind::PacketLoss { .. } => plan::OperationKind::PacketLoss,
-        model::OperationKind::Latency { distribution, drain, .. } => plan::OperationKind::Latency {
-            distribution: match distribution {
-                model::Distribution::Fixed => plan::Distribution::Fixed,
-                model::Distribution::Uniform => plan::Distribution::Uniform,
-            },
-            drain: match drain {
-                model::Drain::Finish => plan::Drain::Finish,
-                model::Drain::Flush => plan::Drain::Flush,
-                model::Drain::Drop => plan::Drain::Drop,
-            },
-        },
-        model::OperationKind::Blackhole => plan::OperationKind::Blackhole,
-        model::OperationKind::Custom { moment: when, .. } => plan::OperationKind::Custom { moment: moment(*when) },
-    };
     plan::Operation {
         name: operation.declaration.name.clone(),
         doc: operation.declaration.doc.clone(),
         topic: operation.topic().map(topic_id),
-        kind,
-        parameters: operation.parameters().iter().map(parameter).collect(),
+        places: operation.target.iter().flat_map(|target| &target.places).map(|place| steps(place)).collect(),
+        kind: disturbance::kind(&operation.kind),
+        parameters: operation.parameters.iter().map(parameter).collect(),
         within: within(operation, end_after),
         priority: operation.priority,
         inclusion: operation.inclusion,
@@ -434,6 +404,15 @@ fn dimension(dimension: model::CoverageDimension) -> plan::Dimension {
         model::CoverageDimension::O2 => plan::Dimension::O2,
         model::CoverageDimension::O3 => plan::Dimension::O3,
     }
+}
+
+fn steps(place: &[model::Step]) -> plan::Place {
+    let step = |step: &model::Step| match step {
+        model::Step::Field(name) => plan::Step::Field(name.clone()),
+        model::Step::Element(at) => plan::Step::Element(*at),
+        model::Step::Each => plan::Step::Each,
+    };
+    place.iter().map(step).collect()
 }
 
 /// The window of an operation; one without `within` may be active during the whole test.

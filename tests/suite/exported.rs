@@ -14,12 +14,13 @@ const SPACE: &str = r#"
     space cell
     system {
       simulator sim = in_process "cell_sim::Cell" { crate "simulator"  step 20ms }
-      message Zone { level: real[mm]  share: real[%] }
+      message Zone { level: real[mm]  share: real[%]  name: text  known: bool  at: int[ns]  spans: list of real[mm] }
       topic link = "link" : real[deg]
       topic speed = "speed" : real[km/h]
       topic count = "count" : int
       topic plain = "plain" : real
       topic zone = "zone" : Zone
+      topic pose = "pose" : point[mm]
     }
     metric collisions maximise default 0 { hook on zone }
     metric distance: real[mm] minimise { hook on zone }
@@ -37,6 +38,23 @@ const SPACE: &str = r#"
     operation lag on link = latency [0ms, 500ms]
     operation wobble on speed = latency [0ms, 500ms] uniform
     operation cut on plain = blackhole
+    operation carry on pose = random offset [(-1, -1.25, 0)cm, (1, 1, 1e-9)cm]
+    operation place on pose = stuck at [(-1, -1.25, 0)cm, (1, 1, 1e-9)cm]
+    operation sink on pose = drift [(-1, -1.25, 0)cm/s, (1, 1, 1e-9)cm/s]
+    operation charge on zone.share = drift [0%/s, 12.3%/s]
+    operation rename on zone.name = stuck at one of "a \"b\"", "c"
+    operation guess on zone.name = random one of "a", "b"
+    operation deny on zone.known = stuck at false
+    operation skew on zone.at = clock skew [-1ms, 1ms]
+    operation stretch on zone.level, zone.spans[2], zone.spans[*] = scale [10%, 3]
+    operation tremble on zone.level = noise [0mm, 3m]
+    operation freeze_all on zone = freeze
+    operation age on zone.spans = stale [0ms, 700ms]
+    operation bursts on zone = burst loss { enter [0%, 12.3%]  leave [1.7%, 100%]  loss [50%, 99.9%] }
+    operation thin on zone = rate limit [0.1Hz, 5kHz]
+    operation mix on zone = reorder [0ms, 900ms] drain drop
+    operation twice on zone = duplicate [1, 7]
+    operation uneven on zone = latency [1ms, 900ms] normal
     operation bend on link = custom {
       points: int [-3, 20]  gain: real [0.1, 0.7]  tilt: real[deg] [-0.3rad, 0.3rad]
       shift: point [(-2, -2.5, 0)m, (2, 200, 1e-9)m]  frame: one of "frame \"B\" \\ 0", "frameB_1"
@@ -45,7 +63,9 @@ const SPACE: &str = r#"
     operation tidy = custom after end { }
     campaign look {
       objectives time, collisions, distance, share, fastest
-      operations swing, rush, recount, shift, level, fill, lose, lose_some, lag, wobble, cut, bend, spoil, tidy   1..14 per test
+      operations swing, rush, recount, shift, level, fill, lose, lose_some, lag, wobble, cut, bend, spoil, tidy,
+                 carry, place, sink, charge, rename, guess, deny, skew, stretch, tremble, freeze_all, age, bursts, thin, mix,
+                 twice, uneven   1..31 per test
       activate by time
       search random { evaluations 100 }
       end after 70s

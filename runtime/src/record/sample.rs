@@ -33,6 +33,7 @@ fn operation(name: &str, topic: u32, kind: OperationKind, parameters: Vec<Parame
         within: Span { start: 0.0, end: 65.0 },
         priority: 0,
         inclusion: 1.0,
+        places: Vec::new(),
         timed: true,
         constraints: Vec::new(),
     }
@@ -51,7 +52,7 @@ pub(crate) fn plan() -> CampaignPlan {
         unit: None,
         domain: Domain::Number { low: 0.0, high: 1.0, shape: Shape::Value, integer: false },
     };
-    let jitter = || OperationKind::RandomValue { path: vec![], mode: ValueMode::Offset, integer: false };
+    let jitter = || OperationKind::RandomValue { mode: ValueMode::Offset, integer: false };
     let topic = |name: &str, path: &str| Topic {
         name: name.to_owned(),
         doc: String::new(),

@@ -8,7 +8,7 @@ use sesame_plan::{
 };
 
 use super::{Delivery, Exchange, Finished, Relay};
-use crate::fixture::{latency, offset, operation, plan, test_of, use_of};
+use crate::fixture::{at, latency, offset, operation, plan, test_of, use_of};
 use crate::fuzz::{MessageCall, OperationContext, OperationEntry, OperationHook};
 use crate::metric::MetricTable;
 use crate::observation::Counters;
@@ -167,7 +167,7 @@ fn when_the_window_ends_dropped_messages_are_gone() {
 
 #[test]
 fn an_offset_is_drawn_anew_for_each_message_from_the_sub_range() {
-    let jitter = vec![operation(0, offset(&[], ValueMode::Offset, false))];
+    let jitter = vec![operation(0, offset(ValueMode::Offset, false))];
     let (delivered, finished) = relayed(jitter, &[use_of(0, 1.0, 9.0, range(2.0, 3.0), 7)], &commands(100));
     let shifts: Vec<f64> = numbers(&delivered).iter().zip(0..).map(|((_, n), at)| n - f64::from(at)).collect();
     assert!(shifts[..10].iter().chain(&shifts[90..]).all(|&shift| shift == 0.0));
@@ -184,7 +184,7 @@ fn zone(level: f64, count: i64) -> Value {
 
 #[test]
 fn a_nested_whole_number_stays_whole_and_its_neighbours_untouched() {
-    let shift = vec![operation(1, offset(&["count"], ValueMode::Absolute, true))];
+    let shift = vec![at(&["count"], operation(1, offset(ValueMode::Absolute, true)))];
     let messages: Vec<_> = (0..60).map(|n| (f64::from(n) * 0.1, "zones/Z1", zone(0.5, 100))).collect();
     let (delivered, _) = relayed(shift, &[use_of(0, 0.0, 10.0, range(-1.0, 1.0), 7)], &messages);
     let mut seen = std::collections::BTreeSet::new();
@@ -198,7 +198,7 @@ fn a_nested_whole_number_stays_whole_and_its_neighbours_untouched() {
 
 #[test]
 fn members_of_a_group_are_disturbed_independently() {
-    let jitter = vec![operation(1, offset(&["level"], ValueMode::Absolute, false))];
+    let jitter = vec![at(&["level"], operation(1, offset(ValueMode::Absolute, false)))];
     let messages = [(0.1, "zones/Z1", zone(0.0, 1)), (0.1, "zones/Z2", zone(0.0, 1))];
     let (delivered, _) = relayed(jitter, &[use_of(0, 0.0, 10.0, range(0.0, 1.0), 7)], &messages);
     assert_ne!(delivered[0].2, delivered[1].2);
@@ -206,8 +206,8 @@ fn members_of_a_group_are_disturbed_independently() {
 
 #[test]
 fn operations_apply_in_priority_then_declaration_order() {
-    let mut replace = operation(0, offset(&[], ValueMode::Absolute, false));
-    let shift = operation(0, offset(&[], ValueMode::Offset, false));
+    let mut replace = operation(0, offset(ValueMode::Absolute, false));
+    let shift = operation(0, offset(ValueMode::Offset, false));
     let test = [use_of(1, 0.0, 10.0, range(1.0, 1.0), 1), use_of(0, 0.0, 10.0, range(5.0, 5.0), 1)];
     let (declared, _) = relayed(vec![replace.clone(), shift.clone()], &test, &commands(1));
     assert_eq!(numbers(&declared), [(0.0, 6.0)], "replaced by 5, then shifted by 1");
@@ -274,7 +274,7 @@ proptest! {
 
     #[test]
     fn repeating_a_test_repeats_its_disturbance(seed: u64) {
-        let jitter = || vec![operation(0, offset(&[], ValueMode::Offset, false))];
+        let jitter = || vec![operation(0, offset(ValueMode::Offset, false))];
         let run = |seed| relayed(jitter(), &[use_of(0, 1.0, 9.0, range(-1.0, 1.0), seed)], &commands(90)).0;
         prop_assert_eq!(run(seed), run(seed));
         prop_assert_ne!(run(seed), run(seed.wrapping_add(1)));

@@ -59,7 +59,7 @@ fn block(plan: &CampaignPlan, seed: u64, record: &TestRecord, name: &str) -> Str
         for (parameter, choice) in operation.parameters.iter().zip(&used.parameters) {
             let written = |x: f64| match (&operation.kind, &parameter.unit) {
                 // Probabilities are percentages in the language.
-                (OperationKind::PacketLoss, _) => format!("{}%", decimal(x, 2)),
+                (kind, _) if kind.has_probabilities() => format!("{}%", decimal(x, 2)),
                 (_, unit) => quantity(x, unit.as_deref()),
             };
             let _ = match choice {

@@ -78,7 +78,7 @@ impl Landscape {
             name: format!("jitter{k}"),
             doc: String::new(),
             topic: Some(TopicId(0)),
-            kind: OperationKind::RandomValue { path: Vec::new(), mode: ValueMode::Offset, integer: false },
+            kind: OperationKind::RandomValue { mode: ValueMode::Offset, integer: false },
             parameters: vec![Parameter {
                 name: "offset".to_owned(),
                 unit: Some("rad".to_owned()),
@@ -87,6 +87,7 @@ impl Landscape {
             within: Span { start: 0.0, end: 65.0 },
             priority: 0,
             inclusion: 1.0,
+            places: Vec::new(),
             timed: true,
             constraints: Vec::new(),
         };

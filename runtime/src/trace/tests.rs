@@ -58,7 +58,7 @@ impl Transport for Awkward {
 
 fn awkward_plan() -> (CampaignPlan, Test) {
     let mut plan = plan(vec![
-        operation(0, offset(&[], ValueMode::Offset, false)),
+        operation(0, offset(ValueMode::Offset, false)),
         operation(1, OperationKind::Blackhole),
         operation(1, latency(Distribution::Fixed, Drain::Drop)),
     ]);

@@ -3,7 +3,8 @@
 //! 1. [`collect`] has who is called what, doubles, and what a space cannot do without
 //! 2. [`system`] has message types (in an order in which each follows those it contains), topics, nodes, the simulator
 //! 3. [`measure`] has metrics (their formulas in [`formula`]) and requirements
-//! 4. [`fuzz`] has operations and known tests
+//! 4. [`fuzz`] has operations ([`disturbance`] what they disturb and permit, [`custom`] those in the user's code) and known
+//!    tests
 //! 5. [`campaign`] has campaigns, whose inherited clauses [`inherit`] has put in their places before all else;
 //!    [`condition`] the conditions of tests and what those of campaigns are made of
 //! 6. [`eddi`] has runtime monitors, [`physical`] labs, and [`surroundings`] what a system says beside its simulator
@@ -16,6 +17,7 @@ mod collect;
 mod condition;
 mod coverage;
 mod custom;
+mod disturbance;
 mod eddi;
 mod formula;
 mod fuzz;

@@ -3,7 +3,7 @@
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::Span;
-use crate::syntax::ast::{Name, OperationBody, Path, Transport};
+use crate::syntax::ast::{Name, OperationBody, Target, Transport};
 
 impl<'a> Resolver<'a> {
     /// Nodes have to publish or subscribe to the topic, and the transport has to tell them apart.
@@ -22,7 +22,7 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    fn on_its_way(&mut self, target: &Path, topic: usize, node: usize, from: bool, names: &[Name]) {
+    fn on_its_way(&mut self, target: &Target, topic: usize, node: usize, from: bool, names: &[Name]) {
         let Some(node) = self.system.nodes[node].as_ref() else { return };
         let lists = if from { &node.publishes } else { &node.subscribes };
         if lists.iter().any(|id| crate::model::Id::index(*id) == topic) {

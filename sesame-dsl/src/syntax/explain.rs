@@ -288,10 +288,9 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
     let found = token_at(text, failure.at);
     let span = span_of(found);
     let words: BTreeSet<&'static str> = failure.expected.iter().filter_map(|&rule| keyword_of(rule)).collect();
-    let wants_name = failure
-        .expected
-        .iter()
-        .any(|&rule| matches!(rule, Rule::name | Rule::names | Rule::path | Rule::condition_variable));
+    let wants_name = failure.expected.iter().any(|&rule| {
+        matches!(rule, Rule::name | Rule::names | Rule::path | Rule::target | Rule::targets | Rule::condition_variable)
+    });
     let expected = describe(&failure, place, found.lo == first.lo);
 
     let before = text[..found.lo].chars().next_back();
@@ -422,7 +421,13 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::repeat_settings
         | Rule::condition_settings => "`{`",
         Rule::close => "`}`",
-        Rule::name | Rule::names | Rule::path | Rule::identifier | Rule::condition_variable => "a name",
+        Rule::name
+        | Rule::names
+        | Rule::path
+        | Rule::target
+        | Rule::targets
+        | Rule::identifier
+        | Rule::condition_variable => "a name",
         Rule::field_name | Rule::field => "a field such as `level: real[mm]`",
         Rule::text | Rule::texts => "a text in double quotes",
         Rule::number | Rule::count => "a number",
@@ -488,6 +493,25 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::process => "`process`",
         Rule::random_value => "`random`",
         Rule::packet_loss | Rule::k_packet => "`packet loss`",
+        Rule::stuck_at | Rule::k_stuck => "`stuck at`",
+        Rule::bias => "`bias`",
+        Rule::drift => "`drift`",
+        Rule::noise => "`noise`",
+        Rule::scale => "`scale`",
+        Rule::not_finite => "`nan` or `infinity`",
+        Rule::freeze => "`freeze`",
+        Rule::stale_value => "`stale`",
+        Rule::clock_skew | Rule::k_clock => "`clock skew`",
+        Rule::burst_loss | Rule::k_burst => "`burst loss`",
+        Rule::burst_enter => "`enter`",
+        Rule::burst_leave => "`leave`",
+        Rule::burst_drops => "`loss`",
+        Rule::rate_limit | Rule::k_rate => "`rate limit`",
+        Rule::reorder => "`reorder`",
+        Rule::duplicate => "`duplicate`",
+        Rule::distribution => "a distribution such as `uniform`",
+        Rule::corners => "a box such as `[(0, 0, 0)m, (1, 1, 1)m]`",
+        Rule::each_element => "`*`",
         Rule::latency => "`latency`",
         Rule::blackhole => "`blackhole`",
         Rule::formula => "a formula such as `last(cycle)`",
@@ -521,7 +545,8 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::k_implies
         | Rule::k_boost
         | Rule::k_node
-        | Rule::k_parameter => return None,
+        | Rule::k_parameter
+        | Rule::element => return None,
         _ => return keyword_of(rule).map(|word| format!("`{word}`")),
     };
     Some(words.to_owned())

@@ -6,6 +6,7 @@ pub(crate) mod eddi;
 mod explain;
 mod formula;
 mod limits;
+mod operation;
 mod parse;
 pub(crate) mod physical;
 pub(crate) mod surroundings;

@@ -6,9 +6,9 @@ use sesame_grammar::{Rule, SesameParser};
 
 use super::ast::{
     ActivationMode, Bound, Campaign, Comparison, Count, Coverage, CoverageAxis, Custom, CustomParameter, Direction,
-    Domain, Drain, Expectation, Field, File, Head, InProcess, Inherited, Message, Metric, MetricSource, Moment, Name,
-    Node, Operation, OperationBody, OperationKind, Operations, Passive, Process, Record, Repeat, Requirement, Search,
-    Simulator, Strategy, System, Test, Topic, Transport, Type, TypeKind,
+    Domain, Expectation, Field, File, Head, InProcess, Inherited, Message, Metric, MetricSource, Moment, Name, Node,
+    Operation, OperationBody, Operations, Passive, Process, Record, Repeat, Requirement, Search, Simulator, Strategy,
+    System, Test, Topic, Transport, Type, TypeKind,
 };
 use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, MAX_CALLS, too_deep};
@@ -477,33 +477,7 @@ impl Reader<'_> {
             self.unsupported(&unsupported);
             return Operation { head, body: None };
         }
-        let kinds = [Rule::random_value, Rule::packet_loss, Rule::latency, Rule::blackhole, Rule::custom];
-        let kind = first_of(pair, &kinds).expect("an operation has a kind");
-        let kind = match kind.as_rule() {
-            Rule::random_value => OperationKind::Random {
-                absolute: child(&expect_child(&kind, Rule::value_mode), Rule::k_absolute).is_some(),
-                range: self.range(&expect_child(&kind, Rule::range)),
-            },
-            Rule::packet_loss => OperationKind::PacketLoss(self.range(&expect_child(&kind, Rule::range))),
-            Rule::latency => OperationKind::Latency {
-                range: self.range(&expect_child(&kind, Rule::range)),
-                uniform: children(&kind, Rule::k_uniform).map(|uniform| self.span(&uniform)).collect(),
-                drain: children(&kind, Rule::drain)
-                    .map(|drain| {
-                        let mode = if child(&drain, Rule::k_finish).is_some() {
-                            Drain::Finish
-                        } else if child(&drain, Rule::k_flush).is_some() {
-                            Drain::Flush
-                        } else {
-                            Drain::Drop
-                        };
-                        (self.keyword_span(&drain), mode)
-                    })
-                    .collect(),
-            },
-            Rule::custom => OperationKind::Custom(self.custom(&kind)),
-            _ => OperationKind::Blackhole,
-        };
+        let kind = self.operation_kind(pair);
         let mut signed = |rule| {
             let clauses = children(pair, rule);
             clauses.map(|it| (self.keyword_span(&it), self.signed(&expect_child(&it, Rule::signed)))).collect()
@@ -520,14 +494,14 @@ impl Reader<'_> {
         let mut nodes = |rule| child(pair, rule).map(|nodes| (self.keyword_span(&nodes), self.names(&nodes)));
         let from = nodes(Rule::from_nodes);
         let to = nodes(Rule::to_nodes);
-        let target = child(pair, Rule::path).map(|path| self.path(&path));
+        let target = child(pair, Rule::targets).map(|targets| self.target(&targets));
         Operation {
             head,
             body: Some(OperationBody { target, from, to, kind, within, priority, inclusion, untimed, contains }),
         }
     }
 
-    fn custom(&mut self, pair: &Pair<'_>) -> Custom {
+    pub(super) fn custom(&mut self, pair: &Pair<'_>) -> Custom {
         let span = self.keyword_span(pair);
         let moment = child(pair, Rule::moment).map(|moment| self.moment(&moment));
         let mut custom = Custom { span, moment, parameters: vec![], damaged: false };
