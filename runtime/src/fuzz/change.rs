@@ -4,7 +4,7 @@ use sesame_plan::Choice;
 
 use crate::value::Value;
 
-/// The most whole numbers that a real tells apart.
+/// The nearest whole number, halves away from zero; what 64 bits do not hold is clamped.
 #[expect(clippy::cast_possible_truncation, reason = "`as` clamps to the integer's range")]
 fn nearest(x: f64) -> i64 {
     libm::round(x) as i64

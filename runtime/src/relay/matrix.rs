@@ -64,7 +64,7 @@ impl Payload {
         match self {
             Payload::Real => Value::Real(x),
             Payload::Int => Value::Int(i64::from(n)),
-            Payload::Bool => Value::Bool(n % 3 == 0),
+            Payload::Bool => Value::Bool(n.is_multiple_of(3)),
             Payload::Text => Value::Text(format!("text {n}").into()),
             Payload::Point => Value::Point([x, -x, x / 2.0]),
             Payload::Nested => {
@@ -367,7 +367,7 @@ fn new_number(case: &Case, payload: Payload, n: u32, first_draw: u64, axis: usiz
 }
 
 /// The value that an operation makes of the `number`th value of message `n`.
-#[expect(clippy::cast_possible_truncation, reason = "the numbers of these tests are small")]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers of these tests are small")]
 fn new_value(case: &Case, payload: Payload, n: u32, number: usize, first_draw: u64, old: &Value) -> Value {
     // The value that was at the same place of another message.
     let of_message = |m: u32| {

@@ -449,7 +449,7 @@ impl<'a> Resolver<'a> {
                 return None;
             };
             ty = *of;
-            holder = "an element".to_owned();
+            "an element".clone_into(&mut holder);
             steps.push(step);
         }
         Some((TopicId::from_index(index), steps, ty))

@@ -511,7 +511,6 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::duplicate => "`duplicate`",
         Rule::distribution => "a distribution such as `uniform`",
         Rule::corners => "a box such as `[(0, 0, 0)m, (1, 1, 1)m]`",
-        Rule::each_element => "`*`",
         Rule::latency => "`latency`",
         Rule::blackhole => "`blackhole`",
         Rule::formula => "a formula such as `last(cycle)`",
@@ -531,7 +530,7 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::members
         | Rule::truth => "a value such as `link0 - 2.5rad`",
         Rule::plus => "`+`",
-        Rule::times => "`*`",
+        Rule::times | Rule::each_element => "`*`",
         Rule::over => "`/`",
         Rule::trigger | Rule::when_then | Rule::formula_when => "`when`",
         Rule::formula_every => "`every`",
