@@ -10,3 +10,4 @@ mod token;
 mod words;
 
 pub(crate) use parse::parse;
+pub(crate) use token::is_keyword;

@@ -82,6 +82,6 @@ pub(super) fn text_end(text: &str, open: usize) -> Option<usize> {
 }
 
 /// Whether a word is reserved.
-pub(super) fn is_keyword(word: &str) -> bool {
+pub(crate) fn is_keyword(word: &str) -> bool {
     SesameParser::parse(Rule::keyword, word).is_ok_and(|pairs| pairs.as_str() == word)
 }
