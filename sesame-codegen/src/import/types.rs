@@ -212,15 +212,18 @@ impl Messages {
         self.list.iter().filter(|message| message.fields.is_empty()).map(|message| message.name.as_str()).collect()
     }
 
-    /// All messages in the words of the language.
+    /// All messages in the words of the language. One without a known field gets one to be replaced.
     pub(super) fn write(&self) -> String {
         let mut text = String::new();
         for message in &self.list {
-            let fields: String = message.fields.iter().fold(String::new(), |mut text, (name, ty)| {
-                let _ = write!(text, " {name}: {} ", self.words(ty));
-                text
-            });
-            let _ = writeln!(text, "  message {} {{{}}}", message.name, if fields.is_empty() { " ".to_owned() } else { fields });
+            if message.fields.is_empty() {
+                text.push_str("  // The file does not say what it holds: declare the fields that you need.\n");
+                let _ = writeln!(text, "  message {} {{ undeclared: text }}", message.name);
+                continue;
+            }
+            let fields: Vec<String> =
+                message.fields.iter().map(|(name, ty)| format!("{name}: {}", self.words(ty))).collect();
+            let _ = writeln!(text, "  message {} {{ {} }}", message.name, fields.join("  "));
         }
         text
     }
