@@ -96,7 +96,8 @@ pub fn tests(repository: &Repository, selection: &Selection) -> Result<Dataset, 
         if test.origin == Origin::Reference || !selection.holds(test.number) {
             return;
         }
-        let called = original.is_some().then(|| originals.get(&test.number).cloned().map_or(Datum::Missing, Datum::Text));
+        let called =
+            original.is_some().then(|| originals.get(&test.number).cloned().map_or(Datum::Missing, Datum::Text));
         let head = [
             Datum::Text(test.origin.word().to_owned()),
             test.generation.map_or(Datum::Missing, |generation| Datum::Whole(i64::from(generation))),

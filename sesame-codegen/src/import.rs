@@ -47,8 +47,11 @@ impl Imported {
         let original = Original::read(path)?;
         let mut notes = Notes::default();
         let file = path.file_name().unwrap_or_default().to_string_lossy();
-        let mapped = space::map(&original, &file, &mut notes)
-            .map_err(|what| Broken { file: path.to_owned(), place: None, what })?;
+        let mapped = space::map(&original, &file, &mut notes).map_err(|what| Broken {
+            file: path.to_owned(),
+            place: None,
+            what,
+        })?;
         Ok(Imported { original, notes, mapped })
     }
 
@@ -60,7 +63,9 @@ impl Imported {
     /// The campaigns that performed tests and are in the `.sesame` file: position in the original, and name.
     pub fn performed(&self) -> impl Iterator<Item = (usize, &str)> {
         let campaigns = self.original.campaigns.iter().zip(&self.mapped.campaigns).enumerate();
-        campaigns.filter(|(_, (campaign, _))| !campaign.tests.is_empty()).filter_map(|(at, (_, name))| Some((at, name.as_deref()?)))
+        campaigns
+            .filter(|(_, (campaign, _))| !campaign.tests.is_empty())
+            .filter_map(|(at, (_, name))| Some((at, name.as_deref()?)))
     }
 
     /// Records the tests of one of these campaigns into a folder without results. The plan is that of the campaign in

@@ -300,9 +300,7 @@ impl Repository {
             "SELECT test, operation, value, low, high, x, y, z, text FROM choices WHERE ?1 IS NULL OR test = ?1 \
              ORDER BY test, operation, position",
             params![only],
-            |row| {
-                Ok(((row.get(0)?, row.get(1)?), choice(row, 2)?))
-            },
+            |row| Ok(((row.get(0)?, row.get(1)?), choice(row, 2)?)),
         )?;
         let mut parameters: BTreeMap<At, Vec<Choice>> = BTreeMap::new();
         for (at, choice) in choices {

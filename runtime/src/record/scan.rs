@@ -117,8 +117,9 @@ impl Repository {
         let _transaction = self.connection.unchecked_transaction().map_err(failed)?;
 
         let mut operations = prepare("SELECT test, operation FROM operations ORDER BY test, position")?;
-        let mut choices =
-            prepare("SELECT test, operation, value, low, high, x, y, z, text FROM choices ORDER BY test, operation, position")?;
+        let mut choices = prepare(
+            "SELECT test, operation, value, low, high, x, y, z, text FROM choices ORDER BY test, operation, position",
+        )?;
         let mut intervals =
             prepare("SELECT test, operation, start_s, end_s FROM intervals ORDER BY test, operation, position")?;
         let mut values = prepare("SELECT test, value, is_set FROM metric_values ORDER BY test, metric")?;
@@ -171,8 +172,9 @@ impl Repository {
             }
             let stray = |what: &str| damaged(format!("T{number} has {what} without an operation"));
             for (at, choice) in choices.of(number).map_err(failed)? {
-                let choice =
-                    choice.ok_or_else(|| damaged(format!("T{number} has a choice that is neither value, range, point nor text")))?;
+                let choice = choice.ok_or_else(|| {
+                    damaged(format!("T{number} has a choice that is neither value, range, point nor text"))
+                })?;
                 test.operations.get_mut(at).ok_or_else(|| stray("a choice"))?.choices.push(choice);
             }
             for (at, span) in intervals.of(number).map_err(failed)? {

@@ -29,8 +29,9 @@ pub(super) fn import(shell: Shell, language: &Language, file: &Path, out: &Path)
     output::create(out, &BTreeMap::from([(name.clone(), imported.text().to_owned())]))?;
     let space = out.join(&name);
     shell.did("Imported", format!("{}: into {}", file.display(), space.display()));
-    let checked = commands::check(shell, language, &space)
-        .with_context(|| format!("{} was written, but is not right yet; its results were not imported", space.display()))?;
+    let checked = commands::check(shell, language, &space).with_context(|| {
+        format!("{} was written, but is not right yet; its results were not imported", space.display())
+    })?;
     let performed: Vec<(usize, String)> = imported.performed().map(|(at, name)| (at, name.to_owned())).collect();
     for (at, campaign) in performed {
         let plan = checked.plans.iter().find(|runner| runner.plan.campaign.name == campaign);
@@ -42,7 +43,12 @@ pub(super) fn import(shell: Shell, language: &Language, file: &Path, out: &Path)
             .with_context(|| format!("cannot import the results of `{campaign}`"))?;
         shell.did(
             "Recorded",
-            format!("{}: {}, {}", folder.display(), counted(recorded.tests, "test"), counted(recorded.sets, "result set")),
+            format!(
+                "{}: {}, {}",
+                folder.display(),
+                counted(recorded.tests, "test"),
+                counted(recorded.sets, "result set")
+            ),
         );
     }
     let mut shown: BTreeMap<Kind, usize> = BTreeMap::new();

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use super::notes::Kind;
 use super::original::{
     Activation, ActivationMode, Approach, Campaign, Comparison, Condition, Coverage, Domain, MetricSource, Operand,
-    Operation, OperationKind, Reference, Test,
+    Operation, OperationKind, Original, Reference, Test,
 };
 use super::parts::{Effect, matching};
 use super::space::{Writer, number, percent, quoted_text};
@@ -15,9 +15,19 @@ use super::xml::printable;
 /// Levels of a condition that the language permits.
 const MOST_LEVELS: u32 = 40;
 
-/// When the tests of a campaign end, in seconds; the original's own constant where a campaign does not say.
-pub(super) fn end_of(campaign: &Campaign) -> f64 {
-    campaign.limit.filter(|&limit| limit > 0.0).unwrap_or(100.0)
+/// When the tests of a campaign end, in seconds. Where a campaign does not say it is the original's own constant, or
+/// later where its operations are.
+pub(super) fn end_of(original: &Original, campaign: &Campaign) -> f64 {
+    if let Some(limit) = campaign.limit.filter(|&limit| limit > 0.0) {
+        return limit;
+    }
+    let included = campaign.included.iter().filter_map(|&it| original.operation(it)).map(|at| &original.operations[at]);
+    let performed = campaign.tests.iter().flat_map(|test| &test.operations);
+    let last = included.chain(performed).map(|operation| match operation.activation {
+        Activation::Time(start, end) => start.max(end),
+        _ => 0.0,
+    });
+    last.fold(100.0, f64::max)
 }
 
 /// Whether the tests of a campaign switch operations by conditions: as it says, or as those that it performed do.
@@ -72,25 +82,41 @@ fn campaign_text(
     if objectives.is_empty() {
         objectives = names(writer, &mut campaign.metrics.iter().copied());
     }
+    if objectives.is_empty() && !matches!(campaign.approach, Approach::Repeat { .. }) {
+        objectives = writer.mapped.metrics.iter().flatten().cloned().collect();
+        writer.notes.say(Kind::Changed, format!("campaign `{shown}` measures nothing: it has all objectives now"));
+    }
     let mut lines: Vec<String> = Vec::new();
     // What else its tests have values or conditions of is measured too, so that results have a place for it.
     let measured = campaign.tests.iter().flat_map(|test| test.values.iter().map(|&(metric, _)| metric));
     let compared = campaign.tests.iter().flat_map(|test| &test.operations).flat_map(compared_by);
     let mut observed = names(writer, &mut campaign.metrics.iter().copied().chain(measured).chain(compared));
-    let end = end_of(campaign);
+    let end = end_of(original, campaign);
     if campaign.limit.is_none() {
-        let text = format!("campaign `{shown}` does not say when its tests end: after 100s, as in the original");
+        let text = format!("campaign `{shown}` does not say when its tests end: after {}s now", number(end));
         writer.notes.say(Kind::Changed, text);
     }
 
     if let Approach::Repeat { test, times } = campaign.approach {
-        let Some(place) = test.and_then(|it| original.test(it)) else {
+        let named = test.and_then(|it| original.test(it));
+        // What it performed are copies of the test it repeated.
+        let first = (!campaign.tests.is_empty()).then(|| (writer.mapped.campaigns.len(), 0));
+        let Some(place) = named.or(first) else {
             return leave_out(writer, "the test that it repeats is not in the file");
         };
+        if named.is_none() {
+            let text =
+                format!("campaign `{shown}`: the test that it repeats is not in the file; it repeats its first copy");
+            writer.notes.say(Kind::Changed, text);
+        }
         let test = match known.get(&place) {
             Some(name) => name.clone(),
             None => {
-                let name = known_test(writer, &original.campaigns[place.0].tests[place.1], tests);
+                let repeated = &original.campaigns[place.0].tests[place.1];
+                let Some(lines) = held_by(writer, repeated).or_else(|| undisturbed(writer, repeated, end)) else {
+                    return leave_out(writer, "nothing of the test that it repeats can be said");
+                };
+                let name = known_test(writer, repeated, &lines, tests);
                 known.insert(place, name.clone());
                 name
             }
@@ -101,6 +127,10 @@ fn campaign_text(
         held.extend(writer.mapped.holders.used_by(original, &campaign.tests));
         held.sort_unstable();
         held.dedup();
+        if held.iter().all(|&at| writer.mapped.parts[at].is_empty()) && !campaign.tests.is_empty() {
+            writer.notes.say(Kind::Changed, format!("campaign `{shown}` has no operations: it may use all now"));
+            held = (0..writer.mapped.parts.len()).collect();
+        }
         let operations: Vec<&str> =
             held.iter().flat_map(|&at| &writer.mapped.parts[at]).map(|part| part.name.as_str()).collect();
         if operations.is_empty() {
@@ -201,7 +231,8 @@ fn cells(writer: &mut Writer<'_>, coverage: &Coverage, shown: &str) -> Option<St
             "T3_TIME_MIDPOINT_VAR" => ("T3", *low, *high),
             "P1_PARAMETER_MEAN" => ("P1", *low, *high),
             "P2_PARAMETER_VARIANCE" => {
-                let text = format!("campaign `{shown}`: P2 is a standard deviation, no variance; its cells are converted");
+                let text =
+                    format!("campaign `{shown}`: P2 is a standard deviation, no variance; its cells are converted");
                 writer.notes.say(Kind::Changed, text);
                 ("P2", low.max(0.0).sqrt(), high.max(0.0).sqrt())
             }
@@ -224,7 +255,9 @@ fn cells(writer: &mut Writer<'_>, coverage: &Coverage, shown: &str) -> Option<St
         let _ = write!(axes, "{name} [{}, {}] cells {count}   ", number(low), number(high));
     }
     if axes.is_empty() {
-        let text = format!("campaign `{shown}`: the file does not say which cells its coverage counts; add `coverage {{ … }}`");
+        let text = format!(
+            "campaign `{shown}`: the file does not say which cells its coverage counts; add `coverage {{ … }}`"
+        );
         writer.notes.say(Kind::LeftOut, text);
         return None;
     }
@@ -263,10 +296,51 @@ pub(super) fn compared_by(operation: &Operation) -> Vec<Reference> {
     metrics
 }
 
-/// A test that is repeated, as a known test; its name.
-fn known_test(writer: &mut Writer<'_>, test: &Test, text: &mut String) -> String {
-    let shown = printable(&test.name);
+/// A test that is repeated, as a known test of these lines; its name.
+fn known_test(writer: &mut Writer<'_>, test: &Test, lines: &str, text: &mut String) -> String {
     let name = writer.names.take(&test.name, "test");
+    text.push('\n');
+    if name != *test.name {
+        let _ = writeln!(text, "/// In the original: `{}`.", printable(&test.name));
+    }
+    let _ = writeln!(text, "test {name} {{\n{lines}}}");
+    name
+}
+
+/// A line for a known test that disturbs nothing: an operation that adds 0, or loses nothing.
+fn undisturbed(writer: &mut Writer<'_>, test: &Test, end: f64) -> Option<String> {
+    if !test.operations.is_empty() {
+        return None;
+    }
+    let holders = &writer.mapped.holders.operations;
+    let parts =
+        holders.iter().zip(&writer.mapped.parts).flat_map(|(holder, parts)| parts.iter().map(move |it| (holder, it)));
+    let mut harmless = parts.filter_map(|(holder, part)| match (&part.effect, &holder.kind) {
+        (&Effect::Value { set, relative: true }, OperationKind::RandomValue { values, .. }) => match values[set].domain
+        {
+            Domain::Reals(low, high) if low.min(high) <= 0.0 && low.max(high) >= 0.0 => {
+                Some((holder, format!("{} offset [0, 0]", part.name)))
+            }
+            _ => None,
+        },
+        (Effect::Loss, OperationKind::PacketLoss { keep }) if keep.0.max(keep.1) >= 1.0 => {
+            Some((holder, format!("{} loss 0%", part.name)))
+        }
+        _ => None,
+    });
+    let (holder, harmless) = harmless.next()?;
+    let (from, to) = match holder.activation {
+        Activation::Time(from, to) if from.max(0.0) < to.min(end) => (from.max(0.0), to.min(end)),
+        _ => (0.0, end),
+    };
+    let shown = printable(&test.name);
+    writer.notes.say(Kind::Changed, format!("known test `{shown}` disturbs nothing: it holds `{harmless}`"));
+    Some(format!("  {harmless} from {}s to {}s\n", number(from), number(to)))
+}
+
+/// The operations of a known test, a line for each; `None` if there is none that can be said.
+fn held_by(writer: &mut Writer<'_>, test: &Test) -> Option<String> {
+    let shown = printable(&test.name);
     let mut lines = String::new();
     for operation in &test.operations {
         let Some(at) = writer.mapped.holders.find(writer.original, operation) else { continue };
@@ -283,20 +357,13 @@ fn known_test(writer: &mut Writer<'_>, test: &Test, text: &mut String) -> String
                     };
                     let _ = writeln!(lines, "  {}{choices} {window}{seed}", part.name);
                 }
-                Err(why) => writer.notes.say(
-                    Kind::LeftOut,
-                    format!("known test `{shown}`, operation `{}`: {why}", part.name),
-                ),
+                Err(why) => {
+                    writer.notes.say(Kind::LeftOut, format!("known test `{shown}`, operation `{}`: {why}", part.name))
+                }
             }
         }
     }
-    let block = if lines.is_empty() { "{ }".to_owned() } else { format!("{{\n{lines}}}") };
-    if name != *test.name {
-        let _ = writeln!(text, "\n/// In the original: `{shown}`.\ntest {name} {block}");
-    } else {
-        let _ = writeln!(text, "\ntest {name} {block}");
-    }
-    name
+    (!lines.is_empty()).then_some(lines)
 }
 
 /// What a test chooses, in words, each after a blank.

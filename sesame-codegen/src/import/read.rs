@@ -24,7 +24,9 @@ pub(super) fn read(path: &Path) -> Result<Original, Broken> {
             )));
         }
         Step::Close | Step::End => {
-            return Err(source.broken("there is nothing in it; a testing space of the original platform is an XMI file"));
+            return Err(
+                source.broken("there is nothing in it; a testing space of the original platform is an XMI file")
+            );
         }
     }
     loop {
@@ -280,10 +282,9 @@ fn operation(original: &mut Original, element: &Element) -> Result<Operation, St
             Some("ConditionBasedActivation") => {
                 Activation::Condition(condition(original, found, "starting")?, condition(original, found, "ending")?)
             }
-            Some("ConditionBasedTimeLimited") => Activation::ConditionFor(
-                condition(original, found, "starting")?,
-                number(found, "length", 0.0)?,
-            ),
+            Some("ConditionBasedTimeLimited") => {
+                Activation::ConditionFor(condition(original, found, "starting")?, number(found, "length", 0.0)?)
+            }
             _ => Activation::Unsaid,
         },
     };
@@ -405,9 +406,9 @@ fn loose_number(element: &Element, name: &str, default: f64) -> Result<f64, Stri
     match text.trim() {
         "Infinity" => Ok(f64::INFINITY),
         "-Infinity" => Ok(f64::NEG_INFINITY),
-        text => text.parse().map_err(|_| {
-            format!("`{name}` of this `{}` is `{}`, which is no number", element.tag, printable(text))
-        }),
+        text => text
+            .parse()
+            .map_err(|_| format!("`{name}` of this `{}` is `{}`, which is no number", element.tag, printable(text))),
     }
 }
 
@@ -423,9 +424,9 @@ fn number(element: &Element, name: &str, default: f64) -> Result<f64, String> {
 
 fn integer(element: &Element, name: &str) -> Result<i64, String> {
     let Some(text) = element.get(name) else { return Ok(0) };
-    text.trim().parse().map_err(|_| {
-        format!("`{name}` of this `{}` is `{}`, which is no whole number", element.tag, printable(text))
-    })
+    text.trim()
+        .parse()
+        .map_err(|_| format!("`{name}` of this `{}` is `{}`, which is no whole number", element.tag, printable(text)))
 }
 
 fn count(element: &Element, name: &str) -> Result<u32, String> {

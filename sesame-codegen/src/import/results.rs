@@ -14,7 +14,7 @@ use super::original::{
 };
 use super::parts::{Effect, Part, matching};
 use super::space::Mapped;
-use super::xml::printable;
+use super::xml::{cleaned, printable};
 
 /// How much was recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,7 +86,10 @@ impl Importer<'_> {
                 continue;
             };
             if !value.is_finite() {
-                notes.say(Kind::LeftOut, format!("values of `{}` that are no finite numbers", self.plan.metric(id).name));
+                notes.say(
+                    Kind::LeftOut,
+                    format!("values of `{}` that are no finite numbers", self.plan.metric(id).name),
+                );
                 continue;
             }
             let default = self.original.metric(metric).and_then(|at| self.original.metrics[at].default);
@@ -146,11 +149,8 @@ impl Importer<'_> {
         let id = *self.operations.get(part.name.as_str()).ok_or("the campaign does not use it")?;
         let parameters = choices(operation, template, &part.effect)?;
         let offline = matches!(part.effect, Effect::Custom { offline: true, .. });
-        let (activation, planned) = if offline {
-            (sesame_plan::Activation::Offline, None)
-        } else {
-            self.activation(&operation.activation)?
-        };
+        let (activation, planned) =
+            if offline { (sesame_plan::Activation::Offline, None) } else { self.activation(&operation.activation)? };
         // Activity by time was never measured: the original switched by the clock alone.
         let active = operation.recorded.filter(|_| !offline).or(planned);
         let intervals = active.and_then(|(start, end)| {
@@ -288,7 +288,7 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
                     Domain::Integers(low, high) => Choice::Value { value: *low.min(high) as f64 },
                     Domain::Points(low, _) => Choice::Point { point: *low },
                     Domain::Texts(texts) => match texts.first() {
-                        Some(text) => Choice::Text { text: printable(text) },
+                        Some(text) => Choice::Text { text: cleaned(text) },
                         None => return Err("it chooses no text".to_owned()),
                     },
                     Domain::Other(_) => return Err("it chooses something that nothing is like".to_owned()),

@@ -7,11 +7,12 @@ use super::campaigns;
 use super::naming::Names;
 use super::notes::{Kind, Notes};
 use super::original::{
-    Activation, ActivationMode, Approach, Constraint, Domain, MetricSource, Operation, OperationKind, Original, Reference,
+    Activation, ActivationMode, Approach, Constraint, Domain, MetricSource, Operation, OperationKind, Original,
+    Reference,
 };
 use super::parts::{Effect, Holders, Part, called, ordered};
 use super::types::{Messages, Type};
-use super::xml::printable;
+use super::xml::{cleaned, printable};
 
 /// What of the original became what.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -147,9 +148,9 @@ impl Writer<'_> {
         if !messages.is_empty() {
             let _ = writeln!(text, "{messages}");
         }
-        let (longest, widest) = topics.iter().fold((0, 0), |(name, path), (topic, at, _)| {
-            (name.max(topic.len()), path.max(at.chars().count() + 2))
-        });
+        let (longest, widest) = topics
+            .iter()
+            .fold((0, 0), |(name, path), (topic, at, _)| (name.max(topic.len()), path.max(at.chars().count() + 2)));
         for (topic, path, ty) in topics {
             let quoted = format!("\"{path}\"");
             let _ = writeln!(text, "  topic {topic:longest$} = {quoted:widest$} : {}", self.messages.words(ty));
@@ -217,8 +218,10 @@ impl Writer<'_> {
                 }
                 let default = metric.default.map_or(String::new(), |it| format!(" default {}", number(it)));
                 let initial = metric.initial.map_or(String::new(), |it| format!(" initial {}", number(it)));
-                let _ = writeln!(text, "metric {name} {direction}{default}{initial} {{ hook on {} }}", topics.join(", "));
-                self.notes.say(Kind::Mapped, format!("metric `{shown}` is a hook: its Java code is to be written in Rust"));
+                let _ =
+                    writeln!(text, "metric {name} {direction}{default}{initial} {{ hook on {} }}", topics.join(", "));
+                self.notes
+                    .say(Kind::Mapped, format!("metric `{shown}` is a hook: its Java code is to be written in Rust"));
             }
             self.mapped.metrics.push(Some(name));
         }
@@ -267,7 +270,8 @@ impl Writer<'_> {
                             (low as f64, high as f64)
                         }
                         _ => {
-                            self.notes.say(Kind::LeftOut, format!("{called}: only numbers can be drawn, not what it has"));
+                            self.notes
+                                .say(Kind::LeftOut, format!("{called}: only numbers can be drawn, not what it has"));
                             continue;
                         }
                     };
@@ -296,7 +300,8 @@ impl Writer<'_> {
                 }
                 if parts.len() > 1 {
                     let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
-                    self.notes.say(Kind::Mapped, format!("{called} draws several values: it is {} now", names.join(", ")));
+                    self.notes
+                        .say(Kind::Mapped, format!("{called} draws several values: it is {} now", names.join(", ")));
                 }
             }
             OperationKind::PacketLoss { keep } => {
@@ -326,7 +331,10 @@ impl Writer<'_> {
             }
             OperationKind::Other(kind) => {
                 let kind = printable(kind);
-                self.notes.say(Kind::LeftOut, format!("{called}: `{kind}` was declared in the original and never did anything"));
+                self.notes.say(
+                    Kind::LeftOut,
+                    format!("{called}: `{kind}` was declared in the original and never did anything"),
+                );
             }
             OperationKind::Custom { .. } => unreachable!("custom operations were written above"),
         }
@@ -360,7 +368,9 @@ impl Writer<'_> {
                 Domain::Points(one, other) => {
                     let axis = |axis: usize, notes: &mut Notes| ordered(one[axis], other[axis], &of, notes);
                     let axes = [axis(0, self.notes), axis(1, self.notes), axis(2, self.notes)];
-                    let corner = |pick: fn(&(f64, f64)) -> f64| axes.iter().map(|it| number(pick(it))).collect::<Vec<_>>().join(", ");
+                    let corner = |pick: fn(&(f64, f64)) -> f64| {
+                        axes.iter().map(|it| number(pick(it))).collect::<Vec<_>>().join(", ")
+                    };
                     format!("point [({}), ({})]", corner(|it| it.0), corner(|it| it.1))
                 }
                 Domain::Texts(texts) => {
@@ -413,7 +423,8 @@ impl Writer<'_> {
             let (start, end) = ordered(start, end, &format!("the window of {called}"), self.notes);
             let start = start.max(0.0);
             if start >= end {
-                self.notes.say(Kind::Changed, format!("{called}: its window is empty, so it may be active at any time"));
+                self.notes
+                    .say(Kind::Changed, format!("{called}: its window is empty, so it may be active at any time"));
             } else if start >= self.first_end(at) {
                 self.notes.say(
                     Kind::Changed,
@@ -433,7 +444,9 @@ impl Writer<'_> {
         if constraints.len() < operation.constraints.len() {
             self.notes.say(
                 Kind::LeftOut,
-                format!("{called}, what its start conditions contain: the campaigns that use it grow no such conditions"),
+                format!(
+                    "{called}, what its start conditions contain: the campaigns that use it grow no such conditions"
+                ),
             );
         }
         if !constraints.is_empty() {
@@ -448,7 +461,7 @@ impl Writer<'_> {
             campaign.included.iter().any(|&it| self.original.operation(it) == Some(at))
                 || self.mapped.holders.used_by(self.original, &campaign.tests).contains(&at)
         });
-        using.map(campaigns::end_of).fold(f64::INFINITY, f64::min)
+        using.map(|campaign| campaigns::end_of(self.original, campaign)).fold(f64::INFINITY, f64::min)
     }
 
     /// A constraint that every campaign by condition with this operation can meet.
@@ -499,5 +512,5 @@ pub(super) fn percent(share: f64) -> String {
 
 /// A text as the language writes it.
 pub(super) fn quoted_text(text: &str) -> String {
-    format!("\"{}\"", printable(text).replace('\\', "\\\\").replace('"', "\\\""))
+    format!("\"{}\"", cleaned(text).replace('\\', "\\\\").replace('"', "\\\""))
 }

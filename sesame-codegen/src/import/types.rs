@@ -28,7 +28,10 @@ const COMMON: &[(&str, &[(&str, &str)])] = &[
     ("geometry_msgs/PoseStamped", &[("pose", "geometry_msgs/Pose")]),
     ("geometry_msgs/PoseWithCovariance", &[("pose", "geometry_msgs/Pose")]),
     ("geometry_msgs/PoseWithCovarianceStamped", &[("pose", "geometry_msgs/PoseWithCovariance")]),
-    ("nav_msgs/Odometry", &[("pose", "geometry_msgs/PoseWithCovariance"), ("twist", "geometry_msgs/TwistWithCovariance")]),
+    (
+        "nav_msgs/Odometry",
+        &[("pose", "geometry_msgs/PoseWithCovariance"), ("twist", "geometry_msgs/TwistWithCovariance")],
+    ),
     ("nav_msgs/Path", &[("poses", "[]geometry_msgs/PoseStamped")]),
     (
         "sensor_msgs/LaserScan",

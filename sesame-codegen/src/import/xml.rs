@@ -188,7 +188,11 @@ impl Source {
                 Err(what) => return Err(broken_xml(&self.path, self.at, &what)),
             };
             if self.open.len() >= DEEPEST {
-                return Err(broken_xml(&self.path, self.at, &format!("elements are nested more than {DEEPEST} levels deep")));
+                return Err(broken_xml(
+                    &self.path,
+                    self.at,
+                    &format!("elements are nested more than {DEEPEST} levels deep"),
+                ));
             }
             self.open.push(element.tag.clone());
             self.closing = empty;
@@ -208,9 +212,10 @@ fn broken_xml(path: &Path, at: u64, what: &str) -> Broken {
         return Broken {
             file: path.to_owned(),
             place: Some((line, 1)),
-            what: "two versions of the file were merged, and the conflict here was never resolved; keep one side, delete \
+            what:
+                "two versions of the file were merged, and the conflict here was never resolved; keep one side, delete \
                    the lines that begin with `<<<<<<<`, `=======` and `>>>>>>>`, and import it again"
-                .to_owned(),
+                    .to_owned(),
         };
     }
     Broken { file: path.to_owned(), place: place_of(path, at), what: format!("this is no XML: {what}") }
@@ -252,6 +257,12 @@ fn is_name(name: &str) -> bool {
 pub(super) fn printable(text: &str) -> String {
     let shown: String = text.chars().filter(|c| !c.is_control()).take(80).collect();
     shown.trim().to_owned()
+}
+
+/// A text without what no line holds, and of a length that a file can.
+pub(super) fn cleaned(text: &str) -> String {
+    let cleaned: String = text.chars().filter(|c| !c.is_control()).take(1000).collect();
+    cleaned.trim().to_owned()
 }
 
 /// The first line of a file that is a marker of a merge conflict. The file is read line by line, and no further than
