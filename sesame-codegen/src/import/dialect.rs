@@ -174,6 +174,21 @@ impl Dialect {
         *name = since;
     }
 
+    /// Why something is not carried over.
+    pub(super) fn why(name: &str) -> &'static str {
+        match name {
+            "useMutationEnhancingCoverage" | "coverageBoostingStrategy" => "coverage is not boosted in this version",
+            "launchFileLocation" | "launchDelaySeconds" | "customTerminateFileLocation" | "recordFileLocation" => {
+                "how a simulator is started is said in its own line"
+            }
+            "res" => "the values of a metric are in the results",
+            "execStrategy" => "workers are a matter of each run",
+            "includeInTiming" => "every operation counts",
+            "customProcessClass" => "its code is to be written in Rust",
+            _ => "there is nothing like it",
+        }
+    }
+
     fn count(&mut self, name: &str) {
         if !READ.contains(&name) && !BESIDE.contains(&name) {
             *self.left_out.entry(printable(name)).or_default() += 1;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::campaigns;
+use super::dialect::Dialect;
 use super::naming::Names;
 use super::notes::{Kind, Notes};
 use super::original::{
@@ -81,7 +82,7 @@ fn dialect(original: &Original, notes: &mut Notes) {
         notes.times(Kind::Renamed, format!("`{old}` is `{new}` since"), times);
     }
     for (name, &times) in &original.dialect.left_out {
-        notes.times(Kind::LeftOut, format!("`{name}`: there is nothing like it"), times);
+        notes.times(Kind::LeftOut, format!("`{name}`: {}", Dialect::why(name)), times);
     }
 }
 

@@ -102,8 +102,10 @@ impl Source {
         self.step().map(|(step, _)| step)
     }
 
-    /// The rest of an element that was opened: it with all that is in it.
+    /// The rest of an element that was just opened: it with all that is in it. What is then found to be
+    /// [broken](Self::broken) is where it began.
     pub(super) fn whole(&mut self, opened: Element) -> Result<Element, Broken> {
+        let began = self.at;
         let mut stack = vec![opened];
         loop {
             let (step, text) = self.step()?;
@@ -115,7 +117,10 @@ impl Source {
                     let closed = stack.pop().expect("the loop ends with the last element");
                     match stack.last_mut() {
                         Some(parent) => parent.children.push(closed),
-                        None => return Ok(closed),
+                        None => {
+                            self.at = began;
+                            return Ok(closed);
+                        }
                     }
                 }
                 Step::End => unreachable!("a file does not end in an element"),
@@ -200,7 +205,7 @@ impl Source {
         }
     }
 
-    /// Something in the file that is wrong, at the step that was read last.
+    /// Something in the file that is wrong, in the element that was read last.
     pub(super) fn broken(&self, what: impl Into<String>) -> Broken {
         Broken { file: self.path.clone(), place: place_of(&self.path, self.at), what: what.into() }
     }
