@@ -63,7 +63,6 @@ fn every_file_of_the_original_platform_is_imported_with_all_its_tests_and_a_brok
         let said = said.expect(0);
         let space = out.join(format!("{stem}.sesame"));
         done(command(sesamec()).arg("check").arg(&space)).expect(0);
-        done(command(sesamec()).arg("generate").arg(&space)).expect(0);
         let mut recorded = 0;
         if out.join("results").exists() {
             for campaign in fs::read_dir(out.join("results")).unwrap() {
@@ -77,6 +76,35 @@ fn every_file_of_the_original_platform_is_imported_with_all_its_tests_and_a_brok
         let performed = fs::read_to_string(&file).unwrap().matches("<performedTests").count();
         assert_eq!(recorded, performed, "{stem}: {}", said.err);
     }
+}
+
+#[test]
+#[ignore = "long: compiles every campaign of a dozen spaces"]
+fn every_imported_space_generates_crates_that_compile() {
+    let Some(folder) = legacy() else { return };
+    let mut compiled = 0;
+    for entry in fs::read_dir(&folder).unwrap() {
+        let file = entry.unwrap().path();
+        let stem = file.file_stem().unwrap().to_str().unwrap().to_owned();
+        if stem == "merge-markers" || file.extension().is_none_or(|extension| extension != "model") {
+            continue;
+        }
+        let out = fresh_folder(&format!("compiled_{stem}"));
+        import(&file, &out).expect(0);
+        let space = out.join(format!("{stem}.sesame"));
+        let project = Project { space, runners: out.join("runners"), folder: out };
+        project.sesamec("generate", &[]).expect(0);
+        for runner in fs::read_dir(&project.runners).unwrap() {
+            let runner = runner.unwrap().path();
+            if runner.join("Cargo.toml").exists() {
+                let campaign = runner.file_name().unwrap().to_str().unwrap().to_owned();
+                let checked = project.cargo(&campaign, "check");
+                assert_eq!(checked.code, Some(0), "{stem}, {campaign}: {}", checked.err);
+                compiled += 1;
+            }
+        }
+    }
+    assert!(compiled >= 20, "{compiled} campaigns");
 }
 
 #[test]
@@ -157,7 +185,8 @@ fn every_stored_front_is_computed_again_from_the_stored_values() {
             let sets: BTreeMap<String, _> =
                 repository.result_sets().unwrap().into_iter().map(|set| (set.name.clone(), set)).collect();
             for (name, full) in sets.iter().filter(|(name, _)| name.starts_with("FULL-")) {
-                let stored = &sets[&name.replace("FULL-", "NONDOM-")];
+                // One that was interrupted between the two has no front.
+                let Some(stored) = sets.get(&name.replace("FULL-", "NONDOM-")) else { continue };
                 let selection = Selection::of(&repository, Some(name)).unwrap();
                 let front = analysis::front(&repository, &selection).unwrap();
                 let computed: BTreeSet<String> = front
@@ -215,20 +244,16 @@ fn an_imported_experiment_runs_on_the_built_in_cell() {
     let text = fs::read_to_string(&space).unwrap();
     let cell = workspace().join("examples/kuka_cell/simulator");
     let named = format!("in_process \"kuka_cell_sim::Cell\" {{ crate \"{}\"  step 20ms }}", cell.display());
-    let pointed = text.replace("process \"./simulator\" { step 20ms }", &named);
+    let pointed = text.replace("process \"simulator\" { step 20ms }", &named);
     assert_ne!(pointed, text, "{text}");
     fs::write(&space, pointed).unwrap();
     project.sesamec("generate", &["--campaign", "coverageExperiment"]).expect(0);
     let hook = project.runners.join("hooks/collision_occurance.rs");
     let mut filled = fs::read_to_string(&hook).unwrap();
-    for zone in ["safetyzones_z1", "safetyzones_z2", "safetyzones_z3"] {
-        let stub = format!("let _ = {zone};\n        ctx.unimplemented();");
-        assert!(filled.contains(&stub), "{filled}");
-        filled = filled.replace(
-            &stub,
-            &format!("if {zone}.level < 0.0 && ctx.every_seconds(0.2) {{\n            ctx.add(1.0);\n        }}"),
-        );
-    }
+    let stub = "let _ = zone;\n        ctx.unimplemented();";
+    assert_eq!(filled.matches(stub).count(), 3, "{filled}");
+    filled =
+        filled.replace(stub, "if zone.level < 0.0 && ctx.every_seconds(0.2) {\n            ctx.add(1.0);\n        }");
     fs::write(&hook, filled).unwrap();
     let runner = project.build("coverageExperiment");
     let said = runner.run(&["run", "--evaluations", "40", "--results", "own"]).expect(0);

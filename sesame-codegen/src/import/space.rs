@@ -141,7 +141,7 @@ impl Writer<'_> {
         // Times are whole nanoseconds.
         let step = (step.unwrap_or(20.0) * 1e6).round() / 1e6;
         let sut = self.names.take("system_under_test", "system_under_test");
-        let _ = writeln!(text, "  simulator {sut} = process \"./simulator\" {{ step {}ms }}\n", number(step));
+        let _ = writeln!(text, "  simulator {sut} = process \"simulator\" {{ step {}ms }}\n", number(step));
         for empty in self.messages.empty() {
             self.notes.say(Kind::Changed, format!("message `{empty}`: the file does not say what it holds"));
         }
