@@ -266,3 +266,87 @@ fn an_imported_experiment_runs_on_the_built_in_cell() {
     let campaigns = rows(&["campaigns"], &out);
     assert!(campaigns.len() >= 1 + 3 + 1, "{campaigns:?}");
 }
+
+/// A file of so many tests in the words of the original platform, made up here.
+fn made_up(tests: usize) -> String {
+    use std::fmt::Write as _;
+    let mut text = String::from(
+        r#"<?xml version="1.0" encoding="ASCII"?>
+<TestingMM:TestingSpace xmi:version="2.0" xmlns:xmi="http://www.omg.org/XMI" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xmlns="Metrics" xmlns:TestingMM="TestingMM" xmlns:_1="FuzzingOperations" name="large">
+  <metrics xsi:type="FuzzingOperationTimesMetric" xmi:id="_m0" name="times" dir="LOWEST" useInOptimisation="true"/>
+  <metrics xsi:type="StreamMetric" xmi:id="_m1" name="hits" relatedVariables="_v1" useInOptimisation="true"><valueIfNotReceived/></metrics>
+  <possibleFuzzingOperations xsi:type="_1:RandomValueFromSetOperation" xmi:id="_o0" name="push" variableToAffect="_v0" isRelative="true">
+    <activation xsi:type="_1:FixedTimeActivation" endTime="65.0"/>
+    <valueSet xsi:type="_1:DoubleRange" propertyName="" lowerBound="-0.3" upperBound="0.3"/>
+  </possibleFuzzingOperations>
+  <campaigns name="search" metrics="_m0 _m1" includedOperations="_o0">
+    <approach xsi:type="TestingMM:NSGAEvolutionaryAlgorithm" populationSize="10" iterations="1000"/>
+"#,
+    );
+    for test in 0..tests {
+        let start = (test % 600) as f64 / 10.1;
+        let end = start + (65.0 - start) * ((test % 7) as f64 + 1.0) / 7.1;
+        let _ = write!(
+            text,
+            r#"    <performedTests xmi:id="_TestOfTheCampaign{test:06}" name="Test_{test:06}" developedFrom="//@campaigns.0/@performedTests.{} _TestOfTheCampaign{:06}">
+"#,
+            test / 2,
+            test / 3
+        );
+        for operation in 0..2 {
+            let _ = write!(
+                text,
+                r#"      <operations xsi:type="_1:RandomValueFromSetOperation" xmi:id="_Operation{operation}OfTest{test:06}" name="push" variableToAffect="_v0" fromTemplate="_o0" isRelative="true" seed="{test}">
+        <activation xsi:type="_1:FixedTimeActivation" xmi:id="_Activation{operation}OfTest{test:06}" startTime="{start}" endTime="{end}"/>
+        <valueSet xsi:type="_1:DoubleRange" xmi:id="_ValueSet{operation}OfTest{test:06}" propertyName="" lowerBound="-0.1" upperBound="0.{test}"/>
+      </operations>
+"#
+            );
+        }
+        let _ = write!(
+            text,
+            r#"      <metrics xmi:id="_TimesOfTest{test:06}" metric="_m0"><result xmi:id="_ResultOfTimes{test:06}" name="times" value="{}"/></metrics>
+      <metrics xmi:id="_HitsOfTest{test:06}" metric="_m1"><result xmi:id="_ResultOfHits{test:06}" name="hits" value="{}.0"/></metrics>
+    </performedTests>
+"#,
+            end - start,
+            test % 20
+        );
+    }
+    text.push_str(
+        r#"    <endTrigger xsi:type="TestingMM:TimeBasedEnd" timeLimitSeconds="70"/>
+  </campaigns>
+  <mrs>
+    <variables xmi:id="_v0" name="arm/link0" type="_t0"/>
+    <variables xmi:id="_v1" name="zones/Z1" type="_t1"/>
+    <propertyType xmi:id="_t0" name="doubleEncodedAsString" parsingMethod="STRING"/>
+    <propertyType xmi:id="_t1" name="SafetyZone"/>
+  </mrs>
+</TestingMM:TestingSpace>
+"#,
+    );
+    text
+}
+
+/// Imports a made-up file with so much address space, in KiB, and says how large it was and how many tests came of it.
+#[cfg(target_os = "linux")]
+fn within(name: &str, tests: usize, kilobytes: u64) -> (usize, usize) {
+    let folder = fresh_folder(name);
+    let (file, out) = (folder.join("large.model"), folder.join("out"));
+    let text = made_up(tests);
+    fs::write(&file, &text).unwrap();
+    let limited = format!("ulimit -v {kilobytes}; exec \"$0\" import \"$1\" -o \"$2\"");
+    done(command("sh").args(["-c", &limited]).arg(sesamec()).arg(&file).arg(&out)).expect(0);
+    let mut found = 0;
+    results(&out, "search").scan(&mut |_| found += 1).unwrap();
+    fs::remove_dir_all(&folder).unwrap();
+    (text.len(), found)
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+#[ignore = "long: 100 MB"]
+fn a_hundred_megabytes_are_imported_in_less_than_five_hundred_of_memory() {
+    let (size, tests) = within("imported_large", 66_000, 500_000);
+    assert!(size > 100_000_000 && tests == 66_000, "{tests} tests of {size} bytes");
+}
