@@ -37,6 +37,8 @@ pub(super) struct Writer<'o> {
     pub(super) names: Names,
     pub(super) mapped: Mapped,
     messages: Messages,
+    /// By position of what tests hold: the earliest end of a test that may hold it, in seconds.
+    first_ends: Vec<f64>,
     /// By position of the variable.
     topics: Vec<Option<(String, Type)>>,
 }
@@ -46,11 +48,13 @@ pub(super) fn map(original: &Original, file: &str, notes: &mut Notes) -> Result<
     dialect(original, notes);
     let mut names = Names::default();
     let space = names.take(&original.name, "space");
+    let holders = Holders::of(original);
     let mut writer = Writer {
         original,
         notes,
         names,
-        mapped: Mapped { holders: Holders::of(original), ..Mapped::default() },
+        first_ends: first_ends(original, &holders),
+        mapped: Mapped { holders, ..Mapped::default() },
         messages: Messages::default(),
         topics: Vec::new(),
     };
@@ -75,6 +79,18 @@ pub(super) fn map(original: &Original, file: &str, notes: &mut Notes) -> Result<
     }
     writer.mapped.text = text;
     Ok(writer.mapped)
+}
+
+fn first_ends(original: &Original, holders: &Holders) -> Vec<f64> {
+    let mut ends = vec![f64::INFINITY; holders.operations.len()];
+    for campaign in &original.campaigns {
+        let end = campaigns::end_of(original, campaign);
+        let included = campaign.included.iter().filter_map(|&it| original.operation(it));
+        for at in included.chain(holders.used_by(original, &campaign.tests)) {
+            ends[at] = ends[at].min(end);
+        }
+    }
+    ends
 }
 
 fn dialect(original: &Original, notes: &mut Notes) {
@@ -426,7 +442,7 @@ impl Writer<'_> {
             if start >= end {
                 self.notes
                     .say(Kind::Changed, format!("{called}: its window is empty, so it may be active at any time"));
-            } else if start >= self.first_end(at) {
+            } else if start >= self.first_ends[at] {
                 self.notes.say(
                     Kind::Changed,
                     format!("{called}: its window begins when tests are over, so it may be active at any time"),
@@ -454,15 +470,6 @@ impl Writer<'_> {
             let _ = write!(clauses, "   start contains {}", constraints.join(", "));
         }
         clauses
-    }
-
-    /// The earliest end of a test that may hold an operation, in seconds.
-    fn first_end(&self, at: usize) -> f64 {
-        let using = self.original.campaigns.iter().filter(|campaign| {
-            campaign.included.iter().any(|&it| self.original.operation(it) == Some(at))
-                || self.mapped.holders.used_by(self.original, &campaign.tests).contains(&at)
-        });
-        using.map(|campaign| campaigns::end_of(self.original, campaign)).fold(f64::INFINITY, f64::min)
     }
 
     /// A constraint that every campaign by condition with this operation can meet.
