@@ -358,7 +358,7 @@ fn held_by(writer: &mut Writer<'_>, test: &Test) -> Option<String> {
                     let _ = writeln!(lines, "  {}{choices} {window}{seed}", part.name);
                 }
                 Err(why) => {
-                    writer.notes.say(Kind::LeftOut, format!("known test `{shown}`, operation `{}`: {why}", part.name))
+                    writer.notes.say(Kind::LeftOut, format!("known test `{shown}`, operation `{}`: {why}", part.name));
                 }
             }
         }

@@ -51,12 +51,11 @@ impl Holders {
                 continue;
             }
             let key = stray(original, operation);
-            match holders.strays.get(&key) {
-                Some(&at) => widen(&mut holders.operations[at], operation),
-                None => {
-                    holders.strays.insert(key, holders.operations.len());
-                    holders.operations.push(Operation { recorded: None, seed: 0, ..operation.clone() });
-                }
+            if let Some(&at) = holders.strays.get(&key) {
+                widen(&mut holders.operations[at], operation);
+            } else {
+                holders.strays.insert(key, holders.operations.len());
+                holders.operations.push(Operation { recorded: None, seed: 0, ..operation.clone() });
             }
         }
         holders

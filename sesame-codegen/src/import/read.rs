@@ -15,7 +15,7 @@ pub(super) fn read(path: &Path) -> Result<Original, Broken> {
     let mut original = Original::default();
     match source.next()? {
         Step::Open(root) if root.tag == "TestingSpace" => {
-            original.name = root.get("name").unwrap_or_default().to_owned();
+            root.get("name").unwrap_or_default().clone_into(&mut original.name);
         }
         Step::Open(root) => {
             let tag = printable(&root.tag);

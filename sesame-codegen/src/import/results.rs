@@ -164,7 +164,6 @@ impl Importer<'_> {
     }
 
     /// When an operation was to be active, and the window if time decided it.
-    #[expect(clippy::type_complexity, reason = "a pair for its one caller")]
     fn activation(&self, activation: &Activation) -> Result<(sesame_plan::Activation, Option<(f64, f64)>), String> {
         let condition = |condition: &Option<Condition>| match condition {
             Some(condition) => self.condition(condition).map(Some),
@@ -255,12 +254,12 @@ impl Importer<'_> {
 /// What a test chose for the parameters of a part.
 fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Result<Vec<Choice>, String> {
     let domain = |at: usize| {
-        let (held, permitted) = match (&operation.kind, &template.kind) {
-            (
-                OperationKind::RandomValue { values: held, .. } | OperationKind::Custom { parameters: held },
-                OperationKind::RandomValue { values: permitted, .. } | OperationKind::Custom { parameters: permitted },
-            ) => (held, permitted),
-            _ => return Err("it does something else".to_owned()),
+        let (
+            OperationKind::RandomValue { values: held, .. } | OperationKind::Custom { parameters: held },
+            OperationKind::RandomValue { values: permitted, .. } | OperationKind::Custom { parameters: permitted },
+        ) = (&operation.kind, &template.kind)
+        else {
+            return Err("it does something else".to_owned());
         };
         matching(held, permitted, at).map(|set| &set.domain).ok_or_else(|| "it has no value of its own".to_owned())
     };

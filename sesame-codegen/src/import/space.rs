@@ -209,10 +209,10 @@ impl Writer<'_> {
             }
             let name = self.names.take(&metric.name, "metric");
             let direction = if metric.highest { "maximise" } else { "minimise" };
-            if name != metric.name {
-                let _ = writeln!(text, "\n/// In the original: `{shown}`.");
-            } else {
+            if name == metric.name {
                 text.push('\n');
+            } else {
+                let _ = writeln!(text, "\n/// In the original: `{shown}`.");
             }
             if metric.source == MetricSource::FuzzingTime {
                 let _ = writeln!(text, "metric {name} {direction} = fuzzing_time()");
@@ -409,7 +409,7 @@ impl Writer<'_> {
                 }
             };
             let name = inner.take(&set.name, "parameter");
-            let _ = write!(lines, "  {name}: {domain}\n");
+            let _ = writeln!(lines, "  {name}: {domain}");
             parameters.push((name, at));
         }
         let name = self.declared_name(wanted, operation, text);

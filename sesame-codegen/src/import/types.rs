@@ -178,18 +178,17 @@ impl Messages {
                 return Err(format!("`{}` is no name of a field", printable(name)));
             }
             let found = self.list[message].fields.iter().find(|(field, _)| field == name).map(|(_, ty)| ty.clone());
-            ty = match found {
-                Some(found) => found,
-                None => {
-                    let new = if at + 1 == path.len() {
-                        Type::Real
-                    } else {
-                        let inner = format!("{}_{name}", self.list[message].name);
-                        Type::Message(self.add(&inner, names))
-                    };
-                    self.list[message].fields.push((name.clone(), new.clone()));
-                    new
-                }
+            ty = if let Some(found) = found {
+                found
+            } else {
+                let new = if at + 1 == path.len() {
+                    Type::Real
+                } else {
+                    let inner = format!("{}_{name}", self.list[message].name);
+                    Type::Message(self.add(&inner, names))
+                };
+                self.list[message].fields.push((name.clone(), new.clone()));
+                new
             };
         }
         match ty {

@@ -115,13 +115,11 @@ impl Source {
                 Step::Open(element) => stack.push(element),
                 Step::Close => {
                     let closed = stack.pop().expect("the loop ends with the last element");
-                    match stack.last_mut() {
-                        Some(parent) => parent.children.push(closed),
-                        None => {
-                            self.at = began;
-                            return Ok(closed);
-                        }
-                    }
+                    let Some(parent) = stack.last_mut() else {
+                        self.at = began;
+                        return Ok(closed);
+                    };
+                    parent.children.push(closed);
                 }
                 Step::End => unreachable!("a file does not end in an element"),
             }
