@@ -109,7 +109,8 @@ pub fn fitness(plan: &CampaignPlan, observation: &Observation) -> Fitness {
 /// As [`fitness`], for a run of which only the outcome and the metrics' values are known.
 pub fn fitness_of(plan: &CampaignPlan, outcome: &Outcome, value: impl Fn(MetricId) -> Option<f64>) -> Fitness {
     match outcome {
-        Outcome::Completed => {}
+        // What was imported stands in fronts as it did there.
+        Outcome::Completed | Outcome::Unknown => {}
         Outcome::Void => return Fitness::Unfit(Unfit::Void),
         Outcome::Crash { .. } => return Fitness::Unfit(Unfit::Crash),
         Outcome::Timeout { .. } => return Fitness::Unfit(Unfit::Timeout),

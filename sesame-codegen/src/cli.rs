@@ -3,6 +3,7 @@
 mod build;
 mod commands;
 mod fmt;
+mod import;
 mod results;
 mod search_space;
 mod shell;
@@ -155,6 +156,14 @@ enum Command {
     /// Analyse the results of campaigns: what ran, fronts, points in the reduced parameter space, coverage.
     #[command(subcommand)]
     Results(results::Results),
+    /// Import a testing space of the original SESAME platform (an EMF file, `.model`), with the tests that it performed.
+    Import {
+        /// The file.
+        file: PathBuf,
+        /// The folder for the space and the results; it must be empty or not there yet.
+        #[arg(long, short = 'o', value_name = "FOLDER")]
+        out: PathBuf,
+    },
     /// Explain the code of a diagnostic, for example E0203; or a campaign of a space, with every default written out.
     Explain {
         /// The code, or the campaign.
@@ -266,6 +275,7 @@ pub fn run(
         }
         Command::Run { generation, arguments } => commands::run(shell, language, &generation, &arguments),
         Command::Results(asked) => results::results(shell, asked),
+        Command::Import { file, out } => import::import(shell, language, &file, &out),
         Command::Explain { what, file: Some(file) } => commands::explain_campaign(shell, language, &what, &file),
         Command::Explain { what, file: None } => commands::explain_code(language, &what),
         Command::Completions { shell } => {

@@ -52,3 +52,8 @@ pub fn analyse(sources: &SourceMap, root: FileId) -> Analysis {
     diagnostics.dedup();
     Analysis { model, diagnostics }
 }
+
+/// Whether a word is reserved, so that nothing but a message field can be named by it.
+pub fn is_reserved(word: &str) -> bool {
+    syntax::is_keyword(word)
+}

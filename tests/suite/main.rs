@@ -10,6 +10,7 @@ mod disk;
 mod exported;
 mod faults;
 mod first_front;
+mod import;
 mod interruption;
 mod kuka_cell;
 mod regeneration;

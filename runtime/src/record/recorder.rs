@@ -107,6 +107,22 @@ impl Recorder {
         })
     }
 
+    /// Records what tests were called in the file they were imported from, each a test that was committed.
+    pub fn put_original_names<'n>(
+        &mut self,
+        names: impl IntoIterator<Item = (u32, &'n str)>,
+    ) -> Result<(), RecordError> {
+        let written = self.repository.connection.transaction().and_then(|transaction| {
+            for (test, name) in names {
+                transaction
+                    .prepare_cached("INSERT OR REPLACE INTO original_names (test, name) VALUES (?1, ?2)")?
+                    .execute(params![test, name])?;
+            }
+            transaction.commit()
+        });
+        written.map_err(|e| RecordError::database("record the names of tests", &self.repository.path, e))
+    }
+
     /// Records a set of results; one of the same name is replaced.
     pub fn put_result_set(&mut self, set: &ResultSet) -> Result<(), RecordError> {
         let written = self.repository.connection.transaction().and_then(|transaction| {
@@ -315,7 +331,7 @@ fn write_test(transaction: &Transaction<'_>, plan: &CampaignPlan, record: &TestR
         Origin::Reference | Origin::Search => None,
     };
     let (detail, limit) = match &observation.outcome {
-        Outcome::Completed | Outcome::Void => (None, None),
+        Outcome::Completed | Outcome::Void | Outcome::Unknown => (None, None),
         Outcome::Crash { message } => (Some(message.as_str()), None),
         Outcome::Timeout { limit } => (None, Some(*limit)),
     };
@@ -376,7 +392,8 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
         let kind = plan.operation(operation.operation);
         let (start, end, start_condition, end_condition, length, times) = switched(&operation.activation, plan);
         let effect = record.observation.operations.get(position);
-        let counters = effect.map(|effect| effect.counters);
+        let counted = record.observation.outcome != Outcome::Unknown;
+        let counters = effect.filter(|_| counted).map(|effect| effect.counters);
         transaction
             .prepare_cached(
                 "INSERT INTO operations (test, position, operation, start_s, end_s, start_condition, end_condition, \

@@ -9,7 +9,7 @@ use sesame_plan::{Activation, Bound, Choice, KnownTestId, MetricId, OperationId,
 use tempfile::TempDir;
 
 use super::*;
-use crate::observation::{MetricObservation, WallTime};
+use crate::observation::{MetricObservation, OperationEffect, WallTime};
 use crate::search::nsga2::Variation as _;
 use crate::search::permitted::Permitted;
 use crate::search::vary::{Rates, TestVariation};
@@ -673,4 +673,26 @@ proptest! {
         let row = &recorder.repository().tests().unwrap()[0];
         prop_assert_eq!(row.value(MetricId(0)), shown);
     }
+}
+
+#[test]
+fn what_was_imported_keeps_its_intervals_and_names_without_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = sample::plan();
+    let mut recorder = Recorder::create(folder.path(), &plan, 1, 0).unwrap();
+    let mut record = sample::record(&plan, 1, Origin::Search, plan.tests[0].test.clone());
+    record.observation.outcome = Outcome::Unknown;
+    for effect in &mut record.observation.operations {
+        *effect = OperationEffect { intervals: effect.intervals.clone(), ..OperationEffect::default() };
+    }
+    recorder.commit(&record).unwrap();
+    recorder.put_original_names([(1, "Test_001_20_06_2023")]).unwrap();
+    let repository = recorder.finish("imported").unwrap();
+    assert_eq!(repository.test(1).unwrap(), record);
+    assert!(!record.observation.operations[0].intervals.is_empty());
+    assert_eq!(repository.find("Test_001_20_06_2023").unwrap(), 1);
+    assert_eq!(repository.original_names().unwrap(), [(1, "Test_001_20_06_2023".to_owned())].into());
+    let seen: Option<i64> =
+        repository.connection.query_row("SELECT seen FROM operations", [], |row| row.get(0)).unwrap();
+    assert_eq!(seen, None, "nobody counted");
 }
