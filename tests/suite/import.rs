@@ -161,7 +161,7 @@ fn the_originals_coverage_curves_come_out_of_the_imported_results() {
     let covered = |out: &Path, after: u32| -> (String, String, String) {
         let curve = rows(&grid, &out.join("results/coverageExperiment"));
         assert_eq!(curve[0][..5], ["evaluations", "covered", "cells", "coverage", "feasible"]);
-        let reached = curve[1..].iter().filter(|row| row[0].parse::<u32>().unwrap() <= after).next_back().unwrap();
+        let reached = curve[1..].iter().rfind(|row| row[0].parse::<u32>().unwrap() <= after).unwrap();
         (reached[1].clone(), reached[2].clone(), reached[4].clone())
     };
     let cells = |covered: &str| (covered.to_owned(), "108".to_owned(), "96".to_owned());
@@ -264,7 +264,7 @@ fn an_imported_experiment_runs_on_the_built_in_cell() {
     assert!(most >= 1.0, "a hook that counts nothing finds nothing");
     // Its new results are read beside the imported ones.
     let campaigns = rows(&["campaigns"], &out);
-    assert!(campaigns.len() >= 1 + 3 + 1, "{campaigns:?}");
+    assert!(campaigns.len() > 4, "{campaigns:?}");
 }
 
 /// A file of so many tests in the words of the original platform, made up here.
@@ -286,10 +286,9 @@ fn made_up(tests: usize) -> String {
     for test in 0..tests {
         let start = (test % 600) as f64 / 10.1;
         let end = start + (65.0 - start) * ((test % 7) as f64 + 1.0) / 7.1;
-        let _ = write!(
+        let _ = writeln!(
             text,
-            r#"    <performedTests xmi:id="_TestOfTheCampaign{test:06}" name="Test_{test:06}" developedFrom="//@campaigns.0/@performedTests.{} _TestOfTheCampaign{:06}">
-"#,
+            r#"    <performedTests xmi:id="_TestOfTheCampaign{test:06}" name="Test_{test:06}" developedFrom="//@campaigns.0/@performedTests.{} _TestOfTheCampaign{:06}">"#,
             test / 2,
             test / 3
         );

@@ -8,7 +8,7 @@ use sesame_plan::{Bound, KnownTestId, MetricId, Test};
 use tempfile::TempDir;
 
 use super::*;
-use crate::observation::{MetricObservation, WallTime};
+use crate::observation::{MetricObservation, OperationEffect, WallTime};
 
 fn folder() -> TempDir {
     tempfile::tempdir().unwrap()

@@ -100,7 +100,7 @@ fn campaign_text(
     if let Approach::Repeat { test, times } = campaign.approach {
         let named = test.and_then(|it| original.test(it));
         // What it performed are copies of the test it repeated.
-        let first = (!campaign.tests.is_empty()).then(|| (writer.mapped.campaigns.len(), 0));
+        let first = (!campaign.tests.is_empty()).then_some((writer.mapped.campaigns.len(), 0));
         let Some(place) = named.or(first) else {
             return leave_out(writer, "the test that it repeats is not in the file");
         };
@@ -109,17 +109,16 @@ fn campaign_text(
                 format!("campaign `{shown}`: the test that it repeats is not in the file; it repeats its first copy");
             writer.notes.say(Kind::Changed, text);
         }
-        let test = match known.get(&place) {
-            Some(name) => name.clone(),
-            None => {
-                let repeated = &original.campaigns[place.0].tests[place.1];
-                let Some(lines) = held_by(writer, repeated).or_else(|| undisturbed(writer, repeated, end)) else {
-                    return leave_out(writer, "nothing of the test that it repeats can be said");
-                };
-                let name = known_test(writer, repeated, &lines, tests);
-                known.insert(place, name.clone());
-                name
-            }
+        let test = if let Some(name) = known.get(&place) {
+            name.clone()
+        } else {
+            let repeated = &original.campaigns[place.0].tests[place.1];
+            let Some(lines) = held_by(writer, repeated).or_else(|| undisturbed(writer, repeated, end)) else {
+                return leave_out(writer, "nothing of the test that it repeats can be said");
+            };
+            let name = known_test(writer, repeated, &lines, tests);
+            known.insert(place, name.clone());
+            name
         };
         lines.push(format!("repeat   {test} {} times", times.max(1)));
     } else {

@@ -168,7 +168,7 @@ fn performed_tests_are_recorded_with_ancestry_timings_values_and_sets() {
     let at = |name| point.get(sesame_plan::Dimension::named(name).unwrap()).unwrap();
     // Midpoints 0.2 and 0.25, lengths 0.2 and 0.5; half of the offsets, and a keep probability a third of the way.
     assert!((at("T1") - 0.225).abs() < 1e-12 && (at("T2") - 0.35).abs() < 1e-12);
-    assert!((at("P1") - (0.5 + 1.0 / 3.0) / 2.0).abs() < 1e-12, "{}", at("P1"));
+    assert!((at("P1") - f64::midpoint(0.5, 1.0 / 3.0)).abs() < 1e-12, "{}", at("P1"));
     let point = points[1].unwrap();
     assert_eq!(point.get(sesame_plan::Dimension::T2), Some(0.5), "what was recorded, not what was planned");
 }
