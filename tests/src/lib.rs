@@ -3,6 +3,7 @@
 //! Everything lies below the workspace's target folder: projects in folders of fixed names, since a path is part of
 //! what cargo knows a crate by, and all runners in one target folder, so that the runtime is compiled once.
 
+pub mod optimisers;
 pub mod python_mcap;
 pub mod rtamt;
 

@@ -11,6 +11,7 @@ mod faults;
 mod first_front;
 mod interruption;
 mod kuka_cell;
+mod optimisers;
 mod regeneration;
 mod search;
 mod stl;

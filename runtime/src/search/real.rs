@@ -117,37 +117,15 @@ fn root(x: f64, n: u32) -> f64 {
     libm::pow(x, 1.0 / f64::from(n))
 }
 
-/// The benchmark ZDT1 (Zitzler et al. 2000): two objectives over the unit box; its front is `1 - sqrt(f1)`.
-pub fn zdt1(x: &[f64]) -> [f64; 2] {
-    let others = x.len().saturating_sub(1).max(1) as f64;
-    let g = 1.0 + 9.0 * x[1..].iter().sum::<f64>() / others;
-    [x[0], g * (1.0 - libm::sqrt(x[0] / g))]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::search::dominance::Fitness;
     use crate::search::hypervolume::hypervolume;
-    use crate::search::nsga2::{Nsga2, Settings, Told};
+    use crate::search::problems::{Problem, approximate};
 
     fn zdt1_hypervolume(evaluations: u32, seed: u64) -> f64 {
-        let settings = Settings { population: 100, evaluations, seed };
-        let mut search = Nsga2::new(settings, RealVariation::usual(30, seed));
-        let mut number = 0;
-        loop {
-            let batch = search.ask();
-            if batch.is_empty() {
-                break;
-            }
-            search.tell(batch.into_iter().map(|asked| {
-                number += 1;
-                let fitness = Fitness::Measured(zdt1(&asked.genome).to_vec());
-                Told { number, genome: asked.genome, fitness }
-            }));
-        }
-        assert_eq!(number, evaluations);
-        let points: Vec<&[f64]> = search.population().iter().filter_map(|member| member.fitness.objectives()).collect();
+        let front = approximate(Problem::Zdt1, 100, evaluations, seed);
+        let points: Vec<&[f64]> = front.iter().map(Vec::as_slice).collect();
         hypervolume(&points, &[1.1, 1.1])
     }
 
