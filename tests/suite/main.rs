@@ -12,6 +12,7 @@ mod first_front;
 mod interruption;
 mod kuka_cell;
 mod optimisers;
+mod random_models;
 mod regeneration;
 mod search;
 mod stl;
