@@ -93,6 +93,7 @@ pub(crate) fn operation(topic: u32, kind: OperationKind) -> Operation {
         within: Span { start: 0.0, end: 10.0 },
         priority: 0,
         inclusion: 1.0,
+        timed: true,
         constraints: Vec::new(),
     }
 }

@@ -11,7 +11,7 @@
 mod release;
 mod tap;
 
-use sesame_plan::{CampaignPlan, Drain, Moment, Test};
+use sesame_plan::{CampaignPlan, Drain, Moment, Span, Test};
 
 use crate::activation::{Activity, Edge};
 use crate::changed_files::ChangedFiles;
@@ -82,6 +82,8 @@ struct Stage {
     disturbance: Disturbance,
     activity: Activity,
     draw_seed: u64,
+    /// Whether it counts in `fuzzing_time()`.
+    timed: bool,
     counters: Counters,
     first_touch: Option<SimTime>,
     last_touch: Option<SimTime>,
@@ -120,6 +122,7 @@ impl<'a> Relay<'a> {
                 disturbance: Disturbance::new(operation, choice, hooks)?,
                 activity: Activity::new(&choice.activation, operation.within),
                 draw_seed: choice.draw_seed,
+                timed: operation.timed,
                 counters: Counters::default(),
                 first_touch: None,
                 last_touch: None,
@@ -190,7 +193,9 @@ impl<'a> Relay<'a> {
                 last_touch: stage.last_touch.map(SimTime::seconds),
             })
             .collect();
-        let (metrics, mut warnings) = self.metrics.finish(&operations);
+        let timed = self.operations.iter().zip(&operations).filter(|(stage, _)| stage.timed);
+        let active: Vec<Span> = timed.flat_map(|(_, operation)| operation.intervals.clone()).collect();
+        let (metrics, mut warnings) = self.metrics.finish(&active);
         for stage in &self.operations {
             if let Disturbance::Custom(custom) = &stage.disturbance
                 && let Some(mismatch) = &custom.mismatch
@@ -248,8 +253,9 @@ impl<'a> Relay<'a> {
         if self.conditional.is_empty() || self.over {
             return;
         }
+        let timed = self.operations.iter().filter(|stage| stage.timed);
         let active = |sum, stage: &Stage| sum + stage.activity.active_time(now);
-        let active_time = self.operations.iter().fold(SimTime::ZERO, active).seconds();
+        let active_time = timed.fold(SimTime::ZERO, active).seconds();
         for next in 0..self.conditional.len() {
             let at = self.conditional[next];
             let value = |metric| self.metrics.value(metric, active_time);

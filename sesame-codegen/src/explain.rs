@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
     ActivationMode, CampaignPlan, Distribution, Domain, Drain, MetricSource, Operation, OperationKind, Parameter,
-    Search,
+    Recorded, Search,
 };
 
 /// More whole numbers than these are not written out one by one.
@@ -58,8 +58,13 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
         // Only a runner's command line makes one, and no `.sesame` text does.
         Search::Known { .. } => return clauses,
         Search::Repeat { test, times } => {
-            let test = &plan.tests[test.index()].name;
-            clauses.push(("repeat", format!("{test} {times} times {{ seed {seed} }}")));
+            let test = &plan.tests[test.index()];
+            // Only a campaign that observes has a test without operations.
+            clauses.push(match test.test.operations.as_slice() {
+                [] => ("passive", format!("{times} times {{ seed {seed} }}")),
+                _ => ("repeat", format!("{} {times} times {{ seed {seed} }}", test.name)),
+            });
+            clauses.extend(record(plan));
             clauses.push(("end", format!("after {}s", campaign.end_after)));
             return clauses;
         }
@@ -70,8 +75,17 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
     clauses.push(("operations", format!("{}   {}..{} per test", operations.join(", "), count.min, count.max)));
     clauses.push(("activate", format!("by {}", activation(plan, &campaign.activation))));
     clauses.push(("search", searches));
+    clauses.extend(record(plan));
     clauses.push(("end", format!("after {}s", campaign.end_after)));
     clauses
+}
+
+fn record(plan: &CampaignPlan) -> Option<(&'static str, String)> {
+    let which = match plan.campaign.record? {
+        Recorded::Failing => "failing",
+        Recorded::All => "all",
+    };
+    Some(("record", format!("mcap {which}")))
 }
 
 fn activation(plan: &CampaignPlan, mode: &ActivationMode) -> String {
@@ -135,6 +149,9 @@ fn operation_line(plan: &CampaignPlan, operation: &Operation) -> String {
         line = format!("{line} within {within}");
     }
     line = format!("{line} priority {} inclusion {}%", operation.priority, percent(operation.inclusion));
+    if !operation.timed {
+        line.push_str(" untimed");
+    }
     if !operation.constraints.is_empty() {
         line = format!("{line} start contains {}", contained(plan, operation).join(", "));
     }
@@ -275,7 +292,7 @@ mod tests {
         operation lose on link = packet loss [0%, 7%] priority -1
         operation lag on link = latency [0ms, 300ms] uniform drain drop
         operation late on link = latency [0.1s, 0.7s]
-        operation cut on zones = blackhole
+        operation cut on zones = blackhole untimed
         operation bend on link = custom {
           points: int [3, 20]  gain: real [0.5, 2]  reach: real[mm] [-10cm, 1m]
           shift: point [(-2, -2, 0)m, (2, 2, 0.5)m]  frame: one of \"a \\\"b\\\"\", \"c\"
@@ -299,7 +316,8 @@ mod tests {
     const BY_TIME: &str = "
         campaign timed { objectives time  operations cut, swing 1 per test  observes pace
           search random { evaluations 8 }  end after 70s }";
-    const AGAIN: &str = "campaign again { repeat still 3 times  end after 70s }";
+    const AGAIN: &str = "campaign again { repeat still 3 times  end after 70s  record mcap failing }";
+    const WATCH: &str = "campaign watch { passive 3 times { seed 4 }  observes near  end after 70s  record mcap all }";
 
     fn plan(campaign: &str) -> CampaignPlan {
         let mut sources = SourceMap::new();
@@ -312,7 +330,7 @@ mod tests {
 
     #[test]
     fn what_is_explained_has_the_same_plan() {
-        for text in [EVERYTHING, DEFAULTS, BY_TIME, AGAIN] {
+        for text in [EVERYTHING, DEFAULTS, BY_TIME, AGAIN, WATCH] {
             // Operations that a campaign leaves out are still needed by the known test.
             let original = plan(&format!("{OPERATIONS}{text}"));
             let explained = campaign(&original);
@@ -337,6 +355,11 @@ mod tests {
     #[test]
     fn a_repetition() {
         insta::assert_snapshot!(campaign(&plan(&format!("{OPERATIONS}{AGAIN}"))));
+    }
+
+    #[test]
+    fn a_campaign_that_only_observes() {
+        insta::assert_snapshot!(campaign(&plan(&format!("{OPERATIONS}{WATCH}"))));
     }
 
     #[test]

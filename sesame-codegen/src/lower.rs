@@ -4,7 +4,8 @@
 //! What a campaign's plan holds:
 //! - messages, topics, nodes and requirements of the whole space;
 //! - operations: those its tests may hold, or those of the test it repeats;
-//! - known tests: those whose operations are all in the plan and begin before the campaign's end;
+//! - known tests: one without operations for a campaign that only observes; else those whose operations are all in the
+//!   plan and begin before the campaign's end;
 //! - metrics: its objectives, those it observes, its condition variables, and those of all requirements and of the
 //!   conditions and expectations of these tests.
 
@@ -32,6 +33,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             (plan::Transport::Process { program, arguments, step_ns: *step_ns }, None)
         }
     };
+    let system_file = space.file_of(&space.simulator.declaration).to_owned();
     let plan = plan::CampaignPlan {
         schema: plan::SCHEMA,
         generator: generator.to_owned(),
@@ -49,10 +51,15 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             .iter()
             .map(|&id| selection.operation_of(&space.operations[id], declared))
             .collect(),
-        tests: selection.tests.iter().map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect(),
+        tests: if let model::Search::Passive { .. } = declared.search {
+            vec![undisturbed()]
+        } else {
+            let tests = selection.tests.iter();
+            tests.map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect()
+        },
         campaign: selection.campaign(space, declared),
     };
-    RunnerPlan { plan, hooks: hooks(space), operations: custom_operations(space), simulator_crate }
+    RunnerPlan { plan, hooks: hooks(space), operations: custom_operations(space), simulator_crate, system_file }
 }
 
 /// The parts of a space that are in a campaign's plan, in declaration order: a position here is the id there.
@@ -69,6 +76,7 @@ impl Selection {
             model::Search::Repeat { test, .. } => {
                 space.tests[*test].operations.iter().map(|operation| operation.operation).collect()
             }
+            model::Search::Passive { .. } => Vec::new(),
         };
         operations.sort();
         operations.dedup();
@@ -83,6 +91,7 @@ impl Selection {
             test.operations.iter().all(|it| operations.contains(&it.operation) && begins(it) < campaign.end_after)
         };
         let tests: Vec<model::TestId> = space.tests.iter().filter(|(_, test)| fits(test)).map(|(id, _)| id).collect();
+        // A test holds an operation at least, so a campaign that only observes has none of them.
         let mut metrics: Vec<model::MetricId> = campaign.objectives.clone();
         metrics.extend(&campaign.observed);
         metrics.extend(space.requirements.values().map(|requirement| requirement.metric));
@@ -166,6 +175,11 @@ impl Selection {
                     plan::Count { min: held, max: held },
                 )
             }
+            model::Search::Passive { times } => (
+                plan::Search::Repeat { test: plan::KnownTestId(0), times: *times },
+                &self.operations,
+                plan::Count { min: 0, max: 0 },
+            ),
         };
         plan::Campaign {
             name: campaign.declaration.name.clone(),
@@ -189,11 +203,21 @@ impl Selection {
     }
 }
 
+/// The test of a campaign that only observes: nothing is intercepted.
+fn undisturbed() -> plan::KnownTest {
+    plan::KnownTest {
+        name: "undisturbed".to_owned(),
+        doc: String::new(),
+        test: plan::Test { operations: Vec::new() },
+        expectations: Vec::new(),
+    }
+}
+
 /// What the tests of a search hold; `None` for a campaign that repeats.
 fn content(campaign: &model::Campaign) -> Option<&model::Content> {
     match &campaign.search {
         model::Search::Nsga2 { content, .. } | model::Search::Random { content, .. } => Some(content),
-        model::Search::Repeat { .. } => None,
+        model::Search::Repeat { .. } | model::Search::Passive { .. } => None,
     }
 }
 
@@ -218,6 +242,7 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
             doc: metric.declaration.doc.clone(),
             unit: unit(metric.unit.as_ref()),
             direction: metric.direction.map(direction),
+            source: space.file_of(&metric.declaration).to_owned(),
             line: metric.declaration.line,
             inputs: topics.iter().map(|&id| topic_id(id)).collect(),
         }),
@@ -234,6 +259,7 @@ fn custom_operations(space: &Space) -> Vec<OperationPlan> {
         model::OperationKind::Custom { moment: when, parameters } => Some(OperationPlan {
             operation: operation.declaration.name.clone(),
             doc: operation.declaration.doc.clone(),
+            source: space.file_of(&operation.declaration).to_owned(),
             line: operation.declaration.line,
             topic: operation.topic().map(topic_id),
             moment: moment(*when),
@@ -377,6 +403,7 @@ fn operation(
         within: within(operation, end_after),
         priority: operation.priority,
         inclusion: operation.inclusion,
+        timed: operation.timed,
         constraints,
     }
 }
@@ -450,7 +477,7 @@ mod tests {
         metric time minimise = fuzzing_time()
         requirement R1 "nothing is hit" = collisions <= 0
         operation swing on link = random offset [-18deg, 18deg] within [0s, 1min]
-        operation lose on link = packet loss [0%, 50%]
+        operation lose on link = packet loss [0%, 50%] untimed
         operation recount on count = random absolute [-3, 3] priority 2 inclusion 40%
         operation level on zones.level = random absolute [0m, 1m]
         test early { lose loss 25% from 1s to 30s  expect seen > 3 }
@@ -458,6 +485,7 @@ mod tests {
         campaign look { objectives time, collisions  operations recount, swing 1..3 per test
                         search nsga2 { population 4  evaluations 8 }  end after 10s }
         campaign again { repeat early 3 times { seed 9 }  observes time  end after 10s }
+        campaign watch from again { passive 4 times { seed 2 }  observes seen }
     "#;
 
     fn lowered(campaign: &str) -> RunnerPlan {
@@ -470,7 +498,8 @@ mod tests {
 
     #[test]
     fn a_search_has_the_parts_it_needs_and_all_hooks() {
-        let RunnerPlan { plan, hooks, simulator_crate, .. } = lowered("look");
+        let RunnerPlan { plan, hooks, simulator_crate, system_file, .. } = lowered("look");
+        assert_eq!(system_file, "cell.sesame");
         let names: Vec<&str> = plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
         assert_eq!(names, ["collisions", "time"]);
         assert_eq!(plan.campaign.objectives, [plan::MetricId(1), plan::MetricId(0)]);
@@ -494,6 +523,32 @@ mod tests {
         assert_eq!(plan.tests[0].test.operations[0].parameters, [plan::Choice::Value { value: 0.25 }]);
         let names: Vec<&str> = plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
         assert_eq!(names, ["collisions", "seen", "time"]);
+    }
+
+    #[test]
+    fn a_campaign_that_only_observes_repeats_a_test_without_operations() {
+        let RunnerPlan { plan, hooks, .. } = lowered("watch");
+        assert!(plan.operations.is_empty() && plan.campaign.operations.is_empty());
+        assert_eq!(plan.campaign.search, plan::Search::Repeat { test: plan::KnownTestId(0), times: 4 });
+        assert_eq!((plan.campaign.seed, plan.campaign.end_after), (2, 10.0));
+        let [test] = plan.tests.as_slice() else { panic!("{:?}", plan.tests) };
+        assert_eq!((test.name.as_str(), test.test.operations.len()), ("undisturbed", 0));
+        let names: Vec<&str> = plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
+        assert_eq!(names, ["collisions", "seen"]);
+        assert_eq!(hooks.len(), 2);
+    }
+
+    #[test]
+    fn an_operation_says_if_it_counts_in_the_fuzzing_time() {
+        assert!(lowered("look").plan.operations.iter().all(|operation| operation.timed));
+        let plan = lowered("again").plan;
+        assert!(!plan.operations[0].timed);
+        let json = serde_json::to_string(&plan.operations[0]).unwrap();
+        let read: plan::Operation = serde_json::from_str(&json).unwrap();
+        assert_eq!(read, plan.operations[0]);
+        let before = json.replace(",\"timed\":false", "");
+        assert_ne!(before, json);
+        assert!(serde_json::from_str::<plan::Operation>(&before).unwrap().timed, "as older plans meant it");
     }
 
     #[test]

@@ -11,6 +11,7 @@ const SAMPLES: &[&str] = &[
     include_str!("good/conditions.sesame"),
     include_str!("bad/ten_mistakes.sesame"),
     include_str!("bad/e0104_later_constructs.sesame"),
+    include_str!("good/blocks.sesame"),
 ];
 
 /// Pieces that mean something somewhere.
@@ -56,6 +57,11 @@ const PIECES: &[&str] = &[
     "to",
     "within",
     "search",
+    "import \"a.sesame\"",
+    "eddi a publishes b {",
+    "from eddi",
+    "physical lab {",
+    "passive 3 times",
     "seed",
     "end after",
     "when",

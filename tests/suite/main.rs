@@ -18,3 +18,4 @@ mod search;
 mod stl;
 mod tampering;
 mod traces;
+mod vendored;

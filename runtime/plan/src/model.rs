@@ -368,8 +368,20 @@ pub struct Operation {
     pub priority: i32,
     /// Probability that a fresh test includes it. Default 1.
     pub inclusion: f64,
+    /// Whether its active time counts in `fuzzing_time()`. Default true, and then not written.
+    #[serde(default = "timed", skip_serializing_if = "is_timed")]
+    pub timed: bool,
     /// What its start conditions contain where a search grows them.
     pub constraints: Vec<Constraint>,
+}
+
+fn timed() -> bool {
+    true
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
+fn is_timed(timed: &bool) -> bool {
+    *timed
 }
 
 /// A stretch of simulation time in seconds, `start <= end`.

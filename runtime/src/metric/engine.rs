@@ -1,12 +1,12 @@
 //! All metrics of one run: which message goes to which, and what comes out.
 
 use sesame_plan::stl::Robustness;
-use sesame_plan::{CampaignPlan, Formula, MetricId, MetricSource, Side, TopicId};
+use sesame_plan::{CampaignPlan, Formula, MetricId, MetricSource, Side, Span, TopicId};
 
 use super::aggregate::FormulaState;
 use super::robustness::RobustnessState;
 use super::{Context, Hook, HookEntry};
-use crate::observation::{MetricObservation, OperationEffect};
+use crate::observation::MetricObservation;
 use crate::stl::FormulaError;
 use crate::time::SimTime;
 use crate::value::{Text, Value};
@@ -215,7 +215,9 @@ impl Metrics<'_> {
 
     /// What the run showed, as far as it went: a metric never set takes its default, one whose hook is not filled in has
     /// no value. Also what the user should know, one line per metric. No hook is called any more.
-    pub fn finish(mut self, operations: &[OperationEffect]) -> (Vec<MetricObservation>, Vec<String>) {
+    ///
+    /// `active` has the active intervals of all operations that count in `fuzzing_time()`.
+    pub fn finish(mut self, active: &[Span]) -> (Vec<MetricObservation>, Vec<String>) {
         let mut warnings = Vec::new();
         let mut observations = Vec::with_capacity(self.states.len());
         for (state, metric) in self.states.iter_mut().zip(&self.table.plan.metrics) {
@@ -224,7 +226,7 @@ impl Metrics<'_> {
                 robustness.break_off(context);
             }
             if matches!(metric.source, MetricSource::FuzzingTime) {
-                for (time, total) in fuzzing_time(operations) {
+                for (time, total) in fuzzing_time(active) {
                     context.now = SimTime::from_seconds(time);
                     context.set(total);
                 }
@@ -243,8 +245,8 @@ impl Metrics<'_> {
 }
 
 /// Total active time so far, at the end of each observed interval.
-fn fuzzing_time(operations: &[OperationEffect]) -> Vec<(f64, f64)> {
-    let mut intervals: Vec<_> = operations.iter().flat_map(|operation| &operation.intervals).copied().collect();
+fn fuzzing_time(active: &[Span]) -> Vec<(f64, f64)> {
+    let mut intervals = active.to_vec();
     intervals.sort_by(|a, b| a.end.total_cmp(&b.end));
     let mut total = 0.0;
     std::iter::once((0.0, 0.0))
@@ -258,15 +260,11 @@ fn fuzzing_time(operations: &[OperationEffect]) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sesame_plan::Span;
 
     #[test]
     fn fuzzing_time_adds_up_over_operations_even_where_they_overlap() {
-        let effect = |intervals: &[(f64, f64)]| OperationEffect {
-            intervals: intervals.iter().map(|&(start, end)| Span { start, end }).collect(),
-            ..OperationEffect::default()
-        };
-        let points = fuzzing_time(&[effect(&[(1.0, 5.0), (6.0, 7.0)]), effect(&[(2.0, 3.5)])]);
+        let active = [(1.0, 5.0), (6.0, 7.0), (2.0, 3.5)].map(|(start, end)| Span { start, end });
+        let points = fuzzing_time(&active);
         assert_eq!(points, [(0.0, 0.0), (3.5, 1.5), (5.0, 5.5), (7.0, 6.5)]);
     }
 }

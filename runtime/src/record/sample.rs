@@ -33,6 +33,7 @@ fn operation(name: &str, topic: u32, kind: OperationKind, parameters: Vec<Parame
         within: Span { start: 0.0, end: 65.0 },
         priority: 0,
         inclusion: 1.0,
+        timed: true,
         constraints: Vec::new(),
     }
 }

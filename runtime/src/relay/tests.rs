@@ -61,6 +61,17 @@ fn numbers(delivered: &[(f64, String, Value)]) -> Vec<(f64, f64)> {
 }
 
 #[test]
+fn an_untimed_operation_acts_and_does_not_count_in_the_fuzzing_time() {
+    let timed = operation(0, OperationKind::Blackhole);
+    let untimed = Operation { timed: false, ..timed.clone() };
+    let test = [use_of(0, 1.0, 2.0, vec![], 1), use_of(1, 4.0, 9.0, vec![], 1)];
+    let (delivered, finished) = relayed(vec![timed, untimed], &test, &commands(100));
+    assert_eq!(finished.metrics[0].value, Some(1.0));
+    assert_eq!(delivered.len(), 100 - 10 - 50);
+    assert_eq!(finished.operations[1].intervals.len(), 1, "it is observed like any other");
+}
+
+#[test]
 fn without_operations_everything_passes_at_once_and_as_it_came() {
     let (delivered, finished) = relayed(vec![], &[], &commands(50));
     let sent: Vec<_> = commands(50).into_iter().map(|(t, _, v)| (SimTime::from_seconds(t).seconds(), v)).collect();

@@ -87,6 +87,7 @@ impl Landscape {
             within: Span { start: 0.0, end: 65.0 },
             priority: 0,
             inclusion: 1.0,
+            timed: true,
             constraints: Vec::new(),
         };
         let metric = |name: &str, direction| Metric {

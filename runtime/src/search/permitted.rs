@@ -248,6 +248,7 @@ pub(crate) mod tests {
                 within: Span { start, end: end + 0.01 },
                 priority: 0,
                 inclusion,
+                timed: true,
                 constraints: Vec::new(),
             },
         );

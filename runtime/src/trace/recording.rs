@@ -10,7 +10,7 @@ use mcap::records::{Channel, MessageHeader, Metadata, Record};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
-use sesame_plan::{CampaignPlan, MetricSource, Type};
+use sesame_plan::{CampaignPlan, MetricSource, OperationId, Span, Type};
 
 use super::{ROLE, ROLE_DELIVERED, ROLE_PUBLISHED, RUN, SUBJECT};
 use crate::json::{Shapes, decode};
@@ -346,7 +346,7 @@ impl Feeder<'_> {
         }
         let damaged =
             |problem: &str| RecordingError::Damaged { problem: problem.to_owned(), path: self.path.to_owned() };
-        let mut effects: Option<Vec<OperationEffect>> = None;
+        let mut active: Option<Vec<Span>> = None;
         let mut end = Some(self.now);
         let mut run = None;
         if let (Some(subject), Some(ending)) = (&self.subject, &self.ending) {
@@ -355,9 +355,9 @@ impl Feeder<'_> {
                 Some(metrics) => serde_json::from_str(metrics).map_err(|_| damaged("its metrics cannot be read"))?,
                 None => Vec::new(),
             };
-            effects = match ending.get("operations") {
+            active = match ending.get("operations") {
                 Some(effects) => {
-                    Some(serde_json::from_str(effects).map_err(|_| damaged("what operations did cannot be read"))?)
+                    Some(timed(subject, effects).map_err(|_| damaged("what operations did cannot be read"))?)
                 }
                 None => None,
             };
@@ -383,9 +383,9 @@ impl Feeder<'_> {
         if let Some(end) = end {
             self.metrics.end(end);
         }
-        let (mut metrics, mut warnings) = self.metrics.finish(effects.as_deref().unwrap_or_default());
+        let (mut metrics, mut warnings) = self.metrics.finish(active.as_deref().unwrap_or_default());
         for (observed, metric) in metrics.iter_mut().zip(&self.plan.metrics) {
-            if matches!(metric.source, MetricSource::FuzzingTime) && effects.is_none() {
+            if matches!(metric.source, MetricSource::FuzzingTime) && active.is_none() {
                 *observed = MetricObservation::default();
             }
         }
@@ -393,6 +393,30 @@ impl Feeder<'_> {
         warnings.extend(missing.map(|path| format!("topic `{path}` is not in the recording")));
         Ok(Fed { run, metrics, warnings, messages: self.messages })
     }
+}
+
+/// When operations were active that count in `fuzzing_time()`, of what a trace says of its test and of its operations.
+fn timed(subject: &BTreeMap<String, String>, effects: &str) -> serde_json::Result<Vec<Span>> {
+    #[derive(Deserialize)]
+    struct Recorded<T> {
+        operations: Vec<T>,
+    }
+    #[derive(Deserialize)]
+    struct Declared {
+        /// As in a plan: not written where it is true.
+        timed: Option<bool>,
+    }
+    #[derive(Deserialize)]
+    struct Use {
+        operation: OperationId,
+    }
+    let entry = |key: &str| subject.get(key).map_or("", String::as_str);
+    let declared: Recorded<Declared> = serde_json::from_str(entry("plan"))?;
+    let test: Recorded<Use> = serde_json::from_str(entry("definition"))?;
+    let effects: Vec<OperationEffect> = serde_json::from_str(effects)?;
+    let counts = |id: OperationId| declared.operations.get(id.index()).is_none_or(|it| it.timed != Some(false));
+    let counted = test.operations.iter().zip(effects).filter(|(used, _)| counts(used.operation));
+    Ok(counted.flat_map(|(_, effect)| effect.intervals).collect())
 }
 
 /// Reads a payload. One that is no object by itself may also stand alone, without the object around it.

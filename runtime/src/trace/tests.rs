@@ -151,7 +151,10 @@ fn a_trace_holds_every_message_and_what_each_operation_did_to_it() {
 fn a_recording_gives_metrics_their_values_again() {
     let folder = tempfile::tempdir().unwrap();
     let (plan, test) = awkward_plan();
+    let mut plan = plan;
+    plan.operations[1].timed = false;
     let observed = traced(folder.path(), &plan, &test);
+    assert_eq!(observed.metrics[0].value, Some(2.0), "two of three operations count");
     let fed = fed(&folder.path().join("T1.mcap"), &plan).unwrap();
     assert_eq!(fed.metrics, observed.metrics, "series and fuzzing time as well");
     assert_eq!((fed.messages, &fed.warnings), (observed.messages, &observed.warnings));

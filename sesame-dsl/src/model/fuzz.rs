@@ -20,6 +20,8 @@ pub struct Operation {
     pub priority: i32,
     /// Probability that a fresh test includes it. Default 1.
     pub inclusion: f64,
+    /// Whether its active time counts in `fuzzing_time()`. Default true.
+    pub timed: bool,
     /// What its start conditions contain in campaigns that activate by condition; in written order.
     pub constraints: Vec<Constraint>,
 }

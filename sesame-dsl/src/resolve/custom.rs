@@ -86,6 +86,7 @@ impl<'a> Resolver<'a> {
                         return None;
                     }
                 }
+                self.one_value(permitted, range);
                 Some((unit, Domain::Number { range: permitted, shape: Shape::Value, integer: *integer }))
             }
             ast::Domain::Point { unit, corners } => {

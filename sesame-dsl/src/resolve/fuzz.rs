@@ -33,6 +33,8 @@ impl<'a> Resolver<'a> {
             Some(quantity) => self.inclusion(quantity),
             None => Some(1.0),
         };
+        self.at_most_one(&body.untimed, "untimed");
+        self.between_nodes(body);
         let constraints = self.constraints(&body.contains);
         let (target, kind) = what?;
         Some(model::Operation {
@@ -42,6 +44,7 @@ impl<'a> Resolver<'a> {
             within: within?,
             priority: priority?,
             inclusion: inclusion?,
+            timed: body.untimed.is_empty(),
             constraints: constraints?,
         })
     }
@@ -71,12 +74,14 @@ impl<'a> Resolver<'a> {
                         return None;
                     }
                 }
+                self.one_value(permitted, range);
                 let mode = if *absolute { model::ValueMode::Absolute } else { model::ValueMode::Offset };
                 Some((field, OperationKind::RandomValue { mode, range: permitted, integer, unit }))
             }
             ast::OperationKind::PacketLoss(range) => {
                 let field = self.whole_messages(target, "packet loss drops");
                 let loss = self.probabilities(range, "the loss")?;
+                self.one_value(loss, range);
                 Some((field?, OperationKind::PacketLoss { loss }))
             }
             ast::OperationKind::Latency { range, uniform, drain } => {
@@ -89,12 +94,22 @@ impl<'a> Resolver<'a> {
                 };
                 let distribution = if uniform.is_empty() { Distribution::Fixed } else { Distribution::Uniform };
                 let delay = self.times(range, "the delay")?;
+                self.one_value(delay, range);
                 Some((field?, OperationKind::Latency { delay, distribution, drain }))
             }
             ast::OperationKind::Blackhole => {
                 Some((self.whole_messages(target, "a blackhole drops")?, OperationKind::Blackhole))
             }
             ast::OperationKind::Custom(_) => unreachable!("custom operations are resolved apart"),
+        }
+    }
+
+    /// A range without width leaves nothing to choose.
+    pub(super) fn one_value(&mut self, found: Range, range: &ast::Range) {
+        if found.low == found.high {
+            let title = "this range has one value only";
+            let diagnostic = Diagnostic::new(Code::ONE_VALUE, range.span, title);
+            self.report(diagnostic.label("tests have nothing to choose here"));
         }
     }
 

@@ -64,7 +64,7 @@ impl<'a> Resolver<'a> {
 
     /// A program is one text and each argument another. A path may hold spaces; with them it begins like `./my robots/`,
     /// so that a whole command line in one text is found out.
-    fn program(&mut self, program: &ast::Text) -> Option<String> {
+    pub(super) fn program(&mut self, program: &ast::Text) -> Option<String> {
         if program.text.trim().is_empty() {
             return None;
         }
@@ -285,6 +285,10 @@ impl<'a> Resolver<'a> {
         if self.names.contains_key(name.text.as_str()) || self.silent.contains(name.text.as_str()) {
             return self.find(name, Kind::Message);
         }
+        self.silent.insert(&name.text);
+        if self.file.incomplete {
+            return None;
+        }
         let messages = self.names_of(Kind::Message);
         let similar = ELSEWHERE
             .iter()
@@ -297,7 +301,6 @@ impl<'a> Resolver<'a> {
             Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
             None => diagnostic.note("types are `bool`, `int`, `real`, `text`, `point`, `list of …`, and messages"),
         };
-        self.silent.insert(&name.text);
         self.report(diagnostic);
         None
     }

@@ -3,22 +3,30 @@
 //! A construct with a syntax error is not here; but the name it was about to declare is kept in [`File::broken`], and the
 //! block around it is marked as damaged, so that one mistake does not look like several.
 
+use super::eddi::Eddi;
+use super::physical::Physical;
+use super::surroundings::{Command, Launch, RelayBudget};
 use crate::span::Span;
 
 /// A whole file. Order between kinds never matters; within a kind it is the order of the file.
 #[derive(Debug, Default)]
 pub(crate) struct File {
     pub(crate) spaces: Vec<Head>,
+    pub(crate) imports: Vec<Text>,
     pub(crate) systems: Vec<System>,
     pub(crate) metrics: Vec<Metric>,
     pub(crate) requirements: Vec<Requirement>,
     pub(crate) operations: Vec<Operation>,
     pub(crate) tests: Vec<Test>,
     pub(crate) campaigns: Vec<Campaign>,
+    pub(crate) eddis: Vec<Eddi>,
+    pub(crate) physicals: Vec<Physical>,
     /// Names that a broken or unsupported construct was about to declare.
     pub(crate) broken: Vec<Name>,
     /// Whether anything at the top level could not be read.
     pub(crate) damaged: bool,
+    /// Whether an imported file is missing, and with it names that others use.
+    pub(crate) incomplete: bool,
 }
 
 /// A name, where it stands.
@@ -43,6 +51,9 @@ pub(crate) struct System {
     pub(crate) messages: Vec<Message>,
     pub(crate) topics: Vec<Topic>,
     pub(crate) nodes: Vec<Node>,
+    pub(crate) launches: Vec<(Span, Launch)>,
+    pub(crate) terminates: Vec<(Span, Command)>,
+    pub(crate) relay_budgets: Vec<(Span, RelayBudget)>,
     pub(crate) damaged: bool,
 }
 
@@ -309,10 +320,13 @@ pub(crate) struct Operation {
 pub(crate) struct OperationBody {
     /// `None` for an operation on no topic.
     pub(crate) target: Option<Path>,
+    pub(crate) from: Option<(Span, Vec<Name>)>,
+    pub(crate) to: Option<(Span, Vec<Name>)>,
     pub(crate) kind: OperationKind,
     pub(crate) within: Vec<(Span, Range)>,
     pub(crate) priority: Vec<(Span, Quantity)>,
     pub(crate) inclusion: Vec<(Span, Quantity)>,
+    pub(crate) untimed: Vec<Span>,
     pub(crate) contains: Vec<(Span, Vec<Contained>)>,
 }
 
@@ -456,27 +470,40 @@ pub(crate) struct Expectation {
 #[derive(Debug)]
 pub(crate) struct Campaign {
     pub(crate) head: Head,
+    /// The campaign it inherits from.
+    pub(crate) from: Option<Name>,
+    /// Clauses that stand in that one.
+    pub(crate) inherited: Inherited,
     pub(crate) objectives: Vec<(Span, Vec<Name>)>,
     pub(crate) observes: Vec<(Span, Vec<Name>)>,
     pub(crate) operations: Vec<Operations>,
     pub(crate) activates: Vec<(Span, ActivationMode)>,
     pub(crate) searches: Vec<Search>,
     pub(crate) repeats: Vec<Repeat>,
+    pub(crate) passives: Vec<Passive>,
     pub(crate) ends: Vec<(Span, Quantity)>,
     pub(crate) records: Vec<(Span, Record)>,
     /// Something of it could not be read or is not supported: what is missing may be there.
     pub(crate) damaged: bool,
 }
 
+/// Which clauses a campaign has from another, as far as it matters for what is said of them.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Inherited {
+    pub(crate) operations: bool,
+    pub(crate) activate: bool,
+    pub(crate) end: bool,
+}
+
 /// How the tests of a search switch operations on and off.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) enum ActivationMode {
     Time,
     Condition(ByCondition),
 }
 
 /// `condition over …`, with its settings as written.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct ByCondition {
     /// The variables and their known ranges, as long as each other.
     pub(crate) variables: Vec<Name>,
@@ -493,7 +520,7 @@ pub(crate) enum Record {
     All,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Operations {
     pub(crate) span: Span,
     pub(crate) names: Vec<Name>,
@@ -501,7 +528,7 @@ pub(crate) struct Operations {
     pub(crate) max: Count,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Search {
     pub(crate) span: Span,
     /// `None` for a strategy that is not supported yet.
@@ -518,10 +545,18 @@ pub(crate) enum Strategy {
     Random,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Repeat {
     pub(crate) span: Span,
     pub(crate) test: Name,
+    pub(crate) times: Count,
+    pub(crate) seed: Vec<(Span, Count)>,
+}
+
+/// Runs that disturb nothing.
+#[derive(Debug, Clone)]
+pub(crate) struct Passive {
+    pub(crate) span: Span,
     pub(crate) times: Count,
     pub(crate) seed: Vec<(Span, Count)>,
 }

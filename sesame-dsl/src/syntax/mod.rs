@@ -2,11 +2,15 @@
 
 mod activation;
 pub(crate) mod ast;
+pub(crate) mod eddi;
 mod explain;
 mod formula;
 mod limits;
 mod parse;
+pub(crate) mod physical;
+pub(crate) mod surroundings;
 mod token;
 mod words;
 
 pub(crate) use parse::parse;
+pub(crate) use token::{is_keyword, token_at};

@@ -5,14 +5,14 @@ use sesame_grammar::{Rule, SesameParser};
 
 /// The token at or after an offset, comments skipped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Token<'t> {
+pub(crate) struct Token<'t> {
     pub(super) kind: TokenKind,
-    pub(super) lo: usize,
-    pub(super) text: &'t str,
+    pub(crate) lo: usize,
+    pub(crate) text: &'t str,
 }
 
 impl Token<'_> {
-    pub(super) fn hi(&self) -> usize {
+    pub(crate) fn hi(&self) -> usize {
         self.lo + self.text.len()
     }
 }
@@ -30,7 +30,7 @@ pub(super) enum TokenKind {
 }
 
 /// The token at or after an offset.
-pub(super) fn token_at(text: &str, offset: usize) -> Token<'_> {
+pub(crate) fn token_at(text: &str, offset: usize) -> Token<'_> {
     let mut at = offset;
     loop {
         let rest = &text[at..];
@@ -82,6 +82,6 @@ pub(super) fn text_end(text: &str, open: usize) -> Option<usize> {
 }
 
 /// Whether a word is reserved.
-pub(super) fn is_keyword(word: &str) -> bool {
+pub(crate) fn is_keyword(word: &str) -> bool {
     SesameParser::parse(Rule::keyword, word).is_ok_and(|pairs| pairs.as_str() == word)
 }
