@@ -5,6 +5,9 @@
 mod items;
 mod words;
 
+use std::fs;
+use std::path::Path;
+
 use sesame_runtime::rng::Stream;
 
 /// What stands in hostile texts and nowhere else: where it turns up as anything but text, a text became something.
@@ -15,10 +18,30 @@ pub const MARK: &str = "injected";
 pub struct Model {
     /// The text of its file.
     pub text: String,
-    /// Its campaigns.
+    /// A file that it imports, beside it: its name and its text.
+    pub imported: Option<(String, String)>,
+    /// Its campaigns, those of the imported file included.
     pub campaigns: Vec<String>,
     /// Files that its custom operations may choose, relative to the folder of the space.
     pub files: Vec<String>,
+}
+
+impl Model {
+    /// Writes the space into a folder as `random.sesame`, with what it imports and its files. Its simulator's crate is
+    /// in `simulator`, as seen from there.
+    pub fn write(&self, folder: &Path, simulator: &str) {
+        let settled = |text: &str| text.replace("crate \"simulator\"", &format!("crate \"{simulator}\""));
+        fs::create_dir_all(folder).expect("a folder can be made");
+        fs::write(folder.join("random.sesame"), settled(&self.text)).expect("a space can be written");
+        if let Some((name, text)) = &self.imported {
+            fs::write(folder.join(name), settled(text)).expect("a space can be written");
+        }
+        for file in &self.files {
+            let file = folder.join(file);
+            fs::create_dir_all(file.parent().expect("it lies in a folder")).expect("a folder can be made");
+            fs::write(file, "a file").expect("a file can be written");
+        }
+    }
 }
 
 /// The space of a seed: the same always. Its simulator is `anything_sim::Anything`, in the folder `simulator`.
@@ -31,10 +54,22 @@ pub fn model(seed: u64) -> Model {
     items.extend(space.tests());
     let (campaigns, written) = space.campaigns();
     items.extend(written);
-    items.extend([head, system]);
+    items.push(system);
+    items.extend(space.monitor());
+    items.extend(space.lab());
     let order = space.draw.0.permutation(items.len());
-    let text = order.into_iter().map(|at| items[at].as_str()).collect::<Vec<_>>().join("\n");
-    Model { text, campaigns, files: space.files }
+    let kept = if space.draw.chance(0.3) { space.draw.below(items.len()) } else { items.len() };
+    let part = |of: &[usize]| of.iter().map(|&at| items[at].as_str()).collect::<Vec<_>>().join("\n");
+    let (here, there) = order.split_at(kept);
+    let mut text = part(here);
+    // The head may stand anywhere.
+    text = if space.draw.chance(0.5) { head + &text } else { text + &head };
+    let imported = (!there.is_empty()).then(|| {
+        let name = words::file(&mut space.draw, 0).replace(['/', ' '], "") + ".sesame";
+        text = format!("import {}\n{text}", words::quoted(&name));
+        (name, part(there))
+    });
+    Model { text, imported, campaigns, files: space.files }
 }
 
 /// Random choices.

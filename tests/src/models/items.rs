@@ -26,6 +26,7 @@ struct Message {
 struct Topic {
     name: String,
     ty: Type,
+    group: bool,
 }
 
 /// A path to one value, with its unit.
@@ -164,7 +165,7 @@ impl Space {
             let ty = if at == 0 { Type::Real(self.unit()) } else { self.ty(self.messages.len()) };
             let path = quoted(&path(&mut self.draw, at));
             members.push(format!("{}  topic {name} = {path} : {}\n", docs(&mut self.draw), self.written_type(&ty)));
-            self.topics.push(Topic { name, ty });
+            self.topics.push(Topic { name, ty, group: path.contains('{') });
         }
         let simulator = self.name("simulator");
         let step = *self.draw.one(&["20ms", "0.1s", "50000us"]);
@@ -179,6 +180,14 @@ impl Space {
             let list = |of: &[usize]| of.iter().map(|&at| self.topics[at].name.as_str()).collect::<Vec<_>>().join(", ");
             let lists = format!("publishes {}  subscribes {}", list(&publishes), list(&subscribes));
             members.push(format!("{}  node {name} {{ {lists} }}\n", docs(&mut self.draw)));
+        }
+        if self.draw.chance(0.2) {
+            let topic = &self.topics[0].name;
+            members.push(format!(
+                "  launch {} {} {{ ready when topic {topic} within 5s }}\n  relay budget {{ latency 5ms }}\n",
+                quoted("./start"),
+                quoted(&text(&mut self.draw))
+            ));
         }
         let order = self.draw.0.permutation(members.len());
         let members: String = order.into_iter().map(|at| members[at].as_str()).collect();
@@ -322,6 +331,9 @@ impl Space {
             if self.draw.chance(0.3) {
                 clauses += " inclusion 62.5%";
             }
+            if during && self.draw.chance(0.2) {
+                clauses += " untimed";
+            }
             let on = if during { format!(" on {target}") } else { String::new() };
             items.push(format!("{}operation {name}{on} = {source}{clauses}\n", docs(&mut self.draw)));
             self.operations.push(Operation { name, kind, within });
@@ -422,8 +434,22 @@ impl Space {
 
     pub(super) fn campaigns(&mut self) -> (Vec<String>, Vec<String>) {
         let (mut names, mut items) = (Vec::new(), Vec::new());
+        // The campaigns that search, for others to start from.
+        let mut searches: Vec<String> = Vec::new();
         for _ in 0..self.draw.between(1, 3) {
             let name = self.name("campaign");
+            if !searches.is_empty() && self.draw.chance(0.4) {
+                let from = self.draw.one(&searches).clone();
+                let metrics = self.draw.some(self.metrics.len(), 2);
+                let member = match self.draw.below(3) {
+                    0 => "search random { evaluations 2 }".to_owned(),
+                    1 => "passive 2 times { seed 7 }".to_owned(),
+                    _ => format!("observes {}", self.list_metrics(&metrics)),
+                };
+                items.push(format!("{}campaign {name} from {from} {{ {member} }}\n", docs(&mut self.draw)));
+                names.push(name);
+                continue;
+            }
             let mut members = vec!["end after 1s".to_owned()];
             let repeated = self.draw.chance(0.25) && !self.tests.is_empty();
             if repeated {
@@ -431,6 +457,7 @@ impl Space {
                 members.push(format!("repeat {test} 2 times {{ seed {} }}", self.draw.0.bits()));
             } else {
                 members.extend(self.search());
+                searches.push(name.clone());
             }
             if self.draw.chance(0.3) {
                 let metrics = self.draw.some(self.metrics.len(), 3);
@@ -445,6 +472,53 @@ impl Space {
             names.push(name);
         }
         (names, items)
+    }
+
+    // ----- monitors and labs
+
+    pub(super) fn monitor(&mut self) -> Option<String> {
+        let state = |topic: &Topic| !topic.group && matches!(topic.ty, Type::Bool | Type::Int("") | Type::Text);
+        let topics: Vec<usize> = (0..self.topics.len()).filter(|&at| state(&self.topics[at])).collect();
+        if topics.is_empty() || self.draw.chance(0.5) {
+            return None;
+        }
+        let name = self.name("eddi");
+        let topic = self.topics[*self.draw.one(&topics)].name.clone();
+        let names = own_names(&mut self.draw, 4);
+        let Field { written, unit, .. } = self.field();
+        let bound = self.draw.number();
+        Some(format!(
+            "{}eddi {name} publishes {topic} {{\n  evidence {} = {written} >= {bound}{unit} held 100ms  stale after 1s is false\n  \
+             guarantee {} integrity 2 = {}\n  guarantee {} integrity 1 = {} or {}\n  otherwise {}\n}}\n",
+            docs(&mut self.draw),
+            names[0],
+            names[1],
+            names[0],
+            names[2],
+            names[0],
+            names[0],
+            names[3]
+        ))
+    }
+
+    pub(super) fn lab(&mut self) -> Option<String> {
+        if self.draw.chance(0.7) {
+            return None;
+        }
+        let name = self.name("physical");
+        let names = own_names(&mut self.draw, 2);
+        let metric = self.draw.below(self.metrics.len());
+        let bound = self.bound(metric);
+        let (metric, unit) = (self.metrics[metric].name.clone(), self.metrics[metric].unit);
+        let [pose, parameter] = [(); 2].map(|()| quoted(&text(&mut self.draw)));
+        Some(format!(
+            "{}physical {name} {{\n  simulator {} = simlog \"http://lab:8089\" {{ step 20ms }}\n  repeats 3\n  \
+             exclude when {metric} {bound}\n  rank by {metric} descending\n  tolerance {metric} 2{unit}\n  \
+             shape {} = sphere 300mm on pose {pose}\n  fit parameter {parameter} [0.5, 1.5]\n}}\n",
+            docs(&mut self.draw),
+            names[0],
+            names[1]
+        ))
     }
 
     fn list_metrics(&self, of: &[usize]) -> String {
