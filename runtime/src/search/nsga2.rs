@@ -6,7 +6,7 @@
 
 use crate::rng::Stream;
 use crate::search::dominance::Fitness;
-use crate::search::selection::{Standing, parents, standings, survivors};
+use crate::search::selection::{Standing, parents, survivors};
 
 /// How genomes of a kind are made and changed. Randomness comes from streams of the given coordinates only.
 pub trait Variation {
@@ -135,13 +135,14 @@ impl<V: Variation> Nsga2<V> {
         assert!(self.population.len() - before == self.awaited, "exactly the generation asked last is told");
         self.awaited = 0;
         let size = self.settings.population as usize;
-        let mut chosen = survivors(&self.fitness(), size).into_iter().peekable();
+        let survivors = survivors(&self.fitness(), size);
+        let mut chosen = survivors.iter().map(|(position, _)| *position).peekable();
         let mut position = 0;
         self.population.retain(|_| {
             position += 1;
             chosen.next_if_eq(&(position - 1)).is_some()
         });
-        self.standings = standings(&self.fitness());
+        self.standings = survivors.into_iter().map(|(_, standing)| standing).collect();
     }
 
     fn breed(&mut self, size: u32) -> Vec<Asked<V::Genome>> {

@@ -44,9 +44,13 @@ impl Variation for RealVariation {
         let crossed = stream.chance(self.crossover);
         if crossed {
             let [a, b] = &mut children;
-            for (x, y) in a.iter_mut().zip(b) {
-                if stream.chance(0.5) {
-                    (*x, *y) = binary_crossover(*x, *y, self.crossover_index, &mut stream);
+            for (xs, ys) in a.chunks_mut(64).zip(b.chunks_mut(64)) {
+                let mut coins = stream.bits();
+                for (x, y) in xs.iter_mut().zip(ys) {
+                    if coins & 1 == 1 {
+                        (*x, *y) = binary_crossover(*x, *y, self.crossover_index, &mut stream);
+                    }
+                    coins >>= 1;
                 }
             }
         }
@@ -112,9 +116,14 @@ fn power(base: f64, n: u32) -> f64 {
     result
 }
 
-/// The `n`th root of a number that is not negative.
-fn root(x: f64, n: u32) -> f64 {
-    libm::pow(x, 1.0 / f64::from(n))
+/// The `n`th root of a number that is not negative. Square roots are one instruction: the usual index of the crossover,
+/// 15, needs four of them and no power.
+fn root(mut x: f64, mut n: u32) -> f64 {
+    while n > 1 && n.is_multiple_of(2) {
+        x = libm::sqrt(x);
+        n /= 2;
+    }
+    if n == 1 { x } else { libm::pow(x, 1.0 / f64::from(n)) }
 }
 
 #[cfg(test)]

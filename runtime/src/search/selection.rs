@@ -49,24 +49,29 @@ pub fn parents(standings: &[Standing], n: usize, stream: &mut Stream) -> Vec<usi
     contestants.chunks_exact(2).take(n).map(winner).collect()
 }
 
-/// The positions of the `n` best solutions in ascending order (all when there are no more): whole fronts while they
-/// fit, of the next one those with the largest crowding distances, of equal ones the earlier.
-pub fn survivors(fitness: &[&Fitness], n: usize) -> Vec<usize> {
-    let mut chosen: Vec<usize> = Vec::with_capacity(n.min(fitness.len()));
-    for mut front in fronts(fitness) {
+/// The `n` best solutions (all when there are no more), as positions in ascending order with their standings among each
+/// other: whole fronts while they fit, of the next one those with the largest crowding distances, of equal ones the
+/// earlier.
+pub fn survivors(fitness: &[&Fitness], n: usize) -> Vec<(usize, Standing)> {
+    let mut chosen: Vec<(usize, Standing)> = Vec::with_capacity(n.min(fitness.len()));
+    // What is dominated by nobody but members of earlier fronts stays on its front, since those are there as a whole.
+    for (rank, mut front) in fronts(fitness).into_iter().enumerate() {
         let room = n - chosen.len();
+        let mut crowding = distances(fitness, &front);
         if front.len() > room {
-            let crowding = distances(fitness, &front);
             let mut order: Vec<usize> = (0..front.len()).collect();
             order.sort_by(|&a, &b| crowding[b].total_cmp(&crowding[a]));
-            front = order[..room].iter().map(|&k| front[k]).collect();
+            order.truncate(room);
+            order.sort_unstable();
+            front = order.iter().map(|&k| front[k]).collect();
+            crowding = distances(fitness, &front);
         }
-        chosen.extend(front);
+        chosen.extend(front.into_iter().zip(crowding).map(|(at, crowding)| (at, Standing { front: rank, crowding })));
         if chosen.len() == n {
             break;
         }
     }
-    chosen.sort_unstable();
+    chosen.sort_unstable_by_key(|&(position, _)| position);
     chosen
 }
 
@@ -86,7 +91,10 @@ mod tests {
             order.sort_by(|&a, &b| standings[a].compare(standings[b]).then(a.cmp(&b)));
             order.truncate(n);
             order.sort_unstable();
-            prop_assert_eq!(survivors(&all, n), order);
+            let (positions, among_each_other): (Vec<usize>, Vec<Standing>) = survivors(&all, n).into_iter().unzip();
+            prop_assert_eq!(&positions, &order);
+            let chosen: Vec<&Fitness> = order.iter().map(|&at| all[at]).collect();
+            prop_assert_eq!(among_each_other, super::standings(&chosen));
         }
 
         #[test]
