@@ -6,7 +6,7 @@
 //! limit of memory, which says what it is at before it tries it: so the text that ended it is known, whatever the end.
 //!
 //! `SESAME_FUZZ_MINUTES` says how long (1 if not said), `SESAME_FUZZ_SEED` which mutations, `SESAME_FUZZ_KEEP` a folder
-//! for what is kept.
+//! for what is kept: all of it in `kept`, in `worth_keeping` what would make the corpus better.
 
 mod sound;
 
@@ -277,17 +277,22 @@ fn search() {
     let mut words: Vec<String> = WORDS.iter().map(|&word| word.to_owned()).collect();
     let known: BTreeSet<&str> = kept.iter().flat_map(|text| pieces(text)).filter(|piece| piece.len() < 40).collect();
     words.extend(known.into_iter().map(str::to_owned));
-    let mut seen: BTreeSet<u64> = kept.iter().flat_map(|text| tried(text)).collect();
+    let mut slowest = Duration::ZERO;
+    let mut attempt = |text: &str| {
+        std::fs::write(keep.join("trying.sesame"), text).expect("there is room for a text");
+        let before = Instant::now();
+        let kinds = tried(text);
+        slowest = slowest.max(before.elapsed());
+        assert!(before.elapsed() < MAX_TIME, "{:?} for {} bytes", before.elapsed(), text.len());
+        (kinds, slowest)
+    };
+    let mut seen: BTreeSet<u64> = kept.iter().flat_map(|text| attempt(text).0).collect();
     let mut draws = Draws(seed);
-    let (start, mut tries, mut slowest) = (Instant::now(), 0u64, Duration::ZERO);
+    let (start, mut tries) = (Instant::now(), 0u64);
     let mut said = start;
     while start.elapsed().as_secs_f64() < 60.0 * minutes {
         let text = mutated(&mut draws, &kept, &words);
-        std::fs::write(keep.join("trying.sesame"), &text).expect("there is room for a text");
-        let before = Instant::now();
-        let kinds = tried(&text);
-        slowest = slowest.max(before.elapsed());
-        assert!(before.elapsed() < MAX_TIME, "{:?} for {} bytes", before.elapsed(), text.len());
+        let (kinds, slowest) = attempt(&text);
         tries += 1;
         if kinds.iter().any(|kind| !seen.contains(kind)) {
             seen.extend(kinds);
@@ -300,7 +305,19 @@ fn search() {
             said = Instant::now();
         }
     }
-    println!("{tries} texts, {} kinds of answers, {} kept, slowest {slowest:?}", seen.len(), kept.len());
+    println!("{tries} texts, {} kinds of answers, {} kept", seen.len(), kept.len());
+    // What is worth a place in the corpus: short texts that give several kinds of answers which no shorter one gives.
+    let folder = keep.join("worth_keeping");
+    std::fs::create_dir_all(&folder).expect("there is room for a folder");
+    let mut given: BTreeSet<u64> = corpus().iter().flat_map(|text| attempt(text).0).collect();
+    kept.sort_by_key(String::len);
+    for text in kept.iter().filter(|text| text.len() < 2_000) {
+        let kinds = attempt(text).0;
+        if kinds.difference(&given).count() >= 12 {
+            given.extend(kinds);
+            std::fs::write(folder.join(format!("{:016x}.sesame", hash(text))), text).expect("there is room for a text");
+        }
+    }
 }
 
 /// Ends of the process are told apart by whether it says so itself: a panic does, a stack or memory that ran out does

@@ -36,6 +36,11 @@ fn turning_escaped(text: &str) -> String {
     text.chars().map(escaped).collect()
 }
 
+/// Text that is said as it is where rustc takes a format, as in `#[diagnostic::on_unimplemented]`.
+pub(super) fn as_format(text: &str) -> String {
+    text.replace('{', "{{").replace('}', "}}")
+}
+
 /// A generated file: its header, then its items as prettyplease sets them. That it parses is an invariant of this
 /// crate, whatever the names in the space.
 pub(super) fn file(header: &str, items: TokenStream) -> String {
