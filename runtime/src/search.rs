@@ -15,6 +15,7 @@ pub mod hypervolume;
 pub mod initial;
 pub mod nsga2;
 pub mod permitted;
+pub mod problems;
 pub mod range;
 pub mod real;
 pub mod selection;

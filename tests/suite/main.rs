@@ -13,6 +13,8 @@ mod first_front;
 mod import;
 mod interruption;
 mod kuka_cell;
+mod optimisers;
+mod random_models;
 mod regeneration;
 mod search;
 mod stl;

@@ -6,7 +6,7 @@
 
 use crate::rng::Stream;
 use crate::search::dominance::Fitness;
-use crate::search::selection::{Standing, distinct_survivors, parents, standings, survivors};
+use crate::search::selection::{Standing, distinct_survivors, parents, survivors};
 
 /// How genomes of a kind are made and changed. Randomness comes from streams of the given coordinates only.
 pub trait Variation {
@@ -148,16 +148,16 @@ impl<V: Variation> Nsga2<V> {
         self.awaited = 0;
         let size = self.settings.population as usize;
         let survivors = match self.settings.survival {
-            Survival::Crowded => survivors,
-            Survival::Distinct => distinct_survivors,
+            Survival::Crowded => survivors(&self.fitness(), size),
+            Survival::Distinct => distinct_survivors(&self.fitness(), size),
         };
-        let mut chosen = survivors(&self.fitness(), size).into_iter().peekable();
+        let mut chosen = survivors.iter().map(|(position, _)| *position).peekable();
         let mut position = 0;
         self.population.retain(|_| {
             position += 1;
             chosen.next_if_eq(&(position - 1)).is_some()
         });
-        self.standings = standings(&self.fitness());
+        self.standings = survivors.into_iter().map(|(_, standing)| standing).collect();
     }
 
     fn breed(&mut self, size: u32) -> Vec<Asked<V::Genome>> {

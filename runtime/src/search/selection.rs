@@ -49,31 +49,36 @@ pub fn parents(standings: &[Standing], n: usize, stream: &mut Stream) -> Vec<usi
     contestants.chunks_exact(2).take(n).map(winner).collect()
 }
 
-/// The positions of the `n` best solutions in ascending order (all when there are no more): whole fronts while they
-/// fit, of the next one those with the largest crowding distances, of equal ones the earlier.
-pub fn survivors(fitness: &[&Fitness], n: usize) -> Vec<usize> {
-    let mut chosen: Vec<usize> = Vec::with_capacity(n.min(fitness.len()));
-    for mut front in fronts(fitness) {
+/// The `n` best solutions (all when there are no more), as positions in ascending order with their standings among each
+/// other: whole fronts while they fit, of the next one those with the largest crowding distances, of equal ones the
+/// earlier.
+pub fn survivors(fitness: &[&Fitness], n: usize) -> Vec<(usize, Standing)> {
+    let mut chosen: Vec<(usize, Standing)> = Vec::with_capacity(n.min(fitness.len()));
+    // What is dominated by nobody but members of earlier fronts stays on its front, since those are there as a whole.
+    for (rank, mut front) in fronts(fitness).into_iter().enumerate() {
         let room = n - chosen.len();
+        let mut crowding = distances(fitness, &front);
         if front.len() > room {
-            let crowding = distances(fitness, &front);
             let mut order: Vec<usize> = (0..front.len()).collect();
             order.sort_by(|&a, &b| crowding[b].total_cmp(&crowding[a]));
-            front = order[..room].iter().map(|&k| front[k]).collect();
+            order.truncate(room);
+            order.sort_unstable();
+            front = order.iter().map(|&k| front[k]).collect();
+            crowding = distances(fitness, &front);
         }
-        chosen.extend(front);
+        chosen.extend(front.into_iter().zip(crowding).map(|(at, crowding)| (at, Standing { front: rank, crowding })));
         if chosen.len() == n {
             break;
         }
     }
-    chosen.sort_unstable();
+    chosen.sort_unstable_by_key(|&(position, _)| position);
     chosen
 }
 
 /// As [`survivors`], but a measured solution whose objective values an earlier one has comes after all that bring values
 /// of their own, however good these are, and before what is not measured. It tells the search nothing new, where a worse
 /// one may be on a way to something.
-pub fn distinct_survivors(fitness: &[&Fitness], n: usize) -> Vec<usize> {
+pub fn distinct_survivors(fitness: &[&Fitness], n: usize) -> Vec<(usize, Standing)> {
     let mut measured: Vec<(&[f64], usize)> = Vec::with_capacity(fitness.len());
     let mut others = Vec::new();
     for (position, solution) in fitness.iter().enumerate() {
@@ -94,10 +99,12 @@ pub fn distinct_survivors(fitness: &[&Fitness], n: usize) -> Vec<usize> {
         group.sort_unstable();
         let members: Vec<&Fitness> = group.iter().map(|&position| fitness[position]).collect();
         let best = survivors(&members, n - chosen.len());
-        chosen.extend(best.into_iter().map(|k| group[k]));
+        chosen.extend(best.into_iter().map(|(k, _)| group[k]));
     }
     chosen.sort_unstable();
-    chosen
+    // Those of each group were ranked by themselves.
+    let standings = standings(&chosen.iter().map(|&position| fitness[position]).collect::<Vec<_>>());
+    chosen.into_iter().zip(standings).collect()
 }
 
 #[cfg(test)]
@@ -116,7 +123,10 @@ mod tests {
             order.sort_by(|&a, &b| standings[a].compare(standings[b]).then(a.cmp(&b)));
             order.truncate(n);
             order.sort_unstable();
-            prop_assert_eq!(survivors(&all, n), order);
+            let (positions, among_each_other): (Vec<usize>, Vec<Standing>) = survivors(&all, n).into_iter().unzip();
+            prop_assert_eq!(&positions, &order);
+            let chosen: Vec<&Fitness> = order.iter().map(|&at| all[at]).collect();
+            prop_assert_eq!(among_each_other, super::standings(&chosen));
         }
 
         #[test]
@@ -137,7 +147,11 @@ mod tests {
             }
             expected.truncate(n);
             expected.sort_unstable();
-            prop_assert_eq!(distinct_survivors(&all, n), expected);
+            let (positions, among_each_other): (Vec<usize>, Vec<Standing>) =
+                distinct_survivors(&all, n).into_iter().unzip();
+            prop_assert_eq!(&positions, &expected);
+            let chosen: Vec<&Fitness> = expected.iter().map(|&at| all[at]).collect();
+            prop_assert_eq!(among_each_other, super::standings(&chosen));
         }
 
         #[test]

@@ -57,13 +57,13 @@ fn hook_trait(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -> Tok
     let name = names::ident(&names::hook_trait(&hook.metric));
     let (hook_type, file) = (names::hook_type(&hook.metric), names::snake(&hook.metric));
     let declared = declared(hook);
-    let message = format!("{declared} has no hook");
+    let message = rust::as_format(&format!("{declared} has no hook"));
     let label = format!("`{hook_type}` does not implement `{name}`");
-    let note = format!(
+    let note = rust::as_format(&format!(
         "hooks/{file}.rs holds the hook: write `impl {name} for {hook_type}` there, \
          or move the file away and run `sesamec generate {}` for a fresh stub",
         runner.plan.source
-    );
+    ));
     let mut doc: Vec<String> = hook.doc.lines().map(str::to_owned).collect();
     if !doc.is_empty() {
         doc.push(String::new());

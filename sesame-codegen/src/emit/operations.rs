@@ -99,13 +99,13 @@ fn hook_trait(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPl
     let name = names::ident(&names::hook_trait(&operation.operation));
     let parameters = names::ident(&names::parameters_type(&operation.operation));
     let declared = declared(operation);
-    let message = format!("{declared} has no hook");
+    let message = rust::as_format(&format!("{declared} has no hook"));
     let label = format!("`{hook_type}` does not implement `{name}`");
-    let note = format!(
+    let note = rust::as_format(&format!(
         "hooks/{file}.rs holds the hook: write `impl {name} for {hook_type}` there, \
          or move the file away and run `sesamec generate {}` for a fresh stub",
         runner.plan.source
-    );
+    ));
     let mut doc: Vec<String> = operation.doc.lines().map(str::to_owned).collect();
     if !doc.is_empty() {
         doc.push(String::new());

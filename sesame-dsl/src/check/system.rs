@@ -3,20 +3,22 @@
 use std::collections::BTreeMap;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{NodeId, Space, TopicId};
+use crate::model::{Declaration, NodeId, Space, TopicId};
 
 /// Operations whose name ends in the name of a topic that they do not disturb.
 pub(super) fn misnamed_operations(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
+    let topics: BTreeMap<&str, &Declaration> =
+        space.topics.values().map(|topic| (topic.declaration.name.as_str(), &topic.declaration)).collect();
     for operation in space.operations.values() {
         let name = &operation.declaration.name;
-        let ends_in = |topic: &str| name.strip_suffix(topic).is_some_and(|before| before.ends_with('_'));
+        // What a name ends in, the longest first.
+        let ends = || name.match_indices('_').map(|(at, _)| &name[at + 1..]);
         let Some(own) = operation.topic().map(|topic| &space.topics[topic].declaration) else { continue };
-        if name == &own.name || ends_in(&own.name) {
+        if name == &own.name || ends().any(|end| end == own.name) {
             continue;
         }
         // The longest is meant: `cut_link_speed` is named for `link_speed` where there is a `speed` too.
-        let meant = space.topics.values().map(|topic| &topic.declaration).filter(|topic| ends_in(&topic.name));
-        let Some(meant) = meant.max_by_key(|topic| topic.name.len()) else { continue };
+        let Some(meant) = ends().find_map(|end| topics.get(end)) else { continue };
         let title = format!("operation `{name}` is named for `{}` and disturbs `{}`", meant.name, own.name);
         let diagnostic = Diagnostic::new(Code::MISNAMED_OPERATION, operation.declaration.span, title)
             .label(format!("it acts on `{}`", own.name))

@@ -16,13 +16,13 @@ mod columns;
 mod lines;
 mod tokens;
 
-use pest::Parser as _;
-use sesame_grammar::{Rule, SesameParser};
+use sesame_grammar::Rule;
 
 use self::tokens::Token;
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::source::SourceMap;
 use crate::span::{FileId, Span};
+use crate::syntax::parse_bounded;
 
 /// The file `root` of `sources` in the one layout, with `\n` at the ends of lines.
 ///
@@ -53,6 +53,6 @@ pub fn format(sources: &SourceMap, root: FileId) -> Result<String, Vec<Diagnosti
 
 /// The words of a text without syntax errors. The entry rule accepts every text, so `None` means that it took too long.
 fn read(text: &str) -> Option<Vec<Token<'_>>> {
-    let mut pairs = SesameParser::parse(Rule::file, text).ok()?;
+    let mut pairs = parse_bounded(Rule::file, text).ok()?;
     Some(tokens::tokens(text, &pairs.next()?))
 }

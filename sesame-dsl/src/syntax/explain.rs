@@ -6,10 +6,10 @@
 
 use std::collections::BTreeSet;
 
-use pest::Parser as _;
 use pest::error::{ErrorVariant, InputLocation};
-use sesame_grammar::{Rule, SesameParser};
+use sesame_grammar::Rule;
 
+use super::limits::parse_bounded;
 use super::token::{Token, TokenKind, is_keyword, token_at};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::{FileId, Span};
@@ -243,7 +243,7 @@ struct Failure {
 }
 
 fn read(text: &str, lo: usize, hi: usize, rule: Rule) -> Option<Failure> {
-    let error = SesameParser::parse(rule, &text[lo..hi]).err()?;
+    let error = parse_bounded(rule, &text[lo..hi]).err()?;
     let at = match error.location {
         InputLocation::Pos(at) | InputLocation::Span((at, _)) => lo + at,
     };

@@ -13,5 +13,6 @@ pub(crate) mod surroundings;
 mod token;
 mod words;
 
+pub(crate) use limits::parse_bounded;
 pub(crate) use parse::parse;
 pub(crate) use token::{is_keyword, token_at};

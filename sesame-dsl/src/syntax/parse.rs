@@ -1,8 +1,7 @@
 //! From the grammar's pairs to the syntax tree.
 
-use pest::Parser as _;
 use pest::iterators::Pair as PestPair;
-use sesame_grammar::{Rule, SesameParser};
+use sesame_grammar::Rule;
 
 use super::ast::{
     ActivationMode, Bound, Campaign, Comparison, Count, Coverage, CoverageAxis, Custom, CustomParameter, Direction,
@@ -11,7 +10,7 @@ use super::ast::{
     System, Test, Topic, Transport, Type, TypeKind,
 };
 use super::explain::{Place, explain};
-use super::limits::{MAX_BYTES, MAX_CALLS, too_deep};
+use super::limits::{MAX_BYTES, parse_bounded, too_deep};
 use super::token::{TokenKind, token_at};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::{FileId, Span};
@@ -29,9 +28,7 @@ pub(crate) fn parse(file: FileId, text: &str, diagnostics: &mut Vec<Diagnostic>)
         let span = reader.span_of(at, at + 1);
         reader.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, span, title).label("this one is too deep"));
     } else {
-        // Process-wide in pest; every caller sets the same value.
-        pest::set_call_limit(Some(MAX_CALLS));
-        match SesameParser::parse(Rule::file, text) {
+        match parse_bounded(Rule::file, text) {
             Ok(mut pairs) => {
                 let root = pairs.next().expect("a parse that succeeds has its rule's pair");
                 reader.file(&root);
