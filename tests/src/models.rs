@@ -2,6 +2,7 @@
 //! only, very long ones, and texts that would be code, paths, markup or queries if anything took them for more than
 //! texts.
 
+mod disturbances;
 mod items;
 mod words;
 

@@ -1,5 +1,7 @@
 //! The items of a space, each made so that it is valid with those before it.
 
+use std::fmt::Write as _;
+
 use super::Draw;
 use super::words::{Names, docs, file, own_names, path, quoted, text};
 
@@ -31,10 +33,10 @@ struct Topic {
 
 /// A path to one value, with its unit.
 #[derive(Clone)]
-struct Field {
-    written: String,
-    unit: &'static str,
-    whole: bool,
+pub(super) struct Field {
+    pub(super) written: String,
+    pub(super) unit: &'static str,
+    pub(super) whole: bool,
 }
 
 struct Metric {
@@ -46,18 +48,15 @@ struct Metric {
     objective: bool,
 }
 
-enum Kind {
+pub(super) enum Kind {
     /// The word before the range, the range, its unit, and whether numbers are whole.
     Range {
         word: &'static str,
         range: (f64, f64),
         unit: &'static str,
     },
-    Value {
-        word: &'static str,
-        range: (f64, f64),
-        unit: &'static str,
-    },
+    /// The same for each of several single values.
+    Values(Vec<(&'static str, (f64, f64), String)>),
     Nothing,
     Custom {
         parameters: Vec<(String, String)>,
@@ -88,7 +87,7 @@ fn bracketed(unit: &str) -> String {
 }
 
 /// A range in a unit.
-fn written((low, high): (f64, f64), unit: &str) -> String {
+pub(super) fn written((low, high): (f64, f64), unit: &str) -> String {
     format!("[{low}{unit}, {high}{unit}]")
 }
 
@@ -208,12 +207,39 @@ impl Space {
         }
     }
 
-    fn field(&mut self) -> Field {
+    pub(super) fn field(&mut self) -> Field {
         let mut found = Vec::new();
         for topic in &self.topics {
             self.numbers(&topic.name, &topic.ty, &mut found);
         }
         self.draw.one(&found).clone()
+    }
+
+    pub(super) fn topic(&mut self) -> String {
+        let topic = self.draw.below(self.topics.len());
+        self.topics[topic].name.clone()
+    }
+
+    /// A range that suits a field: of whole numbers for one that has these.
+    pub(super) fn range_of(&mut self, field: &Field) -> (f64, f64) {
+        let (low, high) = self.draw.range();
+        if field.whole { (low.round(), high.round()) } else { (low, high) }
+    }
+
+    /// A topic or a field of one that is a text, if there is any.
+    pub(super) fn text_place(&mut self) -> Option<String> {
+        let mut found = Vec::new();
+        for topic in &self.topics {
+            match &topic.ty {
+                Type::Text => found.push(topic.name.clone()),
+                Type::Message(at) => {
+                    let texts = self.messages[*at].fields.iter().filter(|(_, ty)| matches!(ty, Type::Text));
+                    found.extend(texts.map(|(name, _)| format!("{}.{name}", topic.name)));
+                }
+                _ => {}
+            }
+        }
+        if found.is_empty() { None } else { Some(self.draw.one(&found).clone()) }
     }
 
     // ----- metrics and requirements
@@ -277,16 +303,14 @@ impl Space {
     pub(super) fn operations(&mut self) -> Vec<String> {
         let mut items = Vec::new();
         for at in 0..self.draw.between(1, 6) {
-            let choice = if at == 0 { self.draw.below(5) } else { self.draw.below(9) };
-            let name = self.name(if choice >= 6 { "hook" } else { "operation" });
-            let topic = self.draw.below(self.topics.len());
-            let topic = self.topics[topic].name.clone();
+            let choice = if at == 0 { self.draw.below(5) } else { self.draw.below(14) };
+            let name = self.name(if (6..9).contains(&choice) { "hook" } else { "operation" });
+            let topic = self.topic();
             let time = *self.draw.one(&[(0.0, 100.0), (0.0, 0.0), (20.0, 500.0)]);
             let (target, source, kind) = match choice {
                 0 | 1 => {
                     let field = self.field();
-                    let (low, high) = self.draw.range();
-                    let range = if field.whole { (low.round(), high.round()) } else { (low, high) };
+                    let range = self.range_of(&field);
                     let mode = if choice == 0 { "offset" } else { "absolute" };
                     let word = if choice == 0 { "offset" } else { "value" };
                     let source = format!("random {mode} {}", written(range, field.unit));
@@ -295,28 +319,29 @@ impl Space {
                 2 => {
                     let range = (0.0, 100.0);
                     let source = format!("packet loss {}", written(range, "%"));
-                    (topic, source, Kind::Value { word: "loss", range, unit: "%" })
+                    (topic, source, Kind::Values(vec![("loss", range, "%".to_owned())]))
                 }
                 3 => {
                     let drain = *self.draw.one(&["", " drain flush", " drain drop", " drain finish"]);
                     let source = format!("latency {}{drain}", written(time, "ms"));
-                    (topic, source, Kind::Value { word: "delay", range: time, unit: "ms" })
+                    (topic, source, Kind::Values(vec![("delay", time, "ms".to_owned())]))
                 }
                 4 => {
                     let source = format!("latency {} uniform", written(time, "ms"));
                     (topic, source, Kind::Range { word: "delay", range: time, unit: "ms" })
                 }
                 5 => (topic, "blackhole".to_owned(), Kind::Nothing),
+                9.. => self.disturbance(),
                 _ => {
-                    let moment = (*self.draw.one(&[None, None, Some("before start"), Some("after end")])).to_owned();
+                    let moment = *self.draw.one(&[None, None, Some("before start"), Some("after end")]);
                     let n = self.draw.below(5);
                     let names = own_names(&mut self.draw, n);
                     let parameters: Vec<(String, String, String)> =
                         names.into_iter().map(|name| self.parameter(name)).collect();
-                    let declared: String =
+                    let declared: Vec<String> =
                         parameters.iter().map(|(name, domain, _)| format!("  {name}: {domain}\n")).collect();
-                    let source =
-                        format!("custom {}{{\n{declared}}}", moment.map_or(String::new(), |it| format!("{it} ")));
+                    let moment_word = moment.map_or(String::new(), |it| format!("{it} "));
+                    let source = format!("custom {moment_word}{{\n{}}}", declared.concat());
                     let parameters = parameters.into_iter().map(|(name, _, choice)| (name, choice)).collect();
                     (topic, source, Kind::Custom { parameters, moment })
                 }
@@ -326,7 +351,8 @@ impl Space {
                 (during && self.draw.chance(0.5)).then(|| *self.draw.one(&[(0.0, 0.9), (0.2, 0.6), (0.0, 5.0)]));
             let mut clauses = within.map_or(String::new(), |within| format!(" within {}", written(within, "s")));
             if self.draw.chance(0.3) {
-                clauses += &format!(" priority {}", self.draw.number().round());
+                let priority = self.draw.number().round();
+                write!(clauses, " priority {priority}").expect("a string takes all text");
             }
             if self.draw.chance(0.3) {
                 clauses += " inclusion 62.5%";
@@ -397,7 +423,13 @@ impl Space {
                     Kind::Range { word, range, unit } => {
                         (format!("{word} {}", written(self.draw.part(*range), unit)), None)
                     }
-                    Kind::Value { word, range, unit } => (format!("{word} {}{unit}", self.draw.part(*range).0), None),
+                    Kind::Values(values) => {
+                        let choices: Vec<String> = values
+                            .iter()
+                            .map(|(word, range, unit)| format!("{word} {}{unit}", self.draw.part(*range).0))
+                            .collect();
+                        (choices.join(" "), None)
+                    }
                     Kind::Nothing => (String::new(), None),
                     Kind::Custom { parameters, moment } => {
                         let choices: Vec<String> =
@@ -413,16 +445,17 @@ impl Space {
                     (None, Some((one, _))) => format!("when {one} for 200ms at most 2 times"),
                     (None, None) => format!("from {from}s to {to}s"),
                 };
-                lines += &format!("  {name} {choices} {activation}\n");
+                writeln!(lines, "  {name} {choices} {activation}").expect("a string takes all text");
                 if self.draw.chance(0.3) {
                     lines.truncate(lines.trim_end().len());
-                    lines += &format!(" seed {}\n", self.draw.below(1000));
+                    let seed = self.draw.below(1000);
+                    writeln!(lines, " seed {seed}").expect("a string takes all text");
                 }
             }
             if self.draw.chance(0.5) {
                 let metric = self.draw.below(self.metrics.len());
                 let bound = self.bound(metric);
-                lines += &format!("  expect {} {bound}\n", self.metrics[metric].name);
+                writeln!(lines, "  expect {} {bound}", self.metrics[metric].name).expect("a string takes all text");
             }
             items.push(format!("{}test {name} {{\n{lines}}}\n", docs(&mut self.draw)));
             self.tests.push(name);
@@ -549,6 +582,13 @@ impl Space {
             members.push(format!("activate by condition over {}{length}", self.list_metrics(&chosen)));
         } else if self.draw.chance(0.5) {
             members.push("activate by time".to_owned());
+        }
+        if self.draw.chance(0.3) {
+            let coverage = self.draw.one(&[
+                "coverage { T1 [0, 1] cells 6  T2 [0, 0.5] cells 6  P1 [0, 1] cells 3 }",
+                "coverage { O0 [0.5, 4.5] cells 4  hits 2  stop at 12.5%  failsafe 4 }",
+            ]);
+            members.push((*coverage).to_owned());
         }
         members
     }

@@ -193,7 +193,7 @@ pub(super) fn quoted(text: &str) -> String {
 pub(super) fn docs(draw: &mut Draw) -> String {
     let lines = if draw.chance(0.4) { draw.between(1, 3) } else { 0 };
     // What begins with a slash would make it a plain comment.
-    (0..lines).map(|_| format!("/// {}\n", text(draw))).collect()
+    (0..lines).map(|_| format!("/// {}\n", text(draw))).collect::<Vec<_>>().concat()
 }
 
 /// A path on the wire: no spaces, no control characters, braces only of a group.
