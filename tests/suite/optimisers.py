@@ -41,12 +41,14 @@ def pymoo_run(problem, population, evaluations, seed):
 
 
 def sort(points):
-    from pymoo.operators.survival.rank_and_crowding.metrics import calc_crowding_distance
+    from pymoo.operators.survival.rank_and_crowding.metrics import calc_crowding_distance, get_crowding_function
     from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
     points = np.array(points, dtype=float)
     fronts = [sorted(int(i) for i in front) for front in NonDominatedSorting().do(points)]
-    crowding = [calc_crowding_distance(points[front]) for front in fronts]
+    # Given as a function, it is asked with copies of a point left aside; by name it would count them.
+    crowd = get_crowding_function(calc_crowding_distance)
+    crowding = [crowd.do(points[front]) for front in fronts]
     # JSON has no infinity.
     return fronts, [[-1.0 if np.isinf(x) else float(x) for x in front] for front in crowding]
 

@@ -85,7 +85,7 @@ pub(super) fn comparison(pair: &Pair<'_>) -> Option<Comparison> {
 
 /// Where a construct's last word ends. pest's own span goes on over the blanks before an optional part that is not there.
 fn end_of(pair: &Pair<'_>) -> usize {
-    let last = pair.clone().into_inner().filter(|inner| inner.as_rule() != Rule::COMMENT).last();
+    let last = pair.clone().into_inner().rfind(|inner| inner.as_rule() != Rule::COMMENT);
     match last {
         // The closing quote is no pair.
         Some(_) if pair.as_rule() == Rule::text => pair.as_span().end(),

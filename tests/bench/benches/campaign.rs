@@ -17,7 +17,7 @@ metric highest maximise default 0 = max(level)
 operation shift on level = random offset [-5, 5]
 operation lose  on level = packet loss [0%, 100%]
 
-campaign search {
+campaign seeking {
   objectives fuzzing_time, highest
   operations shift, lose   1..5 per test
   search     nsga2 { population 100  evaluations 100 }
@@ -28,8 +28,8 @@ campaign search {
 fn main() {
     // Cargo tells whether it measures or only tries that this works.
     let counts: &[u32] = if std::env::args().any(|word| word == "--bench") { &[100, 1_000, 10_000] } else { &[100] };
-    let project = Project::new("cost of tests", SPACE, "faulty");
-    let runner = project.build("search");
+    let project = Project::new("cost_of_tests", SPACE, "faulty");
+    let runner = project.build("seeking");
     println!("| tests | wall time | of that in runs | beside them, per test |");
     println!("|---:|---:|---:|---:|");
     for count in counts {
