@@ -21,20 +21,37 @@ pub mod selection;
 pub mod sorting;
 pub mod vary;
 
+mod boost;
+mod cells;
+mod construct;
+mod constructing;
 mod known;
+mod latin_hypercube;
+mod map_elites;
 mod random;
 mod repeat;
 
 #[cfg(test)]
+mod explored;
+#[cfg(test)]
 pub(crate) mod landscape;
 
-use sesame_plan::{ActivationMode, CampaignPlan, Direction, KnownTestId, MetricId, Search, Test};
+use sesame_plan::{ActivationMode, CampaignPlan, Direction, Exploration, KnownTestId, MetricId, Search, Test};
 
+use crate::coverage::Grid;
 use crate::observation::{Observation, Outcome};
+use crate::sspr::Point;
+use boost::{Boosted, Boosting};
+use cells::Cells;
+use construct::Constructor;
+use constructing::{Constructing, Construction};
+use nsga2::Variation;
 
 pub use dominance::{Fitness, Unfit};
 pub use front::Front;
 pub use known::Known;
+pub use latin_hypercube::LatinHypercube;
+pub use map_elites::MapElites;
 pub use nsga2::Nsga2;
 pub use permitted::{Permitted, SearchError};
 pub use random::Random;
@@ -75,21 +92,48 @@ pub struct Evaluated {
     pub test: Test,
     /// Its fitness, from [`fitness`].
     pub fitness: Fitness,
+    /// Where its run lies in the reduced parameter space, if it counts for coverage.
+    pub point: Option<Point>,
 }
 
 /// The strategy that a plan names. `seed` is the campaign's, or what `run --seed` put in its place.
 pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, SearchError> {
     Ok(match &plan.campaign.search {
-        Search::Nsga2 { population: 0, .. } => {
+        Search::Nsga2 { population: 0, .. } | Search::MapElites { population: 0, .. } => {
             return Err(SearchError::NoPopulation { campaign: plan.campaign.name.clone() });
         }
         &Search::Nsga2 { population, evaluations } => {
-            let rates = match plan.campaign.activation {
-                ActivationMode::Time => vary::Rates::default(),
-                ActivationMode::Condition { .. } => vary::Rates::by_condition(),
-            };
-            let variation = TestVariation::new(Permitted::of(plan)?, rates, seed);
-            Box::new(Nsga2::new(nsga2::Settings { population, evaluations, seed }, variation))
+            let permitted = Permitted::of(plan)?;
+            let tests = variation(plan, permitted.clone(), seed);
+            let settings = nsga2::Settings { population, evaluations, seed };
+            match &plan.campaign.exploration {
+                None => Box::new(Nsga2::new(settings, tests)),
+                &Some(Exploration::Boost { every_generations, children, tries }) => {
+                    let boosting = Boosting { every_generations, children, tries };
+                    Box::new(Nsga2::new(settings, Boosted::new(tests, cells(plan)?, boosting, seed)))
+                }
+                &Some(Exploration::Construct { share, until }) => {
+                    let cells = cells(plan)?;
+                    let constructor = Constructor::new(permitted, cells.grid().clone());
+                    let construction = Construction { share, until: until.unwrap_or(1.0) };
+                    Box::new(Nsga2::new(settings, Constructing::new(tests, cells, constructor, construction, seed)))
+                }
+            }
+        }
+        &Search::MapElites { population, evaluations } => {
+            let campaign = || plan.campaign.name.clone();
+            let goal = plan.campaign.coverage.as_ref();
+            let goal = goal.ok_or_else(|| SearchError::NoCoverage { campaign: campaign() })?;
+            let grid =
+                Grid::new(goal.axes.clone()).map_err(|reason| SearchError::Grid { campaign: campaign(), reason })?;
+            let settings = nsga2::Settings { population, evaluations, seed };
+            Box::new(MapElites::new(settings, variation(plan, Permitted::of(plan)?, seed), grid))
+        }
+        &Search::LatinHypercube { evaluations } => {
+            if plan.campaign.activation != ActivationMode::Time {
+                return Err(SearchError::NotByTime { campaign: plan.campaign.name.clone() });
+            }
+            Box::new(LatinHypercube::new(Permitted::of(plan)?, evaluations, seed))
         }
         &Search::Random { evaluations } => Box::new(Random::new(Permitted::of(plan)?, evaluations, seed)),
         &Search::Repeat { test, times } => Box::new(Repeat::new(plan.test(test).test.clone(), times)),
@@ -97,6 +141,24 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
             Box::new(Known::new(tests.iter().map(|&id| (id, plan.test(id).test.clone())).collect()))
         }
     })
+}
+
+fn variation(plan: &CampaignPlan, permitted: Permitted, seed: u64) -> TestVariation {
+    let rates = match plan.campaign.activation {
+        ActivationMode::Time => vary::Rates::default(),
+        ActivationMode::Condition { .. } => vary::Rates::by_condition(),
+    };
+    TestVariation::new(permitted, rates, seed)
+}
+
+/// The cells that an exploration is about.
+fn cells(plan: &CampaignPlan) -> Result<Cells, SearchError> {
+    let campaign = || plan.campaign.name.clone();
+    if plan.campaign.activation != ActivationMode::Time {
+        return Err(SearchError::NotByTime { campaign: campaign() });
+    }
+    let goal = plan.campaign.coverage.as_ref().ok_or_else(|| SearchError::NoCoverage { campaign: campaign() })?;
+    Cells::of(plan, goal).map_err(|reason| SearchError::Grid { campaign: campaign(), reason })
 }
 
 /// The fitness of a run: its objective values in the campaign's order, negated where more is sought; or why it has none.
@@ -123,7 +185,18 @@ pub fn fitness_of(plan: &CampaignPlan, outcome: &Outcome, value: impl Fn(MetricI
     oriented.collect::<Option<Vec<f64>>>().map_or(Fitness::Unfit(Unfit::Unmeasured), Fitness::Measured)
 }
 
-impl Strategy for Nsga2<TestVariation> {
+/// Variation of tests that is told what came of them.
+pub(crate) trait Learning: Variation<Genome = Test> {
+    /// Takes the results of the generation asked last, in its order.
+    fn learn(&mut self, results: &[Evaluated]);
+}
+
+impl Learning for TestVariation {
+    /// Selection alone decides what becomes of results.
+    fn learn(&mut self, _: &[Evaluated]) {}
+}
+
+impl<V: Learning + Send> Strategy for Nsga2<V> {
     fn ask(&mut self) -> Vec<Candidate> {
         let generation = self.generation();
         let asked = Nsga2::ask(self);
@@ -131,6 +204,7 @@ impl Strategy for Nsga2<TestVariation> {
     }
 
     fn tell(&mut self, results: &[Evaluated]) {
+        self.variation_mut().learn(results);
         Nsga2::tell(
             self,
             results.iter().map(|result| nsga2::Told {

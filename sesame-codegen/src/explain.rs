@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
-    ActivationMode, CampaignPlan, Distribution, Domain, Drain, MetricSource, Operation, OperationKind, Parameter,
-    Search,
+    ActivationMode, BoostedChildren, CampaignPlan, CoverageGoal, Distribution, Domain, Drain, Exploration, GridAxis,
+    MetricSource, Operation, OperationKind, Parameter, Search,
 };
 
 /// More whole numbers than these are not written out one by one.
@@ -54,6 +54,12 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
         Search::Nsga2 { population, evaluations } => {
             format!("nsga2 {{ population {population}  evaluations {evaluations}  seed {seed} }}")
         }
+        Search::MapElites { population, evaluations } => {
+            format!("map_elites {{ population {population}  evaluations {evaluations}  seed {seed} }}")
+        }
+        Search::LatinHypercube { evaluations } => {
+            format!("latin_hypercube {{ evaluations {evaluations}  seed {seed} }}")
+        }
         Search::Random { evaluations } => format!("random {{ evaluations {evaluations}  seed {seed} }}"),
         // Only a runner's command line makes one, and no `.sesame` text does.
         Search::Known { .. } => return clauses,
@@ -70,8 +76,42 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
     clauses.push(("operations", format!("{}   {}..{} per test", operations.join(", "), count.min, count.max)));
     clauses.push(("activate", format!("by {}", activation(plan, &campaign.activation))));
     clauses.push(("search", searches));
+    if let Some(coverage) = &campaign.coverage {
+        clauses.push(("coverage", counted(coverage)));
+    }
+    if let Some(exploration) = &campaign.exploration {
+        clauses.push(explored(exploration));
+    }
     clauses.push(("end", format!("after {}s", campaign.end_after)));
     clauses
+}
+
+fn counted(coverage: &CoverageGoal) -> String {
+    let axis = |axis: &GridAxis| {
+        format!("{} {} cells {}  ", axis.dimension.name(), range(axis.low, axis.high, None), axis.cells)
+    };
+    let axes: String = coverage.axes.iter().map(axis).collect();
+    let stop = coverage.stop_at.map_or(String::new(), |share| format!("  stop at {}%", percent(share)));
+    format!("{{ {axes}hits {}{stop} }}", coverage.hits)
+}
+
+/// The clause of an exploration.
+fn explored(exploration: &Exploration) -> (&'static str, String) {
+    match exploration {
+        Exploration::Boost { every_generations, children, tries } => {
+            let (kind, children) = match children {
+                BoostedChildren::Every { iterations } => ("fixed", format!("every {iterations} iterations")),
+                BoostedChildren::Falling { first, last, drop } => {
+                    ("linear", format!("from {first} to {last}  drop {drop}"))
+                }
+            };
+            ("boost", format!("{kind} {{ every {every_generations} generations  {children}  tries {tries} }}"))
+        }
+        Exploration::Construct { share, until } => {
+            let until = until.map_or(String::new(), |until| format!("  until {}%", percent(until)));
+            ("construct", format!("{{ share {}%{until} }}", percent(*share)))
+        }
+    }
 }
 
 fn activation(plan: &CampaignPlan, mode: &ActivationMode) -> String {
@@ -299,6 +339,21 @@ mod tests {
     const BY_TIME: &str = "
         campaign timed { objectives time  operations cut, swing 1 per test  observes pace
           search random { evaluations 8 }  end after 70s }";
+    const BOOSTED: &str = "
+        campaign boosted { objectives time  operations cut, swing 1..3 per test
+          search nsga2 { population 4  evaluations 8 }
+          coverage { T1 [0, 1] cells 6  O0 [0.5, 3.5] cells 3  hits 2  stop at 50% }
+          boost linear { every 3 generations  from 4 to 1 }  end after 70s }";
+    const CONSTRUCTED: &str = "
+        campaign constructed { objectives time  operations cut, swing 1..3 per test
+          search nsga2 { population 4  evaluations 8 }
+          coverage { T1 [0, 1] cells 6 }  construct { share 30%  until 7% }  end after 70s }";
+    const ELITES: &str = "
+        campaign elites { objectives time  operations cut, swing 1..3 per test
+          search map_elites { population 4  evaluations 8 }  coverage { T1 [0, 1] cells 6 }  end after 70s }";
+    const LATIN: &str = "
+        campaign latin { objectives time  operations cut, swing 1..3 per test
+          search latin_hypercube { evaluations 8 }  end after 70s }";
     const AGAIN: &str = "campaign again { repeat still 3 times  end after 70s }";
 
     fn plan(campaign: &str) -> CampaignPlan {
@@ -312,7 +367,7 @@ mod tests {
 
     #[test]
     fn what_is_explained_has_the_same_plan() {
-        for text in [EVERYTHING, DEFAULTS, BY_TIME, AGAIN] {
+        for text in [EVERYTHING, DEFAULTS, BY_TIME, BOOSTED, CONSTRUCTED, ELITES, LATIN, AGAIN] {
             // Operations that a campaign leaves out are still needed by the known test.
             let original = plan(&format!("{OPERATIONS}{text}"));
             let explained = campaign(&original);
@@ -332,6 +387,15 @@ mod tests {
     #[test]
     fn a_campaign_by_condition_with_defaults() {
         insta::assert_snapshot!(campaign(&plan(&format!("{OPERATIONS}{DEFAULTS}"))));
+    }
+
+    #[test]
+    fn explorations_with_their_defaults() {
+        let explained = [BOOSTED, CONSTRUCTED].map(|text| campaign(&plan(&format!("{OPERATIONS}{text}"))));
+        let clauses = explained.iter().flat_map(|text| text.lines()).filter(|line| {
+            ["coverage", "boost", "construct"].iter().any(|word| line.trim_start().starts_with(&format!("{word} ")))
+        });
+        insta::assert_snapshot!(clauses.collect::<Vec<_>>().join("\n"), @"");
     }
 
     #[test]

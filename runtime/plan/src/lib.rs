@@ -10,12 +10,14 @@
 
 pub mod condition;
 mod coverage;
+mod exploration;
 mod formula;
 mod model;
 pub mod stl;
 mod test;
 
 pub use coverage::*;
+pub use exploration::*;
 pub use formula::*;
 pub use model::*;
 pub use test::*;

@@ -18,7 +18,7 @@ use crate::record::{
 };
 use crate::rng::derive_seed;
 use crate::search::{self, Candidate, Evaluated, Front, SearchError};
-use crate::sspr;
+use crate::sspr::{self, Point};
 
 /// A test that runs this many times as long as the undisturbed run is taken to hang.
 const PATIENCE: f64 = 20.0;
@@ -182,10 +182,11 @@ pub fn conduct(
             let fitness = search::fitness(plan, &record.observation);
             done += 1;
             front.add(record.number, &fitness);
-            told.push(Evaluated { number: record.number, test: record.test.clone(), fitness });
-            if let Some(tracking) = &mut tracking {
-                tracking.add(plan, record);
+            let point = counted_point(plan, record);
+            if let (Some(tracking), Some(point)) = (&mut tracking, &point) {
+                tracking.coverage.add(point);
             }
+            told.push(Evaluated { number: record.number, test: record.test.clone(), fitness, point });
             let coverage = tracking.as_ref().map(|it| &it.coverage);
             progress(Progress { done, total, latest: Some(record), front: &front, coverage });
         })?;
@@ -261,14 +262,6 @@ impl Tracking {
         Ok(Tracking { coverage: Coverage::new(grid, goal.hits), feasible, stop_at: goal.stop_at })
     }
 
-    fn add(&mut self, plan: &CampaignPlan, record: &TestRecord) {
-        if coverage::counts(&record.observation.outcome, record.duplicate_of.is_some())
-            && let Some(point) = sspr::observed_point(plan, &record.test, &record.observation)
-        {
-            self.coverage.add(&point);
-        }
-    }
-
     fn after(&self, generation: u32, evaluations: u32) -> GenerationCoverage {
         GenerationCoverage {
             generation,
@@ -297,6 +290,14 @@ impl Tracking {
             )
         })
     }
+}
+
+/// Where a run lies in the reduced parameter space, if it counts for coverage.
+fn counted_point(plan: &CampaignPlan, record: &TestRecord) -> Option<Point> {
+    if !coverage::counts(&record.observation.outcome, record.duplicate_of.is_some()) {
+        return None;
+    }
+    sspr::observed_point(plan, &record.test, &record.observation)
 }
 
 /// A test that has its number and waits for its run.
@@ -482,8 +483,11 @@ mod tests {
         let records = sample::records(&plan, 40);
         let (mut forth, mut back) = (tracking(0.1), tracking(0.1));
         for (first, last) in records.iter().zip(records.iter().rev()) {
-            forth.add(&plan, first);
-            back.add(&plan, last);
+            for (tracking, record) in [(&mut forth, first), (&mut back, last)] {
+                counted_point(&plan, record).iter().for_each(|point| {
+                    tracking.coverage.add(point);
+                });
+            }
         }
         assert_eq!(forth.after(3, 40), back.after(3, 40));
         assert!(forth.reached().is_some_and(|why| why.starts_with("its coverage was reached: ")));

@@ -121,6 +121,7 @@ pub(crate) fn plan() -> CampaignPlan {
             activation: ActivationMode::Time,
             search: Search::Nsga2 { population: 10, evaluations: 210 },
             coverage: None,
+            exploration: None,
             seed: 42,
             end_after: 70.0,
             record: None,

@@ -14,6 +14,7 @@ use sesame_plan::{
 use crate::activation::Activity;
 use crate::search::hypervolume::hypervolume;
 use crate::search::{Evaluated, Fitness, Front, Strategy, Unfit};
+use crate::sspr::{self, Convention, Point};
 use crate::time::SimTime;
 
 /// Where and to what the robot is vulnerable.
@@ -125,6 +126,7 @@ impl Landscape {
                 activation: ActivationMode::Time,
                 search,
                 coverage: None,
+                exploration: None,
                 seed: 0,
                 end_after: 70.0,
                 record: None,
@@ -205,6 +207,7 @@ impl Landscape {
 
     /// The share of the ideal hypervolume (all hits in no time) that the front of a whole campaign reaches.
     pub(crate) fn campaign(&self, strategy: &mut dyn Strategy) -> Run {
+        let plan = self.plan(Search::Random { evaluations: 1 });
         let mut front = Front::default();
         let mut tests = Vec::new();
         loop {
@@ -220,7 +223,12 @@ impl Landscape {
                     // As in a real campaign, a disturbance too weak to be noticed has no effect at all.
                     let fitness =
                         if time < 0.05 { Fitness::Unfit(Unfit::Void) } else { Fitness::Measured(vec![time, -hits]) };
-                    Evaluated { number, test: candidate.test, fitness }
+                    {
+                        let point = sspr::planned(&plan, &candidate.test)
+                            .filter(|_| matches!(fitness, Fitness::Measured(_)))
+                            .and_then(|planned| Point::of(&planned, Convention::Ours));
+                        Evaluated { number, test: candidate.test, fitness, point }
+                    }
                 })
                 .collect();
             for result in &results {
@@ -340,6 +348,7 @@ mod tests {
                     number,
                     test: candidate.test.clone(),
                     fitness: Fitness::Unfit(Unfit::Unmeasured),
+                    point: None,
                 })
                 .collect();
             strategy.tell(&results);

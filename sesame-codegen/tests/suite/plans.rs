@@ -99,6 +99,7 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 activation: ActivationMode::Time,
                 search: Search::Random { evaluations: 10 },
                 coverage: None,
+                exploration: None,
                 seed: 42,
                 end_after: 70.0,
                 record: None,

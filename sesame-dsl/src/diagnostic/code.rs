@@ -85,6 +85,7 @@ codes! {
     SEARCH_OR_REPEAT = "E0503": "A campaign both searches and repeats, or does neither.",
     NOTHING_TO_GROW = "E0504": "No condition that may hold and may not can be made of what a campaign offers.",
     CANNOT_CONTAIN = "E0505": "An operation asks for something that the campaign's conditions cannot contain.",
+    NOTHING_TO_EXPLORE = "E0506": "A strategy lacks what it works on: cells, windows of time, or an evolution.",
     OUTLASTS_THE_END = "W0001": "A window goes on after the campaign's end.",
     UNUSED_OPERATION = "W0002": "No campaign and no test uses the operation.",
     OBJECTIVE_WITHOUT_DEFAULT = "W0003": "An objective may stay without a value.",

@@ -6,6 +6,7 @@
 
 mod campaign;
 pub mod condition;
+mod exploration;
 mod formula;
 mod fuzz;
 mod ids;
@@ -14,6 +15,7 @@ mod system;
 mod temporal;
 
 pub use campaign::*;
+pub use exploration::*;
 pub use formula::*;
 pub use fuzz::*;
 pub use ids::*;

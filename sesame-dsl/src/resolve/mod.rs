@@ -14,6 +14,7 @@ mod collect;
 mod condition;
 mod coverage;
 mod custom;
+mod exploration;
 mod formula;
 mod fuzz;
 mod measure;

@@ -462,6 +462,7 @@ pub(crate) struct Campaign {
     pub(crate) activates: Vec<(Span, ActivationMode)>,
     pub(crate) searches: Vec<Search>,
     pub(crate) coverages: Vec<Coverage>,
+    pub(crate) explorations: Vec<Exploration>,
     pub(crate) repeats: Vec<Repeat>,
     pub(crate) ends: Vec<(Span, Quantity)>,
     pub(crate) records: Vec<(Span, Record)>,
@@ -517,6 +518,8 @@ pub(crate) struct Search {
 pub(crate) enum Strategy {
     Nsga2,
     Random,
+    MapElites,
+    LatinHypercube,
 }
 
 #[derive(Debug)]
@@ -534,6 +537,28 @@ pub(crate) struct CoverageAxis {
     pub(crate) dimension: Name,
     pub(crate) range: Range,
     pub(crate) cells: Count,
+}
+
+/// `boost fixed { … }`, `boost linear { … }` or `construct { … }`, with the settings as written.
+#[derive(Debug)]
+pub(crate) struct Exploration {
+    pub(crate) span: Span,
+    pub(crate) kind: ExplorationKind,
+    pub(crate) generations: Vec<(Span, Count)>,
+    pub(crate) iterations: Vec<(Span, Count)>,
+    pub(crate) tries: Vec<(Span, Count)>,
+    /// How many children at the beginning, and at the end.
+    pub(crate) children: Vec<(Span, [Count; 2])>,
+    pub(crate) drops: Vec<(Span, Count)>,
+    pub(crate) shares: Vec<(Span, Quantity)>,
+    pub(crate) untils: Vec<(Span, Quantity)>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ExplorationKind {
+    BoostFixed,
+    BoostLinear,
+    Construct,
 }
 
 #[derive(Debug)]

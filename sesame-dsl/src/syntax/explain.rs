@@ -31,6 +31,8 @@ pub(super) enum Place {
     Condition,
     Search,
     Coverage,
+    Boost,
+    Construct,
     Repeat,
 }
 
@@ -50,6 +52,8 @@ impl Place {
             Place::Condition => Rule::error_condition_setting,
             Place::Search => Rule::error_search_setting,
             Place::Coverage => Rule::error_coverage_member,
+            Place::Boost => Rule::error_boost_setting,
+            Place::Construct => Rule::error_construct_setting,
             Place::Repeat => Rule::error_repeat_setting,
         }
     }
@@ -83,16 +87,25 @@ impl Place {
                 Rule::activate,
                 Rule::search,
                 Rule::coverage,
+                Rule::boost,
+                Rule::construct,
                 Rule::end,
                 Rule::repeat,
                 Rule::record,
-                Rule::unsupported_campaign_member,
             ],
             Place::Condition => &[Rule::setting_depth, Rule::setting_integers],
             Place::Search => &[Rule::setting_population, Rule::setting_evaluations, Rule::setting_seed],
             Place::Coverage => {
                 &[Rule::coverage_axis, Rule::coverage_hits, Rule::coverage_stop, Rule::coverage_failsafe]
             }
+            Place::Boost => &[
+                Rule::boost_generations,
+                Rule::boost_iterations,
+                Rule::boost_tries,
+                Rule::boost_children,
+                Rule::boost_drop,
+            ],
+            Place::Construct => &[Rule::construct_share, Rule::construct_until],
             Place::Repeat => &[Rule::setting_seed],
         }
     }
@@ -112,6 +125,8 @@ impl Place {
             Place::Condition => Rule::one_condition_setting,
             Place::Search => Rule::one_search_setting,
             Place::Coverage => Rule::one_coverage_member,
+            Place::Boost => Rule::one_boost_setting,
+            Place::Construct => Rule::one_construct_setting,
             Place::Repeat => Rule::one_repeat_setting,
         }
     }
@@ -131,11 +146,14 @@ impl Place {
             Place::Custom => "a parameter such as `points: int [3, 20]`",
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
             Place::Campaign => {
-                "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `repeat`, `record` or `end after`"
+                "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `boost`, `construct`, `repeat`, `record` \
+                 or `end after`"
             }
             Place::Condition => "`depth` or `integers`",
             Place::Search => "`population`, `evaluations` or `seed`",
             Place::Coverage => "a dimension such as `T1 [0, 1] cells 6`, `hits`, `stop at` or `failsafe`",
+            Place::Boost => "`every N generations`, `every N iterations`, `from N to N`, `drop N` or `tries N`",
+            Place::Construct => "`share` or `until`",
             Place::Repeat => "`seed`",
         }
     }
@@ -151,12 +169,24 @@ impl Place {
             Place::Node => &["publishes", "subscribes"],
             Place::Hook => &["hook"],
             Place::Test => &["expect"],
-            Place::Campaign => {
-                &["objectives", "operations", "observes", "activate", "search", "coverage", "repeat", "record", "end"]
-            }
+            Place::Campaign => &[
+                "objectives",
+                "operations",
+                "observes",
+                "activate",
+                "search",
+                "coverage",
+                "boost",
+                "construct",
+                "repeat",
+                "record",
+                "end",
+            ],
             Place::Condition => &["depth", "integers"],
             Place::Search => &["population", "evaluations", "seed"],
             Place::Coverage => &["hits", "stop", "failsafe"],
+            Place::Boost => &["every", "from", "drop", "tries"],
+            Place::Construct => &["share", "until"],
             Place::Repeat => &["seed"],
         }
     }
@@ -342,6 +372,8 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::simulator_settings
         | Rule::process_settings
         | Rule::search_settings
+        | Rule::boost_settings
+        | Rule::construct_settings
         | Rule::condition_settings => "`{`",
         Rule::close => "`}`",
         Rule::name | Rule::names | Rule::path | Rule::identifier | Rule::condition_variable => "a name",
@@ -383,6 +415,13 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::coverage_hits => "`hits`",
         Rule::coverage_stop => "`stop at`",
         Rule::coverage_failsafe => "`failsafe`",
+        Rule::boost_generations => "`every 2 generations`",
+        Rule::boost_iterations => "`every 2 iterations`",
+        Rule::boost_tries => "`tries`",
+        Rule::boost_children => "`from`",
+        Rule::boost_drop => "`drop`",
+        Rule::construct_share => "`share`",
+        Rule::construct_until => "`until`",
         Rule::within => "`within`",
         Rule::priority => "`priority`",
         Rule::inclusion => "`inclusion`",
@@ -431,7 +470,6 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::k_launch
         | Rule::k_terminate
         | Rule::k_relay
-        | Rule::k_boost
         | Rule::k_node
         | Rule::k_parameter => return None,
         _ => return keyword_of(rule).map(|word| format!("`{word}`")),

@@ -3,6 +3,7 @@
 mod activation;
 pub(crate) mod ast;
 mod explain;
+mod exploration;
 mod formula;
 mod limits;
 mod parse;

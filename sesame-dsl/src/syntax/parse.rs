@@ -569,6 +569,7 @@ impl Reader<'_> {
             activates: vec![],
             searches: vec![],
             coverages: vec![],
+            explorations: vec![],
             repeats: vec![],
             ends: vec![],
             records: vec![],
@@ -599,12 +600,14 @@ impl Reader<'_> {
                 }
                 Rule::search => campaign.searches.push(reader.search(&member, span)),
                 Rule::coverage => campaign.coverages.push(reader.coverage(&member, span)),
+                Rule::boost => campaign.explorations.push(reader.boost(&member, span)),
+                Rule::construct => campaign.explorations.push(reader.construct(&member, span)),
                 Rule::end => campaign.ends.push((span, reader.signed(&expect_child(&member, Rule::signed)))),
                 Rule::record => {
                     let all = child(&member, Rule::k_all).is_some();
                     campaign.records.push((span, if all { Record::All } else { Record::Failing }));
                 }
-                Rule::repeat => {
+                _ => {
                     let mut seed = Vec::new();
                     if let Some(settings) = child(&member, Rule::repeat_settings) {
                         reader.members(&settings, Place::Repeat, |reader, setting| {
@@ -618,9 +621,6 @@ impl Reader<'_> {
                         times: reader.count(&expect_child(&member, Rule::number)),
                         seed,
                     });
-                }
-                _ => {
-                    reader.unsupported(&member);
                 }
             }
         });
@@ -662,8 +662,13 @@ impl Reader<'_> {
             self.unsupported(&strategy);
             return search;
         }
-        let nsga2 = child(pair, Rule::k_nsga2).is_some();
-        search.strategy = Some(if nsga2 { Strategy::Nsga2 } else { Strategy::Random });
+        let strategies = [
+            (Rule::k_nsga2, Strategy::Nsga2),
+            (Rule::k_map_elites, Strategy::MapElites),
+            (Rule::k_latin_hypercube, Strategy::LatinHypercube),
+            (Rule::k_random, Strategy::Random),
+        ];
+        search.strategy = strategies.into_iter().find(|(rule, _)| child(pair, *rule).is_some()).map(|(_, it)| it);
         let settings = expect_child(pair, Rule::search_settings);
         search.damaged = self.members(&settings, Place::Search, |reader, setting| {
             let value = (reader.keyword_span(&setting), reader.count(&expect_child(&setting, Rule::number)));
