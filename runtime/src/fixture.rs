@@ -63,6 +63,7 @@ pub(crate) fn plan(operations: Vec<Operation>) -> CampaignPlan {
             search: Search::Random { evaluations: 1 },
             coverage: None,
             exploration: None,
+            stop: Vec::new(),
             seed: 1,
             end_after: 10.0,
             record: None,

@@ -19,6 +19,7 @@ pub mod range;
 pub mod real;
 pub mod selection;
 pub mod sorting;
+pub mod stop;
 pub mod vary;
 
 mod boost;
@@ -28,6 +29,7 @@ mod constructing;
 mod known;
 mod latin_hypercube;
 mod map_elites;
+mod predict;
 mod random;
 mod repeat;
 
@@ -46,6 +48,7 @@ use cells::Cells;
 use construct::Constructor;
 use constructing::{Constructing, Construction};
 use nsga2::Variation;
+use predict::Predicting;
 
 pub use dominance::{Fitness, Unfit};
 pub use front::Front;
@@ -54,8 +57,10 @@ pub use latin_hypercube::LatinHypercube;
 pub use map_elites::MapElites;
 pub use nsga2::Nsga2;
 pub use permitted::{Permitted, SearchError};
+pub use predict::Course;
 pub use random::Random;
 pub use repeat::Repeat;
+pub use stop::StopRules;
 pub use vary::TestVariation;
 
 /// How tests are found, by ask and tell.
@@ -68,6 +73,9 @@ pub trait Strategy: Send {
 
     /// Takes the results of exactly the generation asked last, in its order.
     fn tell(&mut self, results: &[Evaluated]);
+
+    /// Takes how the condition variables went in the undisturbed run, before the first generation is asked.
+    fn reference(&mut self, _: Course) {}
 }
 
 /// A test to be evaluated.
@@ -94,6 +102,13 @@ pub struct Evaluated {
     pub fitness: Fitness,
     /// Where its run lies in the reduced parameter space, if it counts for coverage.
     pub point: Option<Point>,
+    /// How the condition variables went in its run, where the campaign [predicts](needs_courses).
+    pub course: Option<Course>,
+}
+
+/// Whether the strategy of a plan asks for the courses of runs.
+pub fn needs_courses(plan: &CampaignPlan) -> bool {
+    matches!(plan.campaign.exploration, Some(Exploration::Predict { .. }))
 }
 
 /// The strategy that a plan names. `seed` is the campaign's, or what `run --seed` put in its place.
@@ -106,7 +121,18 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
             let permitted = Permitted::of(plan)?;
             let tests = variation(plan, permitted.clone(), seed);
             let settings = nsga2::Settings { population, evaluations, seed };
+            let by_time = plan.campaign.activation == ActivationMode::Time;
             match &plan.campaign.exploration {
+                Some(Exploration::Predict { .. }) if by_time => {
+                    return Err(SearchError::NotByCondition { campaign: plan.campaign.name.clone() });
+                }
+                Some(Exploration::Boost { .. } | Exploration::Construct { .. }) if !by_time => {
+                    return Err(SearchError::NotByTime { campaign: plan.campaign.name.clone() });
+                }
+                &Some(Exploration::Predict { candidates }) => {
+                    let predicting = Predicting::new(tests, permitted, cells(plan)?, candidates, seed);
+                    Box::new(Nsga2::new(settings, predicting))
+                }
                 None => Box::new(Nsga2::new(settings, tests)),
                 &Some(Exploration::Boost { every_generations, children, tries }) => {
                     let boosting = Boosting { every_generations, children, tries };
@@ -154,9 +180,6 @@ fn variation(plan: &CampaignPlan, permitted: Permitted, seed: u64) -> TestVariat
 /// The cells that an exploration is about.
 fn cells(plan: &CampaignPlan) -> Result<Cells, SearchError> {
     let campaign = || plan.campaign.name.clone();
-    if plan.campaign.activation != ActivationMode::Time {
-        return Err(SearchError::NotByTime { campaign: campaign() });
-    }
     let goal = plan.campaign.coverage.as_ref().ok_or_else(|| SearchError::NoCoverage { campaign: campaign() })?;
     Cells::of(plan, goal).map_err(|reason| SearchError::Grid { campaign: campaign(), reason })
 }
@@ -189,6 +212,9 @@ pub fn fitness_of(plan: &CampaignPlan, outcome: &Outcome, value: impl Fn(MetricI
 pub(crate) trait Learning: Variation<Genome = Test> {
     /// Takes the results of the generation asked last, in its order.
     fn learn(&mut self, results: &[Evaluated]);
+
+    /// Takes how the condition variables went in the undisturbed run.
+    fn reference(&mut self, _: Course) {}
 }
 
 impl Learning for TestVariation {
@@ -201,6 +227,10 @@ impl<V: Learning + Send> Strategy for Nsga2<V> {
         let generation = self.generation();
         let asked = Nsga2::ask(self);
         asked.into_iter().map(|a| Candidate { test: a.genome, parents: a.parents, generation, known: None }).collect()
+    }
+
+    fn reference(&mut self, course: Course) {
+        self.variation_mut().reference(course);
     }
 
     fn tell(&mut self, results: &[Evaluated]) {

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
     ActivationMode, BoostedChildren, CampaignPlan, CoverageGoal, Distribution, Domain, Drain, Exploration, GridAxis,
-    MetricSource, Operation, OperationKind, Parameter, Search,
+    MetricSource, Operation, OperationKind, Parameter, Search, StopRule,
 };
 
 /// More whole numbers than these are not written out one by one.
@@ -82,6 +82,10 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
     if let Some(exploration) = &campaign.exploration {
         clauses.push(explored(exploration));
     }
+    if !campaign.stop.is_empty() {
+        let rules: Vec<String> = campaign.stop.iter().map(stop_rule).collect();
+        clauses.push(("stop", format!("{{ {} }}", rules.join("  "))));
+    }
     clauses.push(("end", format!("after {}s", campaign.end_after)));
     clauses
 }
@@ -111,6 +115,18 @@ fn explored(exploration: &Exploration) -> (&'static str, String) {
             let until = until.map_or(String::new(), |until| format!("  until {}%", percent(until)));
             ("construct", format!("{{ share {}%{until} }}", percent(*share)))
         }
+        Exploration::Predict { candidates } => ("predict", format!("{{ candidates {candidates} }}")),
+    }
+}
+
+fn stop_rule(rule: &StopRule) -> String {
+    match *rule {
+        StopRule::WallTime { seconds } => format!("time {seconds}s"),
+        StopRule::Stagnation { generations, below } => {
+            format!("stagnation {generations} generations below {}%", percent(below))
+        }
+        StopRule::Discovery { below } => format!("discovery below {}%", percent(below)),
+        StopRule::Completeness { share } => format!("completeness {}%", percent(share)),
     }
 }
 
@@ -347,7 +363,13 @@ mod tests {
     const CONSTRUCTED: &str = "
         campaign constructed { objectives time  operations cut, swing 1..3 per test
           search nsga2 { population 4  evaluations 8 }
-          coverage { T1 [0, 1] cells 6 }  construct { share 30%  until 7% }  end after 70s }";
+          coverage { T1 [0, 1] cells 6 }  construct { share 30%  until 7% }
+          stop { time 1.5h  stagnation 5 generations below 2%  discovery below 3%  completeness 90% }  end after 70s }";
+    const PREDICTED: &str = "
+        campaign predicted { objectives time  operations cut, swing 1..3 per test
+          activate by condition over near, collisions
+          search nsga2 { population 4  evaluations 8 }
+          coverage { T1 [0, 1] cells 6 }  predict { }  end after 70s }";
     const ELITES: &str = "
         campaign elites { objectives time  operations cut, swing 1..3 per test
           search map_elites { population 4  evaluations 8 }  coverage { T1 [0, 1] cells 6 }  end after 70s }";
@@ -367,7 +389,7 @@ mod tests {
 
     #[test]
     fn what_is_explained_has_the_same_plan() {
-        for text in [EVERYTHING, DEFAULTS, BY_TIME, BOOSTED, CONSTRUCTED, ELITES, LATIN, AGAIN] {
+        for text in [EVERYTHING, DEFAULTS, BY_TIME, BOOSTED, CONSTRUCTED, PREDICTED, ELITES, LATIN, AGAIN] {
             // Operations that a campaign leaves out are still needed by the known test.
             let original = plan(&format!("{OPERATIONS}{text}"));
             let explained = campaign(&original);
@@ -391,9 +413,11 @@ mod tests {
 
     #[test]
     fn explorations_with_their_defaults() {
-        let explained = [BOOSTED, CONSTRUCTED].map(|text| campaign(&plan(&format!("{OPERATIONS}{text}"))));
+        let explained = [BOOSTED, CONSTRUCTED, PREDICTED].map(|text| campaign(&plan(&format!("{OPERATIONS}{text}"))));
         let clauses = explained.iter().flat_map(|text| text.lines()).filter(|line| {
-            ["coverage", "boost", "construct"].iter().any(|word| line.trim_start().starts_with(&format!("{word} ")))
+            ["coverage", "boost", "construct", "predict", "stop"]
+                .iter()
+                .any(|word| line.trim_start().starts_with(&format!("{word} ")))
         });
         insta::assert_snapshot!(clauses.collect::<Vec<_>>().join("\n"), @"");
     }

@@ -188,6 +188,7 @@ impl Selection {
             search,
             coverage: campaign.coverage.as_ref().map(coverage),
             exploration: campaign.exploration.map(exploration),
+            stop: campaign.stop.iter().copied().map(stop_rule).collect(),
             seed: campaign.seed,
             end_after: campaign.end_after,
             record: campaign.record.map(|record| match record {
@@ -414,6 +415,16 @@ fn exploration(exploration: model::Exploration) -> plan::Exploration {
             plan::Exploration::Boost { every_generations, children, tries }
         }
         model::Exploration::Construct { share, until } => plan::Exploration::Construct { share, until },
+        model::Exploration::Predict { candidates } => plan::Exploration::Predict { candidates },
+    }
+}
+
+fn stop_rule(rule: model::StopRule) -> plan::StopRule {
+    match rule {
+        model::StopRule::WallTime { seconds } => plan::StopRule::WallTime { seconds },
+        model::StopRule::Stagnation { generations, below } => plan::StopRule::Stagnation { generations, below },
+        model::StopRule::Discovery { below } => plan::StopRule::Discovery { below },
+        model::StopRule::Completeness { share } => plan::StopRule::Completeness { share },
     }
 }
 

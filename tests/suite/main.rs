@@ -15,5 +15,6 @@ mod kuka_cell;
 mod regeneration;
 mod search;
 mod stl;
+mod strategies;
 mod tampering;
 mod traces;

@@ -24,6 +24,12 @@ pub enum Exploration {
         /// The share of all cells, in `0..=1`, from which on none is constructed any more; `None` for all feasible ones.
         until: Option<f64>,
     },
+    /// Prediction: of several candidates for each test the one that would probably fall into a cell that wants tests. For
+    /// campaigns by condition.
+    Predict {
+        /// How many candidates; at least 1.
+        candidates: u32,
+    },
 }
 
 /// Which children of a generation are boosted.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::condition::{ConditionSpace, Constraint};
-use crate::{CoverageGoal, Exploration, Formula, KnownTest};
+use crate::{CoverageGoal, Exploration, Formula, KnownTest, StopRule};
 
 macro_rules! id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -576,6 +576,9 @@ pub struct Campaign {
     /// What an evolution does to cover more cells; `None` for one that only counts them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exploration: Option<Exploration>,
+    /// What stops the search besides its number of tests and its coverage.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stop: Vec<StopRule>,
     /// The one seed that decides everything; `run --seed` overrides it.
     pub seed: u64,
     /// Simulation time at which a test ends, in seconds.

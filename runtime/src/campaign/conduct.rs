@@ -4,7 +4,7 @@ use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use sesame_plan::{CampaignPlan, CoverageGoal, Recorded, Search, Test};
 
@@ -17,7 +17,7 @@ use crate::record::{
     ResultSet, Status, TestRecord, Verdict, differences, verdict,
 };
 use crate::rng::derive_seed;
-use crate::search::{self, Candidate, Evaluated, Front, SearchError};
+use crate::search::{self, Candidate, Course, Evaluated, Front, SearchError, StopRules};
 use crate::sspr::{self, Point};
 
 /// A test that runs this many times as long as the undisturbed run is taken to hang.
@@ -153,9 +153,15 @@ pub fn conduct(
         desk.recorder.put_event(&Event { kind: EventKind::Warning, test: None, text })?;
     }
 
+    let courses = search::needs_courses(plan);
+    if let Some(course) = Course::of(plan, &reference).filter(|_| courses) {
+        strategy.reference(course);
+    }
     let total = plan.campaign.search.evaluations();
     let repeats = matches!(plan.campaign.search, Search::Repeat { .. });
     let mut front = Front::default();
+    let mut rules = StopRules::of(plan);
+    let begun = Instant::now();
     let mut earlier = Earlier::default();
     let mut numbered = 0;
     let mut done = 0;
@@ -186,7 +192,8 @@ pub fn conduct(
             if let (Some(tracking), Some(point)) = (&mut tracking, &point) {
                 tracking.coverage.add(point);
             }
-            told.push(Evaluated { number: record.number, test: record.test.clone(), fitness, point });
+            let course = if courses { Course::of(plan, &record.observation) } else { None };
+            told.push(Evaluated { number: record.number, test: record.test.clone(), fitness, point, course });
             let coverage = tracking.as_ref().map(|it| &it.coverage);
             progress(Progress { done, total, latest: Some(record), front: &front, coverage });
         })?;
@@ -195,6 +202,7 @@ pub fn conduct(
         }
         told.sort_by_key(|evaluated| evaluated.number);
         strategy.tell(&told);
+        rules.tell(&told);
         if !plan.campaign.objectives.is_empty() {
             desk.recorder.put_result_set(&ResultSet {
                 name: format!("generation-{generation}"),
@@ -209,6 +217,10 @@ pub fn conduct(
                 stop = reached;
                 break;
             }
+        }
+        if let Some(reached) = rules.reached(begun.elapsed()) {
+            stop = reached;
+            break;
         }
     }
 

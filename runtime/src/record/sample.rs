@@ -122,6 +122,7 @@ pub(crate) fn plan() -> CampaignPlan {
             search: Search::Nsga2 { population: 10, evaluations: 210 },
             coverage: None,
             exploration: None,
+            stop: Vec::new(),
             seed: 42,
             end_after: 70.0,
             record: None,

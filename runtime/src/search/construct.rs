@@ -82,7 +82,7 @@ impl Constructor {
         (0..FROM_THE_TEST + FROM_FRESH).find_map(|attempt| {
             let mut built = if attempt < FROM_THE_TEST { test.clone() } else { fresh_test(&self.permitted, stream) };
             let done = self.number(&mut built, &demands, plan, stream)
-                && self.time(&mut built, &demands, plan, stream)
+                && self.time(&mut built, &demands, plan, attempt, stream)
                 && self.grade(&mut built, &demands, plan, stream);
             if !done {
                 return None;
@@ -181,7 +181,9 @@ impl Constructor {
         windows.collect()
     }
 
-    fn time(&self, test: &mut Test, demands: &Demands, plan: &CampaignPlan, stream: &mut Stream) -> bool {
+    /// Moves the windows. Attempts after the first try shorter intervals where a spread of midpoints is wanted: the shorter
+    /// they are, the farther apart their midpoints can be.
+    fn time(&self, test: &mut Test, demands: &Demands, plan: &CampaignPlan, attempt: u32, stream: &mut Stream) -> bool {
         if !demands.any_of(&[Dimension::T1, Dimension::T2, Dimension::T3]) {
             return true;
         }
@@ -191,7 +193,11 @@ impl Constructor {
         let anything = (f64::NEG_INFINITY, f64::INFINITY);
         let [t1, t2] = [Dimension::T1, Dimension::T2].map(|dimension| demands.of(dimension).unwrap_or(anything));
         // The longer the intervals, the less room for their midpoints: see the feasible cells.
-        let longest = t2.1.min(width - 2.0 * (t1.0 - centre)).min(width - 2.0 * (centre - t1.1));
+        let mut longest = t2.1.min(width - 2.0 * (t1.0 - centre)).min(width - 2.0 * (centre - t1.1));
+        if attempt > 0 && demands.of(Dimension::T3).is_some() {
+            let shortest = t2.0.max(mean(&|it| it.shortest));
+            longest = shortest + (longest.min(width) - shortest) * stream.unit();
+        }
         let lengths: Vec<Member> = windows
             .iter()
             .map(|it| Member { now: it.end - it.start, low: it.shortest, high: it.high - it.low, step: None })

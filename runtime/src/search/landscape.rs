@@ -12,8 +12,9 @@ use sesame_plan::{
 };
 
 use crate::activation::Activity;
+use crate::observation::{MetricObservation, Observation, Outcome, WallTime};
 use crate::search::hypervolume::hypervolume;
-use crate::search::{Evaluated, Fitness, Front, Strategy, Unfit};
+use crate::search::{Course, Evaluated, Fitness, Front, Strategy, Unfit, needs_courses};
 use crate::sspr::{self, Convention, Point};
 use crate::time::SimTime;
 
@@ -127,6 +128,7 @@ impl Landscape {
                 search,
                 coverage: None,
                 exploration: None,
+                stop: Vec::new(),
                 seed: 0,
                 end_after: 70.0,
                 record: None,
@@ -205,9 +207,42 @@ impl Landscape {
         (time, hits as f64)
     }
 
+    /// Where a test lies when it is run.
+    pub(crate) fn point(plan: &CampaignPlan, test: &Test) -> Option<Point> {
+        let disturbances = test.operations.iter().map(|it| {
+            let intervals = Self::active(it).into_iter().map(|(start, end)| Span { start, end }).collect();
+            sspr::disturbance(plan, it.operation, &it.parameters, intervals)
+        });
+        Point::of(&disturbances.collect::<Vec<_>>(), Convention::Ours)
+    }
+
+    /// What is recorded of a run: nothing that a test does changes what conditions see.
+    pub(crate) fn undisturbed(plan: &CampaignPlan) -> Observation {
+        let series =
+            |metric| (0u32..350).map(|slot| f64::from(slot) * 0.2).map(|t| (t, Self::signal(metric, t))).collect();
+        let metrics = (0u32..).map(MetricId).take(plan.metrics.len());
+        Observation {
+            outcome: Outcome::Completed,
+            end: 70.0,
+            operations: Vec::new(),
+            metrics: metrics.map(|id| MetricObservation { value: None, set: false, series: series(id) }).collect(),
+            messages: 0,
+            warnings: Vec::new(),
+            wall: WallTime::default(),
+        }
+    }
+
     /// The share of the ideal hypervolume (all hits in no time) that the front of a whole campaign reaches.
     pub(crate) fn campaign(&self, strategy: &mut dyn Strategy) -> Run {
-        let plan = self.plan(Search::Random { evaluations: 1 });
+        self.campaign_of(&self.plan(Search::Random { evaluations: 1 }), strategy)
+    }
+
+    /// As [`Landscape::campaign`], of a plan that is by condition perhaps.
+    pub(crate) fn campaign_of(&self, plan: &CampaignPlan, strategy: &mut dyn Strategy) -> Run {
+        let course = needs_courses(plan).then(|| Course::of(plan, &Self::undisturbed(plan))).flatten();
+        if let Some(course) = course.clone() {
+            strategy.reference(course);
+        }
         let mut front = Front::default();
         let mut tests = Vec::new();
         loop {
@@ -223,12 +258,8 @@ impl Landscape {
                     // As in a real campaign, a disturbance too weak to be noticed has no effect at all.
                     let fitness =
                         if time < 0.05 { Fitness::Unfit(Unfit::Void) } else { Fitness::Measured(vec![time, -hits]) };
-                    {
-                        let point = sspr::planned(&plan, &candidate.test)
-                            .filter(|_| matches!(fitness, Fitness::Measured(_)))
-                            .and_then(|planned| Point::of(&planned, Convention::Ours));
-                        Evaluated { number, test: candidate.test, fitness, point }
-                    }
+                    let point = if time < 0.05 { None } else { Self::point(plan, &candidate.test) };
+                    Evaluated { number, test: candidate.test, fitness, point, course: course.clone() }
                 })
                 .collect();
             for result in &results {
@@ -349,6 +380,7 @@ mod tests {
                     test: candidate.test.clone(),
                     fitness: Fitness::Unfit(Unfit::Unmeasured),
                     point: None,
+                    course: None,
                 })
                 .collect();
             strategy.tell(&results);

@@ -64,6 +64,12 @@ pub enum SearchError {
         /// The campaign.
         campaign: String,
     },
+    /// A strategy that predicts when conditions hold, of a campaign that has none.
+    #[error("campaign `{campaign}` is by time: there are no conditions whose outcome could be predicted")]
+    NotByCondition {
+        /// The campaign.
+        campaign: String,
+    },
     /// Cells that are no grid.
     #[error("the coverage of campaign `{campaign}` cannot be counted: {reason}")]
     Grid {

@@ -100,6 +100,7 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 search: Search::Random { evaluations: 10 },
                 coverage: None,
                 exploration: None,
+                stop: Vec::new(),
                 seed: 42,
                 end_after: 70.0,
                 record: None,

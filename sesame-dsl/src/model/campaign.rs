@@ -1,7 +1,7 @@
 //! Campaigns: how tests are found and run.
 
 use super::condition::ConditionSpace;
-use super::{Declaration, Exploration, MetricId, OperationId, Range, TestId};
+use super::{Declaration, Exploration, MetricId, OperationId, Range, StopRule, TestId};
 
 /// A campaign.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +18,8 @@ pub struct Campaign {
     pub coverage: Option<Coverage>,
     /// What the search does to cover more cells. Default nothing.
     pub exploration: Option<Exploration>,
+    /// What else stops the search, in the order of [`StopRule`].
+    pub stop: Vec<StopRule>,
     /// The one seed that decides everything. Default 1.
     pub seed: u64,
     /// Simulation time at which a test ends, in seconds; positive.

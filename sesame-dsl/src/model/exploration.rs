@@ -1,6 +1,7 @@
-//! How a search is made to look where it has not been.
+//! How a search is made to look where it has not been, and when it has looked for long enough.
 
-/// What NSGA-II does besides evolving so that more cells are covered; only in campaigns by time that count coverage.
+/// What NSGA-II does besides evolving so that more cells are covered; only in campaigns that count coverage, by time unless
+/// it says otherwise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Exploration {
     /// Some children are mutated again until they are planned to lie in a cell that wants tests.
@@ -18,6 +19,12 @@ pub enum Exploration {
         share: f64,
         /// The share of all cells, in `0..=1` and above 0, from which on none is constructed any more.
         until: Option<f64>,
+    },
+    /// Of several candidates for each test the one is taken that would probably fall into a cell that wants tests. By
+    /// condition only.
+    Predict {
+        /// How many candidates: 1 or more. Default 20.
+        candidates: u32,
     },
 }
 
@@ -37,5 +44,34 @@ pub enum BoostedChildren {
         last: u32,
         /// How many fewer each time. Default 1.
         drop: u32,
+    },
+}
+
+/// What stops a search besides its number of tests and its coverage; after a generation, the first that holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StopRule {
+    /// It has gone on for so many seconds of wall time, more than 0.
+    WallTime {
+        /// Seconds.
+        seconds: f64,
+    },
+    /// Over so many generations, 1 or more, the hypervolume of its front grew by less than a share of itself.
+    Stagnation {
+        /// Generations.
+        generations: u32,
+        /// In `0..=1` and above 0.
+        below: f64,
+    },
+    /// The next test would fall into a new cell with less than this probability, in `0..=1` and above 0. Only in campaigns
+    /// that count coverage.
+    Discovery {
+        /// The probability.
+        below: f64,
+    },
+    /// This share, in `0..=1` and above 0, of the cells that it would ever hit is hit. Only in campaigns that count
+    /// coverage.
+    Completeness {
+        /// The share.
+        share: f64,
     },
 }

@@ -38,6 +38,7 @@ impl<'a> Resolver<'a> {
         let content = self.content(campaign, end_after, activation);
         let coverage = self.coverage(campaign);
         let exploration = self.exploration(campaign);
+        let stop = self.stop(campaign);
         let (search, seed) = match (campaign.searches.first(), campaign.repeats.first()) {
             (_, Some(repeat)) => {
                 self.only_repeats(campaign, repeat);
@@ -65,6 +66,7 @@ impl<'a> Resolver<'a> {
             search: search?,
             coverage: coverage?,
             exploration: exploration?,
+            stop: stop?,
             seed: seed?,
             end_after: end_after?,
             record,
@@ -296,6 +298,7 @@ impl<'a> Resolver<'a> {
             (campaign.objectives.first().map(|(span, _)| *span), "objectives"),
             (campaign.coverages.first().map(|coverage| coverage.span), "coverage"),
             (campaign.explorations.first().map(|exploration| exploration.span), exploring(campaign)),
+            (campaign.stops.first().map(|stop| stop.span), "stop"),
         ];
         for (span, word) in clauses {
             let Some(span) = span else { continue };
@@ -343,6 +346,7 @@ impl<'a> Resolver<'a> {
 fn exploring(campaign: &ast::Campaign) -> &'static str {
     match campaign.explorations.first().map(|exploration| exploration.kind) {
         Some(ast::ExplorationKind::Construct) => "construct",
+        Some(ast::ExplorationKind::Predict) => "predict",
         _ => "boost",
     }
 }

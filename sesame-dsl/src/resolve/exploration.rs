@@ -11,6 +11,8 @@ use crate::syntax::ast::{self, ExplorationKind, Strategy};
 const EVERY: u32 = 2;
 const TRIES: u32 = 10;
 const DROP: u32 = 1;
+/// Candidates that a prediction compares unless it is said.
+const CANDIDATES: u32 = 20;
 /// The share of a generation that is constructed unless it is said.
 const SHARE: f64 = 0.5;
 
@@ -28,6 +30,11 @@ impl<'a> Resolver<'a> {
         let of = match written.kind {
             ExplorationKind::BoostFixed | ExplorationKind::BoostLinear => self.boost(written),
             ExplorationKind::Construct => self.construct(written),
+            ExplorationKind::Predict => match self.single(&written.candidates, "candidates") {
+                Some(&count) => self.count(count, 1, "a prediction compares"),
+                None => Some(CANDIDATES),
+            }
+            .map(|candidates| Exploration::Predict { candidates }),
         };
         Some(Some(of?))
     }
@@ -150,14 +157,25 @@ impl<'a> Resolver<'a> {
             let what = match exploration.kind {
                 ExplorationKind::BoostFixed | ExplorationKind::BoostLinear => "a boost",
                 ExplorationKind::Construct => "construction",
+                ExplorationKind::Predict => "a prediction",
             };
+            let predicts = exploration.kind == ExplorationKind::Predict;
             if strategy.is_some_and(|(_, strategy)| strategy != Strategy::Nsga2) {
                 refuse(self, exploration.span, what, "changes an evolution", "search by `nsga2` to have one");
             } else if without_cells {
                 refuse(self, exploration.span, what, "has no cells to go for", "add a `coverage`");
-            } else if by_condition {
+            } else if predicts && !by_condition {
+                let label = "say `activate by condition`, or take `construct` instead";
+                refuse(self, exploration.span, what, "has no conditions to weigh", label);
+            } else if by_condition && !predicts {
                 let lacks = "has no windows of time to choose";
-                refuse(self, exploration.span, what, lacks, "leave `activate by condition` out, or this");
+                refuse(
+                    self,
+                    exploration.span,
+                    what,
+                    lacks,
+                    "leave `activate by condition` out, or take `predict` instead",
+                );
             }
         }
         complete

@@ -20,6 +20,7 @@ mod fuzz;
 mod measure;
 mod quantity;
 mod robustness;
+mod stop;
 mod system;
 mod truth;
 

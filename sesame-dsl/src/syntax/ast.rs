@@ -463,6 +463,7 @@ pub(crate) struct Campaign {
     pub(crate) searches: Vec<Search>,
     pub(crate) coverages: Vec<Coverage>,
     pub(crate) explorations: Vec<Exploration>,
+    pub(crate) stops: Vec<Stop>,
     pub(crate) repeats: Vec<Repeat>,
     pub(crate) ends: Vec<(Span, Quantity)>,
     pub(crate) records: Vec<(Span, Record)>,
@@ -539,7 +540,7 @@ pub(crate) struct CoverageAxis {
     pub(crate) cells: Count,
 }
 
-/// `boost fixed { … }`, `boost linear { … }` or `construct { … }`, with the settings as written.
+/// `boost fixed { … }`, `boost linear { … }`, `construct { … }` or `predict { … }`, with the settings as written.
 #[derive(Debug)]
 pub(crate) struct Exploration {
     pub(crate) span: Span,
@@ -552,6 +553,18 @@ pub(crate) struct Exploration {
     pub(crate) drops: Vec<(Span, Count)>,
     pub(crate) shares: Vec<(Span, Quantity)>,
     pub(crate) untils: Vec<(Span, Quantity)>,
+    pub(crate) candidates: Vec<(Span, Count)>,
+}
+
+/// `stop { … }` with its rules as written.
+#[derive(Debug)]
+pub(crate) struct Stop {
+    pub(crate) span: Span,
+    pub(crate) times: Vec<(Span, Quantity)>,
+    pub(crate) stagnations: Vec<(Span, (Count, Quantity))>,
+    pub(crate) discoveries: Vec<(Span, Quantity)>,
+    pub(crate) completenesses: Vec<(Span, Quantity)>,
+    pub(crate) damaged: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -559,6 +572,7 @@ pub(crate) enum ExplorationKind {
     BoostFixed,
     BoostLinear,
     Construct,
+    Predict,
 }
 
 #[derive(Debug)]

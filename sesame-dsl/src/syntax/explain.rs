@@ -33,6 +33,8 @@ pub(super) enum Place {
     Coverage,
     Boost,
     Construct,
+    Predict,
+    Stop,
     Repeat,
 }
 
@@ -54,6 +56,8 @@ impl Place {
             Place::Coverage => Rule::error_coverage_member,
             Place::Boost => Rule::error_boost_setting,
             Place::Construct => Rule::error_construct_setting,
+            Place::Predict => Rule::error_predict_setting,
+            Place::Stop => Rule::error_stop_rule,
             Place::Repeat => Rule::error_repeat_setting,
         }
     }
@@ -89,6 +93,8 @@ impl Place {
                 Rule::coverage,
                 Rule::boost,
                 Rule::construct,
+                Rule::predict,
+                Rule::stop,
                 Rule::end,
                 Rule::repeat,
                 Rule::record,
@@ -106,6 +112,8 @@ impl Place {
                 Rule::boost_drop,
             ],
             Place::Construct => &[Rule::construct_share, Rule::construct_until],
+            Place::Predict => &[Rule::predict_candidates],
+            Place::Stop => &[Rule::stop_time, Rule::stop_stagnation, Rule::stop_discovery, Rule::stop_completeness],
             Place::Repeat => &[Rule::setting_seed],
         }
     }
@@ -127,6 +135,8 @@ impl Place {
             Place::Coverage => Rule::one_coverage_member,
             Place::Boost => Rule::one_boost_setting,
             Place::Construct => Rule::one_construct_setting,
+            Place::Predict => Rule::one_predict_setting,
+            Place::Stop => Rule::one_stop_rule,
             Place::Repeat => Rule::one_repeat_setting,
         }
     }
@@ -146,7 +156,7 @@ impl Place {
             Place::Custom => "a parameter such as `points: int [3, 20]`",
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
             Place::Campaign => {
-                "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `boost`, `construct`, `repeat`, `record` \
+                "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `boost`, `construct`, `predict`, `stop`, `repeat`, `record` \
                  or `end after`"
             }
             Place::Condition => "`depth` or `integers`",
@@ -154,6 +164,8 @@ impl Place {
             Place::Coverage => "a dimension such as `T1 [0, 1] cells 6`, `hits`, `stop at` or `failsafe`",
             Place::Boost => "`every N generations`, `every N iterations`, `from N to N`, `drop N` or `tries N`",
             Place::Construct => "`share` or `until`",
+            Place::Predict => "`candidates`",
+            Place::Stop => "`time`, `stagnation`, `discovery` or `completeness`",
             Place::Repeat => "`seed`",
         }
     }
@@ -187,6 +199,8 @@ impl Place {
             Place::Coverage => &["hits", "stop", "failsafe"],
             Place::Boost => &["every", "from", "drop", "tries"],
             Place::Construct => &["share", "until"],
+            Place::Predict => &["candidates"],
+            Place::Stop => &["time", "stagnation", "discovery", "completeness"],
             Place::Repeat => &["seed"],
         }
     }
@@ -374,6 +388,8 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::search_settings
         | Rule::boost_settings
         | Rule::construct_settings
+        | Rule::predict_settings
+        | Rule::stop_settings
         | Rule::condition_settings => "`{`",
         Rule::close => "`}`",
         Rule::name | Rule::names | Rule::path | Rule::identifier | Rule::condition_variable => "a name",
@@ -422,6 +438,11 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::boost_drop => "`drop`",
         Rule::construct_share => "`share`",
         Rule::construct_until => "`until`",
+        Rule::predict_candidates => "`candidates`",
+        Rule::stop_time => "`time`",
+        Rule::stop_stagnation => "`stagnation`",
+        Rule::stop_discovery => "`discovery`",
+        Rule::stop_completeness => "`completeness`",
         Rule::within => "`within`",
         Rule::priority => "`priority`",
         Rule::inclusion => "`inclusion`",

@@ -1,8 +1,8 @@
-//! What a campaign does to cover more cells.
+//! What a campaign does to cover more cells, and when it has done enough.
 
 use sesame_grammar::Rule;
 
-use super::ast::{Count, Exploration, ExplorationKind};
+use super::ast::{Count, Exploration, ExplorationKind, Stop};
 use super::explain::Place;
 use super::parse::{Pair, Reader, child, children, expect_child};
 use crate::span::Span;
@@ -38,6 +38,40 @@ impl Reader<'_> {
         });
         construct
     }
+
+    pub(super) fn predict(&mut self, pair: &Pair<'_>, span: Span) -> Exploration {
+        let mut predict = empty(span, ExplorationKind::Predict);
+        self.members(&expect_child(pair, Rule::predict_settings), Place::Predict, |reader, setting| {
+            let count = reader.count(&expect_child(&setting, Rule::number));
+            predict.candidates.push((reader.keyword_span(&setting), count));
+        });
+        predict
+    }
+
+    pub(super) fn stop(&mut self, pair: &Pair<'_>, span: Span) -> Stop {
+        let mut stop = Stop {
+            span,
+            times: vec![],
+            stagnations: vec![],
+            discoveries: vec![],
+            completenesses: vec![],
+            damaged: false,
+        };
+        stop.damaged = self.members(&expect_child(pair, Rule::stop_settings), Place::Stop, |reader, rule| {
+            let span = reader.keyword_span(&rule);
+            let quantity = reader.signed(&expect_child(&rule, Rule::signed));
+            match rule.as_rule() {
+                Rule::stop_time => stop.times.push((span, quantity)),
+                Rule::stop_stagnation => {
+                    let generations = reader.count(&expect_child(&rule, Rule::number));
+                    stop.stagnations.push((span, (generations, quantity)));
+                }
+                Rule::stop_discovery => stop.discoveries.push((span, quantity)),
+                _ => stop.completenesses.push((span, quantity)),
+            }
+        });
+        stop
+    }
 }
 
 fn empty(span: Span, kind: ExplorationKind) -> Exploration {
@@ -51,5 +85,6 @@ fn empty(span: Span, kind: ExplorationKind) -> Exploration {
         drops: vec![],
         shares: vec![],
         untils: vec![],
+        candidates: vec![],
     }
 }

@@ -570,6 +570,7 @@ impl Reader<'_> {
             searches: vec![],
             coverages: vec![],
             explorations: vec![],
+            stops: vec![],
             repeats: vec![],
             ends: vec![],
             records: vec![],
@@ -601,6 +602,8 @@ impl Reader<'_> {
                 Rule::search => campaign.searches.push(reader.search(&member, span)),
                 Rule::coverage => campaign.coverages.push(reader.coverage(&member, span)),
                 Rule::boost => campaign.explorations.push(reader.boost(&member, span)),
+                Rule::predict => campaign.explorations.push(reader.predict(&member, span)),
+                Rule::stop => campaign.stops.push(reader.stop(&member, span)),
                 Rule::construct => campaign.explorations.push(reader.construct(&member, span)),
                 Rule::end => campaign.ends.push((span, reader.signed(&expect_child(&member, Rule::signed)))),
                 Rule::record => {
