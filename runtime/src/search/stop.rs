@@ -10,6 +10,7 @@
 //! Both assume that tests are drawn independently. Random search draws so; a search that learns does not, and the reason
 //! to stop says that the estimate is biased then.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use sesame_plan::{CampaignPlan, Search, StopRule};
@@ -32,7 +33,7 @@ pub struct StopRules {
     /// The worst value of each objective so far: what hypervolumes are measured from.
     worst: Vec<f64>,
     /// After each generation the objectives of the front, the latest last, as many as a rule looks back.
-    fronts: Vec<Vec<Vec<f64>>>,
+    fronts: VecDeque<Vec<Vec<f64>>>,
 }
 
 impl StopRules {
@@ -47,7 +48,7 @@ impl StopRules {
             counted: 0,
             front: Front::default(),
             worst: Vec::new(),
-            fronts: Vec::new(),
+            fronts: VecDeque::new(),
         }
     }
 
@@ -70,7 +71,15 @@ impl StopRules {
                 }
             }
         }
-        self.fronts.push(self.front.members().iter().map(|member| member.objectives.clone()).collect());
+        let looks_back = self.rules.iter().map(|rule| match rule {
+            StopRule::Stagnation { generations, .. } => *generations as usize + 1,
+            _ => 0,
+        });
+        let looks_back = looks_back.max().unwrap_or(0);
+        self.fronts.push_back(self.front.members().iter().map(|member| member.objectives.clone()).collect());
+        while self.fronts.len() > looks_back {
+            self.fronts.pop_front();
+        }
     }
 
     /// Why the search stops now, if it does. `elapsed` is the wall time since it was started or taken up again.
@@ -128,7 +137,7 @@ impl StopRules {
     /// By how much the hypervolume has grown over so many generations, as a share of what it is; `None` so early that
     /// there are not as many yet, or nothing is on the front. Both fronts are measured from the worst values seen by now.
     fn growth(&self, generations: usize) -> Option<f64> {
-        let now = self.fronts.last()?;
+        let now = self.fronts.back()?;
         let then = &self.fronts[self.fronts.len().checked_sub(generations + 1)?];
         if self.worst.is_empty() || !self.worst.iter().all(|worst| worst.is_finite()) {
             return None;
@@ -246,7 +255,7 @@ mod tests {
     proptest! {
         #[test]
         fn growth_is_what_two_fronts_measured_from_one_place_differ_by(seed: u64, generations in 1usize..4) {
-            let plan = random(10, StopRule::Stagnation { generations: 1, below: 0.1 });
+            let plan = random(10, StopRule::Stagnation { generations: 6, below: 0.1 });
             let mut rules = StopRules::of(&plan);
             let mut stream = Stream::derive(seed, "test", &[]);
             let mut all: Vec<Evaluated> = Vec::new();

@@ -69,10 +69,13 @@ impl<'a> Resolver<'a> {
             None => Some(DROP),
         };
         let Some(&[from, to]) = self.single(&written.children, "from … to") else {
-            let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, written.span, "this boost does not say how many")
-                .label("add how many children are boosted at first and at last")
-                .note("for example `from 10 to 1`");
-            self.report(diagnostic);
+            if !written.damaged {
+                let diagnostic =
+                    Diagnostic::new(Code::CLAUSE_MISSING, written.span, "this boost does not say how many")
+                        .label("add how many children are boosted at first and at last")
+                        .note("for example `from 10 to 1`");
+                self.report(diagnostic);
+            }
             return None;
         };
         let [first, last] = [from, to].map(|count| self.count(count, 0, "a boost takes"));

@@ -554,6 +554,7 @@ pub(crate) struct Exploration {
     pub(crate) shares: Vec<(Span, Quantity)>,
     pub(crate) untils: Vec<(Span, Quantity)>,
     pub(crate) candidates: Vec<(Span, Count)>,
+    pub(crate) damaged: bool,
 }
 
 /// `stop { … }` with its rules as written.

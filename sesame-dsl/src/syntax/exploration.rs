@@ -12,7 +12,7 @@ impl Reader<'_> {
         let fixed = child(pair, Rule::k_fixed).is_some();
         let kind = if fixed { ExplorationKind::BoostFixed } else { ExplorationKind::BoostLinear };
         let mut boost = empty(span, kind);
-        self.members(&expect_child(pair, Rule::boost_settings), Place::Boost, |reader, setting| {
+        boost.damaged = self.members(&expect_child(pair, Rule::boost_settings), Place::Boost, |reader, setting| {
             let span = reader.keyword_span(&setting);
             let mut counts = children(&setting, Rule::number).map(|it| reader.count(&it)).collect::<Vec<Count>>();
             let last = counts.pop().expect("a setting of `boost` has a number");
@@ -29,22 +29,24 @@ impl Reader<'_> {
 
     pub(super) fn construct(&mut self, pair: &Pair<'_>, span: Span) -> Exploration {
         let mut construct = empty(span, ExplorationKind::Construct);
-        self.members(&expect_child(pair, Rule::construct_settings), Place::Construct, |reader, setting| {
-            let share = (reader.keyword_span(&setting), reader.signed(&expect_child(&setting, Rule::signed)));
-            match setting.as_rule() {
-                Rule::construct_share => construct.shares.push(share),
-                _ => construct.untils.push(share),
-            }
-        });
+        construct.damaged =
+            self.members(&expect_child(pair, Rule::construct_settings), Place::Construct, |reader, setting| {
+                let share = (reader.keyword_span(&setting), reader.signed(&expect_child(&setting, Rule::signed)));
+                match setting.as_rule() {
+                    Rule::construct_share => construct.shares.push(share),
+                    _ => construct.untils.push(share),
+                }
+            });
         construct
     }
 
     pub(super) fn predict(&mut self, pair: &Pair<'_>, span: Span) -> Exploration {
         let mut predict = empty(span, ExplorationKind::Predict);
-        self.members(&expect_child(pair, Rule::predict_settings), Place::Predict, |reader, setting| {
-            let count = reader.count(&expect_child(&setting, Rule::number));
-            predict.candidates.push((reader.keyword_span(&setting), count));
-        });
+        predict.damaged =
+            self.members(&expect_child(pair, Rule::predict_settings), Place::Predict, |reader, setting| {
+                let count = reader.count(&expect_child(&setting, Rule::number));
+                predict.candidates.push((reader.keyword_span(&setting), count));
+            });
         predict
     }
 
@@ -86,5 +88,6 @@ fn empty(span: Span, kind: ExplorationKind) -> Exploration {
         shares: vec![],
         untils: vec![],
         candidates: vec![],
+        damaged: false,
     }
 }
