@@ -190,6 +190,8 @@ impl Place {
                 "coverage",
                 "boost",
                 "construct",
+                "predict",
+                "stop",
                 "repeat",
                 "record",
                 "end",
