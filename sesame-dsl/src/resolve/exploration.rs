@@ -41,7 +41,7 @@ impl<'a> Resolver<'a> {
 
     fn boost(&mut self, written: &'a ast::Exploration) -> Option<Exploration> {
         let every_generations = match self.single(&written.generations, "every … generations") {
-            Some(&count) => self.count(count, 1, "generations are boosted every"),
+            Some(&count) => self.count(count, 1, "the generations from one boost to the next are"),
             None => Some(EVERY),
         };
         let tries = match self.single(&written.tries, "tries") {
@@ -52,7 +52,7 @@ impl<'a> Resolver<'a> {
             self.of_the_other(written, &written.children, "from … to");
             self.of_the_other(written, &written.drops, "drop");
             match self.single(&written.iterations, "every … iterations") {
-                Some(&count) => self.count(count, 1, "children are boosted every"),
+                Some(&count) => self.count(count, 1, "the children from one boost to the next are"),
                 None => Some(EVERY),
             }
             .map(|iterations| BoostedChildren::Every { iterations })
