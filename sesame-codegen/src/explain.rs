@@ -414,10 +414,10 @@ mod tests {
     #[test]
     fn explorations_with_their_defaults() {
         let explained = [BOOSTED, CONSTRUCTED, PREDICTED].map(|text| campaign(&plan(&format!("{OPERATIONS}{text}"))));
-        let clauses = explained.iter().flat_map(|text| text.lines()).filter(|line| {
+        let clauses = explained.iter().flat_map(|text| text.lines()).map(str::trim).filter(|line| {
             ["coverage", "boost", "construct", "predict", "stop"]
                 .iter()
-                .any(|word| line.trim_start().starts_with(&format!("{word} ")))
+                .any(|word| line.starts_with(&format!("{word} ")))
         });
         insta::assert_snapshot!(clauses.collect::<Vec<_>>().join("\n"), @r"
 coverage   { T1 [0, 1] cells 6  O0 [0.5, 3.5] cells 3  hits 2  stop at 50% }

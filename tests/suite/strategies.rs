@@ -65,16 +65,16 @@ fn run(runner: &Runner, campaign: &str, seed: u32) -> Ran {
 #[test]
 #[ignore = "long: 140 campaigns of 210 tests"]
 fn construction_reaches_half_of_the_cells_almost_at_once_and_does_not_lose_the_front() {
-    let campaigns: String = STRATEGIES
-        .iter()
-        .map(|(name, search, exploration)| {
-            format!(
-                "campaign {name} {{\n  objectives fuzzing_time, collision_occurrence\n  operations jitter_link0, \
-                 jitter_link1   1..5 per test\n  search {search}\n  coverage {{ T1 [0, 1] cells 6  T2 [0, 0.5] cells 6  \
-                 P1 [0, 1] cells 3 }}\n  {exploration}\n  end after 70s\n}}\n"
-            )
-        })
-        .collect();
+    let mut campaigns = String::new();
+    for (name, search, exploration) in STRATEGIES {
+        write!(
+            campaigns,
+            "campaign {name} {{\n  objectives fuzzing_time, collision_occurrence\n  operations jitter_link0, jitter_link1   \
+             1..5 per test\n  search {search}\n  coverage {{ T1 [0, 1] cells 6  T2 [0, 0.5] cells 6  P1 [0, 1] cells 3 }}\n  \
+             {exploration}\n  end after 70s\n}}\n"
+        )
+        .unwrap();
+    }
     let project = Project::kuka_cell_with("kuka_cell_strategies", &campaigns);
     let mut table = String::from(
         "| strategy | 54 cells after | cells at 210 | hypervolume at 210 | against tracking |\n|---|---:|---:|---:|---:|\n",

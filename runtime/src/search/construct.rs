@@ -1,6 +1,6 @@
 //! Construction of tests: the reduction of tests to points, inverted.
 //!
-//! Given a test and a cell, [`Constructor::into_cell`] changes the test as little as may be so that its point lies in the
+//! Given a test and a cell, [`Constructor::place_in_cell`] changes the test as little as may be so that its point lies in the
 //! cell. The reduction throws away almost everything, so almost everything can stay: how many operations there are unless
 //! the cell counts them, the order of their windows, and of a sub-range its middle, as only its width is counted.
 //!
@@ -76,11 +76,17 @@ impl Constructor {
     }
 
     /// A permitted test in a cell, like the given one; `None` where none was found.
-    pub(crate) fn into_cell(&self, test: &Test, cell: usize, plan: &CampaignPlan, stream: &mut Stream) -> Option<Test> {
+    pub(crate) fn place_in_cell(
+        &self,
+        test: &Test,
+        cell: usize,
+        plan: &CampaignPlan,
+        stream: &mut Stream,
+    ) -> Option<Test> {
         let places = self.grid.axes().iter().zip(self.grid.place(cell));
         let demands = Demands(places.map(|(axis, at)| (axis.dimension, Grid::bounds(axis, at))).collect());
         (0..FROM_THE_TEST + FROM_FRESH).find_map(|attempt| {
-            let mut built = if attempt < FROM_THE_TEST { test.clone() } else { fresh_test(&self.permitted, stream) };
+            let mut built = if attempt < FROM_THE_TEST { test.clone() } else { self.fresh(stream) };
             let done = self.number(&mut built, &demands, plan, stream)
                 && self.time(&mut built, &demands, plan, attempt, stream)
                 && self.grade(&mut built, &demands, plan, stream);
@@ -96,6 +102,18 @@ impl Constructor {
             let point = Point::of(&planned(plan, &built)?, Convention::Ours)?;
             (self.grid.cell_of(&point) == Some(cell)).then_some(built)
         })
+    }
+
+    /// A fresh test, half of it of any operations alike: a cell may ask for some that fresh tests rarely hold.
+    fn fresh(&self, stream: &mut Stream) -> Test {
+        let kinds = self.permitted.operations();
+        let mut test = fresh_test(&self.permitted, stream);
+        for operation in &mut test.operations {
+            if stream.chance(0.5) {
+                *operation = fresh_operation(&kinds[stream.below(kinds.len())], stream);
+            }
+        }
+        test
     }
 
     fn kind_of(&self, operation: &TestOperation) -> &PermittedOperation {

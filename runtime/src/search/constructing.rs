@@ -87,7 +87,7 @@ impl Constructing {
             .collect();
         wanting.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
         for (.., cell) in wanting.into_iter().take(MOST_CELLS_TRIED) {
-            match self.constructor.into_cell(test, cell, self.cells.plan(), stream) {
+            match self.constructor.place_in_cell(test, cell, self.cells.plan(), stream) {
                 Some(test) if self.tests.claim(&test) => return Some((cell, test)),
                 Some(_) => {}
                 // Said to be feasible, and yet not found.

@@ -158,7 +158,7 @@ impl Predicting {
         let cell = |course: &Course| self.cells.grid().cell_of(&course.predicted(self.cells.plan(), test)?);
         Forecast {
             from_reference: self.reference.as_ref().and_then(cell),
-            from_parents: parents.iter().map(|course| cell(course)).collect(),
+            from_parents: parents.iter().map(cell).collect(),
         }
     }
 
@@ -179,8 +179,8 @@ impl Predicting {
     }
 
     /// The best of the test and other candidates: fresh tests in the first generation, else tests changed further.
-    fn chosen(&mut self, test: Test, parents: &[Course], mut stream: Stream) -> Test {
-        let forecast = self.forecast(&test, parents);
+    fn chosen(&mut self, test: &Test, parents: &[Course], mut stream: Stream) -> Test {
+        let forecast = self.forecast(test, parents);
         let mut changed = test.clone();
         let mut best = (self.promise_of(&forecast), test.clone(), forecast);
         for turn in 1..self.candidates {
@@ -218,7 +218,7 @@ impl Variation for Predicting {
 
     fn initial(&mut self, index: u64) -> Test {
         let test = self.tests.initial(index);
-        self.chosen(test, &[], Stream::derive(self.seed, "predict initial", &[index]))
+        self.chosen(&test, &[], Stream::derive(self.seed, "predict initial", &[index]))
     }
 
     fn offspring(&mut self, parents: [&Test; 2], generation: u64, pair: u64) -> [Child<Test>; 2] {
@@ -231,7 +231,7 @@ impl Variation for Predicting {
             .collect();
         self.tests.offspring(parents, generation, pair).map(|child| {
             let stream = Stream::derive(self.seed, "predict", &[generation, place]);
-            let genome = self.chosen(child.genome, &courses, stream);
+            let genome = self.chosen(&child.genome, &courses, stream);
             place += 1;
             Child { genome, ..child }
         })

@@ -213,8 +213,9 @@ mod tests {
             assert!(why.contains("Good and Turing") && !why.contains("biased"), "{why}");
             told += done;
             // What the next thousand tests really did, each against the cells known when the search stopped.
-            let run = LANDSCAPES[0]
-                .campaign(strategy(&random(done as u32 + 1_000, plan.campaign.stop[0]), seed).unwrap().as_mut());
+            let run = LANDSCAPES[0].campaign(
+                strategy(&random(u32::try_from(done).unwrap() + 1_000, plan.campaign.stop[0]), seed).unwrap().as_mut(),
+            );
             let grid = Grid::parse("T1:0:1:6,T2:0:0.5:6,P1:0:1:3").unwrap();
             let cells: Vec<Option<usize>> = run.tests.iter().map(|it| grid.cell_of(it.point.as_ref()?)).collect();
             let new = cells[done..].iter().filter(|cell| cell.is_some() && !cells[..done].contains(cell)).count();

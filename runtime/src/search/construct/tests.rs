@@ -24,7 +24,7 @@ fn not_reached(plan: &CampaignPlan, grid: &Grid, seed: u64) -> (Vec<Vec<u32>>, u
     let mut failed = Vec::new();
     for cell in (0..grid.len()).filter(|&cell| feasible.reaches(cell)) {
         let from = fresh_test(&permitted, &mut stream);
-        match constructor.into_cell(&from, cell, plan, &mut stream) {
+        match constructor.place_in_cell(&from, cell, plan, &mut stream) {
             Some(test) => {
                 assert_eq!(cell_of(plan, grid, &test), Some(cell));
                 assert_eq!(broken_rule(plan, &test), None);
@@ -77,7 +77,7 @@ fn a_test_that_lies_in_the_cell_stays_nearly_as_it_is_and_of_others_middles_and_
         let test = fresh_test(&permitted, &mut stream);
         let feasible = Feasible::of(&plan, &grid);
         let cell = (0..grid.len()).filter(|&cell| feasible.reaches(cell)).nth(stream.below(feasible.count())).unwrap();
-        let built = constructor.into_cell(&test, cell, &plan, &mut stream).unwrap();
+        let built = constructor.place_in_cell(&test, cell, &plan, &mut stream).unwrap();
         let kinds = |test: &Test| test.operations.iter().map(|it| it.operation).collect::<Vec<_>>();
         assert_eq!(kinds(&built), kinds(&test), "the cell does not count operations");
         for (before, after) in test.operations.iter().zip(&built.operations) {
