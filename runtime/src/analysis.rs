@@ -84,18 +84,23 @@ fn search_word(search: &Search) -> &'static str {
     }
 }
 
-/// All tests but the reference runs: where each comes from, how it ended, and the value of each metric.
+/// All tests but the reference runs: where each comes from, how it ended, and the value of each metric; of imported ones
+/// also what they were called.
 pub fn tests(repository: &Repository, selection: &Selection) -> Result<Dataset, RecordError> {
     let plan = repository.plan();
-    let columns = ["test", "origin", "generation", "outcome", "duplicate_of", "operations"].map(str::to_owned);
+    let originals = repository.original_names()?;
+    let original = (!originals.is_empty()).then(|| "original_name".to_owned());
+    let columns = ["origin", "generation", "outcome", "duplicate_of", "operations"].map(str::to_owned);
     let metrics = plan.metrics.iter().map(|metric| metric.name.clone());
-    let mut dataset = Dataset::new(columns.into_iter().chain(metrics));
+    let mut dataset =
+        Dataset::new(std::iter::once("test".to_owned()).chain(original.clone()).chain(columns).chain(metrics));
     repository.scan(&mut |test| {
         if test.origin == Origin::Reference || !selection.holds(test.number) {
             return;
         }
+        let called =
+            original.is_some().then(|| originals.get(&test.number).cloned().map_or(Datum::Missing, Datum::Text));
         let head = [
-            name(test.number),
             Datum::Text(test.origin.word().to_owned()),
             test.generation.map_or(Datum::Missing, |generation| Datum::Whole(i64::from(generation))),
             Datum::Text(test.outcome.word().to_owned()),
@@ -103,7 +108,7 @@ pub fn tests(repository: &Repository, selection: &Selection) -> Result<Dataset, 
             Datum::Text(operations(plan, &test)),
         ];
         let values = (0u32..).map(MetricId).take(plan.metrics.len()).map(|id| Datum::real(test.value(id).value));
-        dataset.row(head.into_iter().chain(values));
+        dataset.row(std::iter::once(name(test.number)).chain(called).chain(head).chain(values));
     })?;
     Ok(dataset)
 }

@@ -216,6 +216,17 @@ mod tests {
     }
 
     #[test]
+    fn a_run_of_a_passive_campaign_is_complete_and_not_void() {
+        let plan = plan(vec![operation(0, OperationKind::Blackhole)]);
+        let wires = WireTable::new(&plan);
+        let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+        let mut ticker = Ticker { now: SimTime::ZERO, fails_at: None };
+        let run = evaluate(&plan, &wires, &metrics, &mut ticker, &test_of(vec![]), 1, &mut Custom::none()).unwrap();
+        assert_eq!((run.outcome, run.messages), (Outcome::Completed, 100));
+        assert_eq!((run.operations.len(), run.metrics[0].value), (0, Some(0.0)));
+    }
+
+    #[test]
     fn what_was_seen_before_a_hook_panics_stands() {
         let run = observed(|| Box::new(Counter { panics: true }), None);
         assert!(matches!(&run.outcome, Outcome::Crash { .. }), "{:?}", run.outcome);

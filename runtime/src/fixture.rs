@@ -3,7 +3,7 @@
 use sesame_plan::{
     Activation, ActivationMode, Campaign, CampaignPlan, Choice, Count, Distribution, Domain, Drain, Field, FieldRef,
     MessageId, MessageType, Metric, MetricSource, Operation, OperationId, OperationKind, Parameter, SCHEMA, Search,
-    Shape, Simulator, Span, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode,
+    Shape, Simulator, Span, Step, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode,
 };
 
 /// Topic `command` of reals, topic `zones` with two members of `Zone { level: real, count: int }`.
@@ -79,29 +79,61 @@ pub(crate) fn operation(topic: u32, kind: OperationKind) -> Operation {
         domain: Domain::Number { low, high, shape, integer },
     };
     let parameters = match &kind {
-        OperationKind::RandomValue { integer, .. } => vec![parameter("offset", -9.0, 9.0, Shape::Range, *integer)],
+        OperationKind::RandomValue { integer, mode } => {
+            vec![parameter(random_word(*mode), -9.0, 9.0, Shape::Range, *integer)]
+        }
         OperationKind::PacketLoss => vec![parameter("loss", 0.0, 1.0, Shape::Value, false)],
         OperationKind::Latency { distribution: Distribution::Fixed, .. } => {
             vec![parameter("delay", 0.0, 5.0, Shape::Value, false)]
         }
         OperationKind::Latency { .. } => vec![parameter("delay", 0.0, 5.0, Shape::Range, false)],
-        OperationKind::Blackhole | OperationKind::Custom { .. } => Vec::new(),
+        OperationKind::Bias => vec![parameter("bias", -9.0, 9.0, Shape::Value, false)],
+        OperationKind::ClockSkew => vec![parameter("skew", -9.0, 9.0, Shape::Value, false)],
+        OperationKind::StuckAt { truth: None } => vec![parameter("value", -9.0, 9.0, Shape::Value, false)],
+        OperationKind::Drift => vec![parameter("rate", -9.0, 9.0, Shape::Value, false)],
+        OperationKind::Noise => vec![parameter("sigma", 0.0, 9.0, Shape::Value, false)],
+        OperationKind::Scale => vec![parameter("factor", -9.0, 9.0, Shape::Value, false)],
+        OperationKind::Stale => vec![parameter("age", 0.0, 5.0, Shape::Value, false)],
+        OperationKind::BurstLoss => {
+            ["enter", "leave", "loss"].map(|name| parameter(name, 0.0, 1.0, Shape::Value, false)).to_vec()
+        }
+        OperationKind::RateLimit => vec![parameter("rate", 0.1, 100.0, Shape::Value, false)],
+        OperationKind::Reorder { .. } => vec![parameter("window", 0.0, 5.0, Shape::Value, false)],
+        OperationKind::Duplicate => vec![parameter("copies", 1.0, 100.0, Shape::Value, true)],
+        OperationKind::RandomText { .. }
+        | OperationKind::StuckAt { truth: Some(_) }
+        | OperationKind::NotFinite { .. }
+        | OperationKind::Freeze
+        | OperationKind::Blackhole
+        | OperationKind::Custom { .. } => Vec::new(),
     };
     Operation {
         name: kind.words().replace(' ', "_"),
         doc: String::new(),
         topic: (!kind.is_offline()).then_some(TopicId(topic)),
+        places: Vec::new(),
         kind,
         parameters,
         within: Span { start: 0.0, end: 10.0 },
         priority: 0,
         inclusion: 1.0,
+        timed: true,
         constraints: Vec::new(),
     }
 }
 
-pub(crate) fn offset(path: &[&str], mode: ValueMode, integer: bool) -> OperationKind {
-    OperationKind::RandomValue { path: path.iter().map(|&name| name.to_owned()).collect(), mode, integer }
+/// The same operation on a field.
+pub(crate) fn at(path: &[&str], operation: Operation) -> Operation {
+    let place = path.iter().map(|&name| Step::Field(name.to_owned())).collect();
+    Operation { places: vec![place], ..operation }
+}
+
+pub(crate) fn offset(mode: ValueMode, integer: bool) -> OperationKind {
+    OperationKind::RandomValue { mode, integer }
+}
+
+fn random_word(mode: ValueMode) -> &'static str {
+    if mode == ValueMode::Offset { "offset" } else { "value" }
 }
 
 pub(crate) fn latency(distribution: Distribution, drain: Drain) -> OperationKind {

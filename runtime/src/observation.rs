@@ -11,6 +11,9 @@ pub enum Outcome {
     Completed,
     /// It ran to its end, but no operation had any effect.
     Void,
+    /// It ran to its end in another program, which did not count what operations did: whether they had any effect is not
+    /// known, and its counters are all zero. Only imported tests end so.
+    Unknown,
     /// The simulator or a hook failed or panicked, or the worker process died.
     Crash {
         /// What is known of the cause.
@@ -29,6 +32,7 @@ impl Outcome {
         match self {
             Outcome::Completed => "completed",
             Outcome::Void => "void",
+            Outcome::Unknown => "unknown",
             Outcome::Crash { .. } => "crash",
             Outcome::Timeout { .. } => "timeout",
         }
@@ -37,7 +41,7 @@ impl Outcome {
     /// What the word leaves out.
     pub fn detail(&self) -> Option<String> {
         match self {
-            Outcome::Completed | Outcome::Void => None,
+            Outcome::Completed | Outcome::Void | Outcome::Unknown => None,
             Outcome::Crash { message } => Some(message.clone()),
             Outcome::Timeout { limit } => Some(format!("stopped after {limit} s of wall time")),
         }

@@ -11,14 +11,13 @@
 mod release;
 mod tap;
 
-use sesame_plan::{CampaignPlan, Drain, Moment, Test};
+use sesame_plan::{CampaignPlan, Drain, Moment, Span, Test};
 
 use crate::activation::{Activity, Edge};
 use crate::changed_files::ChangedFiles;
-use crate::fuzz::{ChoiceError, Disturbance, Draws, Fate, OperationEntry, RunContext};
+use crate::fuzz::{ChoiceError, Disturbance, Draws, Encounter, Fate, OperationEntry, RunContext};
 use crate::metric::Metrics;
 use crate::observation::{Counters, OperationEffect};
-use crate::rng::derive_seed;
 use crate::time::SimTime;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
@@ -50,6 +49,9 @@ pub trait Exchange {
 /// The most messages that operations may hold back at once; beyond it, the oldest is let go early and the run warned.
 pub const HELD_LIMIT: usize = 100_000;
 
+/// The most copies that operations may make in one event; beyond it, no more are made and the run is warned.
+pub const COPIES_LIMIT: u32 = 10_000;
+
 /// The relay of one run.
 pub struct Relay<'a> {
     wires: &'a WireTable,
@@ -71,6 +73,9 @@ pub struct Relay<'a> {
     now: SimTime,
     messages: u64,
     overflowed: bool,
+    /// Copies made in the event at hand.
+    copies: u32,
+    flooded: bool,
     /// The run is over: nothing is delivered any more.
     over: bool,
     tap: Option<&'a mut dyn Tap>,
@@ -80,8 +85,15 @@ pub struct Relay<'a> {
 struct Stage {
     name: String,
     disturbance: Disturbance,
+    /// Whether it has to hear messages while it is off.
+    listens: bool,
+    holds_order: bool,
     activity: Activity,
+    /// When it last went on.
+    since: SimTime,
     draw_seed: u64,
+    /// Whether it counts in `fuzzing_time()`.
+    timed: bool,
     counters: Counters,
     first_touch: Option<SimTime>,
     last_touch: Option<SimTime>,
@@ -91,10 +103,6 @@ impl Stage {
     fn touch(&mut self, now: SimTime) {
         self.first_touch.get_or_insert(now);
         self.last_touch = Some(now);
-    }
-
-    fn holds_order(&self) -> bool {
-        matches!(self.disturbance, Disturbance::Latency(_))
     }
 }
 
@@ -115,11 +123,16 @@ impl<'a> Relay<'a> {
         let mut operations = Vec::with_capacity(test.operations.len());
         for choice in &test.operations {
             let operation = plan.operation(choice.operation);
+            let disturbance = Disturbance::new(operation, choice, hooks)?;
             operations.push(Stage {
                 name: operation.name.clone(),
-                disturbance: Disturbance::new(operation, choice, hooks)?,
+                listens: disturbance.listens(),
+                holds_order: disturbance.holds_order(),
+                disturbance,
                 activity: Activity::new(&choice.activation, operation.within),
+                since: SimTime::ZERO,
                 draw_seed: choice.draw_seed,
+                timed: operation.timed,
                 counters: Counters::default(),
                 first_touch: None,
                 last_touch: None,
@@ -150,6 +163,8 @@ impl<'a> Relay<'a> {
             now: SimTime::ZERO,
             messages: 0,
             overflowed: false,
+            copies: 0,
+            flooded: false,
             over: false,
             tap: None,
         })
@@ -190,7 +205,9 @@ impl<'a> Relay<'a> {
                 last_touch: stage.last_touch.map(SimTime::seconds),
             })
             .collect();
-        let (metrics, mut warnings) = self.metrics.finish(&operations);
+        let timed = self.operations.iter().zip(&operations).filter(|(stage, _)| stage.timed);
+        let active: Vec<Span> = timed.flat_map(|(_, operation)| operation.intervals.clone()).collect();
+        let (metrics, mut warnings) = self.metrics.finish(&active);
         for stage in &self.operations {
             if let Disturbance::Custom(custom) = &stage.disturbance
                 && let Some(mismatch) = &custom.mismatch
@@ -201,6 +218,9 @@ impl<'a> Relay<'a> {
         if self.overflowed {
             warnings
                 .push(format!("more than {HELD_LIMIT} messages were held back at once; the oldest were let go early"));
+        }
+        if self.flooded {
+            warnings.push(format!("copies of copies: more than {COPIES_LIMIT} in one event are not made"));
         }
         Finished { operations, metrics, warnings, messages: self.messages }
     }
@@ -237,7 +257,7 @@ impl<'a> Relay<'a> {
         for at in 0..self.operations.len() {
             match self.operations[at].activity.follow(edge, self.step) {
                 Edge::None => {}
-                Edge::Started => self.tell(edge, at, Deed::Started),
+                Edge::Started => self.begin_activity(at, edge),
                 Edge::Ended => self.end_activity(at, edge, deliveries),
             }
         }
@@ -248,14 +268,15 @@ impl<'a> Relay<'a> {
         if self.conditional.is_empty() || self.over {
             return;
         }
+        let timed = self.operations.iter().filter(|stage| stage.timed);
         let active = |sum, stage: &Stage| sum + stage.activity.active_time(now);
-        let active_time = self.operations.iter().fold(SimTime::ZERO, active).seconds();
+        let active_time = timed.fold(SimTime::ZERO, active).seconds();
         for next in 0..self.conditional.len() {
             let at = self.conditional[next];
             let value = |metric| self.metrics.value(metric, active_time);
             match self.operations[at].activity.weigh(now, self.step, &value) {
                 Edge::None => {}
-                Edge::Started => self.tell(now, at, Deed::Started),
+                Edge::Started => self.begin_activity(at, now),
                 Edge::Ended => self.ended.push(at),
             }
         }
@@ -266,18 +287,25 @@ impl<'a> Relay<'a> {
         self.ended.clear();
     }
 
+    /// What happens when an operation goes on: it begins afresh.
+    fn begin_activity(&mut self, at: usize, now: SimTime) {
+        let stage = &mut self.operations[at];
+        stage.since = now;
+        stage.disturbance.begin();
+        self.tell(now, at, Deed::Started);
+    }
+
     /// What happens when an operation goes off: it is told, and the messages it holds become what they are to become.
     fn end_activity(&mut self, at: usize, now: SimTime, deliveries: &mut Vec<Delivery>) {
         self.tell(now, at, Deed::Ended);
-        let Disturbance::Latency(latency) = &self.operations[at].disturbance else { return };
-        match latency.drain {
-            Drain::Finish => {}
-            Drain::Flush => {
+        match self.operations[at].disturbance.drain() {
+            None | Some(Drain::Finish) => {}
+            Some(Drain::Flush) => {
                 for held in self.queue.take_all(at) {
                     self.pass(now, held, deliveries);
                 }
             }
-            Drain::Drop => {
+            Some(Drain::Drop) => {
                 let lost = self.queue.take_all(at);
                 let counters = &mut self.operations[at].counters;
                 counters.delayed -= lost.len() as u64;
@@ -294,19 +322,26 @@ impl<'a> Relay<'a> {
         while let Some(&(at, member)) = self.pipelines[message.wire.index()].get(message.next_stage) {
             message.next_stage += 1;
             let stage = &mut self.operations[at];
-            let queued_until = if stage.holds_order() { self.queue.last_release(at, message.wire) } else { None };
+            let queued_until = if stage.holds_order { self.queue.last_release(at, message.wire) } else { None };
             let active = stage.activity.is_active();
             if active {
                 stage.counters.seen += 1;
+            } else if stage.listens {
+                stage.disturbance.overhear(now, member, &message.value);
             }
             if active && matches!(stage.disturbance, Disturbance::Custom(_)) {
                 return self.pass_custom(now, at, member, message, deliveries);
             }
             let fate = if active {
-                stage.disturbance.apply(Draws::new(stage.draw_seed, member, message.index), &mut message.value)
+                let draws = Draws::new(stage.draw_seed, member, message.index);
+                let encounter = Encounter { now, active: now - stage.since, member, draws };
+                stage.disturbance.apply(encounter, &mut message.value)
             } else {
                 Fate::Unchanged
             };
+            if let Fate::Duplicated(copies) = fate {
+                return self.pass_copies(now, at, message, copies, deliveries);
+            }
             let release = match fate {
                 Fate::Delayed(delay) => now + delay,
                 _ => now,
@@ -391,14 +426,38 @@ impl Relay<'_> {
         for _ in &call.injected {
             self.tell(now, at, Deed::Injected(message.touched()));
         }
-        let Held { wire, published, index, next_stage, .. } = message;
+        let injected = (0u64..).zip(call.injected);
+        let injected: Vec<Held> = injected.map(|(number, value)| message.beside(at, number, value)).collect();
         if !call.dropped {
             self.pass(now, message, deliveries);
         }
-        for (number, value) in (0u64..).zip(call.injected) {
-            // An index of its own, so that later operations draw for it apart from the message it came with.
-            let index = derive_seed(index, "injected", &[at as u64, number]);
-            self.pass(now, Held { wire, published, index, value, next_stage }, deliveries);
+        for message in injected {
+            self.pass(now, message, deliveries);
+        }
+    }
+}
+
+/// Copies of messages.
+impl Relay<'_> {
+    /// Takes a message on, then copies of it: as many as the operation makes, and no more than one event may bring.
+    fn pass_copies(&mut self, now: SimTime, at: usize, message: Held, copies: u32, deliveries: &mut Vec<Delivery>) {
+        let room = COPIES_LIMIT - self.copies;
+        self.flooded |= copies > room;
+        let copies = copies.min(room);
+        self.copies += copies;
+        if copies > 0 {
+            let stage = &mut self.operations[at];
+            stage.counters.injected += u64::from(copies);
+            stage.touch(now);
+        }
+        let made: Vec<Held> =
+            (0..u64::from(copies)).map(|number| message.beside(at, number, message.value.clone())).collect();
+        for copy in &made {
+            self.tell(now, at, Deed::Injected(copy.touched()));
+        }
+        self.pass(now, message, deliveries);
+        for copy in made {
+            self.pass(now, copy, deliveries);
         }
     }
 }
@@ -414,6 +473,7 @@ impl Exchange for Relay<'_> {
 
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
         self.now = self.now.max(now);
+        self.copies = 0;
         self.follow_time(self.now, deliveries);
         self.weigh_conditions(self.now, deliveries);
     }
@@ -424,6 +484,7 @@ impl Exchange for Relay<'_> {
             self.follow_time(self.now, deliveries);
         }
         self.messages += 1;
+        self.copies = 0;
         let index = self.published[wire.index()];
         self.published[wire.index()] += 1;
         if let Some(tap) = &mut self.tap {
@@ -447,5 +508,9 @@ pub struct Finished {
     pub messages: u64,
 }
 
+#[cfg(test)]
+mod behaviour;
+#[cfg(test)]
+mod matrix;
 #[cfg(test)]
 mod tests;

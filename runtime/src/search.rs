@@ -15,6 +15,7 @@ pub mod hypervolume;
 pub mod initial;
 pub mod nsga2;
 pub mod permitted;
+pub mod problems;
 pub mod range;
 pub mod real;
 pub mod selection;
@@ -47,7 +48,7 @@ use boost::{Boosted, Boosting};
 use cells::Cells;
 use construct::Constructor;
 use constructing::{Constructing, Construction};
-use nsga2::Variation;
+use nsga2::{Survival, Variation};
 use predict::Predicting;
 
 pub use dominance::{Fitness, Unfit};
@@ -120,7 +121,7 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
         &Search::Nsga2 { population, evaluations } => {
             let permitted = Permitted::of(plan)?;
             let tests = variation(plan, permitted.clone(), seed);
-            let settings = nsga2::Settings { population, evaluations, seed };
+            let settings = nsga2::Settings { population, evaluations, seed, survival: survival(plan) };
             let by_time = plan.campaign.activation == ActivationMode::Time;
             match &plan.campaign.exploration {
                 Some(Exploration::Predict { .. }) if by_time => {
@@ -152,7 +153,7 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
             let goal = goal.ok_or_else(|| SearchError::NoCoverage { campaign: campaign() })?;
             let grid =
                 Grid::new(goal.axes.clone()).map_err(|reason| SearchError::Grid { campaign: campaign(), reason })?;
-            let settings = nsga2::Settings { population, evaluations, seed };
+            let settings = nsga2::Settings { population, evaluations, seed, survival: Survival::Crowded };
             Box::new(MapElites::new(settings, variation(plan, Permitted::of(plan)?, seed), grid))
         }
         &Search::LatinHypercube { evaluations } => {
@@ -177,6 +178,14 @@ fn variation(plan: &CampaignPlan, permitted: Permitted, seed: u64) -> TestVariat
     TestVariation::new(permitted, rates, seed)
 }
 
+/// Conditions hold or not: many tests are active equally long, and change nothing that is measured.
+fn survival(plan: &CampaignPlan) -> Survival {
+    match plan.campaign.activation {
+        ActivationMode::Time => Survival::Crowded,
+        ActivationMode::Condition { .. } => Survival::Distinct,
+    }
+}
+
 /// The cells that an exploration is about.
 fn cells(plan: &CampaignPlan) -> Result<Cells, SearchError> {
     let campaign = || plan.campaign.name.clone();
@@ -192,7 +201,8 @@ pub fn fitness(plan: &CampaignPlan, observation: &Observation) -> Fitness {
 /// As [`fitness`], for a run of which only the outcome and the metrics' values are known.
 pub fn fitness_of(plan: &CampaignPlan, outcome: &Outcome, value: impl Fn(MetricId) -> Option<f64>) -> Fitness {
     match outcome {
-        Outcome::Completed => {}
+        // What was imported stands in fronts as it did there.
+        Outcome::Completed | Outcome::Unknown => {}
         Outcome::Void => return Fitness::Unfit(Unfit::Void),
         Outcome::Crash { .. } => return Fitness::Unfit(Unfit::Crash),
         Outcome::Timeout { .. } => return Fitness::Unfit(Unfit::Timeout),

@@ -9,6 +9,7 @@
 //! plan and its tests.
 
 mod adapt;
+mod extent;
 #[cfg(test)]
 mod legacy;
 #[cfg(test)]
@@ -17,6 +18,7 @@ mod tests;
 use sesame_plan::{Dimension, Shape, Span};
 
 pub use adapt::{class_of, disturbance, observed, observed_point, planned};
+pub use extent::extent;
 
 /// What an operation does to messages, as far as the dimensions O1 to O3 tell it apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

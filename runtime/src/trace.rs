@@ -10,6 +10,7 @@
 //! is complete. Of a run whose process died what was written until then is saved.
 
 mod recording;
+mod records;
 mod salvage;
 mod schema;
 mod writer;

@@ -114,6 +114,12 @@ impl Record {
         self.fields.position(name).map(|at| &mut self.values[at])
     }
 
+    /// Names and values to be changed, in order.
+    #[cfg(test)]
+    pub(crate) fn each_mut(&mut self) -> impl Iterator<Item = (&str, &mut Value)> {
+        self.fields.names().iter().map(Text::as_str).zip(&mut self.values)
+    }
+
     /// Names and values, in order.
     pub fn iter(&self) -> impl Iterator<Item = (&Text, &Value)> {
         self.fields.names().iter().zip(&self.values)
@@ -167,6 +173,22 @@ impl Value {
             Value::Int(n) => Some(*n as f64),
             Value::Bool(b) => Some(f64::from(u8::from(*b))),
             _ => None,
+        }
+    }
+
+    /// Whether it is the same in every bit. It is equal to another then, or both hold NaNs in the same places.
+    pub(crate) fn is_same(&self, other: &Value) -> bool {
+        let all = |left: &[Value], right: &[Value]| {
+            left.len() == right.len() && left.iter().zip(right).all(|(left, right)| left.is_same(right))
+        };
+        match (self, other) {
+            (Value::Real(left), Value::Real(right)) => left.to_bits() == right.to_bits(),
+            (Value::Point(left), Value::Point(right)) => left.map(f64::to_bits) == right.map(f64::to_bits),
+            (Value::List(left), Value::List(right)) => all(left, right),
+            (Value::Record(left), Value::Record(right)) => {
+                left.fields == right.fields && all(&left.values, &right.values)
+            }
+            _ => self == other,
         }
     }
 

@@ -2,15 +2,18 @@
 
 mod build;
 mod commands;
+mod fmt;
+mod import;
 mod results;
+mod search_space;
 mod shell;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 
-use crate::environment::RuntimeChoice;
+use crate::environment::{Options, RuntimeChoice};
 use crate::plan::RunnerPlan;
 
 pub use shell::Shell;
@@ -18,23 +21,62 @@ pub use shell::Shell;
 /// The language as the command needs it.
 #[derive(Debug, Clone, Copy)]
 pub struct Language {
-    /// Checks a space: its name as diagnostics show it, its text, and whether diagnostics are coloured.
-    pub check: fn(file: &str, text: &str, colour: bool) -> Checked,
+    /// Checks a space: its path, which diagnostics show and imports are relative to, its text, and how diagnostics are to
+    /// look.
+    pub check: fn(file: &str, text: &str, look: Look) -> Checked,
+    /// Formats a text in the same way: the text in the one layout, or diagnostics of its syntax errors.
+    pub format: fn(file: &str, text: &str, look: Look) -> Result<String, Diagnosed>,
     /// The page of a diagnostic's code.
     pub explain: fn(code: &str) -> Option<&'static str>,
+}
+
+/// How diagnostics look.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Look {
+    /// For people, with the lines they speak of.
+    Human {
+        /// With colours.
+        colour: bool,
+    },
+    /// One line each.
+    Short,
+    /// One JSON object and line each.
+    Json,
+    /// One workflow command of GitHub each.
+    Github,
+}
+
+/// Diagnostics of a text with errors.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Diagnosed {
+    /// As text.
+    pub diagnostics: String,
+    /// How many of them are errors.
+    pub errors: usize,
 }
 
 /// What came of checking a space.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Checked {
-    /// Errors and warnings as text for a terminal; empty when there are none.
+    /// Errors and warnings as text; empty when there are none.
     pub diagnostics: String,
     /// How many of them are errors.
     pub errors: usize,
+    /// How many of them are warnings.
+    pub warnings: usize,
     /// What the space holds, for example `4 campaigns, 9 operations`.
     pub summary: String,
     /// A plan for each campaign; empty when there are errors.
     pub plans: Vec<RunnerPlan>,
+    /// What the space says and no runner uses yet, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// What is an error besides errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Deny {
+    /// Warnings too.
+    Warnings,
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 done, 1 the input has errors or generated files are out of date, 2 wrong usage; \
@@ -57,11 +99,30 @@ enum Command {
         /// Where the runtime comes from: `path:FOLDER` or a version.
         #[arg(long, value_parser = RuntimeChoice::parse)]
         runtime: Option<RuntimeChoice>,
+        /// A folder with templates in place of sesamec's own, by their names; see the page on the compiler's commands.
+        #[arg(long, value_name = "FOLDER")]
+        templates: Option<PathBuf>,
     },
     /// Check a space, and say all that is wrong with it.
     Check {
         /// The `.sesame` file.
         file: PathBuf,
+        /// Exit with 1 if there is anything of this kind.
+        #[arg(long, value_name = "KIND")]
+        deny: Option<Deny>,
+        #[command(flatten)]
+        diagnostics: Diagnostics,
+    },
+    /// Bring `.sesame` files into the one layout. Nothing but blanks and line ends is changed.
+    Fmt {
+        /// The files, or folders whose `.sesame` files are meant, and `-` for standard input to standard output; those in
+        /// this folder if not said.
+        files: Vec<PathBuf>,
+        /// Write nothing; show what would change, and exit with 1 if anything would.
+        #[arg(long)]
+        check: bool,
+        #[command(flatten)]
+        diagnostics: Diagnostics,
     },
     /// Generate the test runners of a space, and stubs for hooks that are not there yet.
     Generate {
@@ -70,6 +131,17 @@ enum Command {
         /// Write nothing; exit with 1 if anything would be written.
         #[arg(long, conflicts_with = "force")]
         check: bool,
+        /// Write nothing; show what would be written, and how files would change.
+        #[arg(long, conflicts_with = "check")]
+        dry_run: bool,
+        /// Put the hooks into each runner's own `src/hooks/`, for a crate that is to be moved elsewhere. They start from the
+        /// shared ones: those in the output folder, or else in `runners` beside the file.
+        #[arg(long)]
+        self_contained: bool,
+        /// Copy the runtime, the simulator's crate and all others that are in folders into each runner, which then builds
+        /// without them; `--self-contained` besides.
+        #[arg(long)]
+        vendor: bool,
     },
     /// Check, generate, build, and run a campaign.
     #[command(after_help = "Everything after `--` goes to the runner, for example `-- --seed 7 --workers 4`.\n\n\
@@ -84,6 +156,14 @@ enum Command {
     /// Analyse the results of campaigns: what ran, fronts, points in the reduced parameter space, coverage.
     #[command(subcommand)]
     Results(results::Results),
+    /// Import a testing space of the original SESAME platform (an EMF file, `.model`), with the tests that it performed.
+    Import {
+        /// The file.
+        file: PathBuf,
+        /// The folder for the space and the results; it must be empty or not there yet.
+        #[arg(long, short = 'o', value_name = "FOLDER")]
+        out: PathBuf,
+    },
     /// Explain the code of a diagnostic, for example E0203; or a campaign of a space, with every default written out.
     Explain {
         /// The code, or the campaign.
@@ -92,6 +172,35 @@ enum Command {
         /// The `.sesame` file of the campaign.
         file: Option<PathBuf>,
     },
+    /// Print a script that completes sesamec's command line in a shell.
+    #[command(
+        after_help = "For example: sesamec completions bash > ~/.local/share/bash-completion/completions/sesamec"
+    )]
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+/// How diagnostics are shown.
+#[derive(Debug, Clone, Copy, clap::Args)]
+struct Diagnostics {
+    /// How errors and warnings of the space are shown: `human` and `short` on standard error, `json` and `github` on
+    /// standard output.
+    #[arg(long, value_enum, default_value_t = Format::Human)]
+    format: Format,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Format {
+    /// With the lines they speak of.
+    Human,
+    /// One line each: `file:line:column: error[E0203]: …`.
+    Short,
+    /// One JSON object and line each.
+    Json,
+    /// Annotations for GitHub's workflows.
+    Github,
 }
 
 /// What is generated, and where.
@@ -108,10 +217,32 @@ struct Generation {
     /// Overwrite generated files that were edited by hand. Hooks are never overwritten.
     #[arg(long)]
     force: bool,
-    /// Where the runtime comes from: `path:FOLDER` or a version. If not said: [runtime] in sesame.toml, else the checkout
-    /// that sesamec was built from, else the released version.
+    /// Where the runtime comes from: `path:FOLDER`, `git:URL`, `git:URL?tag=TAG` (or `branch=`, `rev=`), or a version. If
+    /// not said: [runtime] in sesame.toml, else the checkout that sesamec was built from, else the released version.
     #[arg(long, value_parser = RuntimeChoice::parse)]
     runtime: Option<RuntimeChoice>,
+    /// A folder with templates in place of sesamec's own, by their names; `templates` in sesame.toml if not said.
+    #[arg(long, value_name = "FOLDER")]
+    templates: Option<PathBuf>,
+    #[command(flatten)]
+    diagnostics: Diagnostics,
+}
+
+/// What `generate` does beside writing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Purpose {
+    /// Writing.
+    Write,
+    /// Telling by the exit code whether anything would be written.
+    Check,
+    /// Showing what would be written.
+    DryRun,
+}
+
+impl Generation {
+    fn options(&self) -> Options {
+        Options { runtime: self.runtime.clone(), templates: self.templates.clone(), ..Options::default() }
+    }
 }
 
 /// The command line of this process.
@@ -126,13 +257,31 @@ pub fn run(
     arguments: impl IntoIterator<Item = impl Into<std::ffi::OsString> + Clone>,
 ) -> ExitCode {
     let result = match Arguments::parse_from(arguments).command {
-        Command::New { folder, runtime } => commands::new(shell, &folder, runtime.as_ref()),
-        Command::Check { file } => commands::check(shell, language, &file).map(|_| ExitCode::SUCCESS),
-        Command::Generate { generation, check } => commands::generate(shell, language, &generation, check),
+        Command::New { folder, runtime, templates } => {
+            commands::new(shell, &folder, runtime.as_ref(), templates.as_deref())
+        }
+        Command::Check { file, deny, diagnostics } => {
+            commands::check_only(shell, language, &file, deny, diagnostics.format)
+        }
+        Command::Fmt { files, check, diagnostics } => fmt::fmt(shell, language, &files, check, diagnostics.format),
+        Command::Generate { generation, check, dry_run, self_contained, vendor } => {
+            let purpose = match (check, dry_run) {
+                (true, _) => Purpose::Check,
+                (false, true) => Purpose::DryRun,
+                (false, false) => Purpose::Write,
+            };
+            let options = Options { self_contained, vendor, ..generation.options() };
+            commands::generate(shell, language, &generation, &options, purpose)
+        }
         Command::Run { generation, arguments } => commands::run(shell, language, &generation, &arguments),
         Command::Results(asked) => results::results(shell, asked),
+        Command::Import { file, out } => import::import(shell, language, &file, &out),
         Command::Explain { what, file: Some(file) } => commands::explain_campaign(shell, language, &what, &file),
         Command::Explain { what, file: None } => commands::explain_code(language, &what),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Arguments::command(), "sesamec", &mut std::io::stdout());
+            Ok(ExitCode::SUCCESS)
+        }
     };
     result.unwrap_or_else(|failure| {
         shell.failure(&failure);
@@ -142,13 +291,38 @@ pub fn run(
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory as _;
-
     use super::*;
 
     #[test]
     fn the_command_line_is_consistent() {
         Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn the_page_on_the_commands_has_every_option() {
+        let page = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/sesamec.md");
+        let page = std::fs::read_to_string(page).unwrap();
+        for command in Arguments::command().get_subcommands() {
+            let heading = format!("\n## `sesamec {}`\n", command.get_name());
+            let section = page.split_once(&heading).unwrap_or_else(|| panic!("no section{heading}")).1;
+            let section = section.split("\n## ").next().unwrap();
+            let nested = command.get_subcommands().flat_map(clap::Command::get_arguments);
+            for option in command.get_arguments().chain(nested).filter_map(clap::Arg::get_long) {
+                assert!(
+                    section.contains(&format!("`--{option}")) || section.contains(&format!(", `--{option}")),
+                    "{option}"
+                );
+            }
+        }
+        for name in sesame_templates::ALL.iter().map(|(name, _)| name) {
+            assert!(page.contains(&format!("| `{name}` |")), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_dry_run_and_a_check_are_two_things() {
+        assert!(Arguments::try_parse_from(["sesamec", "generate", "a.sesame", "--check", "--dry-run"]).is_err());
+        assert!(Arguments::try_parse_from(["sesamec", "generate", "a.sesame", "--dry-run", "--force"]).is_ok());
     }
 
     #[test]

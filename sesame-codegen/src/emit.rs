@@ -10,7 +10,7 @@ mod operations;
 mod package;
 mod rust;
 mod stub;
-pub(crate) mod text;
+mod text;
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,9 @@ use sesame_plan::Transport;
 use sha2::{Digest as _, Sha256};
 
 use self::messages::Messages;
-use crate::files::{Hook, Owner, Tree};
+pub(crate) use self::package::is_dependency as is_package_name;
+pub use self::text::Templates;
+use crate::files::{File, Hook, Owner, Tree};
 use crate::names;
 use crate::plan::RunnerPlan;
 
@@ -39,6 +41,40 @@ pub struct Environment {
     pub options: BTreeMap<String, String>,
     /// The folder of the `.sesame` file, as seen from a runner's folder.
     pub space_folder: String,
+    /// The folder of the file that declares the simulator, as seen from a runner's folder.
+    pub simulator_folder: String,
+    /// Where the user's hooks are.
+    pub hooks: HooksFolder,
+    /// Crates that every runner brings along, by path inside its folder; empty if it brings none.
+    pub vendored: BTreeMap<String, Vec<u8>>,
+    /// The texts for people.
+    pub templates: Templates,
+}
+
+/// Where the user's hooks are.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum HooksFolder {
+    /// In one folder beside the runners, which all of them share.
+    #[default]
+    Shared,
+    /// In each runner's own `src/hooks/`, for a crate that is to be moved elsewhere.
+    Own {
+        /// What the shared folder holds so far, by path inside it: what the runner's own hooks start from.
+        shared: BTreeMap<String, String>,
+    },
+}
+
+impl Environment {
+    /// Options that have a say in runners, by name, but none in what they share.
+    fn runner_options(&self) -> BTreeMap<String, String> {
+        let mut options = self.options.clone();
+        if !self.vendored.is_empty() {
+            options.insert("vendor".to_owned(), String::new());
+        } else if matches!(self.hooks, HooksFolder::Own { .. }) {
+            options.insert("self-contained".to_owned(), String::new());
+        }
+        options
+    }
 }
 
 /// Why no crate can be generated from a plan. The language refuses all of this with a place in the `.sesame` file; it
@@ -77,9 +113,28 @@ pub enum Problem {
         /// The path.
         path: String,
     },
+    /// A template of the user's that replaces none.
+    #[error("there is no template `{}` to replace; there are {}", name.escape_debug(), template_names())]
+    NoSuchTemplate {
+        /// Its name.
+        name: String,
+    },
+    /// A template of the user's that cannot be filled in.
+    #[error("the template `{name}` cannot be filled in: {problem}")]
+    Template {
+        /// Its name.
+        name: String,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// The simulator's program, or one of its arguments, is not one.
     #[error("the simulator's program and arguments must be texts without NUL, the program not empty")]
     SimulatorProgram,
+}
+
+fn template_names() -> String {
+    let names: Vec<&str> = sesame_templates::ALL.iter().map(|(name, _)| *name).collect();
+    names.join(", ")
 }
 
 /// The files of a space and of its campaigns: first what all runners share, then one tree for each plan.
@@ -92,7 +147,10 @@ pub fn emit(plans: &[RunnerPlan], environment: &Environment) -> Result<Vec<Tree>
     }
     let mut trees = vec![shared(plans, environment)];
     trees.extend(plans.iter().map(|runner| self::runner(runner, environment)));
-    Ok(trees)
+    let mut problems = Vec::new();
+    let trees = trees.into_iter().filter_map(|tree| tree.map_err(|problem| problems.push(problem)).ok()).collect();
+    problems.dedup();
+    if problems.is_empty() { Ok(trees) } else { Err(problems) }
 }
 
 /// The simulator's type, part by part; `None` for a simulator that is none of Rust's.
@@ -206,6 +264,7 @@ struct ReadmeHook {
     file: String,
     /// What it is of, for example ``metric `speed` ``.
     of: String,
+    source: String,
     line: u32,
     doc: String,
 }
@@ -219,6 +278,7 @@ struct ReadmeCampaign {
 
 #[derive(Serialize)]
 struct RunnerReadme {
+    hooks_folder: &'static str,
     space: String,
     source: String,
     campaign: String,
@@ -230,17 +290,18 @@ struct RunnerReadme {
 
 /// The hooks of a space, metrics first; if `used`, only those that this campaign uses.
 fn readme_hooks(runner: &RunnerPlan, used: bool) -> Vec<ReadmeHook> {
-    let entry = |what: &str, name: &str, line: u32, doc: &str| ReadmeHook {
+    let entry = |what: &str, name: &str, source: &str, line: u32, doc: &str| ReadmeHook {
         file: format!("{}.rs", names::snake(name)),
         of: format!("{what} `{name}`"),
+        source: rust::one_line(source),
         line,
         doc: rust::one_line(doc.lines().next().unwrap_or_default()),
     };
     let metrics = runner.hooks.iter().filter(|hook| !used || runner.uses(hook));
     let operations = runner.operations.iter().filter(|operation| !used || runner.applies(operation));
     metrics
-        .map(|hook| entry("metric", &hook.metric, hook.line, &hook.doc))
-        .chain(operations.map(|it| entry("operation", &it.operation, it.line, &it.doc)))
+        .map(|hook| entry("metric", &hook.metric, &hook.source, hook.line, &hook.doc))
+        .chain(operations.map(|it| entry("operation", &it.operation, &it.source, it.line, &it.doc)))
         .collect()
 }
 
@@ -262,13 +323,13 @@ fn tree(folder: String, runner: &RunnerPlan, environment: &Environment, model: S
 }
 
 /// What all runners of a space share: the hooks, and what makes the folder pleasant.
-fn shared(plans: &[RunnerPlan], environment: &Environment) -> Tree {
+fn shared(plans: &[RunnerPlan], environment: &Environment) -> Result<Tree, Problem> {
     let first = plans.first().expect("a space without campaigns has nothing to generate");
     let model = sha256(plans.iter().map(plan_json));
     let mut tree = tree(String::new(), first, environment, model);
     tree.runners = plans.iter().map(|runner| names::campaign_folder(&runner.plan.campaign.name)).collect();
 
-    let note = format!("# {}\n", generated_by(first, environment));
+    let note = format!("# {}\n", generated_by(first, &environment.options));
     tree.add(
         ".cargo/config.toml",
         Owner::Machine,
@@ -289,41 +350,64 @@ fn shared(plans: &[RunnerPlan], environment: &Environment) -> Tree {
             })
             .collect(),
     };
-    tree.add("README.md", Owner::Machine, text::render(sesame_templates::runner::SHARED_README, &readme));
+    tree.add("README.md", Owner::Machine, environment.templates.render("runner/shared_readme.md.tera", &readme)?);
 
     let types = Messages::new(&first.plan);
-    for hook in &first.hooks {
-        let path = format!("hooks/{}.rs", names::snake(&hook.metric));
-        tree.add(&path, Owner::User, stub::stub(first, &types, hook));
-        let inputs = handlers::inputs(&first.plan, &types, &hook.inputs);
+    hooks(&mut tree, "hooks", first, &types, environment)?;
+    Ok(tree)
+}
+
+/// The user's hooks of a space, in a folder of a tree.
+fn hooks(
+    tree: &mut Tree,
+    folder: &str,
+    runner: &RunnerPlan,
+    types: &Messages<'_>,
+    environment: &Environment,
+) -> Result<(), Problem> {
+    for hook in &runner.hooks {
+        let path = format!("{folder}/{}.rs", names::snake(&hook.metric));
+        tree.add(&path, Owner::User, stub::stub(&environment.templates, runner, types, hook)?);
+        let inputs = handlers::inputs(&runner.plan, types, &hook.inputs);
         tree.hooks.insert(path, Hook { of: format!("metric `{}`", hook.metric), inputs });
     }
-    for operation in &first.operations {
-        let path = format!("hooks/{}.rs", names::snake(&operation.operation));
-        tree.add(&path, Owner::User, operations::stub(first, &types, operation));
-        let inputs = operations::inputs(first, &types, operation);
+    for operation in &runner.operations {
+        let path = format!("{folder}/{}.rs", names::snake(&operation.operation));
+        tree.add(&path, Owner::User, operations::stub(&environment.templates, runner, types, operation)?);
+        let inputs = operations::inputs(runner, types, operation);
         tree.hooks.insert(path, Hook { of: format!("operation `{}`", operation.operation), inputs });
     }
-    tree
+    Ok(())
 }
 
 /// The crate of one campaign.
-fn runner(runner: &RunnerPlan, environment: &Environment) -> Tree {
+fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Problem> {
     let plan = &runner.plan;
     let json = plan_json(runner);
     let mut tree =
         tree(names::campaign_folder(&plan.campaign.name), runner, environment, sha256(std::iter::once(json.clone())));
+    tree.options = environment.runner_options();
     let package = names::package(&plan.space, &plan.campaign.name);
-    let note = generated_by(runner, environment);
+    let note = generated_by(runner, &tree.options);
     let header = format!("// {note}\n");
 
     let dependencies = package::with_features(&environment.dependencies, &features(runner));
-    tree.add("Cargo.toml", Owner::Machine, package::cargo_toml(&note, &package, &dependencies));
+    tree.add(
+        "Cargo.toml",
+        Owner::Machine,
+        package::cargo_toml(&note, &package, &dependencies, !environment.vendored.is_empty()),
+    );
     if let Some(lock) = &environment.lock {
         tree.add("Cargo.lock", Owner::Seed, lock.clone());
     }
     tree.add("campaign.plan.json", Owner::Machine, json);
+    // As seen from the runner's folder, and from its src/generated/.
+    let (hooks_folder, hooks_path) = match environment.hooks {
+        HooksFolder::Shared => ("../hooks", "../../../hooks"),
+        HooksFolder::Own { .. } => ("src/hooks", "../hooks"),
+    };
     let readme = RunnerReadme {
+        hooks_folder,
         space: plan.space.clone(),
         source: rust::one_line(&plan.source),
         campaign: plan.campaign.name.clone(),
@@ -332,7 +416,7 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Tree {
         evaluations: plan.campaign.search.evaluations(),
         seed: plan.campaign.seed,
     };
-    tree.add("README.md", Owner::Machine, text::render(sesame_templates::runner::RUNNER_README, &readme));
+    tree.add("README.md", Owner::Machine, environment.templates.render("runner/runner_readme.md.tera", &readme)?);
 
     let docs = rust::module_docs([format!("The test runner of campaign `{}`.", plan.campaign.name)]);
     let main = rust::file(
@@ -366,15 +450,24 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Tree {
     let types = Messages::new(plan);
     tree.add("src/generated/messages.rs", Owner::Machine, types.file(&header, custom));
     tree.add("src/generated/metrics.rs", Owner::Machine, metrics::traits(runner, &types, &header));
-    // From src/generated/ of a runner to the folder beside it.
-    let hooks = "../../../hooks";
-    tree.add("src/generated/registry.rs", Owner::Machine, metrics::registry(runner, &types, &header, hooks));
+    tree.add("src/generated/registry.rs", Owner::Machine, metrics::registry(runner, &types, &header, hooks_path));
     if custom {
         tree.add("src/generated/operations.rs", Owner::Machine, operations::traits(runner, &types, &header));
-        let registry = operations::registry(runner, &types, &header, hooks);
+        let registry = operations::registry(runner, &types, &header, hooks_path);
         tree.add("src/generated/operation_registry.rs", Owner::Machine, registry);
     }
-    tree
+    if let HooksFolder::Own { shared } = &environment.hooks {
+        tree.add(".gitignore", Owner::Machine, format!("# {note}\n/target/\n/results/\n"));
+        hooks(&mut tree, "src/hooks", runner, &types, environment)?;
+        for (path, text) in shared {
+            let file = File { owner: Owner::User, contents: text.clone().into_bytes() };
+            tree.files.insert(format!("src/hooks/{path}"), file);
+        }
+    }
+    for (path, contents) in &environment.vendored {
+        tree.add(path, Owner::Machine, contents.clone());
+    }
+    Ok(tree)
 }
 
 /// The features of the runtime that a campaign uses, so that its runner compiles nothing else.
@@ -394,7 +487,10 @@ fn features(runner: &RunnerPlan) -> Vec<&'static str> {
 fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> String {
     let plan = &runner.plan;
     let docs = rust::module_docs([format!("Campaign `{}`, for the runtime.", plan.campaign.name)]);
-    let folder = &environment.space_folder;
+    // A runner that can go elsewhere leads out of itself only for files that operations beside the run work on.
+    let beside = runner.operations.iter().any(|operation| operation.topic.is_none());
+    let folder =
+        if environment.hooks == HooksFolder::Shared || beside { environment.space_folder.as_str() } else { "." };
     let operations = if runner.operations.is_empty() {
         quote! { &[] }
     } else {
@@ -409,9 +505,13 @@ fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> Str
         };
         (simulator, quote! { ::sesame_runtime::transport::in_process::<Simulator>() })
     } else {
-        let simulator = quote! {};
+        let folder = &environment.simulator_folder;
+        let simulator = quote! {
+            /// The folder that the simulator runs in, as seen from this crate's.
+            const SIMULATOR: &str = #folder;
+        };
         let connect = quote! {
-            ::sesame_runtime::transport::process(::core::env!("CARGO_MANIFEST_DIR"), SPACE)
+            ::sesame_runtime::transport::process(::core::env!("CARGO_MANIFEST_DIR"), SIMULATOR)
         };
         (simulator, connect)
     };
@@ -439,15 +539,16 @@ fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> Str
             }
         },
     );
-    let place = format!("simulator `{}` in {}", plan.simulator.name, plan.source);
+    let place = format!("simulator `{}` in {}", plan.simulator.name, runner.system_file);
     rust::note_lines(&source, &[("type Simulator =".to_owned(), place)])
 }
 
 /// What every machine file says at its top.
-fn generated_by(runner: &RunnerPlan, environment: &Environment) -> String {
+fn generated_by(runner: &RunnerPlan, options: &BTreeMap<String, String>) -> String {
     let mut command = format!("sesamec generate {}", runner.plan.source);
-    for (name, value) in &environment.options {
-        command = format!("{command} --{name} {value}");
+    for (name, value) in options {
+        let space = if value.is_empty() { "" } else { " " };
+        command = format!("{command} --{name}{space}{value}");
     }
     let RunnerPlan { plan, .. } = runner;
     rust::one_line(&format!(
@@ -470,8 +571,8 @@ fn sha256(texts: impl Iterator<Item = String>) -> String {
 }
 
 /// SHA-256 of a file's contents, in hexadecimal.
-pub(crate) fn hash(contents: &str) -> String {
-    hex(&Sha256::digest(contents.as_bytes()))
+pub(crate) fn hash(contents: &[u8]) -> String {
+    hex(&Sha256::digest(contents))
 }
 
 fn hex(bytes: &[u8]) -> String {

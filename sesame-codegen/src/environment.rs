@@ -4,6 +4,8 @@
 //! Paths are written as seen from a runner's folder, relative wherever there is a relative way, so that a checkout or
 //! a project can be moved as a whole.
 
+mod vendor;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
@@ -13,11 +15,14 @@ use serde::Deserialize;
 use sesame_plan::Transport;
 use toml::{Table, Value};
 
-use crate::emit::{Environment, simulator_path};
+use crate::emit::{Environment, HooksFolder, Problem, Templates, simulator_path};
 use crate::plan::RunnerPlan;
 
 /// The name of the file beside a `.sesame` file that says what its runners need.
 pub const SETTINGS: &str = "sesame.toml";
+
+/// The folder beside a `.sesame` file that its runners are in, if nothing else is said.
+pub const RUNNERS: &str = "runners";
 
 const RUNTIME: &str = "sesame-runtime";
 
@@ -79,6 +84,28 @@ pub enum Error {
         /// The file that is missing.
         file: PathBuf,
     },
+    /// Templates of the user's cannot be used.
+    #[error("{}: {problem}", folder.display())]
+    Templates {
+        /// Their folder.
+        folder: PathBuf,
+        /// What is wrong.
+        problem: Problem,
+    },
+    /// A runtime that is in no folder cannot be copied.
+    #[error(
+        "`--vendor` copies the runtime, and so needs its source in a folder: give it with `--runtime path:FOLDER`, or as \
+         `path` in [runtime] of {SETTINGS}"
+    )]
+    RuntimeHasNoFolder,
+    /// A crate that cannot be copied into a runner.
+    #[error("{} cannot be copied into a runner: {problem}", path.display())]
+    Vendor {
+        /// The folder of the crate, or a file in it.
+        path: PathBuf,
+        /// Why.
+        problem: String,
+    },
     /// A path that TOML cannot hold.
     #[error("the path {} is not UTF-8, and so cannot stand in a Cargo.toml", path.display())]
     NotText {
@@ -94,18 +121,58 @@ pub enum RuntimeChoice {
     Folder(PathBuf),
     /// A released version.
     Version(String),
+    /// A repository.
+    Git {
+        /// Its address.
+        url: String,
+        /// What to take of it: `tag`, `branch` or `rev`, and which. Its main branch if not said.
+        reference: Option<(&'static str, String)>,
+    },
+}
+
+/// What a command line says of the surroundings.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Where runners take the runtime from; if not said: `[runtime]` in `sesame.toml`, else the checkout that sesamec was
+    /// built from, else the released version.
+    pub runtime: Option<RuntimeChoice>,
+    /// A folder, relative to the working directory, with templates in place of this project's; if not said: `templates`
+    /// in `sesame.toml`, which is relative to that.
+    pub templates: Option<PathBuf>,
+    /// Each runner has the hooks in its own folder.
+    pub self_contained: bool,
+    /// Each runner has the hooks, the runtime, the simulator, and every other crate that is in a folder in its own folder.
+    pub vendor: bool,
 }
 
 impl RuntimeChoice {
-    /// From the command line: `path:FOLDER` or a version.
+    /// From the command line: `path:FOLDER`, `git:URL`, `git:URL?tag=TAG` (or `branch=`, `rev=`) or a version.
     pub fn parse(text: &str) -> Result<Self, String> {
+        if let Some(git) = text.strip_prefix("git:").filter(|git| !git.is_empty()) {
+            return Self::parse_git(git);
+        }
         match text.strip_prefix("path:") {
             Some(folder) if !folder.is_empty() => Ok(RuntimeChoice::Folder(folder.into())),
             None if text.starts_with(|first: char| first.is_ascii_digit() || "=^~<>".contains(first)) => {
                 Ok(RuntimeChoice::Version(text.to_owned()))
             }
-            _ => Err(format!("expected `path:FOLDER` or a version such as `{}`", env!("CARGO_PKG_VERSION"))),
+            _ => Err(format!(
+                "expected `path:FOLDER`, `git:URL`, `git:URL?tag=TAG` or a version such as `{}`",
+                env!("CARGO_PKG_VERSION")
+            )),
         }
+    }
+
+    fn parse_git(git: &str) -> Result<Self, String> {
+        let Some((url, reference)) = git.rsplit_once('?') else {
+            return Ok(RuntimeChoice::Git { url: git.to_owned(), reference: None });
+        };
+        let known = ["tag", "branch", "rev"].into_iter().find_map(|kind| {
+            let name = reference.strip_prefix(kind)?.strip_prefix('=').filter(|name| !name.is_empty())?;
+            Some((kind, name.to_owned()))
+        });
+        let expected = || format!("expected `tag=…`, `branch=…` or `rev=…` after `?`, not `{reference}`");
+        Ok(RuntimeChoice::Git { url: url.to_owned(), reference: Some(known.ok_or_else(expected)?) })
     }
 }
 
@@ -113,6 +180,7 @@ impl RuntimeChoice {
 #[serde(deny_unknown_fields, default)]
 struct Settings {
     runtime: Option<Table>,
+    templates: Option<PathBuf>,
     dependencies: Table,
 }
 
@@ -137,8 +205,9 @@ pub fn environment(
     source: &Path,
     out: &Path,
     plans: &[RunnerPlan],
-    runtime: Option<&RuntimeChoice>,
+    options: &Options,
 ) -> Result<Environment, Vec<Error>> {
+    let runtime = options.runtime.as_ref();
     let home = source
         .parent()
         .map_or_else(|| Path::new("."), |parent| if parent == Path::new("") { Path::new(".") } else { parent });
@@ -179,26 +248,119 @@ pub fn environment(
             Err(error) => errors.push(error),
         }
     }
+    let templates_folder = options.templates.clone().or_else(|| settings.templates.map(|folder| home.join(folder)));
+    let templates =
+        templates_folder.as_deref().map_or_else(|| Ok(Templates::default()), templates).unwrap_or_else(|found| {
+            errors.extend(found);
+            Templates::default()
+        });
+    let mut vendored = BTreeMap::new();
+    if options.vendor && errors.is_empty() {
+        match vendor::vendor(&runner_folder, &mut dependencies) {
+            Ok(files) => vendored = files,
+            Err(found) => errors.extend(found),
+        }
+    }
+    let mut hooks = HooksFolder::Shared;
+    if options.self_contained || options.vendor {
+        // A runner that is generated elsewhere takes along what is filled in beside the space.
+        let beside = [out.to_owned(), home.join(RUNNERS)].map(|runners| runners.join("hooks"));
+        match shared_hooks(beside.iter().find(|folder| folder.is_dir())) {
+            Ok(shared) => hooks = HooksFolder::Own { shared },
+            Err(error) => errors.push(error),
+        }
+    }
     if !errors.is_empty() {
         return Err(errors);
     }
-    let mut options = BTreeMap::new();
+    let mut said = BTreeMap::new();
     if let Some(choice) = runtime {
         let text = match choice {
             RuntimeChoice::Folder(folder) => {
                 format!("path:{}", relative(&runner_folder, folder).map_err(|error| vec![error])?)
             }
             RuntimeChoice::Version(version) => version.clone(),
+            RuntimeChoice::Git { url, reference: None } => format!("git:{url}"),
+            RuntimeChoice::Git { url, reference: Some((kind, name)) } => format!("git:{url}?{kind}={name}"),
         };
-        options.insert("runtime".to_owned(), text);
+        said.insert("runtime".to_owned(), text);
     }
+    if let Some(folder) = &options.templates {
+        said.insert("templates".to_owned(), relative(&runner_folder, folder).map_err(|error| vec![error])?);
+    }
+    let system = plans.first().map_or_else(|| home.to_owned(), |first| home.join(first.system_folder()));
     let space_folder = relative(&runner_folder, home).map_err(|error| vec![error])?;
-    Ok(Environment { dependencies, lock, options, space_folder })
+    let simulator_folder = relative(&runner_folder, &system).map_err(|error| vec![error])?;
+    Ok(Environment { dependencies, lock, options: said, space_folder, simulator_folder, hooks, vendored, templates })
 }
 
 /// The runtime as a dependency of a crate in `folder`, which need not exist yet.
 pub fn runtime_for(folder: &Path, runtime: Option<&RuntimeChoice>) -> Result<Value, Error> {
     runtime_dependency(&settled(folder)?, Path::new("."), runtime, None).map(|(value, _)| value)
+}
+
+/// The user's templates in a folder: every file in it and below takes the place of the template of its path.
+pub fn templates(folder: &Path) -> Result<Templates, Vec<Error>> {
+    let read = |path: &String| {
+        let path = folder.join(path);
+        fs::read_to_string(&path).map_err(|cause| Error::Read { path, cause })
+    };
+    let mut errors = Vec::new();
+    let mut replaced = BTreeMap::new();
+    for path in files_below(folder).map_err(|error| vec![error])? {
+        match read(&path) {
+            Ok(text) => drop(replaced.insert(path, text)),
+            Err(error) => errors.push(error),
+        }
+    }
+    let wrong = |problem| Error::Templates { folder: folder.to_owned(), problem };
+    let templates = Templates::replacing(replaced).unwrap_or_else(|problems| {
+        errors.extend(problems.into_iter().map(wrong));
+        Templates::default()
+    });
+    if errors.is_empty() { Ok(templates) } else { Err(errors) }
+}
+
+/// The Rust files in the folder of hooks that runners share, by path.
+fn shared_hooks(folder: Option<&PathBuf>) -> Result<BTreeMap<String, String>, Error> {
+    let Some(folder) = folder else { return Ok(BTreeMap::new()) };
+    let files = files_below(folder)?
+        .into_iter()
+        .filter(|path| Path::new(path).extension().is_some_and(|extension| extension == "rs"));
+    files
+        .map(|path| match fs::read_to_string(folder.join(&path)) {
+            Ok(text) => Ok((path, text)),
+            Err(cause) => Err(Error::Read { path: folder.join(path), cause }),
+        })
+        .collect()
+}
+
+/// The files in a folder and below, sorted, as paths inside it with `/` between their parts. Leaves out what is hidden,
+/// and folders that are links.
+fn files_below(folder: &Path) -> Result<Vec<String>, Error> {
+    let mut files = Vec::new();
+    let mut folders = vec![String::new()];
+    while let Some(inside) = folders.pop() {
+        let here = folder.join(&inside);
+        let failed = |cause| Error::Read { path: here.clone(), cause };
+        for entry in fs::read_dir(&here).map_err(failed)? {
+            let entry = entry.map_err(failed)?;
+            let name = entry.file_name();
+            let Some(name) = name.to_str() else { return Err(Error::NotText { path: entry.path() }) };
+            if name.starts_with('.') {
+                continue;
+            }
+            let path = if inside.is_empty() { name.to_owned() } else { format!("{inside}/{name}") };
+            let kind = entry.file_type().map_err(failed)?;
+            if kind.is_dir() {
+                folders.push(path);
+            } else if kind.is_file() || entry.path().is_file() {
+                files.push(path);
+            }
+        }
+    }
+    files.sort();
+    Ok(files)
 }
 
 fn settings(path: &Path) -> Result<Settings, Error> {
@@ -222,6 +384,11 @@ fn runtime_dependency(
 ) -> Result<(Value, Option<PathBuf>), Error> {
     let folder = match (choice, settings) {
         (Some(RuntimeChoice::Version(version)), _) => return Ok((Value::from(version.as_str()), None)),
+        (Some(RuntimeChoice::Git { url, reference }), _) => {
+            let mut table = Table::from_iter([("git".to_owned(), Value::from(url.as_str()))]);
+            table.extend(reference.iter().map(|(kind, name)| ((*kind).to_owned(), Value::from(name.as_str()))));
+            return Ok((Value::Table(table), None));
+        }
         (Some(RuntimeChoice::Folder(folder)), _) => folder.clone(),
         (None, Some(table)) => match table.get("path").and_then(Value::as_str) {
             Some(path) => home.join(path),
@@ -246,10 +413,11 @@ fn simulator_dependency(
     plan: &RunnerPlan,
     dependencies: &BTreeMap<String, Value>,
 ) -> Result<Option<(String, Value)>, Error> {
+    let system = home.join(plan.system_folder());
     let path = match &plan.plan.simulator.transport {
         Transport::InProcess { .. } => simulator_path(&plan.plan.simulator.transport).unwrap_or_default(),
         Transport::Process { program, .. } => {
-            let file = home.join(program);
+            let file = system.join(program);
             if program.contains('/') && !file.is_file() {
                 let (source_file, program) = (plan.plan.source.clone(), program.clone());
                 return Err(Error::NoProgram { source_file, program, file });
@@ -272,7 +440,7 @@ fn simulator_dependency(
             format!("`{name}` is the simulator's crate, which {source} places in `{folder}`: remove one of them");
         return Err(Error::Settings { path: home.join(SETTINGS), problem });
     }
-    let crate_folder = home.join(folder);
+    let crate_folder = system.join(folder);
     let manifest = crate_folder.join("Cargo.toml");
     if !manifest.is_file() {
         let source_file = plan.plan.source.clone();

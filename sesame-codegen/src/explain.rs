@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
-    ActivationMode, BoostedChildren, CampaignPlan, CoverageGoal, Distribution, Domain, Drain, Exploration, GridAxis,
-    MetricSource, Operation, OperationKind, Parameter, Search, StopRule,
+    ActivationMode, BoostedChildren, CampaignPlan, CoverageGoal, Distribution, Domain, Drain, Exploration, MetricSource,
+    Operation, OperationKind, Parameter, Recorded, Search, StopRule, place_in_words,
 };
 
 /// More whole numbers than these are not written out one by one.
@@ -64,8 +64,13 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
         // Only a runner's command line makes one, and no `.sesame` text does.
         Search::Known { .. } => return clauses,
         Search::Repeat { test, times } => {
-            let test = &plan.tests[test.index()].name;
-            clauses.push(("repeat", format!("{test} {times} times {{ seed {seed} }}")));
+            let test = &plan.tests[test.index()];
+            // Only a campaign that observes has a test without operations.
+            clauses.push(match test.test.operations.as_slice() {
+                [] => ("passive", format!("{times} times {{ seed {seed} }}")),
+                _ => ("repeat", format!("{} {times} times {{ seed {seed} }}", test.name)),
+            });
+            clauses.extend(record(plan));
             clauses.push(("end", format!("after {}s", campaign.end_after)));
             return clauses;
         }
@@ -76,8 +81,8 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
     clauses.push(("operations", format!("{}   {}..{} per test", operations.join(", "), count.min, count.max)));
     clauses.push(("activate", format!("by {}", activation(plan, &campaign.activation))));
     clauses.push(("search", searches));
-    if let Some(coverage) = &campaign.coverage {
-        clauses.push(("coverage", counted(coverage)));
+    if let Some(goal) = &campaign.coverage {
+        clauses.push(("coverage", coverage(goal)));
     }
     if let Some(exploration) = &campaign.exploration {
         clauses.push(explored(exploration));
@@ -86,17 +91,19 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
         let rules: Vec<String> = campaign.stop.iter().map(stop_rule).collect();
         clauses.push(("stop", format!("{{ {} }}", rules.join("  "))));
     }
+    clauses.extend(record(plan));
     clauses.push(("end", format!("after {}s", campaign.end_after)));
     clauses
 }
 
-fn counted(coverage: &CoverageGoal) -> String {
-    let axis = |axis: &GridAxis| {
-        format!("{} {} cells {}  ", axis.dimension.name(), range(axis.low, axis.high, None), axis.cells)
-    };
-    let axes: String = coverage.axes.iter().map(axis).collect();
-    let stop = coverage.stop_at.map_or(String::new(), |share| format!("  stop at {}%", percent(share)));
-    format!("{{ {axes}hits {}{stop} }}", coverage.hits)
+/// A failsafe has become the number of evaluations.
+fn coverage(goal: &CoverageGoal) -> String {
+    let axes = goal
+        .axes
+        .iter()
+        .map(|axis| format!("{} [{}, {}] cells {}   ", axis.dimension.name(), axis.low, axis.high, axis.cells));
+    let stop = goal.stop_at.map(|share| format!("   stop at {}%", percent(share))).unwrap_or_default();
+    format!("{{ {}hits {}{stop} }}", axes.collect::<String>(), goal.hits)
 }
 
 /// The clause of an exploration.
@@ -130,6 +137,14 @@ fn stop_rule(rule: &StopRule) -> String {
     }
 }
 
+fn record(plan: &CampaignPlan) -> Option<(&'static str, String)> {
+    let which = match plan.campaign.record? {
+        Recorded::Failing => "failing",
+        Recorded::All => "all",
+    };
+    Some(("record", format!("mcap {which}")))
+}
+
 fn activation(plan: &CampaignPlan, mode: &ActivationMode) -> String {
     let ActivationMode::Condition { space } = mode else { return "time".to_owned() };
     let variables = space.variables.iter().map(|variable| {
@@ -155,55 +170,102 @@ fn activation(plan: &CampaignPlan, mode: &ActivationMode) -> String {
 fn operation_line(plan: &CampaignPlan, operation: &Operation) -> String {
     let mut line = format!("operation {}", operation.name);
     if let Some(topic) = operation.topic {
-        let fields = match &operation.kind {
-            OperationKind::RandomValue { path, .. } => path.as_slice(),
-            _ => &[],
-        };
         let topic = plan.topic(topic).name.as_str();
-        let target: Vec<&str> = std::iter::once(topic).chain(fields.iter().map(String::as_str)).collect();
-        line = format!("{line} on {}", target.join("."));
-    }
-    line = format!("{line} = {}", operation.kind.words());
-    if let OperationKind::Custom { .. } = operation.kind {
-        let parameters = operation.parameters.iter().map(|it| format!("{}: {}  ", it.name, domain(it)));
-        line = format!("{line} {{ {}}}", parameters.collect::<String>());
-    } else {
-        for parameter in &operation.parameters {
-            let Domain::Number { low, high, .. } = parameter.domain else { continue };
-            let permitted = match operation.kind {
-                OperationKind::PacketLoss => format!("[{}%, {}%]", percent(low), percent(high)),
-                _ => range(low, high, parameter.unit.as_deref()),
-            };
-            line = format!("{line} {permitted}");
+        let mut targets: Vec<String> =
+            operation.places.iter().map(|place| format!("{topic}{}", place_in_words(place))).collect();
+        if targets.is_empty() {
+            targets.push(topic.to_owned());
         }
+        line = format!("{line} on {}", targets.join(", "));
     }
-    if let OperationKind::Latency { distribution, drain } = operation.kind {
-        let uniform = if distribution == Distribution::Uniform { " uniform" } else { "" };
-        let drain = match drain {
-            Drain::Finish => "finish",
-            Drain::Flush => "flush",
-            Drain::Drop => "drop",
-        };
-        line = format!("{line}{uniform} drain {drain}");
-    }
+    line = format!("{line} = {}", disturbance(operation));
     if !operation.kind.is_offline() {
         let within = range(operation.within.start, operation.within.end, Some("s"));
         line = format!("{line} within {within}");
     }
     line = format!("{line} priority {} inclusion {}%", operation.priority, percent(operation.inclusion));
+    if !operation.timed {
+        line.push_str(" untimed");
+    }
     if !operation.constraints.is_empty() {
         line = format!("{line} start contains {}", contained(plan, operation).join(", "));
     }
     line
 }
 
+/// What an operation does and permits, as the language has it.
+fn disturbance(operation: &Operation) -> String {
+    let words = operation.kind.words();
+    let probability = operation.kind.has_probabilities();
+    let permitted: Vec<String> = operation.parameters.iter().map(|it| permitted(it, probability)).collect();
+    match &operation.kind {
+        OperationKind::Custom { .. } => {
+            let parameters = operation.parameters.iter().map(|it| format!("{}: {}  ", it.name, domain(it)));
+            format!("{words} {{ {}}}", parameters.collect::<String>())
+        }
+        OperationKind::RandomText { texts } => format!("{words} {}", quoted(texts)),
+        OperationKind::RandomValue { .. } if operation.parameters.len() == 3 => {
+            let ends = |high: bool| {
+                let end = |it: &Parameter| match it.domain {
+                    Domain::Number { low, high: most, .. } => if high { most } else { low }.to_string(),
+                    _ => String::new(),
+                };
+                let [x, y, z] = [0, 1, 2].map(|axis| end(&operation.parameters[axis]));
+                format!("({x}, {y}, {z}){}", operation.parameters[0].unit.as_deref().unwrap_or_default())
+            };
+            format!("{words} [{}, {}]", ends(false), ends(true))
+        }
+        OperationKind::BurstLoss => {
+            let clauses =
+                operation.parameters.iter().zip(&permitted).map(|(it, range)| format!("{} {range}  ", it.name));
+            let whole = operation.parameters.iter().all(|it| it.name != "loss");
+            let loss = if whole { "loss [100%, 100%]  " } else { "" };
+            format!("{words} {{ {}{loss}}}", clauses.collect::<String>())
+        }
+        OperationKind::Latency { distribution, drain } => {
+            let distribution = match distribution {
+                Distribution::Fixed => "fixed",
+                Distribution::Uniform => "uniform",
+                Distribution::Normal => "normal",
+            };
+            format!("{words} {} {distribution} drain {}", permitted.join(" "), drain_word(*drain))
+        }
+        OperationKind::Reorder { drain } => format!("{words} {} drain {}", permitted.join(" "), drain_word(*drain)),
+        _ if permitted.is_empty() => words.to_owned(),
+        _ => format!("{words} {}", permitted.join(" ")),
+    }
+}
+
+fn drain_word(drain: Drain) -> &'static str {
+    match drain {
+        Drain::Finish => "finish",
+        Drain::Flush => "flush",
+        Drain::Drop => "drop",
+    }
+}
+
+/// What is permitted for a parameter of any operation but a custom one.
+fn permitted(parameter: &Parameter, probability: bool) -> String {
+    let unit = parameter.unit.as_deref();
+    match &parameter.domain {
+        Domain::Number { low, high, .. } if probability => format!("[{}%, {}%]", percent(*low), percent(*high)),
+        Domain::Number { low, high, .. } => range(*low, *high, unit),
+        Domain::Point { low, high } => {
+            let point = |[x, y, z]: [f64; 3]| format!("({x}, {y}, {z}){}", unit.unwrap_or_default());
+            format!("[{}, {}]", point(*low), point(*high))
+        }
+        Domain::Texts { texts: items } | Domain::Files { files: items } => format!("one of {}", quoted(items)),
+    }
+}
+
+fn quoted(items: &[String]) -> String {
+    let quoted = items.iter().map(|item| format!("\"{}\"", item.replace('\\', "\\\\").replace('"', "\\\"")));
+    quoted.collect::<Vec<_>>().join(", ")
+}
+
 /// What a parameter of a custom operation permits.
 fn domain(parameter: &Parameter) -> String {
     let unit = parameter.unit.as_deref().unwrap_or_default();
-    let list = |items: &[String]| {
-        let quoted = items.iter().map(|item| format!("\"{}\"", item.replace('\\', "\\\\").replace('"', "\\\"")));
-        quoted.collect::<Vec<_>>().join(", ")
-    };
     match &parameter.domain {
         Domain::Number { low, high, integer, .. } => {
             let word = if *integer { "int" } else { "real" };
@@ -213,8 +275,8 @@ fn domain(parameter: &Parameter) -> String {
             let point = |[x, y, z]: [f64; 3]| format!("({x}, {y}, {z}){unit}");
             format!("point [{}, {}]", point(*low), point(*high))
         }
-        Domain::Texts { texts } => format!("one of {}", list(texts)),
-        Domain::Files { files } => format!("file one of {}", list(files)),
+        Domain::Texts { texts } => format!("one of {}", quoted(texts)),
+        Domain::Files { files } => format!("file one of {}", quoted(files)),
     }
 }
 
@@ -331,7 +393,7 @@ mod tests {
         operation lose on link = packet loss [0%, 7%] priority -1
         operation lag on link = latency [0ms, 300ms] uniform drain drop
         operation late on link = latency [0.1s, 0.7s]
-        operation cut on zones = blackhole
+        operation cut on zones = blackhole untimed
         operation bend on link = custom {
           points: int [3, 20]  gain: real [0.5, 2]  reach: real[mm] [-10cm, 1m]
           shift: point [(-2, -2, 0)m, (2, 2, 0.5)m]  frame: one of \"a \\\"b\\\"\", \"c\"
@@ -354,7 +416,8 @@ mod tests {
           search random { evaluations 8  seed 7 }  end after 70s }";
     const BY_TIME: &str = "
         campaign timed { objectives time  operations cut, swing 1 per test  observes pace
-          search random { evaluations 8 }  end after 70s }";
+          search random { evaluations 8 }  record mcap failing  end after 70s
+          coverage { T1 [0, 1] cells 6  O0 [0.5, 1.5] cells 1  hits 2  stop at 7%  failsafe 30 } }";
     const BOOSTED: &str = "
         campaign boosted { objectives time  operations cut, swing 1..3 per test
           search nsga2 { population 4  evaluations 8 }
@@ -376,7 +439,8 @@ mod tests {
     const LATIN: &str = "
         campaign latin { objectives time  operations cut, swing 1..3 per test
           search latin_hypercube { evaluations 8 }  end after 70s }";
-    const AGAIN: &str = "campaign again { repeat still 3 times  end after 70s }";
+    const AGAIN: &str = "campaign again { repeat still 3 times  end after 70s  record mcap failing }";
+    const WATCH: &str = "campaign watch { passive 3 times { seed 4 }  observes near  end after 70s  record mcap all }";
 
     fn plan(campaign: &str) -> CampaignPlan {
         let mut sources = SourceMap::new();
@@ -389,7 +453,7 @@ mod tests {
 
     #[test]
     fn what_is_explained_has_the_same_plan() {
-        for text in [EVERYTHING, DEFAULTS, BY_TIME, BOOSTED, CONSTRUCTED, PREDICTED, ELITES, LATIN, AGAIN] {
+        for text in [EVERYTHING, DEFAULTS, BY_TIME, BOOSTED, CONSTRUCTED, PREDICTED, ELITES, LATIN, AGAIN, WATCH] {
             // Operations that a campaign leaves out are still needed by the known test.
             let original = plan(&format!("{OPERATIONS}{text}"));
             let explained = campaign(&original);
@@ -433,6 +497,11 @@ predict    { candidates 20 }
     #[test]
     fn a_repetition() {
         insta::assert_snapshot!(campaign(&plan(&format!("{OPERATIONS}{AGAIN}"))));
+    }
+
+    #[test]
+    fn a_campaign_that_only_observes() {
+        insta::assert_snapshot!(campaign(&plan(&format!("{OPERATIONS}{WATCH}"))));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Generated files in memory, before anything is written.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
@@ -23,7 +24,14 @@ pub struct File {
     /// Who may change it once it exists.
     pub owner: Owner,
     /// All of it.
-    pub contents: String,
+    pub contents: Vec<u8>,
+}
+
+impl File {
+    /// Its contents as text. What is no text, such as a vendored mesh, is shown as far as it can be.
+    pub fn text(&self) -> Cow<'_, str> {
+        String::from_utf8_lossy(&self.contents)
+    }
 }
 
 /// A folder with one manifest: the output folder itself (what all runners share), or one runner's crate.
@@ -58,8 +66,8 @@ pub struct Hook {
 
 impl Tree {
     /// Adds a file.
-    pub(crate) fn add(&mut self, path: &str, owner: Owner, contents: String) {
-        let before = self.files.insert(path.to_owned(), File { owner, contents });
+    pub(crate) fn add(&mut self, path: &str, owner: Owner, contents: impl Into<Vec<u8>>) {
+        let before = self.files.insert(path.to_owned(), File { owner, contents: contents.into() });
         assert!(before.is_none(), "two generated files are called {path}");
     }
 }

@@ -1,34 +1,102 @@
 //! The Sesame language, as the command uses it: text → diagnostics, and a plan for each campaign.
 
-use sesame_dsl::diagnostic::{Severity, page, render};
+use std::io;
+use std::path::Path;
+
+use sesame_dsl::diagnostic::{Diagnostic, Severity, page, render};
 use sesame_dsl::model::Space;
 use sesame_dsl::source::SourceMap;
+use sesame_dsl::span::Span;
 
-use crate::cli::{Checked, Language};
+use crate::cli::{Checked, Diagnosed, Language, Look};
 use crate::lower::lower;
 
 /// The language of this version.
-pub const SESAME: Language = Language { check, explain: page };
+pub const SESAME: Language = Language { check, format, explain: page };
 
 /// What the plan names as its generator.
 const GENERATOR: &str = concat!("sesamec ", env!("CARGO_PKG_VERSION"));
 
-fn check(file: &str, text: &str, colour: bool) -> Checked {
+fn check(file: &str, text: &str, look: Look) -> Checked {
     let mut sources = SourceMap::new();
     let root = sources.add(file, text);
+    sesame_dsl::load_imports(&mut sources, root, read);
     let analysis = sesame_dsl::analyse(&sources, root);
-    let errors = analysis.diagnostics.iter().filter(|found| found.severity() == Severity::Error).count();
-    let diagnostics = render::human(&analysis.diagnostics, &sources, colour);
+    let Diagnosed { diagnostics, errors } = diagnosed(&analysis.diagnostics, &sources, look);
+    let warnings = analysis.diagnostics.iter().filter(|found| found.severity() == Severity::Warning).count();
     // A plan names the file without its folder: the same space gives the same plan wherever it lies.
     let source = file.rsplit(['/', std::path::MAIN_SEPARATOR]).next().unwrap_or(file);
-    let (summary, plans) = match &analysis.model {
+    let (summary, plans, notes) = match &analysis.model {
         Some(space) => {
             let plans = space.campaigns.iter().map(|(campaign, _)| lower(space, campaign, source, GENERATOR)).collect();
-            (summary(space), plans)
+            (summary(space), plans, not_used(space, &sources))
         }
-        None => (String::new(), Vec::new()),
+        None => (String::new(), Vec::new(), Vec::new()),
     };
-    Checked { diagnostics, errors, summary, plans }
+    Checked { diagnostics, errors, warnings, summary, plans, notes }
+}
+
+/// An imported file, or why there is none.
+fn read(name: &str) -> Result<String, String> {
+    let path = Path::new(name);
+    let metadata = std::fs::metadata(path).map_err(|error| in_words(&error))?;
+    if !metadata.is_file() {
+        return Err("it is not a file".to_owned());
+    }
+    std::fs::read_to_string(path).map_err(|error| in_words(&error))
+}
+
+fn in_words(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "there is no such file".to_owned(),
+        io::ErrorKind::InvalidData => "it is not text in UTF-8".to_owned(),
+        _ => format!("it cannot be read: {error}"),
+    }
+}
+
+/// What a space says and no runner uses yet, with its places.
+fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
+    let at = |span: Span| {
+        let file = space.files.get(&span.file).map_or("", String::as_str);
+        format!("{file}:{}", sources.position(span).line)
+    };
+    let mut notes = Vec::new();
+    if let Some(launch) = &space.surroundings.launch {
+        let place = at(launch.command.span);
+        notes.push(format!("`launch` ({place}) is not used by runners yet: they start the simulator themselves"));
+    }
+    if let Some(terminate) = &space.surroundings.terminate {
+        let place = at(terminate.span);
+        notes.push(format!("`terminate` ({place}) is not used by runners yet: they end the simulator themselves"));
+    }
+    if let Some(budget) = &space.surroundings.relay_budget {
+        let place = at(budget.span);
+        notes.push(format!("`relay budget` ({place}) is not used by runners yet: in lock-step a relay adds no delay"));
+    }
+    let monitors = space.eddis.values().map(|eddi| ("monitor", &eddi.declaration));
+    let labs = space.physicals.values().map(|lab| ("lab", &lab.declaration));
+    notes.extend(monitors.chain(labs).map(|(what, declaration)| {
+        let place = at(declaration.span);
+        format!("{what} `{}` ({place}) is checked, but not used by runners yet", declaration.name)
+    }));
+    notes
+}
+
+fn format(file: &str, text: &str, look: Look) -> Result<String, Diagnosed> {
+    let mut sources = SourceMap::new();
+    let root = sources.add(file, text);
+    sesame_dsl::format::format(&sources, root).map_err(|errors| diagnosed(&errors, &sources, look))
+}
+
+fn diagnosed(diagnostics: &[Diagnostic], sources: &SourceMap, look: Look) -> Diagnosed {
+    let text = match look {
+        Look::Human { colour } => render::human(diagnostics, sources, colour),
+        Look::Short => render::short(diagnostics, sources),
+        Look::Json => render::json(diagnostics, sources),
+        Look::Github => render::github(diagnostics, sources),
+    };
+    let errors = diagnostics.iter().filter(|found| found.severity() == Severity::Error).count();
+    Diagnosed { diagnostics: text, errors }
 }
 
 /// What a space holds, for example `4 campaigns, 9 operations, 6 metrics, 2 requirements`.
@@ -47,11 +115,15 @@ fn summary(space: &Space) -> String {
 mod tests {
     use super::*;
 
+    const PLAIN: Look = Look::Human { colour: false };
+
     #[test]
     fn the_space_of_a_new_project_is_correct() {
         let runtime = crate::environment::RuntimeChoice::Version("1.0.0".into());
-        let files = crate::project::files(std::path::Path::new("demo"), Some(&runtime)).unwrap();
-        let checked = check("some/demo.sesame", &files["demo.sesame"], false);
+        let files =
+            crate::project::files(std::path::Path::new("demo"), Some(&runtime), &crate::emit::Templates::default())
+                .unwrap();
+        let checked = check("some/demo.sesame", &files["demo.sesame"], PLAIN);
         assert_eq!((checked.errors, checked.diagnostics.as_str()), (0, ""));
         assert_eq!(checked.summary, "1 campaign, 2 operations, 2 metrics, 1 requirement");
         assert_eq!(checked.plans[0].plan.source, "demo.sesame");
@@ -59,8 +131,62 @@ mod tests {
     }
 
     #[test]
+    fn the_examples_deserve_no_warning() {
+        let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");
+        for name in ["kuka_cell", "two_robots"] {
+            let file = examples.join(name).join(format!("{name}.sesame"));
+            let text = std::fs::read_to_string(&file).unwrap();
+            let checked = check(file.to_str().unwrap(), &text, PLAIN);
+            assert_eq!((checked.diagnostics.as_str(), checked.warnings), ("", 0));
+            assert!(checked.notes.is_empty(), "{:?}", checked.notes);
+        }
+    }
+
+    #[test]
+    fn imports_are_read_beside_the_file_that_imports_and_named_as_seen_from_the_space() {
+        let folder = tempfile::tempdir().unwrap();
+        let spaces = folder.path().join("spaces");
+        std::fs::create_dir_all(&spaces).unwrap();
+        let cell = "system {\n  simulator sim = in_process \"cell_sim::Cell\" { crate \"simulator\"  step 20ms }\n\
+                    topic a = \"a\" : int }\nmetric hits maximise default 0 { hook on a }\n\
+                    operation cut on a = blackhole\n";
+        std::fs::write(folder.path().join("cell.sesame"), cell).unwrap();
+        let demo = "space demo import \"../cell.sesame\" campaign c { objectives hits  operations cut 1 per test\n\
+                    search random { evaluations 3 }  end after 3s }";
+        let file = spaces.join("demo.sesame");
+        let checked = check(file.to_str().unwrap(), demo, PLAIN);
+        assert_eq!(checked.diagnostics, "");
+        let runner = &checked.plans[0];
+        assert_eq!((runner.hooks[0].source.as_str(), runner.hooks[0].line), ("../cell.sesame", 4));
+        assert_eq!(runner.system_folder(), Path::new(".."), "the simulator's crate is beside the file that names it");
+        assert_eq!(runner.plan.source, "demo.sesame");
+        let missing = check(file.to_str().unwrap(), "space demo import \"..\" import \"gone.sesame\"", PLAIN);
+        assert!(missing.diagnostics.contains("it is not a file"), "{}", missing.diagnostics);
+        assert!(missing.diagnostics.contains("there is no such file"), "{}", missing.diagnostics);
+    }
+
+    #[test]
+    fn what_no_runner_uses_yet_is_said_with_its_place() {
+        let text = include_str!("../../sesame-dsl/tests/good/blocks.sesame");
+        let checked = check("spaces/blocks.sesame", text, PLAIN);
+        assert_eq!(checked.diagnostics, "");
+        assert_eq!(
+            checked.notes,
+            [
+                "`launch` (blocks.sesame:6) is not used by runners yet: they start the simulator themselves",
+                "`terminate` (blocks.sesame:6) is not used by runners yet: they end the simulator themselves",
+                "`relay budget` (blocks.sesame:7) is not used by runners yet: in lock-step a relay adds no delay",
+                "monitor `transport` (blocks.sesame:32) is checked, but not used by runners yet",
+                "monitor `conveyor` (blocks.sesame:41) is checked, but not used by runners yet",
+                "lab `lab` (blocks.sesame:47) is checked, but not used by runners yet",
+                "lab `by_hand` (blocks.sesame:62) is checked, but not used by runners yet",
+            ]
+        );
+    }
+
+    #[test]
     fn mistakes_are_counted_and_nothing_is_planned() {
-        let checked = check("a.sesame", "space a\nmetric", false);
+        let checked = check("a.sesame", "space a\nmetric", PLAIN);
         assert!(checked.errors > 0 && checked.plans.is_empty());
         assert!(checked.diagnostics.contains("a.sesame"), "{}", checked.diagnostics);
     }

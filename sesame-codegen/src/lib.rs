@@ -10,6 +10,8 @@ pub mod environment;
 pub mod explain;
 pub mod files;
 #[cfg(feature = "cli")]
+pub mod import;
+#[cfg(feature = "cli")]
 pub mod language;
 pub mod lower;
 pub mod names;

@@ -4,11 +4,13 @@
 //! What a campaign's plan holds:
 //! - messages, topics, nodes and requirements of the whole space;
 //! - operations: those its tests may hold, or those of the test it repeats;
-//! - known tests: those whose operations are all in the plan and begin before the campaign's end;
+//! - known tests: one without operations for a campaign that only observes; else those whose operations are all in the
+//!   plan and begin before the campaign's end;
 //! - metrics: its objectives, those it observes, its condition variables, and those of all requirements and of the
 //!   conditions and expectations of these tests.
 
 mod condition;
+mod disturbance;
 mod formula;
 mod robustness;
 
@@ -32,6 +34,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             (plan::Transport::Process { program, arguments, step_ns: *step_ns }, None)
         }
     };
+    let system_file = space.file_of(&space.simulator.declaration).to_owned();
     let plan = plan::CampaignPlan {
         schema: plan::SCHEMA,
         generator: generator.to_owned(),
@@ -49,10 +52,15 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             .iter()
             .map(|&id| selection.operation_of(&space.operations[id], declared))
             .collect(),
-        tests: selection.tests.iter().map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect(),
+        tests: if let model::Search::Passive { .. } = declared.search {
+            vec![undisturbed()]
+        } else {
+            let tests = selection.tests.iter();
+            tests.map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect()
+        },
         campaign: selection.campaign(space, declared),
     };
-    RunnerPlan { plan, hooks: hooks(space), operations: custom_operations(space), simulator_crate }
+    RunnerPlan { plan, hooks: hooks(space), operations: custom_operations(space), simulator_crate, system_file }
 }
 
 /// The parts of a space that are in a campaign's plan, in declaration order: a position here is the id there.
@@ -72,6 +80,7 @@ impl Selection {
             model::Search::Repeat { test, .. } => {
                 space.tests[*test].operations.iter().map(|operation| operation.operation).collect()
             }
+            model::Search::Passive { .. } => Vec::new(),
         };
         operations.sort();
         operations.dedup();
@@ -86,6 +95,7 @@ impl Selection {
             test.operations.iter().all(|it| operations.contains(&it.operation) && begins(it) < campaign.end_after)
         };
         let tests: Vec<model::TestId> = space.tests.iter().filter(|(_, test)| fits(test)).map(|(id, _)| id).collect();
+        // A test holds an operation at least, so a campaign that only observes has none of them.
         let mut metrics: Vec<model::MetricId> = campaign.objectives.clone();
         metrics.extend(&campaign.observed);
         metrics.extend(space.requirements.values().map(|requirement| requirement.metric));
@@ -173,6 +183,10 @@ impl Selection {
                     (&self.operations, plan::Count { min: held, max: held }),
                 )
             }
+            model::Search::Passive { times } => (
+                plan::Search::Repeat { test: plan::KnownTestId(0), times: *times },
+                (&self.operations, plan::Count { min: 0, max: 0 }),
+            ),
         };
         plan::Campaign {
             name: campaign.declaration.name.clone(),
@@ -196,6 +210,16 @@ impl Selection {
                 model::Recorded::All => plan::Recorded::All,
             }),
         }
+    }
+}
+
+/// The test of a campaign that only observes: nothing is intercepted.
+fn undisturbed() -> plan::KnownTest {
+    plan::KnownTest {
+        name: "undisturbed".to_owned(),
+        doc: String::new(),
+        test: plan::Test { operations: Vec::new() },
+        expectations: Vec::new(),
     }
 }
 
@@ -230,6 +254,7 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
             doc: metric.declaration.doc.clone(),
             unit: unit(metric.unit.as_ref()),
             direction: metric.direction.map(direction),
+            source: space.file_of(&metric.declaration).to_owned(),
             line: metric.declaration.line,
             inputs: topics.iter().map(|&id| topic_id(id)).collect(),
         }),
@@ -243,25 +268,18 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
 
 fn custom_operations(space: &Space) -> Vec<OperationPlan> {
     let operations = space.operations.values().filter_map(|operation| match &operation.kind {
-        model::OperationKind::Custom { moment: when, parameters } => Some(OperationPlan {
+        model::OperationKind::Custom { moment: when } => Some(OperationPlan {
             operation: operation.declaration.name.clone(),
             doc: operation.declaration.doc.clone(),
+            source: space.file_of(&operation.declaration).to_owned(),
             line: operation.declaration.line,
             topic: operation.topic().map(topic_id),
-            moment: moment(*when),
-            parameters: parameters.iter().map(|it| (parameter(it), it.doc.clone())).collect(),
+            moment: disturbance::moment(*when),
+            parameters: operation.parameters.iter().map(|it| (parameter(it), it.doc.clone())).collect(),
         }),
         _ => None,
     });
     operations.collect()
-}
-
-fn moment(moment: model::Moment) -> plan::Moment {
-    match moment {
-        model::Moment::OnMessage => plan::Moment::OnMessage,
-        model::Moment::BeforeStart => plan::Moment::BeforeStart,
-        model::Moment::AfterEnd => plan::Moment::AfterEnd,
-    }
 }
 
 fn parameter(parameter: &model::Parameter) -> plan::Parameter {
@@ -356,39 +374,17 @@ fn operation(
     end_after: f64,
     constraints: Vec<plan::condition::Constraint>,
 ) -> plan::Operation {
-    let kind = match &operation.kind {
-        model::OperationKind::RandomValue { mode, integer, .. } => plan::OperationKind::RandomValue {
-            path: operation.target.as_ref().map_or_else(Vec::new, |target| target.fields.clone()),
-            mode: match mode {
-                model::ValueMode::Absolute => plan::ValueMode::Absolute,
-                model::ValueMode::Offset => plan::ValueMode::Offset,
-            },
-            integer: *integer,
-        },
-        model::OperationKind::PacketLoss { .. } => plan::OperationKind::PacketLoss,
-        model::OperationKind::Latency { distribution, drain, .. } => plan::OperationKind::Latency {
-            distribution: match distribution {
-                model::Distribution::Fixed => plan::Distribution::Fixed,
-                model::Distribution::Uniform => plan::Distribution::Uniform,
-            },
-            drain: match drain {
-                model::Drain::Finish => plan::Drain::Finish,
-                model::Drain::Flush => plan::Drain::Flush,
-                model::Drain::Drop => plan::Drain::Drop,
-            },
-        },
-        model::OperationKind::Blackhole => plan::OperationKind::Blackhole,
-        model::OperationKind::Custom { moment: when, .. } => plan::OperationKind::Custom { moment: moment(*when) },
-    };
     plan::Operation {
         name: operation.declaration.name.clone(),
         doc: operation.declaration.doc.clone(),
         topic: operation.topic().map(topic_id),
-        kind,
-        parameters: operation.parameters().iter().map(parameter).collect(),
+        places: operation.target.iter().flat_map(|target| &target.places).map(|place| steps(place)).collect(),
+        kind: disturbance::kind(&operation.kind),
+        parameters: operation.parameters.iter().map(parameter).collect(),
         within: within(operation, end_after),
         priority: operation.priority,
         inclusion: operation.inclusion,
+        timed: operation.timed,
         constraints,
     }
 }
@@ -440,6 +436,15 @@ fn dimension(dimension: model::CoverageDimension) -> plan::Dimension {
         model::CoverageDimension::O2 => plan::Dimension::O2,
         model::CoverageDimension::O3 => plan::Dimension::O3,
     }
+}
+
+fn steps(place: &[model::Step]) -> plan::Place {
+    let step = |step: &model::Step| match step {
+        model::Step::Field(name) => plan::Step::Field(name.clone()),
+        model::Step::Element(at) => plan::Step::Element(*at),
+        model::Step::Each => plan::Step::Each,
+    };
+    place.iter().map(step).collect()
 }
 
 /// The window of an operation; one without `within` may be active during the whole test.
@@ -511,7 +516,7 @@ mod tests {
         metric time minimise = fuzzing_time()
         requirement R1 "nothing is hit" = collisions <= 0
         operation swing on link = random offset [-18deg, 18deg] within [0s, 1min]
-        operation lose on link = packet loss [0%, 50%]
+        operation lose on link = packet loss [0%, 50%] untimed
         operation recount on count = random absolute [-3, 3] priority 2 inclusion 40%
         operation level on zones.level = random absolute [0m, 1m]
         test early { lose loss 25% from 1s to 30s  expect seen > 3 }
@@ -523,6 +528,7 @@ mod tests {
                          coverage { T1 [0, 1] cells 6  O0 [0.5, 3.5] cells 3  hits 2  stop at 50%  failsafe 30 }
                          end after 10s }
         campaign again { repeat early 3 times { seed 9 }  observes time  end after 10s }
+        campaign guard from again { passive 4 times { seed 2 }  observes seen }
     "#;
 
     fn lowered(campaign: &str) -> RunnerPlan {
@@ -545,7 +551,8 @@ mod tests {
 
     #[test]
     fn a_search_has_the_parts_it_needs_and_all_hooks() {
-        let RunnerPlan { plan, hooks, simulator_crate, .. } = lowered("look");
+        let RunnerPlan { plan, hooks, simulator_crate, system_file, .. } = lowered("look");
+        assert_eq!(system_file, "cell.sesame");
         let names: Vec<&str> = plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
         assert_eq!(names, ["collisions", "time"]);
         assert_eq!(plan.campaign.objectives, [plan::MetricId(1), plan::MetricId(0)]);
@@ -572,10 +579,36 @@ mod tests {
     }
 
     #[test]
+    fn a_campaign_that_only_observes_repeats_a_test_without_operations() {
+        let RunnerPlan { plan, hooks, .. } = lowered("guard");
+        assert!(plan.operations.is_empty() && plan.campaign.operations.is_empty());
+        assert_eq!(plan.campaign.search, plan::Search::Repeat { test: plan::KnownTestId(0), times: 4 });
+        assert_eq!((plan.campaign.seed, plan.campaign.end_after), (2, 10.0));
+        let [test] = plan.tests.as_slice() else { panic!("{:?}", plan.tests) };
+        assert_eq!((test.name.as_str(), test.test.operations.len()), ("undisturbed", 0));
+        let names: Vec<&str> = plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
+        assert_eq!(names, ["collisions", "seen"]);
+        assert_eq!(hooks.len(), 2);
+    }
+
+    #[test]
+    fn an_operation_says_if_it_counts_in_the_fuzzing_time() {
+        assert!(lowered("look").plan.operations.iter().all(|operation| operation.timed));
+        let plan = lowered("again").plan;
+        assert!(!plan.operations[0].timed);
+        let json = serde_json::to_string(&plan.operations[0]).unwrap();
+        let read: plan::Operation = serde_json::from_str(&json).unwrap();
+        assert_eq!(read, plan.operations[0]);
+        let before = json.replace(",\"timed\":false", "");
+        assert_ne!(before, json);
+        assert!(serde_json::from_str::<plan::Operation>(&before).unwrap().timed, "as older plans meant it");
+    }
+
+    #[test]
     fn a_search_by_condition_measures_its_variables_and_those_of_known_tests() {
         let text = CELL.replace("metric seen", "metric near initial 0rad = last(abs(link)) outbound metric seen").replace(
             "campaign look {",
-            "test watch { swing offset [1deg, 2deg] when near > 0.1rad and collisions == 2 until time > 1min at most 2 times
+            "test spot { swing offset [1deg, 2deg] when near > 0.1rad and collisions == 2 until time > 1min at most 2 times
                           recount value [1, 2] when collisions > 1 for 500ms }
              operation shake on link = random offset [0rad, 1rad] start contains near, integer [2, 3]
              campaign grown { objectives time  operations shake, swing, recount 1..3 per test

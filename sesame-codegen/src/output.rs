@@ -18,12 +18,20 @@ use crate::files::{Owner, Tree};
 /// What to do about the difference between generated files and those on disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
-    /// Only say what would be done.
+    /// Only say what would be done by [`Mode::Write`].
     Check,
+    /// Only say what would be done by [`Mode::Force`].
+    CheckForce,
     /// Write, but refuse to overwrite what was edited by hand.
     Write,
     /// Write, and overwrite machine files that were edited by hand.
     Force,
+}
+
+impl Mode {
+    fn forces(self) -> bool {
+        matches!(self, Mode::Force | Mode::CheckForce)
+    }
 }
 
 /// What became, or would become, of a file.
@@ -50,6 +58,8 @@ pub struct FileReport {
     pub owner: Owner,
     /// What became of it.
     pub change: Change,
+    /// From what is there to what is generated, as a unified diff; only for text that is or would be updated.
+    pub diff: Option<String>,
 }
 
 /// Something that is left in the output folder although the space has no use for it any more.
@@ -144,6 +154,18 @@ pub enum Error {
         /// File name of the `.sesame` file that was to be generated.
         source_file: String,
     },
+    /// The runner there carries more with it than this one would.
+    #[error(
+        "the runner in {} was generated with `--{option}`: say so again, give this one a folder of its own with `-o`, \
+         or take that one over with `--force`",
+        folder.display()
+    )]
+    OtherOption {
+        /// The runner's folder.
+        folder: PathBuf,
+        /// The option.
+        option: &'static str,
+    },
     /// A new project would be mixed with something else.
     #[error("{} is there already and not empty: choose another name", folder.display())]
     NotEmpty {
@@ -196,7 +218,7 @@ pub fn apply(out: &Path, trees: &[Tree], mode: Mode) -> Result<Report, Error> {
         return Err(Error::Edited { files: edited });
     }
     report.orphans.sort();
-    if mode != Mode::Check {
+    if matches!(mode, Mode::Write | Mode::Force) {
         steps.iter().try_for_each(Step::take)?;
     }
     Ok(report)
@@ -216,13 +238,22 @@ pub fn create(folder: &Path, files: &std::collections::BTreeMap<String, String>)
     }
     files.iter().try_for_each(|(path, contents)| {
         assert!(is_inside(path), "a project's path stays in its folder: {path}");
-        write(&folder.join(path), contents)
+        write(&folder.join(path), contents.as_bytes())
     })
+}
+
+/// Gives a file that is there another text. Who may read and write it stays as it is, and a link stays a link.
+pub fn replace(path: &Path, contents: &str) -> Result<(), Error> {
+    let failed = |cause| Error::Io { action: "write", path: path.to_owned(), cause };
+    let file = path.canonicalize().map_err(failed)?;
+    let permissions = fs::metadata(&file).map_err(failed)?.permissions();
+    write(&file, contents.as_bytes())?;
+    fs::set_permissions(&file, permissions).map_err(failed)
 }
 
 /// Something to be done on disk.
 enum Step {
-    Write { path: PathBuf, contents: String },
+    Write { path: PathBuf, contents: Vec<u8> },
     Remove { path: PathBuf },
 }
 
@@ -241,7 +272,7 @@ impl Step {
 }
 
 /// Writes beside the file's place and renames, so that a reader sees the old file or the new one, never half of it.
-fn write(path: &Path, contents: &str) -> Result<(), Error> {
+fn write(path: &Path, contents: &[u8]) -> Result<(), Error> {
     let failed = |action, path: &Path| {
         let path = path.to_owned();
         move |cause| Error::Io { action, path, cause }
@@ -255,10 +286,10 @@ fn write(path: &Path, contents: &str) -> Result<(), Error> {
     fs::rename(&temporary, path).map_err(failed("write", path))
 }
 
-/// A file's text; `None` when there is no file. What is not UTF-8 was not generated and counts as edited.
-fn read(path: &Path) -> Result<Option<String>, Error> {
+/// What a file holds; `None` when there is no file.
+fn read(path: &Path) -> Result<Option<Vec<u8>>, Error> {
     match fs::read(path) {
-        Ok(bytes) => Ok(Some(String::from_utf8_lossy(&bytes).into_owned())),
+        Ok(bytes) => Ok(Some(bytes)),
         Err(cause) if cause.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(cause) => Err(Error::Io { action: "read", path: path.to_owned(), cause }),
     }
@@ -276,7 +307,8 @@ fn survey(
     let root = if tree.folder.is_empty() { out.to_owned() } else { out.join(&tree.folder) };
     let shown = |path: &str| if tree.folder.is_empty() { path.to_owned() } else { format!("{}/{path}", tree.folder) };
     let manifest_path = root.join(manifest::PATH);
-    let old_text = read(&manifest_path)?;
+    // What is not UTF-8 was not generated, and is no JSON either.
+    let old_text = read(&manifest_path)?.map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     let old = old_text
         .as_deref()
         .map(Manifest::parse)
@@ -284,31 +316,41 @@ fn survey(
         .map_err(|problem| Error::Manifest { path: manifest_path.clone(), problem })?;
     if let Some(old) = &old
         && old.source != tree.source
-        && mode != Mode::Force
+        && !mode.forces()
     {
         return Err(Error::OtherSpace { folder: root, other: old.source.clone(), source_file: tree.source.clone() });
+    }
+    if let Some(old) = &old
+        && let Some(option) = ["vendor", "self-contained"].into_iter().find(|&option| old.options.contains_key(option))
+        && !["vendor", option].iter().any(|&option| tree.options.contains_key(option))
+        && !mode.forces()
+    {
+        return Err(Error::OtherOption { folder: root, option });
     }
     let mut new = Manifest::of(tree);
 
     for (path, file) in &tree.files {
         assert!(is_inside(path), "a generated path stays in its folder: {path}");
         let on_disk = root.join(path);
+        let mut changed = None;
         let change = match (file.owner, read(&on_disk)?) {
             (_, None) => Change::Created,
             (Owner::User | Owner::Seed, Some(_)) => Change::Kept,
-            (Owner::Machine, Some(text)) if text == file.contents => Change::Unchanged,
-            (Owner::Machine, Some(text)) => {
+            (Owner::Machine, Some(found)) if found == file.contents => Change::Unchanged,
+            (Owner::Machine, Some(found)) => {
                 let generated = old.as_ref().and_then(|old| old.files.get(path)).and_then(|entry| entry.hash.as_ref());
-                if mode != Mode::Force && generated != Some(&crate::emit::hash(&text)) {
-                    edited.push(EditedFile { path: shown(path), diff: diff(&file.contents, &text) });
+                if !mode.forces() && generated != Some(&crate::emit::hash(&found)) {
+                    let diff = diff(("generated", &file.contents), ("found", &found)).unwrap_or_default();
+                    edited.push(EditedFile { path: shown(path), diff });
                 }
+                changed = diff(("there", &found), ("generated", &file.contents));
                 Change::Updated
             }
         };
         if matches!(change, Change::Created | Change::Updated) {
             steps.push(Step::Write { path: on_disk, contents: file.contents.clone() });
         }
-        report.files.push(FileReport { path: shown(path), owner: file.owner, change });
+        report.files.push(FileReport { path: shown(path), owner: file.owner, change, diff: changed });
     }
 
     if let Some(old) = &old {
@@ -322,9 +364,9 @@ fn survey(
         Some(_) => Change::Updated,
     };
     if change != Change::Unchanged {
-        steps.push(Step::Write { path: manifest_path, contents: text });
+        steps.push(Step::Write { path: manifest_path, contents: text.into_bytes() });
     }
-    report.files.push(FileReport { path: shown(manifest::PATH), owner: Owner::Machine, change });
+    report.files.push(FileReport { path: shown(manifest::PATH), owner: Owner::Machine, change, diff: None });
     Ok(())
 }
 
@@ -365,7 +407,8 @@ fn leftovers(
         match (entry.owner, &entry.hash) {
             (Owner::Machine, Some(hash)) if *hash == crate::emit::hash(&text) => {
                 steps.push(Step::Remove { path: on_disk });
-                report.files.push(FileReport { path: shown(path), owner: Owner::Machine, change: Change::Removed });
+                let (owner, change) = (Owner::Machine, Change::Removed);
+                report.files.push(FileReport { path: shown(path), owner, change, diff: None });
                 continue;
             }
             (Owner::User, _) => {
@@ -395,6 +438,13 @@ fn is_inside(path: &str) -> bool {
         && Path::new(path).components().all(|part| matches!(part, Component::Normal(_)))
 }
 
-fn diff(generated: &str, found: &str) -> String {
-    TextDiff::from_lines(generated, found).unified_diff().header("generated", "found").context_radius(2).to_string()
+/// A unified diff; `None` when one of the two is no text.
+fn diff((old_name, old): (&str, &[u8]), (new_name, new): (&str, &[u8])) -> Option<String> {
+    let (old, new) = (std::str::from_utf8(old).ok()?, std::str::from_utf8(new).ok()?);
+    Some(TextDiff::from_lines(old, new).unified_diff().header(old_name, new_name).context_radius(2).to_string())
+}
+
+/// How a text would change, as a unified diff.
+pub fn text_diff(old: &str, new: &str) -> String {
+    diff(("there", old.as_bytes()), ("formatted", new.as_bytes())).expect("both are text")
 }

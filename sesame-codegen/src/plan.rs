@@ -3,6 +3,8 @@
 //! `lower` makes it from the language's model. Everything a runner needs at run time is in the
 //! [`CampaignPlan`]; beside it stands only what decides the generated code.
 
+use std::path::Path;
+
 use sesame_plan::{CampaignPlan, Direction, MetricSource, Moment, Parameter, TopicId};
 
 /// The plan of one runner crate.
@@ -15,10 +17,14 @@ pub struct RunnerPlan {
     pub hooks: Vec<HookPlan>,
     /// Every custom operation of the space in declaration order, used by this campaign or not, for the same reason.
     pub operations: Vec<OperationPlan>,
-    /// Folder of the simulator's crate as the `.sesame` file has it (`crate "simulator"`), relative to that file.
+    /// Folder of the simulator's crate as the `.sesame` file has it (`crate "simulator"`), relative to the file that
+    /// declares it.
     /// `None` when the file names none: the crate of an in-process simulator then comes from `[dependencies]` in
     /// `sesame.toml`.
     pub simulator_crate: Option<String>,
+    /// The file that declares the simulator, as seen from the folder of the space's own. The simulator's crate or
+    /// program is relative to its folder.
+    pub system_file: String,
 }
 
 /// A metric that the user writes in Rust.
@@ -32,6 +38,8 @@ pub struct HookPlan {
     pub unit: Option<String>,
     /// Which end of it is of interest.
     pub direction: Option<Direction>,
+    /// The file of its declaration, as seen from the folder of the space's own.
+    pub source: String,
     /// Line of its declaration, from 1.
     pub line: u32,
     /// Its inputs in declaration order: positions in [`CampaignPlan::topics`], each at most once.
@@ -45,6 +53,8 @@ pub struct OperationPlan {
     pub operation: String,
     /// Its doc comment, lines joined by `\n`; empty when there is none.
     pub doc: String,
+    /// The file of its declaration, as seen from the folder of the space's own.
+    pub source: String,
     /// Line of its declaration, from 1.
     pub line: u32,
     /// The topic whose messages it takes: `Some` exactly if it is called on messages.
@@ -56,6 +66,11 @@ pub struct OperationPlan {
 }
 
 impl RunnerPlan {
+    /// The folder of the file that declares the simulator, as seen from that of the space; empty where they are one.
+    pub fn system_folder(&self) -> &Path {
+        Path::new(&self.system_file).parent().unwrap_or(Path::new(""))
+    }
+
     /// Whether a test of this campaign may hold a custom operation, and so needs its hook to be compiled.
     pub fn applies(&self, operation: &OperationPlan) -> bool {
         self.plan.operations.iter().any(|used| used.name == operation.operation)

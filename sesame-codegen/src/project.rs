@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Serialize;
 use toml::Value;
 
-use crate::emit::text;
+use crate::emit::{Problem, Templates};
 use crate::environment::{self, RuntimeChoice};
 use crate::names;
 
@@ -25,6 +25,9 @@ pub enum Error {
         /// The name.
         name: String,
     },
+    /// A template of the user's.
+    #[error(transparent)]
+    Template(#[from] Problem),
     /// The runtime was not found.
     #[error(transparent)]
     Runtime(#[from] environment::Error),
@@ -37,7 +40,11 @@ struct Project<'a> {
 }
 
 /// The files of a project, by path inside its folder.
-pub fn files(folder: &Path, runtime: Option<&RuntimeChoice>) -> Result<BTreeMap<String, String>, Error> {
+pub fn files(
+    folder: &Path,
+    runtime: Option<&RuntimeChoice>,
+    templates: &Templates,
+) -> Result<BTreeMap<String, String>, Error> {
     let name = folder.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let plain = name.starts_with(|first: char| first.is_ascii_lowercase()) && names::snake(name) == name;
     if !plain || !names::check(name) {
@@ -46,12 +53,12 @@ pub fn files(folder: &Path, runtime: Option<&RuntimeChoice>) -> Result<BTreeMap<
     let runtime = environment::runtime_for(&folder.join("simulator"), runtime)?;
     let project = Project { name, hook_line: HOOK_LINE };
     Ok([
-        (format!("{name}.sesame"), text::render(sesame_templates::project::SPACE, &project)),
-        ("README.md".to_owned(), text::render(sesame_templates::project::README, &project)),
-        ("sesame.toml".to_owned(), text::render(sesame_templates::project::SETTINGS, &project)),
+        (format!("{name}.sesame"), templates.render("project/space.sesame.tera", &project)?),
+        ("README.md".to_owned(), templates.render("project/readme.md.tera", &project)?),
+        ("sesame.toml".to_owned(), templates.render("project/sesame.toml.tera", &project)?),
         (".gitignore".to_owned(), "target/\n".to_owned()),
         ("simulator/Cargo.toml".to_owned(), simulator_manifest(name, &runtime)),
-        ("simulator/src/lib.rs".to_owned(), text::render(sesame_templates::project::SIMULATOR, &project)),
+        ("simulator/src/lib.rs".to_owned(), templates.render("project/simulator/lib.rs.tera", &project)?),
     ]
     .into())
 }

@@ -5,6 +5,8 @@
 
 mod check;
 pub mod diagnostic;
+pub mod format;
+mod import;
 pub mod model;
 mod resolve;
 mod similar;
@@ -17,6 +19,8 @@ use diagnostic::{Diagnostic, Severity};
 use model::Space;
 use source::SourceMap;
 use span::FileId;
+
+pub use import::load_imports;
 
 /// What an analysis found.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,17 +38,22 @@ impl Analysis {
     }
 }
 
-/// Analyses the file `root` of `sources`: syntax, names, types and units, ranges, campaigns, and what deserves a warning.
+/// Analyses the file `root` of `sources` with all it imports, which [`load_imports`] has added: syntax, names, types and units, ranges, campaigns, and what deserves a warning.
 ///
 /// All mistakes of all these kinds come out of one call.
 pub fn analyse(sources: &SourceMap, root: FileId) -> Analysis {
     let mut diagnostics = Vec::new();
-    let file = syntax::parse(root, sources.file(root).text(), &mut diagnostics);
-    let model = resolve::resolve(sources, root, &file, &mut diagnostics);
+    let merged = import::merge(sources, root, &mut diagnostics);
+    let model = resolve::resolve(sources, root, merged, &mut diagnostics);
     if let Some(space) = &model {
-        diagnostics.extend(check::check(space));
+        diagnostics.extend(check::check(space, root));
     }
     diagnostics.sort_by_key(|diagnostic| (diagnostic.span, diagnostic.code));
     diagnostics.dedup();
     Analysis { model, diagnostics }
+}
+
+/// Whether a word is reserved, so that nothing but a message field can be named by it.
+pub fn is_reserved(word: &str) -> bool {
+    syntax::is_keyword(word)
 }

@@ -1,11 +1,17 @@
 //! Source files in memory, and where their lines begin.
 
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::import::normal;
 use crate::span::{FileId, Span};
 
 /// The files of one analysis. Nothing here touches a disk: the caller reads files and adds their text.
 #[derive(Debug, Clone, Default)]
 pub struct SourceMap {
     files: Vec<SourceFile>,
+    /// Why files that are imported could not be read, by name.
+    unreadable: BTreeMap<String, String>,
 }
 
 /// One file: its name as shown to people, its text, and where its lines begin.
@@ -37,6 +43,22 @@ impl SourceMap {
         let id = FileId(u32::try_from(self.files.len()).expect("fewer than 2^32 files"));
         self.files.push(SourceFile::new(name.into(), text.into()));
         id
+    }
+
+    /// Says that a file cannot be read, and why, for example `there is no such file`.
+    pub fn add_unreadable(&mut self, name: impl Into<String>, why: impl Into<String>) {
+        self.unreadable.insert(name.into(), why.into());
+    }
+
+    /// Why the file of a name cannot be read, if that was said.
+    pub fn unreadable(&self, name: &str) -> Option<&str> {
+        self.unreadable.get(name).map(String::as_str)
+    }
+
+    /// The file of a name, `.` and `..` in it worked out.
+    pub fn find(&self, name: &str) -> Option<FileId> {
+        let at = self.files.iter().position(|file| normal(Path::new(&file.name)) == normal(Path::new(name)))?;
+        Some(FileId(u32::try_from(at).expect("fewer than 2^32 files")))
     }
 
     /// The file of an id of this map.

@@ -69,6 +69,16 @@ fn bad_files_give_their_diagnostics() {
 }
 
 #[test]
+fn nothing_in_a_file_becomes_a_command_of_github() {
+    let mut sources = SourceMap::new();
+    let file = sources.add("a,line=1::b%.sesame", "space a\n::error::x\nspace \"%0A::warning::x\"");
+    let analysis = analyse(&sources, file);
+    let said = render::github(&analysis.diagnostics, &sources);
+    assert_eq!(said.lines().count(), analysis.diagnostics.len());
+    assert!(said.lines().all(|line| line.starts_with("::error file=a%2Cline=1%3A%3Ab%25.sesame,line=")), "{said}");
+}
+
+#[test]
 fn every_code_occurs_in_the_corpus_file_named_after_it() {
     let files = corpus("bad");
     for (code, page) in CODES {
@@ -109,6 +119,7 @@ fn one_line_and_json_say_the_same_as_the_long_form() {
     let (sources, analysis) = analyse_text("ten_mistakes", include_str!("bad/ten_mistakes.sesame"));
     insta::assert_snapshot!("ten_mistakes_short", render::short(&analysis.diagnostics, &sources));
     insta::assert_snapshot!("ten_mistakes_json", render::json(&analysis.diagnostics, &sources));
+    insta::assert_snapshot!("ten_mistakes_github", render::github(&analysis.diagnostics, &sources));
     let json = render::json(&analysis.diagnostics, &sources);
     for (line, diagnostic) in json.lines().zip(&analysis.diagnostics) {
         let value: serde_json::Value = serde_json::from_str(line).unwrap();

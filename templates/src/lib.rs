@@ -6,3 +6,15 @@
 pub mod project;
 pub mod report;
 pub mod runner;
+
+/// The templates that the generator fills in, by the names under which they can be replaced.
+pub const ALL: &[(&str, &str)] = &[
+    ("project/readme.md.tera", project::README),
+    ("project/sesame.toml.tera", project::SETTINGS),
+    ("project/simulator/lib.rs.tera", project::SIMULATOR),
+    ("project/space.sesame.tera", project::SPACE),
+    ("runner/hook.rs.tera", runner::HOOK),
+    ("runner/operation_hook.rs.tera", runner::OPERATION_HOOK),
+    ("runner/runner_readme.md.tera", runner::RUNNER_README),
+    ("runner/shared_readme.md.tera", runner::SHARED_README),
+];

@@ -22,10 +22,20 @@ operation jitter on command    = random offset [-0.3rad, 0.3rad]
 operation shift  on zone.level = random offset [-5mm, 5mm]
 operation lose   on command    = packet loss [0%, 100%]
 operation lag    on command    = latency [0ms, 500ms] uniform
+operation offset on command    = bias [-0.3rad, 0.3rad]
+operation wander on command    = drift [-0.1rad/s, 0.2rad/s]
+operation blur   on command    = noise [0rad, 0.1rad]
+operation gain   on command    = scale [50%, 160%]
+operation hold   on command    = freeze
+operation behind on command    = stale [0ms, 100ms]
+operation bursts on command    = burst loss { enter [0%, 10%]  leave [20%, 80%] }
+operation thin   on command    = rate limit [100Hz, 900Hz]
+operation mix    on command    = reorder [0ms, 100ms]
+operation twice  on command    = duplicate [1, 1]
 
 campaign all {
   objectives fuzzing_time, level
-  operations jitter, shift, lose, lag   1..5 per test
+  operations jitter, shift, lose, lag, offset, wander, blur, gain, hold, behind, bursts, thin, mix, twice   1..5 per test
   search     nsga2 { population 10  evaluations 210  seed 42 }
   end        after 1000s
 }

@@ -3,6 +3,8 @@
 //! Everything lies below the workspace's target folder: projects in folders of fixed names, since a path is part of
 //! what cargo knows a crate by, and all runners in one target folder, so that the runtime is compiled once.
 
+pub mod models;
+pub mod optimisers;
 pub mod python_mcap;
 pub mod rtamt;
 
@@ -21,6 +23,11 @@ fn scratch() -> PathBuf {
     let program = std::env::current_exe().expect("a test has a program");
     let target = program.ancestors().nth(3).expect("cargo puts test programs three folders deep");
     target.join("across")
+}
+
+/// The target folder of everything that these tests compile.
+pub fn target() -> PathBuf {
+    scratch().join("target")
 }
 
 /// The program `sesamec` of this workspace, built if it is not up to date.
@@ -51,7 +58,7 @@ pub fn command(program: impl AsRef<Path>) -> Command {
         }
     }
     command
-        .env("CARGO_TARGET_DIR", scratch().join("target"))
+        .env("CARGO_TARGET_DIR", target())
         // The root's test command has fetched what runners need: what the workspace's lock names.
         .env("CARGO_NET_OFFLINE", "true")
         .env("NO_COLOR", "1")
@@ -181,7 +188,7 @@ impl Project {
         let name = package.lines().find_map(|line| line.strip_prefix("name = \"")).expect("a package has a name");
         let name = name.trim_end_matches('"');
         let program = self.folder.join(name);
-        fs::copy(scratch().join("target/debug").join(name), &program).expect("what was built can be copied");
+        fs::copy(target().join("debug").join(name), &program).expect("what was built can be copied");
         Runner { program, folder: self.folder.clone() }
     }
 

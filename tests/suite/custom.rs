@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use sesame_plan::Choice;
+use sesame_plan::{Activation, Choice};
 use sesame_runtime::observation::Counters;
 use sesame_runtime::record::{Repository, TestRecord};
 use sesame_tests::{Project, Runner, workspace};
@@ -51,11 +51,16 @@ test aborting  { spoil file "calibration.txt" gain 7 fate "abort" before start }
 test leaving   { spoil file "calibration.txt" gain 8 fate "leave" before start }
 test undone    { tidy after end  spoil file "spare.txt" gain 2 fate "go on" before start }
 test stuck     { stick before start }
+test switched  {
+  bend copies 0 shift (1.5, 0, 0)m way "move" when arrived > 2 until arrived > 4
+  spoil file "calibration.txt" gain 4 fate "go on" before start
+}
 
 campaign look {
   objectives gain_seen
   observes arrived, farthest
   operations bend, spoil, stick, tidy, empty   1..3 per test
+  activate by condition over arrived in [0, 20] { integers [1, 9]  depth 2 }
   search random { evaluations 12  seed 3 }
   end after 1s
 }
@@ -90,7 +95,7 @@ fn hooks_change_drop_and_inject_and_files_are_put_back() {
         assert_eq!(fs::read_to_string(project.folder.join("spare.txt")).unwrap(), "0\n");
         assert!(!project.folder.join("made.txt").exists());
     };
-    let names = ["moved", "dropped", "scattered", "spoilt", "panicking", "aborting", "leaving", "undone"];
+    let names = ["moved", "dropped", "scattered", "spoilt", "panicking", "aborting", "leaving", "undone", "switched"];
     let arguments = [&["known"], &names[..], &["--results", "results", "--workers", "2"]].concat();
     let said = runner.run(&arguments).expect(3);
     intact();
@@ -134,6 +139,13 @@ fn hooks_change_drop_and_inject_and_files_are_put_back() {
     let undone = &record(&records, &repository, "undone").observation;
     let effects: Vec<u64> = undone.operations.iter().map(|operation| operation.counters.side_effects).collect();
     assert_eq!((undone.outcome.word(), effects), ("completed", vec![2, 1]), "before the start and after the end");
+    let switched = record(&records, &repository, "switched");
+    let [bent, spoilt] = &switched.observation.operations[..] else { panic!("{switched:?}") };
+    assert_eq!(bent.counters, counted(2, 2, 0, 0), "from the third arrival until the fifth");
+    assert_eq!((bent.intervals.len(), spoilt.intervals.len()), (1, 0));
+    assert_eq!((metric("switched", "gain_seen"), metric("switched", "farthest")), (4.0, 1.5));
+    assert!(matches!(switched.test.operations[0].activation, Activation::Condition { .. }));
+    assert_eq!(switched.test.operations[1].activation, Activation::Offline);
     let detail = |test: &str| record(&records, &repository, test).observation.outcome.detail().unwrap();
     assert!(detail("panicking").contains("spoilt too much"), "{}", detail("panicking"));
     assert!(detail("aborting").contains("SIGABRT"), "{}", detail("aborting"));
@@ -148,10 +160,24 @@ fn hooks_change_drop_and_inject_and_files_are_put_back() {
     assert!(exported.contains("spoil file \"spare.txt\" gain 2 fate \"go on\" before start seed "), "{exported}");
     assert!(exported.contains("tidy after end seed "), "{exported}");
 
+    let exported = runner.run(&["export", "switched", "--results", "results/known"]).expect(0).out;
+    assert!(exported.contains("way \"move\" when arrived > 2 until arrived > 4 seed "), "{exported}");
+
     let one = runner.run(&["--results", "one", "--workers", "1"]).expect(0);
     let two = runner.run(&["--results", "two", "--workers", "2"]).expect(0);
     assert_eq!(one.digest(), two.digest(), "hooks draw from their contexts alone");
     intact();
+    let searched = Repository::open(&runner.folder.join("one/3")).unwrap();
+    let mut activations = [0; 2];
+    for row in searched.tests().unwrap() {
+        for used in searched.test(row.number).unwrap().test.operations {
+            let offline = searched.plan().operation(used.operation).kind.is_offline();
+            assert_eq!(used.activation == Activation::Offline, offline, "{used:?}");
+            assert!(!matches!(used.activation, Activation::Time { .. }), "{used:?}");
+            activations[usize::from(offline)] += 1;
+        }
+    }
+    assert!(activations[0] > 0 && activations[1] > 0, "{activations:?}");
 }
 
 #[test]

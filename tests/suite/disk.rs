@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use nix::sys::signal::Signal;
+use rusqlite::Connection;
 use sesame_runtime::record::Repository;
 use sesame_tests::{Runner, done};
 
@@ -14,18 +15,41 @@ use crate::interruption::Running;
 /// A small disk in memory; gone when dropped.
 struct Disk(PathBuf);
 
+/// Set where a test runs once more, in a namespace of its own.
+const WITHIN: &str = "SESAME_TEST_NAMESPACE";
+
+/// Runs a test that mounts disks. A user who may not mount any may in a user namespace, where Linux permits those: there
+/// the test, which has this name, runs once more. Where neither is permitted it is skipped, which is said.
+fn with_disks(test: &str, body: fn()) {
+    let may_mount = |command: &mut Command| {
+        let place = tempfile::tempdir().unwrap();
+        let script = "mount -t tmpfs -o size=64k sesame-test \"$0\" && umount \"$0\"";
+        command.args(["sh", "-c", script]).arg(place.path()).output().is_ok_and(|said| said.status.success())
+    };
+    let namespace = || {
+        let mut unshare = Command::new("unshare");
+        unshare.args(["--user", "--map-root-user", "--mount"]);
+        unshare
+    };
+    if may_mount(&mut Command::new("env")) {
+        body();
+    } else if std::env::var_os(WITHIN).is_none() && may_mount(&mut namespace()) {
+        let mut again = namespace();
+        again.arg(std::env::current_exe().unwrap()).args([&format!("disk::{test}"), "--exact", "--nocapture"]);
+        let said = done(again.env(WITHIN, "1")).expect(0);
+        assert!(said.out.contains("1 passed"), "{}", said.out);
+    } else {
+        eprintln!("skipped: a small disk can be mounted neither by this user nor in a user namespace");
+    }
+}
+
 impl Disk {
-    /// `None` where this user may not mount one, which is said.
-    fn mount(runner: &Runner) -> Option<Disk> {
+    fn mount(runner: &Runner) -> Disk {
         let place = runner.folder.join("disk");
         fs::create_dir_all(&place).unwrap();
         let mut mount = Command::new("mount");
-        let said = mount.args(["-t", "tmpfs", "-o", "size=16m", "sesame-test"]).arg(&place).output();
-        if said.is_ok_and(|said| said.status.success()) {
-            return Some(Disk(place));
-        }
-        eprintln!("skipped: a small disk can only be mounted by root on Linux");
-        None
+        done(mount.args(["-t", "tmpfs", "-o", "size=16m", "sesame-test"]).arg(&place)).expect(0);
+        Disk(place)
     }
 
     fn remount(&self, how: &str) {
@@ -51,10 +75,10 @@ fn recorded(folder: &Path) -> usize {
 }
 
 /// Runs on disks with less and less room, makes room, and goes on. Gives how many runs broke off in the middle.
-fn filled_up(name: &str, clause: &str, room: &[usize]) -> Option<usize> {
+fn filled_up(name: &str, clause: &str, room: &[usize]) -> usize {
     let runner = recording(name, "harmless", clause);
     let whole = runner.run(&["--results", "whole"]).expect(0).digest();
-    let disk = Disk::mount(&runner)?;
+    let disk = Disk::mount(&runner);
     let mut broke_off = 0;
     for kilobytes in room {
         let filler = disk.leave(kilobytes << 10);
@@ -85,38 +109,68 @@ fn filled_up(name: &str, clause: &str, room: &[usize]) -> Option<usize> {
         }
         fs::remove_dir_all(&results).unwrap();
     }
-    Some(broke_off)
+    broke_off
 }
 
 #[test]
 fn a_full_disk_loses_nothing_that_was_recorded_and_resume_goes_on() {
-    let Some(broke_off) = filled_up("disk_full", "", &[16, 200, 300, 400, 500]) else { return };
-    assert!(broke_off >= 2, "{broke_off} runs broke off in the middle");
+    with_disks("a_full_disk_loses_nothing_that_was_recorded_and_resume_goes_on", || {
+        let broke_off = filled_up("disk_full", "", &[16, 200, 300, 400, 500]);
+        assert!(broke_off >= 2, "{broke_off} runs broke off in the middle");
+    });
 }
 
 #[test]
 fn a_disk_that_traces_fill_loses_nothing_that_was_recorded_and_resume_goes_on() {
-    let Some(broke_off) = filled_up("disk_full_of_traces", "record mcap all", &[600, 1200]) else { return };
-    assert!(broke_off >= 1, "{broke_off} runs broke off in the middle");
+    with_disks("a_disk_that_traces_fill_loses_nothing_that_was_recorded_and_resume_goes_on", || {
+        let broke_off = filled_up("disk_full_of_traces", "record mcap all", &[600, 1200]);
+        assert!(broke_off >= 1, "{broke_off} runs broke off in the middle");
+    });
 }
 
 #[test]
 fn results_on_a_disk_made_read_only_are_left_alone_and_taken_up_again() {
-    let runner = recording("disk_read_only", "harmless", "");
-    let whole = runner.run(&["--results", "whole"]).expect(0).digest();
-    let Some(disk) = Disk::mount(&runner) else { return };
-    let mut running = Running::start(&runner, "disk/r", "1");
-    running.until_recorded(10);
-    running.signal(Signal::SIGINT);
-    running.ended().1.expect(130);
-    let tests = recorded(&disk.0.join("r/3"));
-    disk.remount("ro");
-    let said = runner.run(&["resume", "disk/r/3"]).expect(1);
-    assert!(said.err.contains("error: cannot lock the results: Read-only file system"), "{}", said.err);
-    assert!(said.err.contains("disk/r/3"), "{}", said.err);
-    let begun = runner.run(&["--results", "disk/other"]).expect(1);
-    assert!(begun.err.contains("Read-only file system") && begun.err.contains("disk/other"), "{}", begun.err);
-    disk.remount("rw");
-    assert_eq!(recorded(&disk.0.join("r/3")), tests);
-    assert_eq!(runner.run(&["resume", "disk/r/3"]).expect(0).digest(), whole);
+    with_disks("results_on_a_disk_made_read_only_are_left_alone_and_taken_up_again", || {
+        let runner = recording("disk_read_only", "harmless", "");
+        let whole = runner.run(&["--results", "whole"]).expect(0).digest();
+        let disk = Disk::mount(&runner);
+        let mut running = Running::start(&runner, "disk/r", "1");
+        running.until_recorded(10);
+        running.signal(Signal::SIGINT);
+        running.ended().1.expect(130);
+        let tests = recorded(&disk.0.join("r/3"));
+        disk.remount("ro");
+        let said = runner.run(&["resume", "disk/r/3"]).expect(1);
+        assert!(said.err.contains("error: cannot lock the results: Read-only file system"), "{}", said.err);
+        assert!(said.err.contains("disk/r/3"), "{}", said.err);
+        let begun = runner.run(&["--results", "disk/other"]).expect(1);
+        assert!(begun.err.contains("Read-only file system") && begun.err.contains("disk/other"), "{}", begun.err);
+        disk.remount("rw");
+        assert_eq!(recorded(&disk.0.join("r/3")), tests);
+        assert_eq!(runner.run(&["resume", "disk/r/3"]).expect(0).digest(), whole);
+    });
+}
+
+#[test]
+fn results_left_in_the_middle_of_writing_are_put_right_where_something_may_be_written() {
+    with_disks("results_left_in_the_middle_of_writing_are_put_right_where_something_may_be_written", || {
+        let runner = recording("disk_unsettled", "harmless", "");
+        let whole = runner.run(&["--results", "whole"]).expect(0).digest();
+        let disk = Disk::mount(&runner);
+        let (from, to) = (runner.folder.join("whole/3"), disk.0.join("3"));
+        fs::create_dir(&to).unwrap();
+        // What a kill leaves of a transaction that has begun to overwrite the file.
+        let database = Connection::open(from.join("results.sqlite")).unwrap();
+        database.pragma_update(None, "cache_size", 1).unwrap();
+        database.execute_batch("BEGIN IMMEDIATE; UPDATE change_points SET value = value + 1").unwrap();
+        for name in ["results.sqlite", "results.sqlite-journal"] {
+            fs::copy(from.join(name), to.join(name)).unwrap();
+        }
+        disk.remount("ro");
+        let refused = runner.run(&["digest", "--results", "disk/3"]).expect(1);
+        assert!(refused.err.contains("a run that broke off left these results unsettled"), "{}", refused.err);
+        assert!(refused.err.contains("disk/3"), "{}", refused.err);
+        disk.remount("rw");
+        assert_eq!(runner.run(&["digest", "--results", "disk/3"]).expect(0).out.trim(), whole);
+    });
 }

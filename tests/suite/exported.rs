@@ -14,12 +14,13 @@ const SPACE: &str = r#"
     space cell
     system {
       simulator sim = in_process "cell_sim::Cell" { crate "simulator"  step 20ms }
-      message Zone { level: real[mm]  share: real[%] }
+      message Zone { level: real[mm]  share: real[%]  name: text  known: bool  at: int[ns]  spans: list of real[mm] }
       topic link = "link" : real[deg]
       topic speed = "speed" : real[km/h]
       topic count = "count" : int
       topic plain = "plain" : real
       topic zone = "zone" : Zone
+      topic pose = "pose" : point[mm]
     }
     metric collisions maximise default 0 { hook on zone }
     metric distance: real[mm] minimise { hook on zone }
@@ -37,6 +38,23 @@ const SPACE: &str = r#"
     operation lag on link = latency [0ms, 500ms]
     operation wobble on speed = latency [0ms, 500ms] uniform
     operation cut on plain = blackhole
+    operation carry on pose = random offset [(-1, -1.25, 0)cm, (1, 1, 1e-9)cm]
+    operation place on pose = stuck at [(-1, -1.25, 0)cm, (1, 1, 1e-9)cm]
+    operation sink on pose = drift [(-1, -1.25, 0)cm/s, (1, 1, 1e-9)cm/s]
+    operation charge on zone.share = drift [0%/s, 12.3%/s]
+    operation rename on zone.name = stuck at one of "a \"b\"", "c"
+    operation guess on zone.name = random one of "a", "b"
+    operation deny on zone.known = stuck at false
+    operation skew on zone.at = clock skew [-1ms, 1ms]
+    operation stretch on zone.level, zone.spans[2], zone.spans[*] = scale [10%, 3]
+    operation tremble on zone.level = noise [0mm, 3m]
+    operation freeze_all on zone = freeze
+    operation age on zone.spans = stale [0ms, 700ms]
+    operation bursts on zone = burst loss { enter [0%, 12.3%]  leave [1.7%, 100%]  loss [50%, 99.9%] }
+    operation thin on zone = rate limit [0.1Hz, 5kHz]
+    operation mix on zone = reorder [0ms, 900ms] drain drop
+    operation twice on zone = duplicate [1, 7]
+    operation uneven on zone = latency [1ms, 900ms] normal
     operation bend on link = custom {
       points: int [-3, 20]  gain: real [0.1, 0.7]  tilt: real[deg] [-0.3rad, 0.3rad]
       shift: point [(-2, -2.5, 0)m, (2, 200, 1e-9)m]  frame: one of "frame \"B\" \\ 0", "frameB_1"
@@ -45,7 +63,9 @@ const SPACE: &str = r#"
     operation tidy = custom after end { }
     campaign look {
       objectives time, collisions, distance, share, fastest
-      operations swing, rush, recount, shift, level, fill, lose, lose_some, lag, wobble, cut, bend, spoil, tidy   1..14 per test
+      operations swing, rush, recount, shift, level, fill, lose, lose_some, lag, wobble, cut, bend, spoil, tidy,
+                 carry, place, sink, charge, rename, guess, deny, skew, stretch, tremble, freeze_all, age, bursts, thin, mix,
+                 twice, uneven   1..31 per test
       activate by time
       search random { evaluations 100 }
       end after 70s
@@ -102,13 +122,20 @@ fn check(plan: &CampaignPlan, tests: &[(Test, f64)]) {
 
 #[test]
 fn every_test_that_a_search_finds_reads_back_as_it_was() {
-    let plan = plan(SPACE);
-    for seed in 0..10 {
-        let mut strategy = search::strategy(&plan, seed).unwrap();
-        let asked = strategy.ask();
-        assert!(asked.len() >= 50);
-        let values = asked.iter().map(|candidate| candidate.test.operations[0].draw_seed as f64 / 1e13);
-        check(&plan, &asked.iter().map(|candidate| candidate.test.clone()).zip(values).collect::<Vec<_>>());
+    let variables = "by condition over distance in [-2m, 1e5m], collisions, share, fastest in [0m/s, 9m/s], time";
+    for activate in [
+        "by time",
+        &format!("{variables} {{ depth 6  integers [-2, 3000000] }}"),
+        &format!("{variables} for [1ms, 0.25min] at most 3 times"),
+    ] {
+        let plan = plan(&SPACE.replace("activate by time", &format!("activate {activate}")));
+        for seed in 0..10 {
+            let mut strategy = search::strategy(&plan, seed).unwrap();
+            let asked = strategy.ask();
+            assert!(asked.len() >= 50);
+            let values = asked.iter().map(|candidate| candidate.test.operations[0].draw_seed as f64 / 1e13);
+            check(&plan, &asked.iter().map(|candidate| candidate.test.clone()).zip(values).collect::<Vec<_>>());
+        }
     }
 }
 
@@ -118,7 +145,11 @@ fn the_ends_of_what_is_permitted_read_back_as_they_are() {
     let at = |share: f64| {
         let operations = (0u32..).map(OperationId).zip(&plan.operations).map(|(id, operation)| TestOperation {
             operation: id,
-            activation: Activation::Time { start: operation.within.start, end: operation.within.end },
+            activation: if operation.kind.is_offline() {
+                Activation::Offline
+            } else {
+                Activation::Time { start: operation.within.start, end: operation.within.end }
+            },
             parameters: operation
                 .parameters
                 .iter()

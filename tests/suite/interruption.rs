@@ -1,5 +1,6 @@
 //! A run that is stopped, in good order or not, goes on to what it would have been.
 
+use std::cell::RefCell;
 use std::fs;
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::path::Path;
@@ -12,7 +13,7 @@ use nix::unistd::Pid;
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
 use sesame_runtime::observation::Outcome;
-use sesame_runtime::record::Repository;
+use sesame_runtime::record::{RecordError, Repository};
 use sesame_tests::{Done, Runner};
 
 use crate::faults::faulty;
@@ -83,12 +84,15 @@ fn processes() -> Vec<(i32, String)> {
     said.lines().filter_map(split).collect()
 }
 
-/// Insists that all workers are gone, which may take them a moment.
+/// Insists that all processes of a runner's program are gone, which may take workers a moment. One that was only just
+/// being started has its supervisor's command line yet, and its lock.
 #[track_caller]
 fn no_worker_is_left(runner: &Runner) {
+    let program = format!("{} ", runner.program.display());
+    let left = || processes().into_iter().filter(|(_, words)| words.starts_with(&program)).collect::<Vec<_>>();
     let patience = Instant::now();
-    while !workers(runner).is_empty() {
-        assert!(patience.elapsed() < Duration::from_secs(20), "left behind: {:?}", workers(runner));
+    while !left().is_empty() {
+        assert!(patience.elapsed() < Duration::from_secs(20), "left behind: {:?}", left());
         sleep(Duration::from_millis(10));
     }
 }
@@ -140,33 +144,86 @@ fn a_run_in_progress_is_not_resumed_by_another_process_but_can_be_read() {
     assert!(status.success());
 }
 
-/// Kills the supervisor after this share of what a run takes, and resumes.
-fn killed_at(runner: &Runner, moment: f64, whole: &str, takes: Duration) {
+/// How far a run was when it was killed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Progress {
+    /// It had no results yet.
+    HardlyBegun,
+    /// With so many tests recorded.
+    Recorded(usize),
+    /// All was recorded but the page.
+    AllButThePage,
+    /// The kill came too late.
+    Ended,
+}
+
+/// Whom a kill hits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Victim {
+    Supervisor,
+    Worker,
+}
+
+/// Kills the supervisor or a worker after this share of what a run takes, and resumes where there is something to resume.
+fn killed_at(runner: &Runner, victim: Victim, moment: f64, whole: &str, takes: Duration) -> Progress {
     let results = format!("killed{moment:.6}");
     let running = Running::start(runner, &results, "2");
     sleep(takes.mul_f64(moment));
-    kill(running.pid(), Signal::SIGKILL).unwrap();
-    let (status, _) = running.ended();
+    let tests = match victim {
+        Victim::Supervisor => {
+            kill(running.pid(), Signal::SIGKILL).unwrap();
+            0
+        }
+        Victim::Worker => {
+            // With both of them busy, which one does not matter.
+            let worker = workers(runner).first().copied();
+            let killed = worker.is_some_and(|worker| kill(worker, Signal::SIGKILL).is_ok());
+            if killed { recorded(&running.folder) } else { usize::MAX }
+        }
+    };
+    let (status, said) = running.ended();
     no_worker_is_left(runner);
-    if status.signal() == Some(9) {
-        let folder = runner.folder.join(&results).join("3");
-        if recorded(&folder) == 0 && Repository::open(&folder).is_err() {
-            // It had hardly begun: there is nothing yet, and nothing half done either.
-            runner.run(&["resume", &format!("{results}/3")]).expect(1);
-            return;
+    let folder = format!("{results}/3");
+    let progress = if status.signal() == Some(9) {
+        match Repository::open(&runner.folder.join(&folder)) {
+            Err(error) => {
+                // There is nothing yet, and nothing half done either: no test can have ended.
+                assert!(matches!(error, RecordError::Missing { .. }), "killed after {moment} of its time: {error}");
+                assert!(!said.err.contains("harmless "), "killed after {moment} of its time: {}", said.err);
+                runner.run(&["resume", &folder]).expect(1);
+                Progress::HardlyBegun
+            }
+            Ok(repository) if repository.campaign().stop.is_some() => {
+                // There is nothing to go on with, and nothing is missing.
+                assert_eq!(runner.run(&["report", "--results", &folder]).expect(0).digest(), whole);
+                Progress::AllButThePage
+            }
+            Ok(repository) => {
+                let tests = repository.tests().unwrap().len();
+                drop(repository);
+                let next = runner.run(&["--results", &results, "--evaluations", "1"]).expect(0);
+                assert!(next.err.contains("an earlier run is unfinished"), "{}", next.err);
+                assert_eq!(resumed(runner, &results), whole, "killed with {tests} tests recorded");
+                Progress::Recorded(tests)
+            }
         }
-        let tests = recorded(&folder);
-        if Repository::open(&folder).unwrap().campaign().stop.is_some() {
-            // All was done but the page: there is nothing to go on with, and nothing is missing.
-            assert_eq!(runner.run(&["report", "--results", &format!("{results}/3")]).expect(0).digest(), whole);
-            fs::remove_dir_all(runner.folder.join(&results)).unwrap();
-            return;
+    } else if victim == Victim::Worker && status.code() == Some(1) {
+        // A worker that cannot even start ends the run.
+        assert!(said.err.contains("cannot start worker"), "{}", said.err);
+        match Repository::open(&runner.folder.join(&folder)) {
+            Err(error) => assert!(matches!(error, RecordError::Missing { .. }), "{error}"),
+            Ok(repository) => {
+                drop(repository);
+                assert_eq!(resumed(runner, &results), whole);
+            }
         }
-        let next = runner.run(&["--results", &results, "--evaluations", "1"]).expect(0);
-        assert!(next.err.contains("an earlier run is unfinished"), "{}", next.err);
-        assert_eq!(resumed(runner, &results), whole, "killed with {tests} tests recorded");
-    }
+        Progress::HardlyBegun
+    } else {
+        assert_eq!(said.expect(0).digest(), whole, "{victim:?} killed with {tests} tests recorded");
+        if tests < 62 { Progress::Recorded(tests) } else { Progress::Ended }
+    };
     fs::remove_dir_all(runner.folder.join(&results)).unwrap();
+    progress
 }
 
 fn killed_at_random_moments(name: &str, moments: u32) {
@@ -179,41 +236,57 @@ fn killed_at_random_moments(name: &str, moments: u32) {
     let takes = started.elapsed();
     let config =
         ProptestConfig { cases: moments, failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..Default::default() };
+    let kills = RefCell::new(Vec::new());
     TestRunner::new(config)
         .run(&(0.0..1.0f64), |moment| {
-            killed_at(&runner, moment, &whole, takes);
+            let victim = if kills.borrow().len() % 2 == 0 { Victim::Supervisor } else { Victim::Worker };
+            let progress = killed_at(&runner, victim, moment, &whole, takes);
+            eprintln!("{victim:?} killed after {:.0} % of {takes:.1?}: {progress:?}", moment * 100.0);
+            kills.borrow_mut().push((victim, progress));
             Ok(())
         })
         .unwrap();
+    let mut kills = kills.into_inner();
+    kills.sort_unstable();
+    eprintln!("{kills:?}");
+    let middle = kills.iter().filter(|(_, progress)| matches!(progress, Progress::Recorded(1..))).count();
+    assert!(2 * middle > kills.len(), "most kills are in the middle of a run: {kills:?}");
 }
 
 #[test]
-fn a_supervisor_killed_at_any_moment_loses_nothing_that_cannot_be_taken_up_again() {
-    killed_at_random_moments("killed", 5);
+fn a_run_killed_at_any_moment_loses_nothing_that_cannot_be_taken_up_again() {
+    killed_at_random_moments("killed", 6);
 }
 
 #[test]
 #[ignore = "long: a hundred kills"]
-fn a_supervisor_killed_at_a_hundred_moments_loses_nothing_that_cannot_be_taken_up_again() {
+fn a_run_killed_at_a_hundred_moments_loses_nothing_that_cannot_be_taken_up_again() {
     killed_at_random_moments("killed_often", 100);
 }
 
-/// A worker that someone kills cannot be told from one that its simulator brought down: its test is a crash.
 #[test]
-fn a_killed_worker_is_a_crash_of_its_test_and_the_campaign_goes_on() {
+fn a_killed_worker_leaves_no_trace_in_results_but_a_note() {
     let runner = faulty("worker_killed", "harmless");
+    let whole = undisturbed(&runner);
     let mut running = Running::start(&runner, "results", "1");
     running.until_recorded(5);
     let [worker] = workers(&runner)[..] else { panic!("there is one worker") };
     kill(worker, Signal::SIGKILL).unwrap();
-    let folder = running.folder.clone();
     let (status, said) = running.ended();
     assert!(status.success(), "{}", said.err);
-    let repository = Repository::open(&folder).unwrap();
-    let crashes: Vec<_> =
-        repository.tests().unwrap().into_iter().filter(|row| row.outcome != Outcome::Completed).collect();
-    let [crash] = &crashes[..] else { panic!("one test was running: {crashes:?}") };
-    assert!(crash.outcome.detail().unwrap().contains("signal: 9 (SIGKILL)"), "{crash:?}");
-    assert!(said.out.contains(&format!("T{} ", crash.number)), "{}", said.out);
+    assert_eq!(said.digest(), whole);
+    let listed = (1..=62).map(|test| runner.run(&["show", &format!("T{test}"), "--results", "results/3"]).out);
+    let noted = listed.filter(|shown| shown.contains("the test was run again")).count();
+    assert_eq!(noted, 1, "one test was running");
     no_worker_is_left(&runner);
+}
+
+/// What kills itself, or is killed for want of memory each time, is not run for ever.
+#[test]
+fn a_worker_that_is_killed_each_time_is_a_crash_of_its_test() {
+    let runner = faulty("killed_each_time", "harmless");
+    let mut command = runner.command(&["--results", "results"]);
+    let said = Done::of(&command.env("FAULT", "kill").output().unwrap()).expect(1);
+    assert!(said.err.contains("signal: 9 (SIGKILL)"), "{}", said.err);
+    assert!(said.err.contains("the undisturbed reference run failed"), "{}", said.err);
 }

@@ -357,6 +357,9 @@ pub struct Operation {
     pub doc: String,
     /// The topic whose messages it disturbs; `None` exactly for a custom operation before the start or after the end.
     pub topic: Option<TopicId>,
+    /// The values in each message that it changes, in written order; none exactly where it acts on whole messages.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub places: Vec<Place>,
     /// What it does to them.
     pub kind: OperationKind,
     /// The parameters a test chooses, in the order that [`OperationKind`] documents.
@@ -368,8 +371,20 @@ pub struct Operation {
     pub priority: i32,
     /// Probability that a fresh test includes it. Default 1.
     pub inclusion: f64,
+    /// Whether its active time counts in `fuzzing_time()`. Default true, and then not written.
+    #[serde(default = "timed", skip_serializing_if = "is_timed")]
+    pub timed: bool,
     /// What its start conditions contain where a search grows them.
     pub constraints: Vec<Constraint>,
+}
+
+fn timed() -> bool {
+    true
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
+fn is_timed(timed: &bool) -> bool {
+    *timed
 }
 
 /// A stretch of simulation time in seconds, `start <= end`.
@@ -388,22 +403,89 @@ impl Span {
     }
 }
 
-/// What an operation does to the messages of its topic.
+/// Where in a message a value is: from the message inwards; empty for the message itself.
+pub type Place = Vec<Step>;
+
+/// One step into a message.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Step {
+    /// The field of this name.
+    Field(String),
+    /// The element of a list at this position, from 0; none in a list that is shorter.
+    Element(u32),
+    /// Each element of a list.
+    Each,
+}
+
+/// A place behind a topic's name, as the `.sesame` file has it: `.level`, `[3]`, `.ranges[*]`.
+pub fn place_in_words(place: &[Step]) -> String {
+    let step = |step: &Step| match step {
+        Step::Field(name) => format!(".{name}"),
+        Step::Element(at) => format!("[{at}]"),
+        Step::Each => "[*]".to_owned(),
+    };
+    place.iter().map(step).collect()
+}
+
+/// What an operation does to the messages of its topic, with the parameters that a test chooses for it.
+///
+/// Of the values at an operation's places, only numbers, points, texts and truth values are changed as the kind says; the
+/// generator makes sure that they are of a type that the kind is for. Numbers are in the unit of their field. Results of
+/// whole numbers are rounded to the nearest whole number, halves away from zero, and held inside 64 bits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum OperationKind {
-    /// Replaces or shifts a number by a fresh uniform draw per message. One parameter: a sub-range
-    /// ([`Shape::Range`]) in the field's unit.
+    /// Replaces or shifts numbers and points by fresh uniform draws per message. Of numbers one parameter, a sub-range
+    /// ([`Shape::Range`]) in the field's unit: `value` or `offset`. Of points three of them: `x`, `y`, `z`.
     RandomValue {
-        /// Field names from the message inwards; empty for a topic that carries the number itself.
-        path: Vec<String>,
         /// Whether the draw replaces the value or is added to it.
         mode: ValueMode,
-        /// Whether the field is a whole number; the draw is then uniform over the whole numbers of the range.
+        /// Whether the values are whole numbers; the draw is then uniform over the whole numbers of the range.
         integer: bool,
     },
+    /// Replaces texts by a fresh draw per message. No parameters.
+    RandomText {
+        /// What is drawn from, each alike: at least one, none twice.
+        texts: Vec<String>,
+    },
+    /// Replaces values by one and the same. One parameter `value`: a number, a point or a text; of truth values none.
+    StuckAt {
+        /// The truth value, where that is what is replaced.
+        truth: Option<bool>,
+    },
+    /// Adds one and the same. One parameter `bias`: a number, or a point.
+    Bias,
+    /// Adds what grows with the time since the operation went on. One parameter `rate`: a number or a point, in the
+    /// field's unit per second.
+    Drift,
+    /// Adds a fresh normal draw per message and number, of mean zero. One parameter `sigma`, not negative: its standard
+    /// deviation, on each axis of a point.
+    Noise,
+    /// Multiplies. One parameter `factor`: a number.
+    Scale,
+    /// Replaces reals, and all coordinates of points, by what is no finite number. No parameters.
+    NotFinite {
+        /// By what.
+        number: NotFinite,
+    },
+    /// Repeats, on each wire, the values that were there last before the operation went on; if none were, the first ones
+    /// after that. With no places: the whole message. No parameters.
+    Freeze,
+    /// Replaces values by those that were there some time ago. With no places: the whole message. One parameter `age` in
+    /// seconds, not negative.
+    Stale,
+    /// Adds to time stamps. One parameter `skew`, in the field's unit.
+    ClockSkew,
     /// Drops each message independently. One parameter `loss`: the probability to drop, a value in `0..=1`.
     PacketLoss,
+    /// Drops messages in bursts (Gilbert 1960, Elliott 1963). Parameters, values in `0..=1`: `enter` and `leave`, the
+    /// probabilities per message that a burst begins and ends, and where it is not 1, `loss`, the probability to drop a
+    /// message of a burst.
+    BurstLoss,
+    /// Drops what comes sooner after the last message that passed on the wire than the period of a rate. One parameter
+    /// `rate` in hertz; positive.
+    RateLimit,
     /// Delays each message, order kept. One parameter `delay` in seconds: a value if fixed, else a sub-range.
     Latency {
         /// How each message's delay is drawn.
@@ -411,6 +493,13 @@ pub enum OperationKind {
         /// What becomes of held messages when the window ends.
         drain: Drain,
     },
+    /// Delays each message by a fresh uniform draw from zero to a parameter `window` in seconds; order is not kept.
+    Reorder {
+        /// What becomes of held messages when the window ends.
+        drain: Drain,
+    },
+    /// Sends copies right after each message. One parameter `copies`: how many, a whole number from 1.
+    Duplicate,
     /// Drops every message. No parameters.
     Blackhole,
     /// The user's Rust code, with parameters as declared.
@@ -418,6 +507,18 @@ pub enum OperationKind {
         /// When it is called.
         moment: Moment,
     },
+}
+
+/// What is no finite number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NotFinite {
+    /// Not a number.
+    Nan,
+    /// Larger than every number.
+    Infinity,
+    /// Smaller than every number.
+    MinusInfinity,
 }
 
 /// When the code of a custom operation is called.
@@ -439,13 +540,36 @@ impl OperationKind {
         matches!(self, OperationKind::Custom { moment: Moment::BeforeStart | Moment::AfterEnd })
     }
 
+    /// Whether its parameters are probabilities: fractions here, percentages in the `.sesame` file.
+    pub fn has_probabilities(&self) -> bool {
+        matches!(self, OperationKind::PacketLoss | OperationKind::BurstLoss)
+    }
+
     /// The kind in words, as the `.sesame` file has it.
     pub fn words(&self) -> &'static str {
         match self {
             OperationKind::RandomValue { mode: ValueMode::Absolute, .. } => "random absolute",
             OperationKind::RandomValue { mode: ValueMode::Offset, .. } => "random offset",
+            OperationKind::RandomText { .. } => "random one of",
+            OperationKind::StuckAt { truth: None } => "stuck at",
+            OperationKind::StuckAt { truth: Some(true) } => "stuck at true",
+            OperationKind::StuckAt { truth: Some(false) } => "stuck at false",
+            OperationKind::Bias => "bias",
+            OperationKind::Drift => "drift",
+            OperationKind::Noise => "noise",
+            OperationKind::Scale => "scale",
+            OperationKind::NotFinite { number: NotFinite::Nan } => "nan",
+            OperationKind::NotFinite { number: NotFinite::Infinity } => "infinity",
+            OperationKind::NotFinite { number: NotFinite::MinusInfinity } => "-infinity",
+            OperationKind::Freeze => "freeze",
+            OperationKind::Stale => "stale",
+            OperationKind::ClockSkew => "clock skew",
             OperationKind::PacketLoss => "packet loss",
+            OperationKind::BurstLoss => "burst loss",
+            OperationKind::RateLimit => "rate limit",
             OperationKind::Latency { .. } => "latency",
+            OperationKind::Reorder { .. } => "reorder",
+            OperationKind::Duplicate => "duplicate",
             OperationKind::Blackhole => "blackhole",
             OperationKind::Custom { moment: Moment::OnMessage } => "custom",
             OperationKind::Custom { moment: Moment::BeforeStart } => "custom before start",
@@ -472,6 +596,9 @@ pub enum Distribution {
     Fixed,
     /// Uniform over the test's sub-range, drawn anew per message.
     Uniform,
+    /// Normal around the middle of the test's sub-range with a quarter of its width as standard deviation, drawn anew per
+    /// message, and drawn again where it would leave the sub-range.
+    Normal,
 }
 
 /// What becomes of held messages when an operation's window ends.

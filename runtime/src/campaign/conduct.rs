@@ -422,7 +422,7 @@ impl Desk<'_> {
             if self.interrupted.load(Ordering::Relaxed) {
                 return Ok(false);
             }
-            let Some(Ended { number, observation, last_words, trace_failure }) =
+            let Some(Ended { number, observation, notes, trace_failure }) =
                 self.pool.next(Duration::from_millis(100))?
             else {
                 continue;
@@ -432,8 +432,7 @@ impl Desk<'_> {
                 return Err(CampaignError::Trace { test: number, reason });
             }
             self.record(&test.with(observation), each)?;
-            if let Some(words) = last_words {
-                let text = format!("the worker's last words:\n{words}");
+            for text in notes {
                 self.recorder.put_event(&Event { kind: EventKind::Session, test: Some(number), text })?;
             }
         }

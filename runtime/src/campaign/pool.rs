@@ -8,7 +8,7 @@ use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread::{self, JoinHandle};
@@ -54,8 +54,9 @@ pub struct Ended {
     pub number: u32,
     /// What its run showed.
     pub observation: Observation,
-    /// What its worker printed last before it died, if it died. Of this one session: it may hold process numbers.
-    pub last_words: Option<String>,
+    /// What befell its worker: that it was killed and the test run again, what it printed last before it died. Of this
+    /// one session: it may hold process numbers.
+    pub notes: Vec<String>,
     /// Why the trace that was asked for could not be written: the result must not be recorded without it.
     pub trace_failure: Option<String>,
 }
@@ -144,34 +145,53 @@ impl Lane {
         }
     }
 
+    /// Runs a test. If its worker is killed, which no simulator does to itself, the test is run once more: whoever kills
+    /// processes, by hand or for want of memory, is to leave no trace in results. Killed again, it is a crash.
     fn run(&mut self, job: &Job) -> Result<Ended, PoolError> {
+        let (ended, killed) = self.attempt(job)?;
+        if !killed || self.stop.load(Ordering::Relaxed) {
+            return Ok(ended);
+        }
+        let (mut ended, _) = self.attempt(job)?;
+        ended.notes.insert(0, "the worker was killed while it ran this test, so the test was run again".to_owned());
+        Ok(ended)
+    }
+
+    /// Runs a test, and says whether its worker was killed by someone else.
+    fn attempt(&mut self, job: &Job) -> Result<(Ended, bool), PoolError> {
         let mut worker = match self.worker.take() {
             Some(worker) => worker,
             None => Worker::start(self)?,
         };
         let printed = fs::metadata(output_file(&self.directory())).map_or(0, |file| file.len());
         let timeout = Duration::from_millis(self.timeout.load(Ordering::Relaxed));
-        let (observation, last_words, trace_failure) = match worker.ask(job, timeout, &self.stop) {
+        let mut killed = false;
+        let (observation, notes, trace_failure) = match worker.ask(job, timeout, &self.stop) {
             Ok(reply) => {
                 self.worker = Some(worker);
-                (reply.observation, None, reply.trace_failure)
+                (reply.observation, Vec::new(), reply.trace_failure)
             }
             Err(error) if error.kind() == io::ErrorKind::TimedOut => {
                 let outcome = Outcome::Timeout { limit: timeout.as_secs_f64() };
                 // Only of a worker that is gone is it known that it writes no more.
                 drop(worker);
                 let lost = self.save_trace(job, &outcome);
-                (empty(outcome), None, lost)
+                (empty(outcome), Vec::new(), lost)
             }
             Err(error) => {
                 // Only what is the same in every session: the cause is part of the digest.
-                let observation = crashed(format!("the worker process ended: {}", worker.how_it_ended(&error)));
+                let how = worker.how_it_ended(&error);
+                killed = how.as_ref().is_ok_and(|status| was_killed(*status));
+                let how = how.map_or_else(|error| error, |status| status.to_string());
+                let observation = crashed(format!("the worker process ended: {how}"));
                 drop(worker);
                 let lost = self.save_trace(job, &observation.outcome);
-                (observation, last_lines(&output_file(&self.directory()), printed, 10), lost)
+                let words = last_lines(&output_file(&self.directory()), printed, 10);
+                let words = words.map(|words| format!("the worker's last words:\n{words}"));
+                (observation, words.into_iter().collect(), lost)
             }
         };
-        Ok(Ended { number: job.number, observation, last_words, trace_failure })
+        Ok((Ended { number: job.number, observation, notes, trace_failure }, killed))
     }
 
     /// Saves what a dead worker wrote of a trace that was asked for; why not, otherwise.
@@ -272,16 +292,17 @@ impl Worker {
         frames::receive(stream)
     }
 
-    fn how_it_ended(&mut self, error: &io::Error) -> String {
+    /// The status of a process that broke off the conversation; the error it broke off with if it has not ended.
+    fn how_it_ended(&mut self, error: &io::Error) -> Result<ExitStatus, String> {
         let patience = Instant::now();
         while patience.elapsed() < Duration::from_secs(2) {
             match self.process.try_wait() {
-                Ok(Some(status)) => return status.to_string(),
+                Ok(Some(status)) => return Ok(status),
                 Ok(None) => thread::sleep(Duration::from_millis(5)),
                 Err(_) => break,
             }
         }
-        error.to_string()
+        Err(error.to_string())
     }
 }
 
@@ -292,6 +313,20 @@ impl Drop for Worker {
         self.process.kill().ok();
         self.process.wait().ok();
     }
+}
+
+/// Whether a process was killed, which it cannot be but from outside.
+#[cfg(unix)]
+fn was_killed(status: ExitStatus) -> bool {
+    /// `SIGKILL`, which POSIX numbers.
+    const KILL: i32 = 9;
+    std::os::unix::process::ExitStatusExt::signal(&status) == Some(KILL)
+}
+
+/// Whether a process was killed: its status does not tell here.
+#[cfg(not(unix))]
+fn was_killed(_: ExitStatus) -> bool {
+    false
 }
 
 fn millis(duration: Duration) -> u64 {

@@ -50,12 +50,12 @@ pub(super) fn replay(
         Job { number: record.number, test: record.test.clone(), simulator_seed: record.simulator_seed, trace: None };
     let ended = run_alone(job, &settings, &interrupted);
     files.finish()?;
-    let Some(Ended { observation: again, last_words, .. }) = ended? else {
+    let Some(Ended { observation: again, notes, .. }) = ended? else {
         eprintln!("stopped; a replay leaves nothing behind");
         return Ok(ExitCode::from(STOPPED));
     };
-    if let Some(words) = last_words {
-        eprintln!("the worker's last words:\n{words}");
+    for note in notes {
+        eprintln!("{note}");
     }
     let differences = differences(repository.plan(), &record.test, &record.observation, &again);
     let replay = Replay {

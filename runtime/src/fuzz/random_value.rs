@@ -1,50 +1,64 @@
-//! Random value: replaces or shifts a number by a fresh uniform draw per message (paper §3.8,
+//! Random value: replaces or shifts numbers, points and texts by a fresh uniform draw per message (paper §3.8,
 //! `RandomValueFromSetOperation`).
 
 use sesame_plan::ValueMode;
 
-use super::{Draws, Fate};
-use crate::value::Value;
+use super::change::{add, map, put};
+use super::{Draws, Fate, Places};
+use crate::value::{Text, Value};
 
-/// A random value operation with its sub-range.
+/// A random value operation on numbers or points, with its sub-ranges.
 #[derive(Debug, Clone)]
 pub struct RandomValue {
-    /// Where the number is in the message.
-    pub path: Vec<String>,
+    /// What is changed.
+    pub places: Places,
     /// Whether the draw replaces the number or is added to it.
     pub mode: ValueMode,
     /// Whether draws are whole numbers.
     pub integer: bool,
-    /// What is drawn from, in the field's unit; both ends included for whole numbers.
-    pub range: (f64, f64),
+    /// What is drawn from on each axis of a point, in the field's unit; of numbers the first. Both ends are included for
+    /// whole numbers.
+    pub ranges: [(f64, f64); 3],
 }
 
 impl RandomValue {
-    /// Changes the number, if the message has it where the space says; whole numbers stay whole. A message that comes
+    /// Changes the numbers, where the message has them as the space says; whole numbers stay whole. A message that comes
     /// out as it went in counts as unchanged.
     pub fn apply(&self, draws: Draws, message: &mut Value) -> Fate {
-        let Some(value) = message.at_mut(&self.path) else { return Fate::Unchanged };
-        let draw = self.draw(draws.unit(0));
-        let changed = match value {
-            Value::Real(x) => replace(x, if self.mode == ValueMode::Offset { *x + draw } else { draw }),
-            #[expect(clippy::cast_possible_truncation, reason = "`as` clamps to the integer's range")]
-            Value::Int(n) => {
-                let draw = libm::round(draw) as i64;
-                replace(n, if self.mode == ValueMode::Offset { n.saturating_add(draw) } else { draw })
+        self.places.change(message, |value, first| {
+            let draw = |axis: usize| self.draw(axis, draws.unit(first + axis as u64));
+            match self.mode {
+                ValueMode::Offset => add(value, draw),
+                ValueMode::Absolute => map(value, |axis, _| draw(axis)),
             }
-            _ => false,
-        };
-        if changed { Fate::Changed } else { Fate::Unchanged }
+        })
     }
 
-    fn draw(&self, unit: f64) -> f64 {
-        let (low, high) = self.range;
+    fn draw(&self, axis: usize, unit: f64) -> f64 {
+        let (low, high) = self.ranges[axis];
         if self.integer { libm::floor(low + unit * (high - low + 1.0)).min(high) } else { low + unit * (high - low) }
     }
 }
 
-fn replace<T: PartialEq>(place: &mut T, new: T) -> bool {
-    let changed = *place != new;
-    *place = new;
-    changed
+/// A random value operation on texts.
+#[derive(Debug, Clone)]
+pub struct RandomText {
+    /// What is changed.
+    pub places: Places,
+    /// What is drawn from, each alike; at least one.
+    pub texts: Vec<Text>,
+}
+
+impl RandomText {
+    /// Replaces the texts.
+    pub fn apply(&self, draws: Draws, message: &mut Value) -> Fate {
+        self.places.change(message, |value, first| {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is below their number")]
+            let at = (draws.unit(first) * self.texts.len() as f64) as usize;
+            match (value, self.texts.get(at)) {
+                (Value::Text(text), Some(drawn)) => put(text, drawn.clone()),
+                _ => false,
+            }
+        })
+    }
 }

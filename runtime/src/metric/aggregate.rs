@@ -95,13 +95,20 @@ impl<'p> FormulaState<'p> {
 
     /// The value over all keys: what is counted adds up, the greatest is the greatest, and of all others it is the least.
     fn set(&self, context: &mut Context) {
-        let join: fn(f64, f64) -> f64 = match self.formula.aggregate {
-            Aggregate::Count { .. } | Aggregate::Duration { .. } => |a, b| a + b,
-            Aggregate::Max { .. } => greatest,
-            Aggregate::Last { .. } | Aggregate::Min { .. } | Aggregate::Mean { .. } => least,
+        let tallies = || std::iter::once(&self.common).chain(self.keys.values()).map(|stream| &stream.tally);
+        let values = tallies().filter_map(|tally| tally.value);
+        let value = match self.formula.aggregate {
+            // In whole nanoseconds, so that what held equally long is equal.
+            Aggregate::Duration { .. } => tallies()
+                .filter(|tally| tally.value.is_some())
+                .map(|tally| tally.held)
+                .reduce(|a, b| a + b)
+                .map(SimTime::seconds),
+            Aggregate::Count { .. } => values.reduce(|a, b| a + b),
+            Aggregate::Max { .. } => values.reduce(greatest),
+            Aggregate::Last { .. } | Aggregate::Min { .. } | Aggregate::Mean { .. } => values.reduce(least),
         };
-        let streams = std::iter::once(&self.common).chain(self.keys.values());
-        if let Some(value) = streams.filter_map(|stream| stream.tally.value).reduce(join) {
+        if let Some(value) = value {
             context.set(value);
         }
     }

@@ -1,12 +1,12 @@
 //! All metrics of one run: which message goes to which, and what comes out.
 
 use sesame_plan::stl::Robustness;
-use sesame_plan::{CampaignPlan, Formula, MetricId, MetricSource, Side, TopicId};
+use sesame_plan::{CampaignPlan, Formula, MetricId, MetricSource, Side, Span, TopicId};
 
 use super::aggregate::FormulaState;
 use super::robustness::RobustnessState;
 use super::{Context, Hook, HookEntry};
-use crate::observation::{MetricObservation, OperationEffect};
+use crate::observation::MetricObservation;
 use crate::stl::FormulaError;
 use crate::time::SimTime;
 use crate::value::{Text, Value};
@@ -215,7 +215,9 @@ impl Metrics<'_> {
 
     /// What the run showed, as far as it went: a metric never set takes its default, one whose hook is not filled in has
     /// no value. Also what the user should know, one line per metric. No hook is called any more.
-    pub fn finish(mut self, operations: &[OperationEffect]) -> (Vec<MetricObservation>, Vec<String>) {
+    ///
+    /// `active` has the active intervals of all operations that count in `fuzzing_time()`.
+    pub fn finish(mut self, active: &[Span]) -> (Vec<MetricObservation>, Vec<String>) {
         let mut warnings = Vec::new();
         let mut observations = Vec::with_capacity(self.states.len());
         for (state, metric) in self.states.iter_mut().zip(&self.table.plan.metrics) {
@@ -224,9 +226,9 @@ impl Metrics<'_> {
                 robustness.break_off(context);
             }
             if matches!(metric.source, MetricSource::FuzzingTime) {
-                for (time, total) in fuzzing_time(operations) {
-                    context.now = SimTime::from_seconds(time);
-                    context.set(total);
+                for (time, total) in fuzzing_time(active) {
+                    context.now = time;
+                    context.set(total.seconds());
                 }
             }
             warnings.extend(context.problem.take().map(|problem| format!("metric `{}`: {problem}", metric.name)));
@@ -242,31 +244,66 @@ impl Metrics<'_> {
     }
 }
 
-/// Total active time so far, at the end of each observed interval.
-fn fuzzing_time(operations: &[OperationEffect]) -> Vec<(f64, f64)> {
-    let mut intervals: Vec<_> = operations.iter().flat_map(|operation| &operation.intervals).copied().collect();
-    intervals.sort_by(|a, b| a.end.total_cmp(&b.end));
-    let mut total = 0.0;
-    std::iter::once((0.0, 0.0))
-        .chain(intervals.into_iter().map(|interval| {
-            total += interval.length();
-            (interval.end, total)
+/// Total active time so far, at the end of each observed interval. It is summed in whole nanoseconds, so that tests which
+/// were active equally long are equal, however their intervals lie.
+fn fuzzing_time(active: &[Span]) -> Vec<(SimTime, SimTime)> {
+    let mut intervals: Vec<(SimTime, SimTime)> =
+        active.iter().map(|span| (SimTime::from_seconds(span.start), SimTime::from_seconds(span.end))).collect();
+    intervals.sort_by_key(|&(_, end)| end);
+    let mut total = SimTime::ZERO;
+    std::iter::once((SimTime::ZERO, total))
+        .chain(intervals.into_iter().map(|(start, end)| {
+            total = total + (end - start);
+            (end, total)
         }))
         .collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
-    use sesame_plan::Span;
+
+    /// The last of it, in seconds.
+    fn total(intervals: &[(f64, f64)]) -> f64 {
+        fuzzing_time(&spans(intervals)).last().unwrap().1.seconds()
+    }
+
+    fn spans(intervals: &[(f64, f64)]) -> Vec<Span> {
+        intervals.iter().map(|&(start, end)| Span { start, end }).collect()
+    }
 
     #[test]
     fn fuzzing_time_adds_up_over_operations_even_where_they_overlap() {
-        let effect = |intervals: &[(f64, f64)]| OperationEffect {
-            intervals: intervals.iter().map(|&(start, end)| Span { start, end }).collect(),
-            ..OperationEffect::default()
-        };
-        let points = fuzzing_time(&[effect(&[(1.0, 5.0), (6.0, 7.0)]), effect(&[(2.0, 3.5)])]);
+        let points = fuzzing_time(&spans(&[(1.0, 5.0), (6.0, 7.0), (2.0, 3.5)]));
+        let points: Vec<(f64, f64)> = points.iter().map(|(time, total)| (time.seconds(), total.seconds())).collect();
         assert_eq!(points, [(0.0, 0.0), (3.5, 1.5), (5.0, 5.5), (7.0, 6.5)]);
+    }
+
+    proptest! {
+        #[test]
+        fn equal_activity_is_equal_fuzzing_time(
+            mut intervals in prop::collection::vec((0i64..70_000_000_000, 0i64..9_000_000_000), 1..20),
+            moved in prop::collection::vec(0i64..70_000_000_000, 20),
+        ) {
+            let seconds = |intervals: &[(i64, i64)]| {
+                let of = |nanos| SimTime::from_nanos(nanos).seconds();
+                intervals.iter().map(|&(start, length)| (of(start), of(start + length))).collect::<Vec<_>>()
+            };
+            let before = total(&seconds(&intervals));
+            let nanos: i64 = intervals.iter().map(|(_, length)| length).sum();
+            prop_assert_eq!(before, SimTime::from_nanos(nanos).seconds());
+            for (interval, start) in intervals.iter_mut().zip(moved) {
+                interval.0 = start;
+            }
+            prop_assert_eq!(total(&seconds(&intervals)), before);
+        }
+    }
+
+    #[test]
+    fn intervals_that_seconds_cannot_hold_exactly_add_up_all_the_same() {
+        assert_ne!((0.3 - 0.2) + (0.6 - 0.5), 0.2, "floating point would tell them apart");
+        assert_eq!(total(&[(0.2, 0.3), (0.5, 0.6)]), total(&[(0.0, 0.2)]));
     }
 }

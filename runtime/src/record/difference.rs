@@ -99,7 +99,7 @@ fn outcome(outcome: &Outcome) -> String {
     match outcome {
         Outcome::Crash { message } => format!("{}: {message}", outcome.word()),
         // How long it was waited for is wall time.
-        Outcome::Completed | Outcome::Void | Outcome::Timeout { .. } => outcome.word().to_owned(),
+        Outcome::Completed | Outcome::Void | Outcome::Unknown | Outcome::Timeout { .. } => outcome.word().to_owned(),
     }
 }
 

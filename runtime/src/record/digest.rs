@@ -26,6 +26,7 @@ const CONTENT: &[(&str, &str)] = &[
         "SELECT number, name, origin, known_test, generation, simulator_seed, outcome, outcome_detail, end_s, messages, \
          duplicate_of FROM tests ORDER BY number",
     ),
+    ("original_names", "SELECT test, name FROM original_names ORDER BY test"),
     ("parents", "SELECT test, position, parent FROM parents ORDER BY test, position"),
     (
         "operations",

@@ -74,6 +74,17 @@ pub enum RecordError {
         /// The file.
         path: PathBuf,
     },
+    /// Reading needs to write: a run that broke off left the file unsettled, and it lies where nothing may be written.
+    #[error(
+        "a run that broke off left these results unsettled, and they lie where nothing may be written ({source}); make \
+         their folder writable, or copy all of it to where you may write: {}", path.display()
+    )]
+    Unsettled {
+        /// What the database says.
+        source: rusqlite::Error,
+        /// The database.
+        path: PathBuf,
+    },
     /// A test of this number is there already.
     #[error("test T{number} is recorded already; a number is used once: {}", path.display())]
     TestExists {

@@ -9,6 +9,9 @@ use crate::record::{RecordError, Repository};
 /// Name of the database in a run's folder.
 pub const DATABASE: &str = "results.sqlite";
 
+/// Name of the database until it has all of its tables.
+pub(crate) const BEGUN: &str = "results.sqlite.begun";
+
 /// Name of the lock file in a run's folder.
 pub const LOCK: &str = "results.lock";
 

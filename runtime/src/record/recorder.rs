@@ -9,7 +9,7 @@ use sesame_plan::{Activation, CampaignPlan, Choice};
 
 use crate::condition;
 use crate::observation::{Observation, Outcome};
-use crate::record::folder::{DATABASE, Lock};
+use crate::record::folder::{BEGUN, DATABASE, Lock};
 use crate::record::schema::{self, index};
 use crate::record::{Event, EventKind, GenerationCoverage, Origin, RecordError, Repository, ResultSet, TestRecord};
 
@@ -33,12 +33,24 @@ impl Recorder {
         if path.exists() {
             return Err(RecordError::Exists { path });
         }
-        let made = Connection::open(&path).and_then(|mut connection| {
-            tune(&connection)?;
-            schema::install(&mut connection, plan, seed)?;
-            Ok(connection)
-        });
-        let connection = made.map_err(|e| RecordError::database("begin the results", &path, e))?;
+        // Whole before it has its name: a run that is killed as it begins leaves no results, rather than some that are
+        // none. What an earlier one left under the other name is not worth keeping.
+        let begun = folder.join(BEGUN);
+        for leftover in [begun.clone(), folder.join(format!("{BEGUN}-journal"))] {
+            match std::fs::remove_file(&leftover) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(RecordError::io("remove what a broken-off run left", &leftover, error));
+                }
+                _ => {}
+            }
+        }
+        let failed = |error| RecordError::database("begin the results", &path, error);
+        let mut connection = Connection::open(&begun).map_err(failed)?;
+        schema::install(&mut connection, plan, seed).map_err(failed)?;
+        connection.close().map_err(|(_, error)| failed(error))?;
+        std::fs::rename(&begun, &path).map_err(|e| RecordError::io("begin the results", &path, e))?;
+        let connection = Connection::open(&path).map_err(failed)?;
+        tune(&connection).map_err(failed)?;
         Recorder::begin_session(Repository::from_connection(connection, path)?, lock, workers)
     }
 
@@ -93,6 +105,22 @@ impl Recorder {
             }
             _ => RecordError::database("record a test", &path, source),
         })
+    }
+
+    /// Records what tests were called in the file they were imported from, each a test that was committed.
+    pub fn put_original_names<'n>(
+        &mut self,
+        names: impl IntoIterator<Item = (u32, &'n str)>,
+    ) -> Result<(), RecordError> {
+        let written = self.repository.connection.transaction().and_then(|transaction| {
+            for (test, name) in names {
+                transaction
+                    .prepare_cached("INSERT OR REPLACE INTO original_names (test, name) VALUES (?1, ?2)")?
+                    .execute(params![test, name])?;
+            }
+            transaction.commit()
+        });
+        written.map_err(|e| RecordError::database("record the names of tests", &self.repository.path, e))
     }
 
     /// Records a set of results; one of the same name is replaced.
@@ -303,7 +331,7 @@ fn write_test(transaction: &Transaction<'_>, plan: &CampaignPlan, record: &TestR
         Origin::Reference | Origin::Search => None,
     };
     let (detail, limit) = match &observation.outcome {
-        Outcome::Completed | Outcome::Void => (None, None),
+        Outcome::Completed | Outcome::Void | Outcome::Unknown => (None, None),
         Outcome::Crash { message } => (Some(message.as_str()), None),
         Outcome::Timeout { limit } => (None, Some(*limit)),
     };
@@ -364,7 +392,8 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
         let kind = plan.operation(operation.operation);
         let (start, end, start_condition, end_condition, length, times) = switched(&operation.activation, plan);
         let effect = record.observation.operations.get(position);
-        let counters = effect.map(|effect| effect.counters);
+        let counted = record.observation.outcome != Outcome::Unknown;
+        let counters = effect.filter(|_| counted).map(|effect| effect.counters);
         transaction
             .prepare_cached(
                 "INSERT INTO operations (test, position, operation, start_s, end_s, start_condition, end_condition, \

@@ -111,11 +111,12 @@ impl Repository {
         self.rows(None)
     }
 
-    /// The number of the test that a user calls `T158`, `158`, by the name of a known test, or `reference` (the first
-    /// undisturbed run).
+    /// The number of the test that a user calls `T158`, `158`, by the name of a known test or by the one it had before it
+    /// was imported, or `reference` (the first undisturbed run).
     pub fn find(&self, name: &str) -> Result<u32, RecordError> {
         let found = self.read(
             "SELECT min(number) FROM tests WHERE name = ?1 OR name = 'T' || ?1 OR known_test = ?1 \
+             OR number = (SELECT min(test) FROM original_names WHERE name = ?1) \
              OR (origin = 'reference' AND ?1 = 'reference')",
             params![name],
             |row| row.get::<_, Option<u32>>(0),
@@ -173,15 +174,21 @@ impl Repository {
             simulator_seed: self.seed(&simulator_seed)?,
             duplicate_of: row.duplicate_of,
             observation: Observation {
+                operations: self.effects(number, &row.outcome)?,
                 outcome: row.outcome,
                 end: row.end,
-                operations: self.effects(number)?,
                 metrics,
                 messages,
                 warnings,
                 wall: WallTime { run },
             },
         })
+    }
+
+    /// What tests were called in the file they were imported from, by number; empty for a campaign that was run.
+    pub fn original_names(&self) -> Result<BTreeMap<u32, String>, RecordError> {
+        let names = self.read("SELECT test, name FROM original_names", [], |row| Ok((row.get(0)?, row.get(1)?)))?;
+        Ok(names.into_iter().collect())
     }
 
     /// The sets of results, by generation, the final one last.
@@ -293,17 +300,7 @@ impl Repository {
             "SELECT test, operation, value, low, high, x, y, z, text FROM choices WHERE ?1 IS NULL OR test = ?1 \
              ORDER BY test, operation, position",
             params![only],
-            |row| {
-                let point: [Option<f64>; 3] = [row.get(5)?, row.get(6)?, row.get(7)?];
-                let choice = match (row.get(2)?, row.get(3)?, row.get(4)?, point, row.get(8)?) {
-                    (Some(value), None, None, [None, None, None], None) => Some(Choice::Value { value }),
-                    (None, Some(low), Some(high), [None, None, None], None) => Some(Choice::Range { low, high }),
-                    (None, None, None, [Some(x), Some(y), Some(z)], None) => Some(Choice::Point { point: [x, y, z] }),
-                    (None, None, None, [None, None, None], Some(text)) => Some(Choice::Text { text }),
-                    _ => None,
-                };
-                Ok(((row.get(0)?, row.get(1)?), choice))
-            },
+            |row| Ok(((row.get(0)?, row.get(1)?), choice(row, 2)?)),
         )?;
         let mut parameters: BTreeMap<At, Vec<Choice>> = BTreeMap::new();
         for (at, choice) in choices {
@@ -377,12 +374,15 @@ impl Repository {
         }
     }
 
-    fn effects(&self, number: u32) -> Result<Vec<OperationEffect>, RecordError> {
+    fn effects(&self, number: u32, outcome: &Outcome) -> Result<Vec<OperationEffect>, RecordError> {
         let mut effects: Vec<OperationEffect> = self.read(
             "SELECT seen, changed, dropped, delayed, injected, side_effects, first_touch_s, last_touch_s \
-             FROM operations WHERE test = ?1 AND seen IS NOT NULL ORDER BY position",
-            params![number],
+             FROM operations WHERE test = ?1 AND (seen IS NOT NULL OR ?2) ORDER BY position",
+            params![number, *outcome == Outcome::Unknown],
             |row| {
+                if row.get_ref(0)? == rusqlite::types::ValueRef::Null {
+                    return Ok(OperationEffect::default());
+                }
                 Ok(OperationEffect {
                     intervals: Vec::new(),
                     counters: Counters {
@@ -434,6 +434,7 @@ impl Repository {
         match (word, detail, limit) {
             ("completed", None, None) => Ok(Outcome::Completed),
             ("void", None, None) => Ok(Outcome::Void),
+            ("unknown", None, None) => Ok(Outcome::Unknown),
             ("crash", Some(message), None) => Ok(Outcome::Crash { message }),
             ("timeout", None, Some(limit)) => Ok(Outcome::Timeout { limit }),
             _ => Err(RecordError::damaged(&self.path, format!("a test cannot have ended as `{word}`"))),
@@ -470,4 +471,17 @@ fn unsigned(row: &Row<'_>, column: usize) -> rusqlite::Result<u64> {
 pub(super) fn position(row: &Row<'_>, column: usize) -> rusqlite::Result<usize> {
     let count = unsigned(row, column)?;
     usize::try_from(count).map_err(|_| rusqlite::Error::IntegralValueOutOfRange(column, i64::MAX))
+}
+
+/// What was chosen for a parameter, from the columns value, low, high, x, y, z and text that begin here; `None` where it
+/// is neither value, range, point nor text.
+pub(super) fn choice(row: &Row<'_>, first: usize) -> rusqlite::Result<Option<Choice>> {
+    let point: [Option<f64>; 3] = [row.get(first + 3)?, row.get(first + 4)?, row.get(first + 5)?];
+    Ok(match (row.get(first)?, row.get(first + 1)?, row.get(first + 2)?, point, row.get(first + 6)?) {
+        (Some(value), None, None, [None, None, None], None) => Some(Choice::Value { value }),
+        (None, Some(low), Some(high), [None, None, None], None) => Some(Choice::Range { low, high }),
+        (None, None, None, [Some(x), Some(y), Some(z)], None) => Some(Choice::Point { point: [x, y, z] }),
+        (None, None, None, [None, None, None], Some(text)) => Some(Choice::Text { text }),
+        _ => None,
+    })
 }

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use sesame_plan::condition::{Comparison, Condition, Operand};
+use sesame_plan::condition::{Comparison, Condition, ConditionEnd, ConditionSpace, Integers, Operand, Variable};
 use sesame_plan::*;
 
 use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
@@ -33,6 +33,8 @@ fn operation(name: &str, topic: u32, kind: OperationKind, parameters: Vec<Parame
         within: Span { start: 0.0, end: 65.0 },
         priority: 0,
         inclusion: 1.0,
+        places: Vec::new(),
+        timed: true,
         constraints: Vec::new(),
     }
 }
@@ -50,7 +52,7 @@ pub(crate) fn plan() -> CampaignPlan {
         unit: None,
         domain: Domain::Number { low: 0.0, high: 1.0, shape: Shape::Value, integer: false },
     };
-    let jitter = || OperationKind::RandomValue { path: vec![], mode: ValueMode::Offset, integer: false };
+    let jitter = || OperationKind::RandomValue { mode: ValueMode::Offset, integer: false };
     let topic = |name: &str, path: &str| Topic {
         name: name.to_owned(),
         doc: String::new(),
@@ -140,7 +142,28 @@ fn window(operation: &TestOperation) -> (f64, f64) {
     }
 }
 
-/// A test with every kind of activation in it.
+/// The plan with an operation before the start, `spoil`, and a search that grows conditions over two metrics.
+pub(crate) fn offline_plan(end: ConditionEnd) -> CampaignPlan {
+    let mut plan = plan();
+    let texts = ["cold", "warm", "hot"].map(str::to_owned).to_vec();
+    let way = Parameter { name: "way".to_owned(), unit: None, domain: Domain::Texts { texts } };
+    let kind = OperationKind::Custom { moment: Moment::BeforeStart };
+    plan.operations.push(Operation { topic: None, ..operation("spoil", 0, kind, vec![way]) });
+    plan.campaign.operations.push(OperationId(4));
+    let variable = |metric: u32, high: f64| Variable {
+        metric: MetricId(metric),
+        unit: plan.metrics[metric as usize].unit.clone(),
+        low: Some(0.0),
+        high: Some(high),
+    };
+    let variables = vec![variable(2, 3.0), variable(4, 700.0)];
+    let integers = Integers { lowest: 1, highest: 20 };
+    plan.campaign.activation =
+        ActivationMode::Condition { space: ConditionSpace { variables, depth: 3, integers, end, times: 2 } };
+    plan
+}
+
+/// A test with every kind of activation in it that acts during the run.
 pub(crate) fn conditional_test() -> Test {
     let compare = |left, by, right| Condition::Compare { left, by, right };
     let (speed, distance) = (Operand::Variable(MetricId(2)), Operand::Variable(MetricId(4)));
@@ -178,7 +201,7 @@ pub(crate) fn observe(plan: &CampaignPlan, test: &Test, seed: u64) -> Observatio
             _ => Counters { dropped: seen, ..whole },
         };
         effects.push(OperationEffect {
-            intervals: vec![Span { start, end }],
+            intervals: if start < end { vec![Span { start, end }] } else { Vec::new() },
             counters,
             first_touch: counters.any_effect().then_some(start),
             last_touch: counters.any_effect().then_some(end - 0.02),

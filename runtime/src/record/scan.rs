@@ -7,7 +7,7 @@ use sesame_plan::{CampaignPlan, Choice, OperationId, Span};
 
 use crate::coverage;
 use crate::observation::Outcome;
-use crate::record::repository::position;
+use crate::record::repository::{choice, position};
 use crate::record::{MetricValue, Origin, RecordError, Repository};
 use crate::sspr::{Convention, Disturbance, Point, disturbance};
 
@@ -103,7 +103,7 @@ impl<'s, T> Cursor<'s, T> {
     }
 }
 
-/// A row of `choices`: the position of its operation, and the choice; `None` where it is neither value nor range.
+/// A row of `choices`: the position of its operation, and the choice; `None` where it is none.
 type ChoiceRow = (usize, Option<Choice>);
 
 impl Repository {
@@ -117,8 +117,9 @@ impl Repository {
         let _transaction = self.connection.unchecked_transaction().map_err(failed)?;
 
         let mut operations = prepare("SELECT test, operation FROM operations ORDER BY test, position")?;
-        let mut choices =
-            prepare("SELECT test, operation, value, low, high FROM choices ORDER BY test, operation, position")?;
+        let mut choices = prepare(
+            "SELECT test, operation, value, low, high, x, y, z, text FROM choices ORDER BY test, operation, position",
+        )?;
         let mut intervals =
             prepare("SELECT test, operation, start_s, end_s FROM intervals ORDER BY test, operation, position")?;
         let mut values = prepare("SELECT test, value, is_set FROM metric_values ORDER BY test, metric")?;
@@ -129,12 +130,7 @@ impl Repository {
         let mut operations =
             Cursor::over(operations.query([]).map_err(failed)?, |row| row.get::<_, String>(1)).map_err(failed)?;
         let mut choices = Cursor::over(choices.query([]).map_err(failed)?, |row| -> rusqlite::Result<ChoiceRow> {
-            let choice = match (row.get(2)?, row.get(3)?, row.get(4)?) {
-                (Some(value), None, None) => Some(Choice::Value { value }),
-                (None, Some(low), Some(high)) => Some(Choice::Range { low, high }),
-                _ => None,
-            };
-            Ok((position(row, 1)?, choice))
+            Ok((position(row, 1)?, choice(row, 2)?))
         })
         .map_err(failed)?;
         let mut intervals = Cursor::over(intervals.query([]).map_err(failed)?, |row| {
@@ -176,8 +172,9 @@ impl Repository {
             }
             let stray = |what: &str| damaged(format!("T{number} has {what} without an operation"));
             for (at, choice) in choices.of(number).map_err(failed)? {
-                let choice =
-                    choice.ok_or_else(|| damaged(format!("T{number} has a choice that is neither value nor range")))?;
+                let choice = choice.ok_or_else(|| {
+                    damaged(format!("T{number} has a choice that is neither value, range, point nor text"))
+                })?;
                 test.operations.get_mut(at).ok_or_else(|| stray("a choice"))?.choices.push(choice);
             }
             for (at, span) in intervals.of(number).map_err(failed)? {

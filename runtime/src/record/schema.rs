@@ -1,6 +1,7 @@
 //! The database's schema: made new, and recognised.
 
 use std::fmt::Write as _;
+use std::io::Read as _;
 use std::path::Path;
 
 use rusqlite::{Connection, OpenFlags};
@@ -10,7 +11,7 @@ use crate::record::RecordError;
 use crate::record::verdict::ends;
 
 /// The schema's version, in the file's `user_version`.
-pub const SCHEMA: i64 = 2;
+pub const SCHEMA: i64 = 3;
 
 /// Marks an SQLite file as ours, in its `application_id`: "SESM".
 pub(crate) const APPLICATION_ID: i64 = 0x5345_534D;
@@ -103,6 +104,9 @@ fn wide_views(plan: &CampaignPlan) -> String {
 }
 
 /// Opens an existing database, after making sure that it is ours, readable by this release, and whole.
+///
+/// What a kill in the middle of writing left behind is put right first, for reading too, as SQLite does it: the file is
+/// then what it was at the last commit.
 pub(crate) fn open(path: &Path, writable: bool) -> Result<Connection, RecordError> {
     let length = match std::fs::metadata(path) {
         Ok(metadata) if metadata.is_file() => metadata.len(),
@@ -115,27 +119,70 @@ pub(crate) fn open(path: &Path, writable: bool) -> Result<Connection, RecordErro
     if length == 0 {
         return Err(RecordError::damaged(path, "the file is empty"));
     }
-    let doing = "open the results";
-    let flags = OpenFlags::SQLITE_OPEN_NO_MUTEX
-        | if writable { OpenFlags::SQLITE_OPEN_READ_WRITE } else { OpenFlags::SQLITE_OPEN_READ_ONLY };
-    let connection = Connection::open_with_flags(path, flags).map_err(|e| RecordError::database(doing, path, e))?;
-    connection.busy_timeout(std::time::Duration::from_secs(5)).map_err(|e| RecordError::database(doing, path, e))?;
-    let pragma = |name: &str| -> Result<i64, RecordError> {
-        connection.pragma_query_value(None, name, |row| row.get(0)).map_err(|e| RecordError::database(doing, path, e))
+    std::fs::File::open(path).map_err(|e| RecordError::io("read the results", path, e))?;
+    let foreign =
+        || RecordError::Foreign { found: "an SQLite file of another program".to_owned(), path: path.to_owned() };
+    let opened = match begin(path, writable) {
+        Err(error) if !writable && needs_rollback(&error) => {
+            if !claims_to_be_ours(path) {
+                return Err(foreign());
+            }
+            // SQLite itself makes sure that the journal is not that of a process at work.
+            begin(path, true)
+                .and_then(|(connection, _)| connection.close().map_err(|(_, error)| error))
+                .and_then(|()| begin(path, false))
+        }
+        opened => opened,
     };
-    if pragma("application_id")? != APPLICATION_ID {
-        return Err(RecordError::Foreign {
-            found: "an SQLite file of another program".to_owned(),
-            path: path.to_owned(),
-        });
+    let (connection, application_id) = opened.map_err(|source| {
+        use rusqlite::ErrorCode::{CannotOpen, ReadOnly};
+        match source.sqlite_error_code() {
+            Some(CannotOpen | ReadOnly) => RecordError::Unsettled { source, path: path.to_owned() },
+            _ => RecordError::database(OPENING, path, source),
+        }
+    })?;
+    if application_id != APPLICATION_ID {
+        return Err(foreign());
     }
-    match pragma("user_version")? {
+    let version: i64 = connection
+        .pragma_query_value(None, "user_version", |row| row.get(0))
+        .map_err(|e| RecordError::database(OPENING, path, e))?;
+    match version {
         SCHEMA => {}
         found if found > SCHEMA => return Err(RecordError::Newer { found, known: SCHEMA, path: path.to_owned() }),
         found if found >= 1 => return Err(RecordError::Older { found, known: SCHEMA, path: path.to_owned() }),
         found => return Err(RecordError::damaged(path, format!("there is no schema {found}"))),
     }
     Ok(connection)
+}
+
+const OPENING: &str = "open the results";
+
+/// A connection, and the mark of the program whose file it is: reading it is what makes SQLite look at the file at all.
+fn begin(path: &Path, writable: bool) -> rusqlite::Result<(Connection, i64)> {
+    let flags = OpenFlags::SQLITE_OPEN_NO_MUTEX
+        | if writable { OpenFlags::SQLITE_OPEN_READ_WRITE } else { OpenFlags::SQLITE_OPEN_READ_ONLY };
+    let connection = Connection::open_with_flags(path, flags)?;
+    connection.busy_timeout(std::time::Duration::from_secs(5))?;
+    let application_id = connection.pragma_query_value(None, "application_id", |row| row.get(0))?;
+    Ok((connection, application_id))
+}
+
+/// Whether a transaction broke off in the middle, which only a process that may write can undo.
+fn needs_rollback(error: &rusqlite::Error) -> bool {
+    use rusqlite::ffi::{SQLITE_READONLY_RECOVERY, SQLITE_READONLY_ROLLBACK};
+    error
+        .sqlite_error()
+        .is_some_and(|error| matches!(error.extended_code, SQLITE_READONLY_ROLLBACK | SQLITE_READONLY_RECOVERY))
+}
+
+/// Whether the file has our mark as it lies there, so that nothing is done to the files of others.
+fn claims_to_be_ours(path: &Path) -> bool {
+    /// Where an SQLite file has its `application_id`, which is big-endian.
+    const AT: usize = 68;
+    let mut header = [0; AT + 4];
+    let read = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut header));
+    read.is_ok() && header[AT..].iter().fold(0, |id, &byte| id << 8 | i64::from(byte)) == APPLICATION_ID
 }
 
 /// Makes sure that no part of the file was overwritten or cut off. Reading all of it is worth its time only before

@@ -48,12 +48,19 @@ CREATE TABLE tests (
     known_test      TEXT,           -- name of the known test in the .sesame file
     generation      INTEGER,
     simulator_seed  TEXT NOT NULL,
-    outcome         TEXT NOT NULL CHECK (outcome IN ('completed', 'void', 'crash', 'timeout')), -- void: no effect
+    outcome         TEXT NOT NULL CHECK (outcome IN ('completed', 'void', 'unknown', 'crash', 'timeout')), -- void: no effect
+                                    -- unknown: imported, and nobody counted effects
     outcome_detail  TEXT,           -- what is known of a crash
     time_limit_s    REAL,           -- of a timeout, in seconds of wall time
     end_s           REAL NOT NULL,  -- when the run ended
     messages        INTEGER NOT NULL, -- handled by the relay
     duplicate_of    INTEGER REFERENCES tests -- the equal test whose result stands for this one, which was not simulated
+) STRICT;
+
+-- What tests were called in the file they were imported from; empty for a campaign that was run.
+CREATE TABLE original_names (
+    test            INTEGER PRIMARY KEY REFERENCES tests,
+    name            TEXT NOT NULL
 ) STRICT;
 
 CREATE TABLE parents (
@@ -185,8 +192,8 @@ CREATE VIEW verdicts AS
                WHEN v.value IS NULL THEN 'unsaid'
                WHEN v.value < r.low OR v.value > r.high OR (r.low_excluded AND v.value = r.low)
                     OR (r.high_excluded AND v.value = r.high)
-                    THEN CASE WHEN t.outcome IN ('completed', 'void') OR v.is_set THEN 'violated' ELSE 'unsaid' END
-               WHEN t.outcome IN ('completed', 'void') THEN 'kept'
+                    THEN CASE WHEN t.outcome IN ('completed', 'void', 'unknown') OR v.is_set THEN 'violated' ELSE 'unsaid' END
+               WHEN t.outcome IN ('completed', 'void', 'unknown') THEN 'kept'
                ELSE 'unsaid'
            END AS verdict
       FROM tests t CROSS JOIN requirements r LEFT JOIN metric_values v ON v.test = t.number AND v.metric = r.metric

@@ -4,11 +4,15 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use rusqlite::Connection;
-use sesame_plan::{Bound, KnownTestId, MetricId, Test};
+use sesame_plan::condition::ConditionEnd;
+use sesame_plan::{Activation, Bound, Choice, KnownTestId, MetricId, OperationId, Test, TestOperation};
 use tempfile::TempDir;
 
 use super::*;
-use crate::observation::{MetricObservation, WallTime};
+use crate::observation::{MetricObservation, OperationEffect, WallTime};
+use crate::search::nsga2::Variation as _;
+use crate::search::permitted::Permitted;
+use crate::search::vary::{Rates, TestVariation};
 
 fn folder() -> TempDir {
     tempfile::tempdir().unwrap()
@@ -111,6 +115,71 @@ fn a_run_that_was_killed_keeps_every_committed_test_and_can_be_resumed() {
     assert_eq!(repository.digest().unwrap(), whole, "going on gives what an unbroken run gives");
 }
 
+/// What a kill in the middle of a transaction without write-ahead log leaves behind, as the end of a run has it: half of
+/// the file overwritten, and a journal with what was there before. Gives the database.
+fn broken_off(folder: &Path, into: &Path, change: &str) -> std::path::PathBuf {
+    let writer = Connection::open(folder.join(DATABASE)).unwrap();
+    // With next to no memory pages are written before the commit.
+    let mode: String = writer.query_row("PRAGMA journal_mode = DELETE", [], |row| row.get(0)).unwrap();
+    assert_eq!(mode, "delete");
+    writer.pragma_update(None, "cache_size", 1).unwrap();
+    writer.execute_batch(&format!("BEGIN IMMEDIATE; {change}")).unwrap();
+    for name in [DATABASE.to_owned(), format!("{DATABASE}-journal")] {
+        std::fs::copy(folder.join(&name), into.join(&name)).unwrap();
+    }
+    into.join(DATABASE)
+}
+
+#[test]
+fn results_whose_run_was_killed_while_it_wrote_its_end_are_read_as_they_were() {
+    let (folder, killed) = (folder(), tempfile::tempdir().unwrap());
+    let whole = sample::campaign(folder.path(), &sample::plan(), 60).digest().unwrap();
+    let before = std::fs::read(folder.path().join(DATABASE)).unwrap();
+    let copy = broken_off(folder.path(), killed.path(), "UPDATE change_points SET value = value + 1");
+    assert_ne!(std::fs::read(&copy).unwrap(), before, "it was half overwritten");
+    let raw = Connection::open_with_flags(&copy, rusqlite::OpenFlags::SQLITE_OPEN_READ_ONLY).unwrap();
+    let refused = raw.query_row("SELECT count(*) FROM tests", [], |row| row.get::<_, i64>(0)).unwrap_err();
+    assert_eq!(refused.sqlite_error().unwrap().extended_code, rusqlite::ffi::SQLITE_READONLY_ROLLBACK);
+    drop(raw);
+    assert_eq!(Repository::open(killed.path()).unwrap().digest().unwrap(), whole);
+    assert_eq!(std::fs::read(&copy).unwrap(), before);
+    assert!(!killed.path().join(format!("{DATABASE}-journal")).exists());
+}
+
+#[test]
+fn a_run_killed_before_its_results_had_all_tables_has_none_and_the_folder_can_be_used() {
+    let results = folder();
+    let run = results.path().join("7");
+    std::fs::create_dir(&run).unwrap();
+    let database = Connection::open(run.join("results.sqlite.begun")).unwrap();
+    database.execute_batch("CREATE TABLE tests (number INTEGER)").unwrap();
+    drop(database);
+    std::fs::write(run.join("results.sqlite.begun-journal"), "half a journal").unwrap();
+    assert!(matches!(Repository::open(&run), Err(RecordError::Missing { .. })));
+    assert_eq!(latest_folder(results.path()).unwrap(), None);
+    let whole = sample::campaign(&run, &sample::plan(), 60).digest().unwrap();
+    assert_eq!(Repository::open(&run).unwrap().digest().unwrap(), whole);
+    let mut left: Vec<_> = std::fs::read_dir(&run).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    left.sort();
+    assert_eq!(left, ["results.lock", "results.sqlite"]);
+}
+
+#[test]
+fn what_broke_off_in_the_file_of_another_program_is_left_to_that_program() {
+    let (folder, killed) = (folder(), tempfile::tempdir().unwrap());
+    let other = Connection::open(folder.path().join(DATABASE)).unwrap();
+    let fill = "INSERT INTO t WITH RECURSIVE n(i) AS (SELECT 1 UNION SELECT i + 1 FROM n WHERE i < 999) \
+                SELECT i, hex(zeroblob(200)) FROM n";
+    other.execute_batch(&format!("CREATE TABLE t (a, b); {fill}")).unwrap();
+    drop(other);
+    let copy = broken_off(folder.path(), killed.path(), "UPDATE t SET a = a + 1");
+    let journal = killed.path().join(format!("{DATABASE}-journal"));
+    let before = (std::fs::read(&copy).unwrap(), std::fs::read(&journal).unwrap());
+    let error = Repository::open(killed.path()).unwrap_err();
+    assert!(matches!(error, RecordError::Foreign { .. }), "{error}");
+    assert_eq!((std::fs::read(&copy).unwrap(), std::fs::read(&journal).unwrap()), before);
+}
+
 #[test]
 fn a_test_that_cannot_be_recorded_leaves_nothing_behind() {
     let folder = folder();
@@ -182,10 +251,10 @@ fn what_is_no_repository_of_this_release_is_refused_with_what_to_do() {
     let open = Connection::open(&path).unwrap();
     open.pragma_update(None, "user_version", SCHEMA + 1).unwrap();
     drop(open);
-    assert!(matches!(refused("schema 3, this release reads 2"), RecordError::Newer { found: 3, known: 2, .. }));
+    assert!(matches!(refused("schema 4, this release reads 3"), RecordError::Newer { found: 4, known: 3, .. }));
     Connection::open(&path).unwrap().pragma_update(None, "user_version", 1).unwrap();
-    let earlier = refused("schema 1, this release reads 2; read them with the release that wrote them");
-    assert!(matches!(earlier, RecordError::Older { found: 1, known: 2, .. }));
+    let earlier = refused("schema 1, this release reads 3; read them with the release that wrote them");
+    assert!(matches!(earlier, RecordError::Older { found: 1, known: 3, .. }));
     for length in [whole.len() / 2, 4096, 700] {
         std::fs::write(&path, &whole[..length]).unwrap();
         assert!(matches!(refused("restore the file"), RecordError::Damaged { .. }), "cut to {length} bytes");
@@ -367,17 +436,17 @@ fn change(record: &mut TestRecord, kind: usize) {
         16 => next_up(&mut observation.operations[0].intervals[0].end),
         17 => observation.operations[0].first_touch = Some(0.5),
         18 => {
-            let sesame_plan::Activation::Time { start, .. } = &mut record.test.operations[0].activation else {
+            let Activation::Time { start, .. } = &mut record.test.operations[0].activation else {
                 panic!("the known test has a window")
             };
             *start = start.next_down();
         }
         19 => record.origin = Origin::Known(KnownTestId(0)),
         20 => match &mut record.test.operations[0].parameters[0] {
-            sesame_plan::Choice::Range { high, .. } => next_up(high),
-            sesame_plan::Choice::Value { value } => next_up(value),
-            sesame_plan::Choice::Point { point } => next_up(&mut point[1]),
-            sesame_plan::Choice::Text { text } => text.push('.'),
+            Choice::Range { high, .. } => next_up(high),
+            Choice::Value { value } => next_up(value),
+            Choice::Point { point } => next_up(&mut point[1]),
+            Choice::Text { text } => text.push('.'),
         },
         _ => observation.operations.clear(),
     }
@@ -406,7 +475,6 @@ fn activations_of_every_kind_come_back_as_they_were() {
 
 #[test]
 fn any_kind_of_change_to_a_condition_changes_the_digest() {
-    use sesame_plan::Activation;
     use sesame_plan::condition::{Comparison, Condition};
     let plan = sample::plan();
     let mut seen = std::collections::BTreeSet::from([digest_of(&[conditional_record(&plan)])]);
@@ -448,7 +516,6 @@ fn any_kind_of_change_to_a_condition_changes_the_digest() {
 
 #[test]
 fn a_number_in_a_condition_that_is_none_is_refused() {
-    use sesame_plan::Activation;
     use sesame_plan::condition::{Condition, Operand};
     let folder = folder();
     let plan = sample::plan();
@@ -461,6 +528,76 @@ fn a_number_in_a_condition_that_is_none_is_refused() {
     let mut recorder = Recorder::create(folder.path(), &plan, 1, 1).unwrap();
     let refused = recorder.commit(&record).unwrap_err().to_string();
     assert!(refused.starts_with("test T3: a number in a condition is NaN cannot be recorded"), "{refused}");
+}
+
+#[test]
+fn tests_by_condition_that_hold_an_offline_operation_vary_and_come_back_as_they_were() {
+    for end in [ConditionEnd::Condition, ConditionEnd::Length { low: 1.0, high: 15.0 }] {
+        let plan = sample::offline_plan(end);
+        let mut variation = TestVariation::new(Permitted::of(&plan).unwrap(), Rates::by_condition(), 5);
+        let mut tests = [variation.initial(0), variation.initial(1)];
+        let folder = folder();
+        let mut recorder = Recorder::create(folder.path(), &plan, 42, 2).unwrap();
+        let mut records = Vec::new();
+        for generation in 1..=30 {
+            tests = variation.offspring([&tests[0], &tests[1]], generation, 0).map(|child| child.genome);
+            for test in &tests {
+                let number = u32::try_from(records.len()).unwrap() + 1;
+                records.push(sample::record(&plan, number, Origin::Search, test.clone()));
+                recorder.commit(&records[records.len() - 1]).unwrap();
+            }
+        }
+        let repository = recorder.repository();
+        for record in &records {
+            assert_eq!(repository.test(record.number).unwrap(), *record);
+        }
+        let all = records.iter().flat_map(|record| &record.test.operations);
+        let (offline, others): (Vec<_>, Vec<_>) = all.partition(|used| used.operation == OperationId(4));
+        assert!(offline.iter().all(|used| used.activation == Activation::Offline));
+        assert!(others.iter().all(|used| !matches!(used.activation, Activation::Offline | Activation::Time { .. })));
+        let chosen = |text: &str| {
+            let choice = Choice::Text { text: text.to_owned() };
+            offline.iter().filter(|used| used.parameters == [choice.clone()]).count()
+        };
+        assert!(["cold", "warm", "hot"].into_iter().all(|text| chosen(text) > 0), "{offline:?}");
+        assert!(!others.is_empty());
+        let bare: u32 = repository
+            .connection
+            .query_row(
+                "SELECT count(*) FROM operations WHERE operation = 'spoil' AND start_s IS NULL AND end_s IS NULL \
+                 AND start_condition IS NULL AND end_condition IS NULL AND length_s IS NULL AND times IS NULL",
+                [],
+                |row| row.get(0),
+            )
+            .unwrap();
+        assert_eq!(bare as usize, offline.len());
+    }
+}
+
+#[test]
+fn an_activation_that_does_not_fit_its_operation_is_damage() {
+    let folder = folder();
+    let plan = sample::offline_plan(ConditionEnd::Condition);
+    let offline = TestOperation {
+        operation: OperationId(4),
+        activation: Activation::Offline,
+        parameters: vec![Choice::Text { text: "hot".to_owned() }],
+        draw_seed: 1,
+    };
+    let mut test = sample::conditional_test();
+    test.operations.push(offline);
+    let mut recorder = Recorder::create(folder.path(), &plan, 42, 2).unwrap();
+    recorder.commit(&sample::record(&plan, 3, Origin::Search, test)).unwrap();
+    let refused = |change: &str| {
+        let changing = Connection::open(folder.path().join(DATABASE)).unwrap();
+        assert_eq!(changing.execute(change, []).unwrap(), 1, "{change}");
+        recorder.repository().test(3).unwrap_err().to_string()
+    };
+    let nothing = refused("UPDATE operations SET start_s = NULL, end_s = NULL WHERE position = 1");
+    assert!(nothing.contains("switched neither by time nor by condition"), "{nothing}");
+    refused("UPDATE operations SET start_s = 1, end_s = 2 WHERE position = 3");
+    let window = refused("UPDATE operations SET start_s = 1.5, end_s = 20 WHERE position = 1");
+    assert!(window.contains("T3 has `spoil` during the run, which acts before or after it"), "{window}");
 }
 
 fn finite() -> impl Strategy<Value = f64> {
@@ -536,4 +673,26 @@ proptest! {
         let row = &recorder.repository().tests().unwrap()[0];
         prop_assert_eq!(row.value(MetricId(0)), shown);
     }
+}
+
+#[test]
+fn what_was_imported_keeps_its_intervals_and_names_without_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = sample::plan();
+    let mut recorder = Recorder::create(folder.path(), &plan, 1, 0).unwrap();
+    let mut record = sample::record(&plan, 1, Origin::Search, plan.tests[0].test.clone());
+    record.observation.outcome = Outcome::Unknown;
+    for effect in &mut record.observation.operations {
+        *effect = OperationEffect { intervals: effect.intervals.clone(), ..OperationEffect::default() };
+    }
+    recorder.commit(&record).unwrap();
+    recorder.put_original_names([(1, "Test_001_20_06_2023")]).unwrap();
+    let repository = recorder.finish("imported").unwrap();
+    assert_eq!(repository.test(1).unwrap(), record);
+    assert!(!record.observation.operations[0].intervals.is_empty());
+    assert_eq!(repository.find("Test_001_20_06_2023").unwrap(), 1);
+    assert_eq!(repository.original_names().unwrap(), [(1, "Test_001_20_06_2023".to_owned())].into());
+    let seen: Option<i64> =
+        repository.connection.query_row("SELECT seen FROM operations", [], |row| row.get(0)).unwrap();
+    assert_eq!(seen, None, "nobody counted");
 }

@@ -35,7 +35,7 @@ impl Verdict {
 /// a value that was set and is outside the bound is a violation and stands; anything else is unsaid, since the rest of
 /// the run might have changed it.
 pub fn verdict(bound: Bound, outcome: &Outcome, value: MetricValue) -> Verdict {
-    let ended = matches!(outcome, Outcome::Completed | Outcome::Void);
+    let ended = matches!(outcome, Outcome::Completed | Outcome::Void | Outcome::Unknown);
     match value.value {
         Some(x) if bound.holds(x) && ended => Verdict::Kept,
         Some(x) if !bound.holds(x) && (ended || value.set) => Verdict::Violated,

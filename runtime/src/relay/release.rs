@@ -4,6 +4,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::Touched;
+use crate::rng::derive_seed;
 use crate::time::SimTime;
 use crate::value::Value;
 use crate::wire::Wire;
@@ -25,6 +26,13 @@ impl Held {
     /// Which message it is, for a tap.
     pub(super) fn touched(&self) -> Touched {
         Touched { wire: self.wire, index: self.published }
+    }
+
+    /// A message that an operation makes up beside this one, its `number`th. It goes on where this one does, with an index
+    /// of its own, so that later operations draw for it apart from this one.
+    pub(super) fn beside(&self, operation: usize, number: u64, value: Value) -> Held {
+        let index = derive_seed(self.index, "injected", &[operation as u64, number]);
+        Held { wire: self.wire, published: self.published, index, value, next_stage: self.next_stage }
     }
 }
 

@@ -4,12 +4,14 @@ use proptest::prelude::*;
 use sesame_plan::condition as switch;
 use sesame_plan::{
     Activation, Aggregate, Choice, Condition, Distribution, Drain, FieldRef, Formula, Input, Members, MetricId,
-    MetricSource, Operation, OperationKind, Side, Test, TestOperation, TopicId, ValueMode,
+    MetricSource, Moment, Operation, OperationKind, Side, Test, TestOperation, TopicId, ValueMode,
 };
 
 use super::{Delivery, Exchange, Finished, Relay};
-use crate::fixture::{latency, offset, operation, plan, test_of, use_of};
+use crate::fixture::{at, latency, offset, operation, plan, test_of, use_of};
+use crate::fuzz::{MessageCall, OperationContext, OperationEntry, OperationHook};
 use crate::metric::MetricTable;
+use crate::observation::Counters;
 use crate::time::SimTime;
 use crate::value::{Fields, Record, Value};
 use crate::wire::WireTable;
@@ -31,10 +33,20 @@ fn relayed(
     test: &[TestOperation],
     messages: &[(f64, &str, Value)],
 ) -> (Vec<(f64, String, Value)>, Finished) {
+    relayed_with(&[], operations, test, messages)
+}
+
+/// The same with the code of custom operations.
+fn relayed_with(
+    hooks: &[OperationEntry],
+    operations: Vec<Operation>,
+    test: &[TestOperation],
+    messages: &[(f64, &str, Value)],
+) -> (Vec<(f64, String, Value)>, Finished) {
     let plan = plan(operations);
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-    let mut relay = Relay::new(&plan, &wires, &test_of(test.to_vec()), metrics.start(), &[]).unwrap();
+    let mut relay = Relay::new(&plan, &wires, &test_of(test.to_vec()), metrics.start(), hooks).unwrap();
     let mut delivered = Vec::new();
     let mut messages = messages.iter().peekable();
     for tick in 0..=100 {
@@ -58,6 +70,17 @@ fn commands(count: u32) -> Vec<(f64, &'static str, Value)> {
 
 fn numbers(delivered: &[(f64, String, Value)]) -> Vec<(f64, f64)> {
     delivered.iter().map(|(time, _, value)| (*time, value.number_at::<&str>(&[]).unwrap())).collect()
+}
+
+#[test]
+fn an_untimed_operation_acts_and_does_not_count_in_the_fuzzing_time() {
+    let timed = operation(0, OperationKind::Blackhole);
+    let untimed = Operation { timed: false, ..timed.clone() };
+    let test = [use_of(0, 1.0, 2.0, vec![], 1), use_of(1, 4.0, 9.0, vec![], 1)];
+    let (delivered, finished) = relayed(vec![timed, untimed], &test, &commands(100));
+    assert_eq!(finished.metrics[0].value, Some(1.0));
+    assert_eq!(delivered.len(), 100 - 10 - 50);
+    assert_eq!(finished.operations[1].intervals.len(), 1, "it is observed like any other");
 }
 
 #[test]
@@ -144,7 +167,7 @@ fn when_the_window_ends_dropped_messages_are_gone() {
 
 #[test]
 fn an_offset_is_drawn_anew_for_each_message_from_the_sub_range() {
-    let jitter = vec![operation(0, offset(&[], ValueMode::Offset, false))];
+    let jitter = vec![operation(0, offset(ValueMode::Offset, false))];
     let (delivered, finished) = relayed(jitter, &[use_of(0, 1.0, 9.0, range(2.0, 3.0), 7)], &commands(100));
     let shifts: Vec<f64> = numbers(&delivered).iter().zip(0..).map(|((_, n), at)| n - f64::from(at)).collect();
     assert!(shifts[..10].iter().chain(&shifts[90..]).all(|&shift| shift == 0.0));
@@ -161,7 +184,7 @@ fn zone(level: f64, count: i64) -> Value {
 
 #[test]
 fn a_nested_whole_number_stays_whole_and_its_neighbours_untouched() {
-    let shift = vec![operation(1, offset(&["count"], ValueMode::Absolute, true))];
+    let shift = vec![at(&["count"], operation(1, offset(ValueMode::Absolute, true)))];
     let messages: Vec<_> = (0..60).map(|n| (f64::from(n) * 0.1, "zones/Z1", zone(0.5, 100))).collect();
     let (delivered, _) = relayed(shift, &[use_of(0, 0.0, 10.0, range(-1.0, 1.0), 7)], &messages);
     let mut seen = std::collections::BTreeSet::new();
@@ -175,7 +198,7 @@ fn a_nested_whole_number_stays_whole_and_its_neighbours_untouched() {
 
 #[test]
 fn members_of_a_group_are_disturbed_independently() {
-    let jitter = vec![operation(1, offset(&["level"], ValueMode::Absolute, false))];
+    let jitter = vec![at(&["level"], operation(1, offset(ValueMode::Absolute, false)))];
     let messages = [(0.1, "zones/Z1", zone(0.0, 1)), (0.1, "zones/Z2", zone(0.0, 1))];
     let (delivered, _) = relayed(jitter, &[use_of(0, 0.0, 10.0, range(0.0, 1.0), 7)], &messages);
     assert_ne!(delivered[0].2, delivered[1].2);
@@ -183,8 +206,8 @@ fn members_of_a_group_are_disturbed_independently() {
 
 #[test]
 fn operations_apply_in_priority_then_declaration_order() {
-    let mut replace = operation(0, offset(&[], ValueMode::Absolute, false));
-    let shift = operation(0, offset(&[], ValueMode::Offset, false));
+    let mut replace = operation(0, offset(ValueMode::Absolute, false));
+    let shift = operation(0, offset(ValueMode::Offset, false));
     let test = [use_of(1, 0.0, 10.0, range(1.0, 1.0), 1), use_of(0, 0.0, 10.0, range(5.0, 5.0), 1)];
     let (declared, _) = relayed(vec![replace.clone(), shift.clone()], &test, &commands(1));
     assert_eq!(numbers(&declared), [(0.0, 6.0)], "replaced by 5, then shifted by 1");
@@ -251,7 +274,7 @@ proptest! {
 
     #[test]
     fn repeating_a_test_repeats_its_disturbance(seed: u64) {
-        let jitter = || vec![operation(0, offset(&[], ValueMode::Offset, false))];
+        let jitter = || vec![operation(0, offset(ValueMode::Offset, false))];
         let run = |seed| relayed(jitter(), &[use_of(0, 1.0, 9.0, range(-1.0, 1.0), seed)], &commands(90)).0;
         prop_assert_eq!(run(seed), run(seed));
         prop_assert_ne!(run(seed), run(seed.wrapping_add(1)));
@@ -320,6 +343,67 @@ fn the_message_that_makes_a_condition_hold_is_disturbed_and_the_one_that_ends_it
     assert_eq!(kept, (0..50).filter(|n| !(10..20).contains(n)).map(f64::from).collect::<Vec<_>>());
     assert_eq!(intervals(&finished, 0), [(1.0, 2.0)]);
     assert_eq!(finished.metrics[0].value, Some(1.0), "fuzzing time");
+}
+
+/// Adds a hundred, and makes up a message besides.
+struct Raise;
+
+impl OperationHook for Raise {
+    fn on_message(&mut self, message: &mut Value, call: &mut MessageCall<'_>) {
+        call.typed(message, |number: &mut f64, ctx: &mut OperationContext<'_, f64>| {
+            *number += 100.0;
+            ctx.inject(-1.0);
+        });
+    }
+}
+
+fn custom(moment: Moment) -> Operation {
+    operation(0, OperationKind::Custom { moment })
+}
+
+/// The code of `custom` at each moment.
+fn raising() -> [OperationEntry; 3] {
+    ["custom", "custom_before_start", "custom_after_end"]
+        .map(|operation| OperationEntry { operation, build: |_| Box::new(Raise) })
+}
+
+#[test]
+fn the_code_of_a_custom_operation_is_called_while_conditions_say_so() {
+    let until = Activation::Condition { start: above(1, 9.5), end: above(1, 12.5), times: 1 };
+    let test = [by_condition(0, until, vec![])];
+    let (delivered, finished) = relayed_with(&raising(), vec![custom(Moment::OnMessage)], &test, &commands(20));
+    let heard: Vec<f64> = numbers(&delivered).into_iter().map(|(_, n)| n).collect();
+    let raised = [110.0, -1.0, 111.0, -1.0, 112.0, -1.0];
+    let expected = (0..10).map(f64::from).chain(raised).chain((13..20).map(f64::from));
+    assert_eq!(heard, expected.collect::<Vec<f64>>());
+    assert_eq!(intervals(&finished, 0), [(1.0, 1.3)]);
+    let Counters { seen, changed, injected, .. } = finished.operations[0].counters;
+    assert_eq!((seen, changed, injected), (3, 3, 3));
+}
+
+#[test]
+fn an_offline_operation_is_never_active_and_leaves_messages_alone() {
+    let operations = vec![custom(Moment::BeforeStart), custom(Moment::AfterEnd)];
+    let test = [0, 1].map(|operation| by_condition(operation, Activation::Offline, vec![]));
+    let (delivered, finished) = relayed_with(&raising(), operations, &test, &commands(20));
+    assert_eq!(delivered, relayed(vec![], &[], &commands(20)).0);
+    assert!(intervals(&finished, 0).is_empty() && intervals(&finished, 1).is_empty());
+    assert_eq!(finished.metrics[0].value, Some(0.0), "no time is spent fuzzing");
+}
+
+#[test]
+fn only_an_offline_operation_is_offline_in_a_test() {
+    let refused = |moment: Moment, activation: Activation| {
+        let plan = plan(vec![custom(moment)]);
+        let wires = WireTable::new(&plan);
+        let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+        let test = test_of(vec![by_condition(0, activation, vec![])]);
+        Relay::new(&plan, &wires, &test, metrics.start(), &raising()).err().expect("it does not fit").to_string()
+    };
+    let window = refused(Moment::AfterEnd, Activation::Time { start: 1.0, end: 2.0 });
+    assert!(window.contains("has no activation: it acts beside the run"), "{window}");
+    let offline = refused(Moment::OnMessage, Activation::Offline);
+    assert!(offline.contains("lacks an activation: it acts during the run"), "{offline}");
 }
 
 #[test]

@@ -59,7 +59,7 @@ fn block(plan: &CampaignPlan, seed: u64, record: &TestRecord, name: &str) -> Str
         for (parameter, choice) in operation.parameters.iter().zip(&used.parameters) {
             let written = |x: f64| match (&operation.kind, &parameter.unit) {
                 // Probabilities are percentages in the language.
-                (OperationKind::PacketLoss, _) => format!("{}%", decimal(x, 2)),
+                (kind, _) if kind.has_probabilities() => format!("{}%", decimal(x, 2)),
                 (_, unit) => quantity(x, unit.as_deref()),
             };
             let _ = match choice {
@@ -160,6 +160,9 @@ pub(crate) fn is_name(name: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use sesame_plan::condition::ConditionEnd;
+    use sesame_plan::{OperationId, Test};
+
     use super::*;
     use crate::record::sample;
 
@@ -189,6 +192,23 @@ mod tests {
           expect collision_occurrence == 5
         }
         ");
+    }
+
+    #[test]
+    fn a_block_says_that_an_operation_acts_beside_the_run() {
+        let mut plan = sample::offline_plan(ConditionEnd::Condition);
+        let used = TestOperation {
+            operation: OperationId(4),
+            activation: Activation::Offline,
+            parameters: vec![Choice::Text { text: "hot".to_owned() }],
+            draw_seed: 11,
+        };
+        let record = sample::record(&plan, 5, crate::record::Origin::Search, Test { operations: vec![used] });
+        let before = block(&plan, 42, &record, "spoilt");
+        assert!(before.contains("\n  spoil way \"hot\" before start seed 11\n"), "{before}");
+        plan.operations[4].kind = OperationKind::Custom { moment: Moment::AfterEnd };
+        let after = block(&plan, 42, &record, "spoilt");
+        assert!(after.contains("\n  spoil way \"hot\" after end seed 11\n"), "{after}");
     }
 
     #[test]

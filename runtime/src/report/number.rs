@@ -97,9 +97,10 @@ pub(crate) fn choice(kind: &OperationKind, parameter: &Parameter, choice: &Choic
         Choice::Text { text } => return format!("{} {text}", parameter.name),
     };
     let (factor, unit) = match kind {
-        OperationKind::PacketLoss => (100.0, Some("%")),
-        OperationKind::Latency { .. } if high < 1.0 => (1000.0, Some("ms")),
-        OperationKind::Latency { .. } => (1.0, Some("s")),
+        kind if kind.has_probabilities() => (100.0, Some("%")),
+        OperationKind::Latency { .. } | OperationKind::Reorder { .. } | OperationKind::Stale if high < 1.0 => {
+            (1000.0, Some("ms"))
+        }
         _ => (1.0, parameter.unit.as_deref()),
     };
     let text = match choice {

@@ -297,7 +297,8 @@ fn points(
     drawn: &[u32],
     place: impl Fn(&TestRow) -> Option<(f64, f64)>,
 ) -> Vec<Point> {
-    let measured = |row: &&TestRow| row.outcome == Outcome::Completed && row.duplicate_of.is_none();
+    let measured =
+        |row: &&TestRow| matches!(row.outcome, Outcome::Completed | Outcome::Unknown) && row.duplicate_of.is_none();
     rows.iter()
         .filter(measured)
         .filter_map(|row| {

@@ -226,7 +226,7 @@ fn counts(plan: &CampaignPlan, rows: &[TestRow]) -> Counts {
         counts.evaluations += 1;
         counts.duplicates += usize::from(row.duplicate_of.is_some());
         match row.outcome {
-            Outcome::Completed => {
+            Outcome::Completed | Outcome::Unknown => {
                 counts.unmeasured += usize::from(needed.iter().any(|&id| row.value(id).value.is_none()));
             }
             Outcome::Void => counts.void += 1,

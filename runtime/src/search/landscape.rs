@@ -80,7 +80,7 @@ impl Landscape {
             name: format!("jitter{k}"),
             doc: String::new(),
             topic: Some(TopicId(0)),
-            kind: OperationKind::RandomValue { path: Vec::new(), mode: ValueMode::Offset, integer: false },
+            kind: OperationKind::RandomValue { mode: ValueMode::Offset, integer: false },
             parameters: vec![Parameter {
                 name: "offset".to_owned(),
                 unit: Some("rad".to_owned()),
@@ -89,6 +89,8 @@ impl Landscape {
             within: Span { start: 0.0, end: 65.0 },
             priority: 0,
             inclusion: 1.0,
+            places: Vec::new(),
+            timed: true,
             constraints: Vec::new(),
         };
         let metric = |name: &str, direction| Metric {
@@ -194,7 +196,9 @@ impl Landscape {
                 active.map(move |(start, end)| (operation.operation.index(), start, end, f64::midpoint(low, high)))
             })
             .collect();
-        let time = active.iter().map(|(_, start, end, _)| end - start).sum();
+        // As the relay sums it: active equally long is equal.
+        let length = |&(_, start, end, _): &_| SimTime::from_seconds(end) - SimTime::from_seconds(start);
+        let time = active.iter().map(length).fold(SimTime::ZERO, |sum, length| sum + length).seconds();
         let hit = |phase: &Phase, t: f64| {
             phase.thresholds.iter().all(|&(signal, threshold)| {
                 let on = active.iter().filter(|(s, start, end, _)| *s == signal && *start <= t && t < *end);
@@ -308,15 +312,15 @@ mod tests {
         assert!(ratios.iter().all(|(_, ratio)| *ratio > 1.1), "{ratios:?}");
     }
 
-    /// On the other two robots the ten tests an evolution begins with mostly hit nothing when conditions switch, and what
-    /// it then has to go by is active time alone: there it is not reliably ahead of chance.
+    /// On "joint bias" two signals must be out together: of thirty campaigns 26 have no hit among their first ten tests,
+    /// and evolution then has nothing to go by but active time.
     #[test]
-    fn evolution_beats_chance_where_conditions_switch_and_some_first_tests_hit() {
-        for landscape in [&LANDSCAPES[0], &LANDSCAPES[2]] {
+    fn evolution_beats_chance_where_conditions_switch_and_one_signal_is_enough() {
+        for landscape in [&LANDSCAPES[0], &LANDSCAPES[2], &LANDSCAPES[3]] {
             let by_condition = |search| landscape.plan_by_condition(search, ConditionEnd::Condition);
             let random = median_volume_of(landscape, &by_condition(Search::Random { evaluations: 210 }));
             let evolved = median_volume_of(landscape, &by_condition(NSGA2));
-            assert!(evolved > 1.05 * random, "{}: {evolved} and {random}", landscape.name);
+            assert!(evolved > 1.2 * random, "{}: {evolved} and {random}", landscape.name);
         }
     }
 

@@ -86,7 +86,7 @@ impl MapElites {
         if elites.len() > ELITES {
             let fitness: Vec<&Fitness> = elites.iter().map(|it| &it.fitness).collect();
             let kept = survivors(&fitness, ELITES);
-            *elites = kept.into_iter().map(|at| elites[at].clone()).collect();
+            *elites = kept.into_iter().map(|(at, _)| elites[at].clone()).collect();
         }
     }
 }
@@ -117,6 +117,7 @@ mod tests {
 
     use super::*;
     use crate::search::landscape::LANDSCAPES;
+    use crate::search::nsga2::Survival;
     use crate::search::vary::Rates;
     use crate::search::{Permitted, strategy};
     use crate::sspr::{Convention, Point, planned};
@@ -125,7 +126,7 @@ mod tests {
         let plan = LANDSCAPES[0].plan(sesame_plan::Search::Random { evaluations: 1 });
         let tests = TestVariation::new(Permitted::of(&plan).unwrap(), Rates::default(), 1);
         let grid = Grid::parse("T1:0:1:2").unwrap();
-        MapElites::new(Settings { population: 10, evaluations: 100, seed: 1 }, tests, grid)
+        MapElites::new(Settings { population: 10, evaluations: 100, seed: 1, survival: Survival::Crowded }, tests, grid)
     }
 
     proptest! {

@@ -6,7 +6,7 @@
 
 use crate::rng::Stream;
 use crate::search::dominance::Fitness;
-use crate::search::selection::{Standing, parents, standings, survivors};
+use crate::search::selection::{Standing, distinct_survivors, parents, survivors};
 
 /// How genomes of a kind are made and changed. Randomness comes from streams of the given coordinates only.
 pub trait Variation {
@@ -41,7 +41,7 @@ pub enum Heritage {
     Both,
 }
 
-/// The sizes of a run.
+/// The sizes of a run, and what decides in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
     /// Members of the population, and of each generation; at least 1.
@@ -50,6 +50,18 @@ pub struct Settings {
     pub evaluations: u32,
     /// The seed of selection.
     pub seed: u64,
+    /// Who survives.
+    pub survival: Survival,
+}
+
+/// Who survives of a population and its offspring.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Survival {
+    /// The best by the crowded comparison, as in the paper.
+    Crowded,
+    /// Of equal objective values one, as long as there are others: where many solutions come to the same, the paper's way
+    /// fills the population with them.
+    Distinct,
 }
 
 /// A genome to be evaluated.
@@ -140,13 +152,17 @@ impl<V: Variation> Nsga2<V> {
         assert!(self.population.len() - before == self.awaited, "exactly the generation asked last is told");
         self.awaited = 0;
         let size = self.settings.population as usize;
-        let mut chosen = survivors(&self.fitness(), size).into_iter().peekable();
+        let survivors = match self.settings.survival {
+            Survival::Crowded => survivors(&self.fitness(), size),
+            Survival::Distinct => distinct_survivors(&self.fitness(), size),
+        };
+        let mut chosen = survivors.iter().map(|(position, _)| *position).peekable();
         let mut position = 0;
         self.population.retain(|_| {
             position += 1;
             chosen.next_if_eq(&(position - 1)).is_some()
         });
-        self.standings = standings(&self.fitness());
+        self.standings = survivors.into_iter().map(|(_, standing)| standing).collect();
     }
 
     fn breed(&mut self, size: u32) -> Vec<Asked<V::Genome>> {

@@ -275,6 +275,8 @@ pub(crate) mod tests {
                 within: Span { start, end: end + 0.01 },
                 priority: 0,
                 inclusion,
+                places: Vec::new(),
+                timed: true,
                 constraints: Vec::new(),
             },
         );

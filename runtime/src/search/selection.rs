@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use crate::rng::Stream;
 use crate::search::crowding::distances;
-use crate::search::dominance::Fitness;
+use crate::search::dominance::{Fitness, lexicographic};
 use crate::search::sorting::fronts;
 
 /// Where a solution stands in its population.
@@ -49,25 +49,62 @@ pub fn parents(standings: &[Standing], n: usize, stream: &mut Stream) -> Vec<usi
     contestants.chunks_exact(2).take(n).map(winner).collect()
 }
 
-/// The positions of the `n` best solutions in ascending order (all when there are no more): whole fronts while they
-/// fit, of the next one those with the largest crowding distances, of equal ones the earlier.
-pub fn survivors(fitness: &[&Fitness], n: usize) -> Vec<usize> {
-    let mut chosen: Vec<usize> = Vec::with_capacity(n.min(fitness.len()));
-    for mut front in fronts(fitness) {
+/// The `n` best solutions (all when there are no more), as positions in ascending order with their standings among each
+/// other: whole fronts while they fit, of the next one those with the largest crowding distances, of equal ones the
+/// earlier.
+pub fn survivors(fitness: &[&Fitness], n: usize) -> Vec<(usize, Standing)> {
+    let mut chosen: Vec<(usize, Standing)> = Vec::with_capacity(n.min(fitness.len()));
+    // What is dominated by nobody but members of earlier fronts stays on its front, since those are there as a whole.
+    for (rank, mut front) in fronts(fitness).into_iter().enumerate() {
         let room = n - chosen.len();
+        let mut crowding = distances(fitness, &front);
         if front.len() > room {
-            let crowding = distances(fitness, &front);
             let mut order: Vec<usize> = (0..front.len()).collect();
             order.sort_by(|&a, &b| crowding[b].total_cmp(&crowding[a]));
-            front = order[..room].iter().map(|&k| front[k]).collect();
+            order.truncate(room);
+            order.sort_unstable();
+            front = order.iter().map(|&k| front[k]).collect();
+            crowding = distances(fitness, &front);
         }
-        chosen.extend(front);
+        chosen.extend(front.into_iter().zip(crowding).map(|(at, crowding)| (at, Standing { front: rank, crowding })));
         if chosen.len() == n {
             break;
         }
     }
-    chosen.sort_unstable();
+    chosen.sort_unstable_by_key(|&(position, _)| position);
     chosen
+}
+
+/// As [`survivors`], but a measured solution whose objective values an earlier one has comes after all that bring values
+/// of their own, however good these are, and before what is not measured. It tells the search nothing new, where a worse
+/// one may be on a way to something.
+pub fn distinct_survivors(fitness: &[&Fitness], n: usize) -> Vec<(usize, Standing)> {
+    let mut measured: Vec<(&[f64], usize)> = Vec::with_capacity(fitness.len());
+    let mut others = Vec::new();
+    for (position, solution) in fitness.iter().enumerate() {
+        match solution.objectives() {
+            Some(objectives) => measured.push((objectives, position)),
+            None => others.push(position),
+        }
+    }
+    // Stable, so that the first of equals is the earliest.
+    measured.sort_by(|a, b| lexicographic(a.0, b.0));
+    let (mut distinct, mut repeated) = (Vec::new(), Vec::new());
+    for equals in measured.chunk_by(|a, b| lexicographic(a.0, b.0).is_eq()) {
+        distinct.push(equals[0].1);
+        repeated.extend(equals[1..].iter().map(|&(_, position)| position));
+    }
+    let mut chosen: Vec<usize> = Vec::with_capacity(n.min(fitness.len()));
+    for mut group in [distinct, repeated, others] {
+        group.sort_unstable();
+        let members: Vec<&Fitness> = group.iter().map(|&position| fitness[position]).collect();
+        let best = survivors(&members, n - chosen.len());
+        chosen.extend(best.into_iter().map(|(k, _)| group[k]));
+    }
+    chosen.sort_unstable();
+    // Those of each group were ranked by themselves.
+    let standings = standings(&chosen.iter().map(|&position| fitness[position]).collect::<Vec<_>>());
+    chosen.into_iter().zip(standings).collect()
 }
 
 #[cfg(test)]
@@ -86,7 +123,35 @@ mod tests {
             order.sort_by(|&a, &b| standings[a].compare(standings[b]).then(a.cmp(&b)));
             order.truncate(n);
             order.sort_unstable();
-            prop_assert_eq!(survivors(&all, n), order);
+            let (positions, among_each_other): (Vec<usize>, Vec<Standing>) = survivors(&all, n).into_iter().unzip();
+            prop_assert_eq!(&positions, &order);
+            let chosen: Vec<&Fitness> = order.iter().map(|&at| all[at]).collect();
+            prop_assert_eq!(among_each_other, super::standings(&chosen));
+        }
+
+        #[test]
+        fn distinct_survivors_are_values_of_their_own_first(population in any_population(), n in 0usize..40) {
+            let all: Vec<&Fitness> = population.iter().collect();
+            // By pairs: 0 brings values of its own, 1 repeats an earlier one's, 2 is not measured.
+            let group = |i: usize| match all[i].objectives() {
+                None => 2,
+                Some(objectives) => i32::from(all[..i].iter().any(|earlier| earlier.objectives() == Some(objectives))),
+            };
+            let mut expected = Vec::new();
+            for wanted in 0..3 {
+                let members: Vec<usize> = (0..all.len()).filter(|&i| group(i) == wanted).collect();
+                let standings = standings(&members.iter().map(|&i| all[i]).collect::<Vec<_>>());
+                let mut order: Vec<usize> = (0..members.len()).collect();
+                order.sort_by(|&a, &b| standings[a].compare(standings[b]).then(a.cmp(&b)));
+                expected.extend(order.into_iter().map(|k| members[k]));
+            }
+            expected.truncate(n);
+            expected.sort_unstable();
+            let (positions, among_each_other): (Vec<usize>, Vec<Standing>) =
+                distinct_survivors(&all, n).into_iter().unzip();
+            prop_assert_eq!(&positions, &expected);
+            let chosen: Vec<&Fitness> = expected.iter().map(|&at| all[at]).collect();
+            prop_assert_eq!(among_each_other, super::standings(&chosen));
         }
 
         #[test]

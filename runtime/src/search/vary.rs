@@ -321,7 +321,7 @@ fn retarget(operation: &mut TestOperation, permitted: &Permitted, stream: &mut S
             kept @ (Activation::Condition { start, .. } | Activation::ConditionFor { start, .. }),
             PermittedActivation::Condition { constraints, .. },
         ) if constraints.iter().all(|constraint| contains(start, constraint)) => fresh.activation = kept.clone(),
-        // Of an offline operation there is no activation to keep, and none to give it.
+        // What is kept is not permitted there, or one of them is offline and has nothing to keep or to be given.
         _ => {}
     }
     *operation = fresh;

@@ -8,9 +8,21 @@ use crate::sspr::{Class, Convention, Disturbance, Intensity, Point};
 /// The class of a kind of operation.
 pub fn class_of(kind: &OperationKind) -> Class {
     match kind {
-        OperationKind::RandomValue { .. } => Class::Value,
-        OperationKind::PacketLoss | OperationKind::Blackhole => Class::Loss,
-        OperationKind::Latency { .. } => Class::Delay,
+        OperationKind::RandomValue { .. }
+        | OperationKind::RandomText { .. }
+        | OperationKind::StuckAt { .. }
+        | OperationKind::Bias
+        | OperationKind::Drift
+        | OperationKind::Noise
+        | OperationKind::Scale
+        | OperationKind::NotFinite { .. }
+        | OperationKind::Freeze
+        | OperationKind::ClockSkew
+        | OperationKind::Duplicate => Class::Value,
+        OperationKind::PacketLoss | OperationKind::BurstLoss | OperationKind::RateLimit | OperationKind::Blackhole => {
+            Class::Loss
+        }
+        OperationKind::Latency { .. } | OperationKind::Reorder { .. } | OperationKind::Stale => Class::Delay,
         // What the user's code does nobody knows.
         OperationKind::Custom { .. } => Class::Other,
     }

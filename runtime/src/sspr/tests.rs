@@ -141,7 +141,7 @@ fn naive(plan: &CampaignPlan, test: &Test, dimension: Dimension) -> Option<f64> 
             OperationKind::RandomValue { .. } => 1,
             OperationKind::PacketLoss | OperationKind::Blackhole => 2,
             OperationKind::Latency { .. } => 3,
-            OperationKind::Custom { .. } => panic!("none here"),
+            _ => panic!("none here"),
         }] += 1.0;
         for (choice, parameter) in it.parameters.iter().zip(&operation.parameters) {
             let mut part = |low: f64, high: f64, part: f64| {
@@ -185,7 +185,7 @@ proptest! {
             OperationKind::PacketLoss,
             OperationKind::Blackhole,
             OperationKind::Latency { distribution: Distribution::Uniform, drain: Drain::Finish },
-            OperationKind::RandomValue { path: vec![], mode: sesame_plan::ValueMode::Offset, integer: false },
+            OperationKind::RandomValue { mode: sesame_plan::ValueMode::Offset, integer: false },
         ];
         for (operation, kind) in plan.operations.iter_mut().zip(kinds.into_iter().cycle()) {
             operation.kind = kind;

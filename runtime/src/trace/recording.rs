@@ -10,8 +10,9 @@ use mcap::records::{Channel, MessageHeader, Metadata, Record};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
-use sesame_plan::{CampaignPlan, MetricSource, Type};
+use sesame_plan::{CampaignPlan, MetricSource, OperationId, Span, Type};
 
+use super::records::records;
 use super::{ROLE, ROLE_DELIVERED, ROLE_PUBLISHED, RUN, SUBJECT};
 use crate::json::{Shapes, decode};
 use crate::message::Mismatch;
@@ -199,7 +200,7 @@ fn read(
 ) -> Result<(), RecordingError> {
     let mut file = BufReader::with_capacity(BLOCK, file);
     let reading = LinearReaderOptions::default()
-        .with_validate_chunk_crcs(true)
+        .with_emit_chunks(true)
         .with_validate_data_section_crc(true)
         .with_validate_summary_section_crc(true)
         .with_record_length_limit(LIMIT);
@@ -215,7 +216,9 @@ fn read(
                 reader.notify_read(read);
             }
             LinearReadEvent::Record { opcode, data } => {
-                each(mcap::parse_record(opcode, data).map_err(|error| sorted(error, path))?)?;
+                for record in records(opcode, data).map_err(|error| sorted(error, path))? {
+                    each(record)?;
+                }
             }
         }
     }
@@ -346,7 +349,7 @@ impl Feeder<'_> {
         }
         let damaged =
             |problem: &str| RecordingError::Damaged { problem: problem.to_owned(), path: self.path.to_owned() };
-        let mut effects: Option<Vec<OperationEffect>> = None;
+        let mut active: Option<Vec<Span>> = None;
         let mut end = Some(self.now);
         let mut run = None;
         if let (Some(subject), Some(ending)) = (&self.subject, &self.ending) {
@@ -355,9 +358,9 @@ impl Feeder<'_> {
                 Some(metrics) => serde_json::from_str(metrics).map_err(|_| damaged("its metrics cannot be read"))?,
                 None => Vec::new(),
             };
-            effects = match ending.get("operations") {
+            active = match ending.get("operations") {
                 Some(effects) => {
-                    Some(serde_json::from_str(effects).map_err(|_| damaged("what operations did cannot be read"))?)
+                    Some(timed(subject, effects).map_err(|_| damaged("what operations did cannot be read"))?)
                 }
                 None => None,
             };
@@ -383,9 +386,9 @@ impl Feeder<'_> {
         if let Some(end) = end {
             self.metrics.end(end);
         }
-        let (mut metrics, mut warnings) = self.metrics.finish(effects.as_deref().unwrap_or_default());
+        let (mut metrics, mut warnings) = self.metrics.finish(active.as_deref().unwrap_or_default());
         for (observed, metric) in metrics.iter_mut().zip(&self.plan.metrics) {
-            if matches!(metric.source, MetricSource::FuzzingTime) && effects.is_none() {
+            if matches!(metric.source, MetricSource::FuzzingTime) && active.is_none() {
                 *observed = MetricObservation::default();
             }
         }
@@ -393,6 +396,30 @@ impl Feeder<'_> {
         warnings.extend(missing.map(|path| format!("topic `{path}` is not in the recording")));
         Ok(Fed { run, metrics, warnings, messages: self.messages })
     }
+}
+
+/// When operations were active that count in `fuzzing_time()`, of what a trace says of its test and of its operations.
+fn timed(subject: &BTreeMap<String, String>, effects: &str) -> serde_json::Result<Vec<Span>> {
+    #[derive(Deserialize)]
+    struct Recorded<T> {
+        operations: Vec<T>,
+    }
+    #[derive(Deserialize)]
+    struct Declared {
+        /// As in a plan: not written where it is true.
+        timed: Option<bool>,
+    }
+    #[derive(Deserialize)]
+    struct Use {
+        operation: OperationId,
+    }
+    let entry = |key: &str| subject.get(key).map_or("", String::as_str);
+    let declared: Recorded<Declared> = serde_json::from_str(entry("plan"))?;
+    let test: Recorded<Use> = serde_json::from_str(entry("definition"))?;
+    let effects: Vec<OperationEffect> = serde_json::from_str(effects)?;
+    let counts = |id: OperationId| declared.operations.get(id.index()).is_none_or(|it| it.timed != Some(false));
+    let counted = test.operations.iter().zip(effects).filter(|(used, _)| counts(used.operation));
+    Ok(counted.flat_map(|(_, effect)| effect.intervals).collect())
 }
 
 /// Reads a payload. One that is no object by itself may also stand alone, without the object around it.

@@ -8,6 +8,7 @@ use mcap::records::{Metadata, Record};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult, Writer};
 
+use super::records::records;
 use super::writer::{finish, options};
 use super::{RUN, TraceError, how_it_ended, publish};
 use crate::observation::Outcome;
@@ -31,10 +32,8 @@ fn copy(unfinished: &Path, outcome: &Outcome, saved: &Path) -> McapResult<()> {
     let mut writer = options().create(BufWriter::new(File::create(saved)?))?;
     let mut file = File::open(unfinished)?;
     // A chunk is looked at only when it is whole.
-    let reading = LinearReaderOptions::default()
-        .with_skip_end_magic(true)
-        .with_prevalidate_chunk_crcs(true)
-        .with_record_length_limit(LIMIT);
+    let reading =
+        LinearReaderOptions::default().with_skip_end_magic(true).with_emit_chunks(true).with_record_length_limit(LIMIT);
     let mut reader = LinearReader::new_with_options(reading);
     while let Some(event) = reader.next_event() {
         match event {
@@ -43,8 +42,8 @@ fn copy(unfinished: &Path, outcome: &Outcome, saved: &Path) -> McapResult<()> {
                 reader.notify_read(read);
             }
             // What cannot be understood is where the process died.
-            Ok(LinearReadEvent::Record { opcode, data }) => match mcap::parse_record(opcode, data) {
-                Ok(record) => copy_record(&mut writer, &record)?,
+            Ok(LinearReadEvent::Record { opcode, data }) => match records(opcode, data) {
+                Ok(records) => records.iter().try_for_each(|record| copy_record(&mut writer, record))?,
                 Err(_) => break,
             },
             Err(McapError::Io(error)) => return Err(error.into()),

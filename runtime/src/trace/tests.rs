@@ -58,7 +58,7 @@ impl Transport for Awkward {
 
 fn awkward_plan() -> (CampaignPlan, Test) {
     let mut plan = plan(vec![
-        operation(0, offset(&[], ValueMode::Offset, false)),
+        operation(0, offset(ValueMode::Offset, false)),
         operation(1, OperationKind::Blackhole),
         operation(1, latency(Distribution::Fixed, Drain::Drop)),
     ]);
@@ -151,7 +151,10 @@ fn a_trace_holds_every_message_and_what_each_operation_did_to_it() {
 fn a_recording_gives_metrics_their_values_again() {
     let folder = tempfile::tempdir().unwrap();
     let (plan, test) = awkward_plan();
+    let mut plan = plan;
+    plan.operations[1].timed = false;
     let observed = traced(folder.path(), &plan, &test);
+    assert_eq!(observed.metrics[0].value, Some(2.0), "two of three operations count");
     let fed = fed(&folder.path().join("T1.mcap"), &plan).unwrap();
     assert_eq!(fed.metrics, observed.metrics, "series and fuzzing time as well");
     assert_eq!((fed.messages, &fed.warnings), (observed.messages, &observed.warnings));
@@ -320,4 +323,33 @@ fn whatever_is_done_to_a_recording_it_is_fed_or_refused() {
         Ok(())
     });
     tried.unwrap();
+}
+
+#[test]
+fn lengths_inside_a_chunk_that_do_not_add_up_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, test) = awkward_plan();
+    traced(folder.path(), &plan, &test);
+    let whole = fs::read(folder.path().join("T1.mcap")).unwrap();
+    // The first chunk: its checksum, the length of its records, and that of the first of these.
+    let chunk = {
+        let mut at = 8;
+        while whole[at] != mcap::records::op::CHUNK {
+            at += 9 + usize::try_from(u64::from_le_bytes(whole[at + 1..at + 9].try_into().unwrap())).unwrap();
+        }
+        at + 9
+    };
+    let (checksum, length) = (chunk + 24, chunk + 32);
+    let first = length + 8;
+    for (place, value) in
+        [(length, 7u64), (length, u64::MAX), (first + 1, u64::MAX), (first + 1, 1 << 40), (first + 1, 3)]
+    {
+        let mut bytes = whole.clone();
+        bytes[checksum..checksum + 4].fill(0);
+        bytes[place..place + 8].copy_from_slice(&value.to_le_bytes());
+        let file = folder.path().join("damaged.mcap");
+        fs::write(&file, bytes).unwrap();
+        let said = fed(&file, &plan).unwrap_err().to_string();
+        assert!(said.contains("damaged.mcap"), "{said}");
+    }
 }

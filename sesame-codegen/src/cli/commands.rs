@@ -5,17 +5,27 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context as _, anyhow, bail};
+use sesame_plan::Transport;
 
 use super::shell::{self, Shell};
-use super::{Checked, Generation, Language, build};
-use crate::environment::{RuntimeChoice, environment};
+use super::{Checked, Deny, Format, Generation, Language, Purpose, build};
+use crate::emit::Templates;
+use crate::environment::{self, Options, RuntimeChoice, environment};
 use crate::files::{Owner, Tree};
 use crate::output::{self, Change, Mode, Orphan, Report};
+use crate::plan::RunnerPlan;
 use crate::{emit, names, project};
 
 /// `sesamec new`
-pub(super) fn new(shell: Shell, folder: &Path, runtime: Option<&RuntimeChoice>) -> anyhow::Result<ExitCode> {
-    output::create(folder, &project::files(folder, runtime)?)?;
+pub(super) fn new(
+    shell: Shell,
+    folder: &Path,
+    runtime: Option<&RuntimeChoice>,
+    templates: Option<&Path>,
+) -> anyhow::Result<ExitCode> {
+    let templates = templates.map_or_else(|| Ok(Templates::default()), environment::templates);
+    let templates = templates.map_err(|errors| all(&errors))?;
+    output::create(folder, &project::files(folder, runtime, &templates)?)?;
     let name = folder.file_name().unwrap_or_default().display();
     let space = folder.join(format!("{name}.sesame"));
     let (space, hook) = (space.display(), folder.join(project::HOOK_FILE));
@@ -34,19 +44,40 @@ pub(super) fn new(shell: Shell, folder: &Path, runtime: Option<&RuntimeChoice>) 
 }
 
 /// `sesamec check`
-pub(super) fn check(shell: Shell, language: &Language, file: &Path) -> anyhow::Result<Checked> {
+pub(super) fn check_only(
+    shell: Shell,
+    language: &Language,
+    file: &Path,
+    deny: Option<Deny>,
+    format: Format,
+) -> anyhow::Result<ExitCode> {
+    let checked = check(shell, language, file, format)?;
+    match (deny, checked.warnings) {
+        (None, _) | (Some(Deny::Warnings), 0) => Ok(ExitCode::SUCCESS),
+        (Some(Deny::Warnings), 1) => bail!("{} has a warning, which `--deny warnings` refuses", file.display()),
+        (Some(Deny::Warnings), n) => bail!("{} has {n} warnings, which `--deny warnings` refuses", file.display()),
+    }
+}
+
+/// Reads and checks a space, and says what is wrong with it.
+pub(super) fn check(shell: Shell, language: &Language, file: &Path, format: Format) -> anyhow::Result<Checked> {
     let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
-    let checked = (language.check)(&file.display().to_string(), &text, shell.colour());
-    if !checked.diagnostics.is_empty() {
-        shell.text(&checked.diagnostics);
+    let checked = (language.check)(&file.display().to_string(), &text, shell.look(format));
+    shell.diagnostics(&checked.diagnostics, format);
+    if checked.errors > 0 {
+        return Err(has_errors(file, checked.errors));
     }
-    let shown = file.display();
-    match checked.errors {
-        0 => shell.did("Checked", format!("{shown}: {}", checked.summary)),
-        1 => bail!("{shown} has an error; `{} explain CODE` says more on its code", shell::command()),
-        n => bail!("{shown} has {n} errors; `{} explain CODE` says more on a code", shell::command()),
-    }
+    shell.did("Checked", format!("{}: {}", file.display(), checked.summary));
     Ok(checked)
+}
+
+/// That a file has errors, which were shown.
+pub(super) fn has_errors(file: &Path, errors: usize) -> anyhow::Error {
+    let (file, sesamec) = (file.display(), shell::command());
+    match errors {
+        1 => anyhow!("{file} has an error; `{sesamec} explain CODE` says more on its code"),
+        n => anyhow!("{file} has {n} errors; `{sesamec} explain CODE` says more on a code"),
+    }
 }
 
 /// `sesamec generate`
@@ -54,21 +85,26 @@ pub(super) fn generate(
     shell: Shell,
     language: &Language,
     generation: &Generation,
-    only_check: bool,
+    options: &Options,
+    purpose: Purpose,
 ) -> anyhow::Result<ExitCode> {
-    let checked = check(shell, language, &generation.file)?;
+    let checked = check(shell, language, &generation.file, generation.diagnostics.format)?;
     let chosen = match &generation.campaign {
         Some(name) => vec![choose(&checked, &generation.file, Some(name))?],
         None if checked.plans.is_empty() => bail!("{} has no campaign to generate for", generation.file.display()),
         None => (0..checked.plans.len()).collect(),
     };
-    let mode = match (only_check, generation.force) {
-        (true, _) => Mode::Check,
-        (false, true) => Mode::Force,
-        (false, false) => Mode::Write,
+    let mode = match (purpose, generation.force) {
+        (Purpose::Check, _) | (Purpose::DryRun, false) => Mode::Check,
+        (Purpose::DryRun, true) => Mode::CheckForce,
+        (Purpose::Write, true) => Mode::Force,
+        (Purpose::Write, false) => Mode::Write,
     };
-    let (out, report) = write(shell, generation, &checked, &chosen, mode)?;
-    if only_check && report.out_of_date() {
+    let (out, report) = write(shell, generation, options, &checked, &chosen, mode)?;
+    if purpose == Purpose::DryRun {
+        shell::asked_for(&preview(&out, &report));
+    }
+    if purpose == Purpose::Check && report.out_of_date() {
         let files = report.files.iter().filter(|file| file.owner != Owner::Seed);
         for file in files.filter(|file| !matches!(file.change, Change::Unchanged | Change::Kept)) {
             let what = match file.change {
@@ -83,6 +119,24 @@ pub(super) fn generate(
     Ok(ExitCode::SUCCESS)
 }
 
+/// What a generation would do: a line for each file that it would touch, and how it would change.
+fn preview(out: &Path, report: &Report) -> String {
+    let mut text = String::new();
+    for file in &report.files {
+        let what = match file.change {
+            Change::Created => "would create",
+            Change::Updated => "would update",
+            Change::Removed => "would remove",
+            Change::Unchanged | Change::Kept => continue,
+        };
+        text = format!("{text}{what} {}\n", out.join(&file.path).display());
+        if let Some(diff) = &file.diff {
+            text.push_str(diff);
+        }
+    }
+    text
+}
+
 /// `sesamec run`
 pub(super) fn run(
     shell: Shell,
@@ -90,10 +144,10 @@ pub(super) fn run(
     generation: &Generation,
     arguments: &[OsString],
 ) -> anyhow::Result<ExitCode> {
-    let checked = check(shell, language, &generation.file)?;
+    let checked = check(shell, language, &generation.file, generation.diagnostics.format)?;
     let chosen = choose(&checked, &generation.file, generation.campaign.as_deref())?;
     let mode = if generation.force { Mode::Force } else { Mode::Write };
-    let (out, _) = write(shell, generation, &checked, &[chosen], mode)?;
+    let (out, _) = write(shell, generation, &generation.options(), &checked, &[chosen], mode)?;
     let campaign = &checked.plans[chosen].plan.campaign.name;
     let program = build::build(shell, &out.join(names::campaign_folder(campaign)), campaign)?;
     let mut runner = Command::new(&program);
@@ -139,9 +193,10 @@ pub(super) fn explain_campaign(
     campaign: &str,
     file: &Path,
 ) -> anyhow::Result<ExitCode> {
-    let checked = check(shell, language, file)?;
+    let checked = check(shell, language, file, Format::Human)?;
     let chosen = choose(&checked, file, Some(campaign))?;
-    print!("{}", crate::explain::campaign(&checked.plans[chosen].plan));
+    let plan = &checked.plans[chosen].plan;
+    print!("{}\n{}", crate::explain::campaign(plan), super::search_space::described(plan));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -172,21 +227,44 @@ fn choose(checked: &Checked, file: &Path, name: Option<&str>) -> anyhow::Result<
 fn write(
     shell: Shell,
     generation: &Generation,
+    options: &Options,
     checked: &Checked,
     chosen: &[usize],
     mode: Mode,
 ) -> anyhow::Result<(PathBuf, Report)> {
     let out = match &generation.out {
         Some(out) => out.clone(),
-        None => generation.file.with_file_name("runners"),
+        None => generation.file.with_file_name(environment::RUNNERS),
     };
-    let environment = environment(&generation.file, &out, &checked.plans, generation.runtime.as_ref())
-        .map_err(|errors| all(&errors))?;
+    let environment = environment(&generation.file, &out, &checked.plans, options).map_err(|errors| all(&errors))?;
     let trees = emit::emit(&checked.plans, &environment).map_err(|problems| all(&problems))?;
     let (shared, runners) = trees.split_first().expect("there is a tree for what runners share");
-    let trees: Vec<Tree> = std::iter::once(shared).chain(chosen.iter().map(|&at| &runners[at])).cloned().collect();
+    let alone = options.self_contained || options.vendor;
+    // A runner that can be moved elsewhere shares nothing.
+    let shared = (!alone).then_some(shared);
+    let trees: Vec<Tree> = shared.into_iter().chain(chosen.iter().map(|&at| &runners[at])).cloned().collect();
     let report = output::apply(&out, &trees, mode)?;
-    tell(shell, &out, &trees, &report, mode);
+    let space = &checked.plans[chosen[0]];
+    tell(shell, &out, &trees, &report, mode, space);
+    if let Transport::Process { program, .. } = &space.plan.simulator.transport
+        && alone
+    {
+        let folder = &environment.simulator_folder;
+        shell.warning(format!(
+            "the simulator `{program}` is a program, which is not copied: wherever the runner goes, it starts it in \
+             `{folder}`, as seen from its own folder"
+        ));
+    }
+    if alone && space.operations.iter().any(|operation| operation.topic.is_none()) {
+        let folder = &environment.space_folder;
+        shell.warning(format!(
+            "custom operations before the start and after the end work on files, which are not copied: wherever the \
+             runner goes, it looks for them in `{folder}`, as seen from its own folder"
+        ));
+    }
+    for note in &checked.notes {
+        shell.note(note);
+    }
     Ok((out, report))
 }
 
@@ -196,14 +274,15 @@ fn all(errors: &[impl std::fmt::Display]) -> anyhow::Error {
 }
 
 /// What was generated.
-fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode) {
+fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode, space: &RunnerPlan) {
     let written = |files: &[&output::FileReport]| {
         files.iter().filter(|file| matches!(file.change, Change::Created | Change::Updated)).count()
     };
     let stubs: Vec<_> =
         report.files.iter().filter(|file| file.owner == Owner::User && file.change == Change::Created).collect();
     let kept = report.files.iter().filter(|file| file.owner == Owner::User && file.change == Change::Kept).count();
-    let verb = if mode == Mode::Check { "Compared" } else { "Generated" };
+    let writes = matches!(mode, Mode::Write | Mode::Force);
+    let verb = if writes { "Generated" } else { "Compared" };
     for tree in trees.iter().filter(|tree| !tree.folder.is_empty()) {
         let prefix = format!("{}/", tree.folder);
         let files: Vec<_> = report.files.iter().filter(|file| file.path.starts_with(&prefix)).collect();
@@ -219,7 +298,7 @@ fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode) {
         };
         shell.did(verb, format!("{}: {} files{changed}{hooks}", out.join(&tree.folder).display(), files.len()));
     }
-    if mode != Mode::Check {
+    if writes {
         for stub in stubs {
             shell.did("Stub", format!("{}: yours to fill in", out.join(&stub.path).display()));
         }
@@ -235,6 +314,12 @@ fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode) {
     }
     for orphan in &report.orphans {
         shell.warning(match orphan {
+            Orphan::Hook { path, of } if declares(space, of) => {
+                format!("{of} takes its hook from elsewhere now; {} is kept but not compiled", out.join(path).display())
+            }
+            Orphan::Hook { path, of } if of.is_empty() => {
+                format!("{} is not part of the runner any more; it is kept but not compiled", out.join(path).display())
+            }
             Orphan::Hook { path, of } => {
                 format!("there is no {of} any more; its hook {} is kept but not compiled", out.join(path).display())
             }
@@ -247,4 +332,11 @@ fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode) {
             ),
         });
     }
+}
+
+/// Whether a space declares what a hook is of, for example ``metric `speed` ``.
+fn declares(space: &RunnerPlan, of: &str) -> bool {
+    let metrics = space.hooks.iter().map(|hook| format!("metric `{}`", hook.metric));
+    let operations = space.operations.iter().map(|it| format!("operation `{}`", it.operation));
+    metrics.chain(operations).any(|declared| declared == of)
 }

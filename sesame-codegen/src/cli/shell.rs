@@ -3,6 +3,8 @@
 use std::fmt::Display;
 use std::io::{self, IsTerminal as _, Write as _};
 
+use super::{Format, Look};
+
 /// Where messages go: standard error, so that standard output is free for what is asked for.
 #[derive(Debug, Clone, Copy)]
 pub struct Shell {
@@ -47,10 +49,34 @@ impl Shell {
         self.line(&format!("{} {what}", self.painted("1;33", "warning:")));
     }
 
+    /// Something that is good to know and needs nothing done.
+    pub(super) fn note(self, what: impl Display) {
+        self.line(&format!("{} {what}", self.painted("1;36", "note:")));
+    }
+
     /// What went wrong, with its causes.
     pub(super) fn failure(self, failure: &anyhow::Error) {
         for error in format!("{failure:#}").split('\u{1e}') {
             self.line(&format!("{} {error}", self.painted("1;31", "error:")));
+        }
+    }
+
+    /// How diagnostics are to look.
+    pub(super) fn look(self, format: Format) -> Look {
+        match format {
+            Format::Human => Look::Human { colour: self.colour },
+            Format::Short => Look::Short,
+            Format::Json => Look::Json,
+            Format::Github => Look::Github,
+        }
+    }
+
+    /// Diagnostics: those for programs on standard output.
+    pub(super) fn diagnostics(self, text: &str, format: Format) {
+        match format {
+            _ if text.is_empty() => {}
+            Format::Human | Format::Short => self.text(text),
+            Format::Json | Format::Github => asked_for(text),
         }
     }
 
@@ -67,6 +93,12 @@ impl Shell {
     fn painted(self, style: &str, text: &str) -> String {
         if self.colour { format!("\x1b[{style}m{text}\x1b[0m") } else { text.to_owned() }
     }
+}
+
+/// What was asked for, on standard output.
+pub(super) fn asked_for(text: &str) {
+    // A reader that has seen enough, such as `head`, is no failure.
+    let _ = io::stdout().write_all(text.as_bytes());
 }
 
 /// How the user called this command, for hints that can be copied.

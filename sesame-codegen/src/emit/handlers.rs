@@ -37,7 +37,7 @@ fn parameter(plan: &CampaignPlan, topic: &Topic) -> String {
         Type::Message { id } => {
             let snake = names::snake(&plan.message(*id).name);
             let last = snake.rsplit('_').find(|word| word.starts_with(|first: char| first.is_ascii_alphabetic()));
-            last.unwrap_or("message").to_owned()
+            names::snake(last.unwrap_or("message"))
         }
         _ => names::snake(&topic.name),
     };

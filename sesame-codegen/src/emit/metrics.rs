@@ -11,8 +11,8 @@ use crate::names;
 use crate::plan::{HookPlan, RunnerPlan};
 
 /// Where a metric is declared, for example ``metric `top_speed` (kuka_cell.sesame:31)``.
-pub(super) fn declared(runner: &RunnerPlan, hook: &HookPlan) -> String {
-    format!("metric `{}` ({}:{})", hook.metric, runner.plan.source, hook.line)
+pub(super) fn declared(hook: &HookPlan) -> String {
+    format!("metric `{}` ({}:{})", hook.metric, hook.source, hook.line)
 }
 
 /// What kind of number a metric is, in a sentence; nothing for a plain number without a direction.
@@ -56,14 +56,14 @@ pub(super) fn traits(runner: &RunnerPlan, types: &Messages<'_>, header: &str) ->
 fn hook_trait(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -> TokenStream {
     let name = names::ident(&names::hook_trait(&hook.metric));
     let (hook_type, file) = (names::hook_type(&hook.metric), names::snake(&hook.metric));
-    let declared = declared(runner, hook);
-    let message = format!("{declared} has no hook");
+    let declared = declared(hook);
+    let message = rust::as_format(&format!("{declared} has no hook"));
     let label = format!("`{hook_type}` does not implement `{name}`");
-    let note = format!(
+    let note = rust::as_format(&format!(
         "hooks/{file}.rs holds the hook: write `impl {name} for {hook_type}` there, \
          or move the file away and run `sesamec generate {}` for a fresh stub",
         runner.plan.source
-    );
+    ));
     let mut doc: Vec<String> = hook.doc.lines().map(str::to_owned).collect();
     if !doc.is_empty() {
         doc.push(String::new());
@@ -113,7 +113,7 @@ pub(super) fn registry(runner: &RunnerPlan, types: &Messages<'_>, header: &str, 
     });
     let notes: Vec<(String, String)> = used
         .iter()
-        .map(|hook| (format!("use self::{}::", names::written(&names::snake(&hook.metric))), declared(runner, hook)))
+        .map(|hook| (format!("use self::{}::", names::written(&names::snake(&hook.metric))), declared(hook)))
         .collect();
     let entries = used.iter().enumerate().map(|(at, hook)| {
         let (metric, build, here) = (&hook.metric, build(hook), here(at));

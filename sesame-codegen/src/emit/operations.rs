@@ -6,16 +6,17 @@ use quote::quote;
 use serde::Serialize;
 use sesame_plan::{Domain, Moment, Parameter, Topic, Type};
 
+use super::Problem;
 use super::handlers::{self, handlers, paths};
 use super::messages::{self, Messages, Place};
 use super::rust::{self, one_line};
-use super::text;
+use super::text::Templates;
 use crate::names::{self, Scope};
 use crate::plan::{OperationPlan, RunnerPlan};
 
 /// Where an operation is declared, for example ``operation `bend_path` (kuka_cell.sesame:41)``.
-fn declared(runner: &RunnerPlan, operation: &OperationPlan) -> String {
-    format!("operation `{}` ({}:{})", operation.operation, runner.plan.source, operation.line)
+fn declared(operation: &OperationPlan) -> String {
+    format!("operation `{}` ({}:{})", operation.operation, operation.source, operation.line)
 }
 
 /// The function of a hook, with the topic and the name of its message if it takes one.
@@ -97,14 +98,14 @@ fn hook_trait(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPl
     let (hook_type, file) = (names::hook_type(&operation.operation), names::snake(&operation.operation));
     let name = names::ident(&names::hook_trait(&operation.operation));
     let parameters = names::ident(&names::parameters_type(&operation.operation));
-    let declared = declared(runner, operation);
-    let message = format!("{declared} has no hook");
+    let declared = declared(operation);
+    let message = rust::as_format(&format!("{declared} has no hook"));
     let label = format!("`{hook_type}` does not implement `{name}`");
-    let note = format!(
+    let note = rust::as_format(&format!(
         "hooks/{file}.rs holds the hook: write `impl {name} for {hook_type}` there, \
          or move the file away and run `sesamec generate {}` for a fresh stub",
         runner.plan.source
-    );
+    ));
     let mut doc: Vec<String> = operation.doc.lines().map(str::to_owned).collect();
     if !doc.is_empty() {
         doc.push(String::new());
@@ -178,7 +179,7 @@ pub(super) fn registry(runner: &RunnerPlan, types: &Messages<'_>, header: &str, 
         .iter()
         .map(|operation| {
             let module = names::written(&names::snake(&operation.operation));
-            (format!("use self::{module}::"), declared(runner, operation))
+            (format!("use self::{module}::"), declared(operation))
         })
         .collect();
     let entries = used.iter().enumerate().map(|(at, operation)| {
@@ -289,7 +290,12 @@ struct StubMessage {
 }
 
 /// The stub of a hook.
-pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPlan) -> String {
+pub(super) fn stub(
+    templates: &Templates,
+    runner: &RunnerPlan,
+    types: &Messages<'_>,
+    operation: &OperationPlan,
+) -> Result<String, Problem> {
     let (hook_type, hook_trait) = (names::hook_type(&operation.operation), names::hook_trait(&operation.operation));
     let parameters_type = names::parameters_type(&operation.operation);
     let Call { method, message } = call(runner, operation);
@@ -341,7 +347,7 @@ pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, operation: &Operat
         doc: operation.doc.lines().map(one_line).collect(),
         operation: operation.operation.clone(),
         space: runner.plan.space.clone(),
-        source: one_line(&runner.plan.source),
+        source: one_line(&operation.source),
         line: operation.line,
         imports,
         hook_type: names::written(&hook_type),
@@ -353,5 +359,5 @@ pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, operation: &Operat
         context,
         example,
     };
-    text::render(sesame_templates::runner::OPERATION_HOOK, &stub)
+    templates.render("runner/operation_hook.rs.tera", &stub)
 }

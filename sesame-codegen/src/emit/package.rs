@@ -28,7 +28,7 @@ pub(super) fn with_features(dependencies: &BTreeMap<String, Value>, features: &[
 }
 
 /// The manifest. Names of packages and dependencies are checked by those who made them; values are printed by toml.
-pub(super) fn cargo_toml(note: &str, package: &str, dependencies: &BTreeMap<String, Value>) -> String {
+pub(super) fn cargo_toml(note: &str, package: &str, dependencies: &BTreeMap<String, Value>, vendored: bool) -> String {
     let mut text = format!(
         "# {note}\n\
          # What hooks need goes into [dependencies] of the sesame.toml beside the .sesame file.\n\
@@ -48,8 +48,13 @@ pub(super) fn cargo_toml(note: &str, package: &str, dependencies: &BTreeMap<Stri
     text.push_str(
         "\n\
          # The runner is a workspace of its own, whatever folder it lies in.\n\
-         [workspace]\n\
-         \n\
+         [workspace]\n",
+    );
+    if vendored {
+        text.push_str("exclude = [\"vendor\"]\n");
+    }
+    text.push_str(
+        "\n\
          # Simulator and runtime run at full speed. Hooks and generated code are built quickly, since they change; build\n\
          # scripts and macros are not optimised at all (a profile for package.\"*\" would do that too, and take twice as long).\n\
          [profile.dev]\n\
@@ -68,7 +73,7 @@ pub(super) fn cargo_toml(note: &str, package: &str, dependencies: &BTreeMap<Stri
 }
 
 /// Whether a dependency's name is one that cargo knows of, and so a bare key of TOML.
-pub(super) fn is_dependency(name: &str) -> bool {
+pub(crate) fn is_dependency(name: &str) -> bool {
     !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_')
 }
 
@@ -91,7 +96,7 @@ mod tests {
     fn hostile_dependencies_stay_data() {
         assert!(!is_dependency("x\"]\n[evil"));
         let value: Value = toml::from_str("version = \"1\"\nfeatures = [\"a\\\"\\n[evil]\"]").unwrap();
-        let text = cargo_toml("note", "space-campaign", &BTreeMap::from([("x".to_owned(), value.clone())]));
+        let text = cargo_toml("note", "space-campaign", &BTreeMap::from([("x".to_owned(), value.clone())]), false);
         let parsed: toml::Table = toml::from_str(&text).unwrap();
         assert_eq!(parsed["dependencies"]["x"], value);
         assert_eq!(parsed.keys().collect::<Vec<_>>(), ["dependencies", "package", "profile", "workspace"]);

@@ -20,17 +20,33 @@ fn doc_lines(lines: impl IntoIterator<Item = impl AsRef<str>>) -> impl Iterator<
     })
 }
 
-/// Text that stays on its line in any kind of file.
+/// Text that stays on its line in any kind of file, and reads there as it is.
 pub(super) fn one_line(text: &str) -> String {
     let plain = |c: char| if c.is_control() || matches!(c, '\u{2028}' | '\u{2029}') { ' ' } else { c };
-    text.chars().map(plain).collect::<String>().trim_end().to_owned()
+    turning_escaped(&text.chars().map(plain).collect::<String>()).trim_end().to_owned()
+}
+
+/// With the signs that change the direction of what follows written as `\u{202e}`: rustc refuses them even in comments.
+fn turning_escaped(text: &str) -> String {
+    let turning = |c: char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    if !text.contains(turning) {
+        return text.to_owned();
+    }
+    let escaped = |c: char| if turning(c) { c.escape_unicode().to_string() } else { c.to_string() };
+    text.chars().map(escaped).collect()
+}
+
+/// Text that is said as it is where rustc takes a format, as in `#[diagnostic::on_unimplemented]`.
+pub(super) fn as_format(text: &str) -> String {
+    text.replace('{', "{{").replace('}', "}}")
 }
 
 /// A generated file: its header, then its items as prettyplease sets them. That it parses is an invariant of this
 /// crate, whatever the names in the space.
 pub(super) fn file(header: &str, items: TokenStream) -> String {
     let file = syn::parse2(items).expect("generated Rust parses, since every name and text goes through quote");
-    format!("{header}\n{}", prettyplease::unparse(&file))
+    // In comments they are escaped already, and in a literal the escape means the same sign.
+    turning_escaped(&format!("{header}\n{}", prettyplease::unparse(&file)))
 }
 
 /// Adds a comment at the end of each line that starts with one of these beginnings. rustc shows the whole line when
@@ -54,15 +70,17 @@ mod tests {
 
     #[test]
     fn no_doc_comment_ends_early() {
-        let docs = docs(["a */ b", "c \r\n fn evil() {}", "d \u{2028} e", ""]);
-        let text = file("// header", quote! { #docs pub struct A; });
-        insta::assert_snapshot!(text, @r"
+        let docs = docs(["a */ b", "c \r\n fn evil() {}", "d \u{2028} e", "f \u{202e}g", ""]);
+        let text = file("// header", quote! { #docs pub struct A; const B: &str = "b\u{2066}"; });
+        insta::assert_snapshot!(text, @r#"
         // header
         /// a */ b
         /// c    fn evil() {}
         /// d   e
+        /// f \u{202e}g
         ///
         pub struct A;
-        ");
+        const B: &str = "b\u{2066}";
+        "#);
     }
 }

@@ -9,7 +9,8 @@ use sesame_plan::{Direction, Type};
 use super::handlers::{Handler, handlers, paths};
 use super::messages::{self, Messages, Place};
 use super::rust::one_line;
-use super::{metrics, text};
+use super::text::Templates;
+use super::{Problem, metrics};
 use crate::names;
 use crate::plan::{HookPlan, RunnerPlan};
 
@@ -39,7 +40,12 @@ struct StubHandler {
 }
 
 /// The stub of a hook.
-pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -> String {
+pub(super) fn stub(
+    templates: &Templates,
+    runner: &RunnerPlan,
+    types: &Messages<'_>,
+    hook: &HookPlan,
+) -> Result<String, Problem> {
     let hook_type = names::hook_type(&hook.metric);
     let hook_trait = names::hook_trait(&hook.metric);
     let handlers = handlers(&runner.plan, &hook.inputs);
@@ -67,7 +73,7 @@ pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -
         doc: hook.doc.lines().map(one_line).collect(),
         metric: hook.metric.clone(),
         space: runner.plan.space.clone(),
-        source: one_line(&runner.plan.source),
+        source: one_line(&hook.source),
         line: hook.line,
         meaning: metrics::meaning(hook).as_deref().map(one_line),
         imports,
@@ -75,7 +81,7 @@ pub(super) fn stub(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -
         hook_trait: names::written(&hook_trait),
         handlers: handlers.iter().map(|handler| stub_handler(types, hook, handler, place)).collect(),
     };
-    text::render(sesame_templates::runner::HOOK, &stub)
+    templates.render("runner/hook.rs.tera", &stub)
 }
 
 fn stub_handler(types: &Messages<'_>, hook: &HookPlan, handler: &Handler<'_>, place: Place) -> StubHandler {

@@ -4,18 +4,27 @@ use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
 
-use sesame_codegen::cli::{Checked, Language, Shell, run};
+use sesame_codegen::cli::{Checked, Diagnosed, Language, Look, Shell, run};
 
 use crate::plans::small;
 
-fn check(file: &str, text: &str, _colour: bool) -> Checked {
+fn check(file: &str, text: &str, _look: Look) -> Checked {
     if text.contains("mistake") {
         return Checked { diagnostics: format!("error: {file}"), errors: 1, ..Checked::default() };
     }
-    Checked { summary: "2 campaigns".into(), plans: vec![small("day"), small("night")], ..Checked::default() }
+    let warnings = usize::from(text.contains("doubtful"));
+    Checked { warnings, summary: "2 campaigns".into(), plans: vec![small("day"), small("night")], ..Checked::default() }
 }
 
-const LANGUAGE: Language = Language { check, explain: |code| (code == "E0203").then_some("# E0203") };
+/// Knows of nothing but blanks at the ends of lines.
+fn format(_file: &str, text: &str, _look: Look) -> Result<String, Diagnosed> {
+    if text.contains("mistake") {
+        return Err(Diagnosed { diagnostics: "error".into(), errors: 1 });
+    }
+    Ok(text.lines().flat_map(|line| [line.trim_end(), "\n"]).collect())
+}
+
+const LANGUAGE: Language = Language { check, format, explain: |code| (code == "E0203").then_some("# E0203") };
 
 fn sesamec(arguments: &[&str]) -> bool {
     let arguments = ["sesamec"].iter().chain(arguments);
@@ -71,6 +80,16 @@ fn a_space_with_mistakes_generates_nothing() {
 }
 
 #[test]
+fn warnings_are_refused_on_demand_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = project(folder.path(), "doubtful");
+    assert!(sesamec(&["check", &file]));
+    assert!(!sesamec(&["check", "--deny", "warnings", &file]));
+    let file = project(folder.path(), "fine");
+    assert!(sesamec(&["check", &file, "--deny", "warnings"]));
+}
+
+#[test]
 fn checking_what_was_generated_tells_by_its_exit_code() {
     let folder = tempfile::tempdir().unwrap();
     let file = project(folder.path(), "");
@@ -103,6 +122,7 @@ fn the_texts_of_a_new_project() {
     let files = sesame_codegen::project::files(
         Path::new("demo"),
         Some(&sesame_codegen::environment::RuntimeChoice::Version("0.1.0".into())),
+        &sesame_codegen::emit::Templates::default(),
     )
     .unwrap();
     let shown: Vec<String> = files.iter().map(|(path, text)| format!("═══ {path}\n{text}")).collect();
@@ -123,4 +143,62 @@ fn a_campaign_is_explained_from_its_file() {
     assert!(!sesamec(&["explain", "nihgt", &file]));
     assert!(!sesamec(&["explain", "night"]), "nobody knows which space it is in");
     assert!(!folder.path().join("runners").exists(), "explaining writes nothing");
+}
+
+#[test]
+fn a_dry_run_writes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = project(folder.path(), "");
+    assert!(sesamec(&["generate", "--dry-run", &file]));
+    assert!(!folder.path().join("runners").exists());
+}
+
+#[test]
+fn a_self_contained_runner_stands_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = project(folder.path(), "");
+    assert!(sesamec(&["generate", &file, "-c", "day", "--self-contained"]));
+    assert!(folder.path().join("runners/day/src/hooks/top_speed.rs").is_file());
+    assert!(!folder.path().join("runners/hooks").exists() && !folder.path().join("runners/README.md").exists());
+    assert!(sesamec(&["generate", &file, "-c", "day", "--self-contained", "--check"]));
+    assert!(!sesamec(&["generate", &file, "-c", "day"]), "it would lose what it carries");
+    assert!(sesamec(&["generate", &file, "-c", "night"]), "its neighbour shares as ever");
+}
+
+#[test]
+fn files_are_formatted_in_place_or_only_looked_at() {
+    let folder = tempfile::tempdir().unwrap();
+    let (untidy, tidy, broken) = ("a.sesame", "b.sesame", "c.sesame");
+    let path = |name: &str| folder.path().join(name);
+    let text = |name: &str| fs::read_to_string(path(name)).unwrap();
+    fs::write(path(untidy), "space a  \n").unwrap();
+    fs::write(path(tidy), "space b\n").unwrap();
+    fs::write(path("notes.txt"), "blanks  \n").unwrap();
+    let all = folder.path().to_str().unwrap();
+    assert!(!sesamec(&["fmt", "--check", all]));
+    assert_eq!(text(untidy), "space a  \n");
+    assert!(sesamec(&["fmt", path(tidy).to_str().unwrap(), "--check"]));
+    fs::write(path(broken), "mistake  \n").unwrap();
+    assert!(!sesamec(&["fmt", all]), "one has a mistake");
+    assert_eq!((text(untidy).as_str(), text(broken).as_str()), ("space a\n", "mistake  \n"));
+    assert_eq!(text("notes.txt"), "blanks  \n");
+    fs::remove_file(path(broken)).unwrap();
+    assert!(sesamec(&["fmt", "--check", all]));
+    assert!(!sesamec(&["fmt", path("none.sesame").to_str().unwrap()]));
+}
+
+#[cfg(unix)]
+#[test]
+fn formatting_keeps_links_and_permissions() {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    let folder = tempfile::tempdir().unwrap();
+    let (file, link) = (folder.path().join("a.sesame"), folder.path().join("link.sesame"));
+    fs::write(&file, "space a  \n").unwrap();
+    fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).unwrap();
+    std::os::unix::fs::symlink(&file, &link).unwrap();
+    assert!(sesamec(&["fmt", link.to_str().unwrap()]));
+    assert_eq!(fs::read_to_string(&file).unwrap(), "space a\n");
+    assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o640);
+    assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
 }

@@ -16,7 +16,7 @@ fn shown(trees: &[Tree]) -> String {
                 continue;
             }
             let folder = if tree.folder.is_empty() { "." } else { &tree.folder };
-            text = format!("{text}═══ {folder}/{path} ({:?})\n{}\n", file.owner, file.contents);
+            text = format!("{text}═══ {folder}/{path} ({:?})\n{}\n", file.owner, file.text());
         }
         text = format!("{text}═══ hooks: {:#?}\n", tree.hooks);
     }
@@ -44,10 +44,10 @@ fn a_simulator_that_is_a_program_needs_its_transport_and_no_crate() {
     let mut environment = environment();
     environment.dependencies.remove("kuka_cell_sim");
     let trees = emit(&[with_program("c")], &environment).unwrap();
-    let file = |path: &str| trees[1].files[path].contents.as_str();
+    let file = |path: &str| trees[1].files[path].text().into_owned();
     insta::assert_snapshot!(file("src/generated/campaign.rs"));
     assert!(file("Cargo.toml").contains(r#"features = ["campaign", "process"]"#), "{}", file("Cargo.toml"));
-    let plan: sesame_plan::CampaignPlan = serde_json::from_str(file("campaign.plan.json")).unwrap();
+    let plan: sesame_plan::CampaignPlan = serde_json::from_str(&file("campaign.plan.json")).unwrap();
     assert_eq!(plan, with_program("c").plan);
 }
 
@@ -68,7 +68,7 @@ fn a_program_that_no_system_could_start_is_refused() {
 #[test]
 fn the_plan_is_in_the_crate_as_it_was_given() {
     let trees = emit(&[awkward()], &environment()).unwrap();
-    let plan: sesame_plan::CampaignPlan = serde_json::from_str(&trees[1].files["campaign.plan.json"].contents).unwrap();
+    let plan: sesame_plan::CampaignPlan = serde_json::from_str(&trees[1].files["campaign.plan.json"].text()).unwrap();
     assert_eq!(plan, awkward().plan);
 }
 
@@ -80,7 +80,7 @@ fn the_same_plans_give_the_same_bytes() {
 #[test]
 fn a_metric_that_one_campaign_leaves_out_is_not_compiled_there_but_has_its_trait() {
     let trees = emit(&[small("c")], &environment()).unwrap();
-    let generated = |file: &str| &trees[1].files[&format!("src/generated/{file}.rs")].contents;
+    let generated = |file: &str| trees[1].files[&format!("src/generated/{file}.rs")].text().into_owned();
     assert!(generated("metrics").contains("trait TopSpeedHook"));
     assert!(!generated("registry").contains("top_speed"));
     assert!(trees[0].files.contains_key("hooks/top_speed.rs"));
@@ -147,13 +147,13 @@ proptest! {
                 if kind == Some("rs") {
                     let items = |source: &str| syn::parse_file(source).map(|file| file.items.len());
                     prop_assert_eq!(
-                        items(&file.contents).unwrap(),
-                        items(&usual.files[path].contents).unwrap(),
+                        items(&file.text()).unwrap(),
+                        items(&usual.files[path].text()).unwrap(),
                         "{}", path
                     );
                 }
                 if kind == Some("toml") {
-                    prop_assert!(toml::from_str::<toml::Table>(&file.contents).is_ok(), "{}", file.contents);
+                    prop_assert!(toml::from_str::<toml::Table>(&file.text()).is_ok(), "{}", file.text());
                 }
             }
         }

@@ -6,8 +6,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use sesame_codegen::emit::emit;
-use sesame_codegen::environment::environment;
+use sesame_codegen::emit::{Templates, emit};
+use sesame_codegen::environment::{Options, environment};
 use sesame_codegen::output::{Mode, apply};
 use sesame_codegen::plan::RunnerPlan;
 
@@ -33,7 +33,7 @@ fn generated(folder: &Path, plans: &[RunnerPlan]) {
     )
     .unwrap();
     let out = folder.join("runners");
-    let environment = environment(&folder.join("kuka_cell.sesame"), &out, plans, None).unwrap();
+    let environment = environment(&folder.join("kuka_cell.sesame"), &out, plans, &Options::default()).unwrap();
     apply(&out, &emit(plans, &environment).unwrap(), Mode::Write).unwrap();
 }
 
@@ -114,7 +114,11 @@ fn hooks_may_share_a_file_of_their_own() {
 fn the_simulator_of_a_new_project_passes_its_own_tests() {
     let folder = tempfile::tempdir().unwrap();
     let project = folder.path().join("demo");
-    sesame_codegen::output::create(&project, &sesame_codegen::project::files(&project, None).unwrap()).unwrap();
+    sesame_codegen::output::create(
+        &project,
+        &sesame_codegen::project::files(&project, None, &Templates::default()).unwrap(),
+    )
+    .unwrap();
     let workspace = sesame_codegen::environment::checkout_runtime().unwrap();
     fs::copy(workspace.parent().unwrap().join("Cargo.lock"), project.join("simulator/Cargo.lock")).unwrap();
     let output = Command::new(env!("CARGO"))

@@ -4,6 +4,7 @@
 mod command;
 mod emission;
 mod emitted;
+mod options;
 mod plans;
 mod regeneration;
 mod surroundings;

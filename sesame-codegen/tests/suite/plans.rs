@@ -25,6 +25,7 @@ pub(crate) fn hook(metric: &str, line: u32, inputs: &[u32]) -> HookPlan {
         doc: String::new(),
         unit: None,
         direction: None,
+        source: "kuka_cell.sesame".into(),
         line,
         inputs: inputs.iter().map(|&input| TopicId(input)).collect(),
     }
@@ -116,6 +117,7 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
             HookPlan { unit: Some("m/s".into()), direction: Some(Direction::Maximise), ..hook("top_speed", 35, &[2]) },
         ],
         simulator_crate: Some("simulator".into()),
+        system_file: "kuka_cell.sesame".into(),
     };
     measured(&mut runner, "collision_occurrence");
     runner
@@ -214,5 +216,7 @@ pub(crate) fn environment() -> Environment {
         lock: None,
         options: [].into(),
         space_folder: "../..".to_owned(),
+        simulator_folder: "../..".to_owned(),
+        ..Environment::default()
     }
 }

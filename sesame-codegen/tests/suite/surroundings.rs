@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use sesame_codegen::environment::{Error, RuntimeChoice, checkout_runtime, environment};
+use sesame_codegen::environment::{Error, Options, RuntimeChoice, checkout_runtime, environment};
 use sesame_codegen::plan::RunnerPlan;
 
 use crate::plans::{small, with_program};
@@ -19,7 +19,12 @@ fn project(folder: &Path, settings: &str) {
 
 fn dependencies(folder: &Path, plan: RunnerPlan, runtime: Option<&str>) -> Result<String, String> {
     let runtime = runtime.map(|text| RuntimeChoice::parse(text).unwrap());
-    let found = environment(&folder.join("kuka_cell.sesame"), &folder.join("runners"), &[plan], runtime.as_ref());
+    let found = environment(
+        &folder.join("kuka_cell.sesame"),
+        &folder.join("runners"),
+        &[plan],
+        &Options { runtime, ..Options::default() },
+    );
     let lines = |(name, value): (&String, &toml::Value)| format!("{name} = {value}");
     let mentioned = |error: &Error| error.to_string().replace(&folder.display().to_string(), "PROJECT");
     found
@@ -65,7 +70,7 @@ fn a_checkout_build_uses_the_runtime_of_its_checkout_and_its_locked_versions() {
     let folder = tempfile::tempdir().unwrap();
     project(folder.path(), "");
     let out = folder.path().join("runners");
-    let found = environment(&folder.path().join("kuka_cell.sesame"), &out, &[small("c")], None).unwrap();
+    let found = environment(&folder.path().join("kuka_cell.sesame"), &out, &[small("c")], &Options::default()).unwrap();
     let path = found.dependencies["sesame-runtime"]["path"].as_str().unwrap();
     fs::create_dir_all(out.join("c")).unwrap();
     assert_eq!(
@@ -82,7 +87,7 @@ fn a_sibling_runners_lock_file_comes_first() {
     let out = folder.path().join("runners");
     fs::create_dir_all(out.join("b")).unwrap();
     fs::write(out.join("b/Cargo.lock"), "of b").unwrap();
-    let found = environment(&folder.path().join("kuka_cell.sesame"), &out, &[small("c")], None).unwrap();
+    let found = environment(&folder.path().join("kuka_cell.sesame"), &out, &[small("c")], &Options::default()).unwrap();
     assert_eq!(found.lock.as_deref(), Some("of b"));
 }
 
@@ -108,10 +113,13 @@ fn a_program_needs_no_crate_and_its_folder_is_known_as_seen_from_the_runner() {
     assert_eq!(dependencies(folder.path(), with_program("c"), Some("1.0.0")).unwrap(), "sesame-runtime = \"1.0.0\"");
     let found = |out: &str| {
         let space = folder.path().join("kuka_cell.sesame");
-        environment(&space, &folder.path().join(out), &[with_program("c")], None).unwrap().space_folder
+        let plan = RunnerPlan { system_file: "shared/cell.sesame".to_owned(), ..with_program("c") };
+        let found = environment(&space, &folder.path().join(out), &[plan], &Options::default()).unwrap();
+        (found.space_folder, found.simulator_folder)
     };
-    assert_eq!(found("runners"), "../..");
-    assert_eq!(found("else/where"), "../../..");
+    fs::create_dir(folder.path().join("shared")).unwrap();
+    assert_eq!(found("runners"), ("../..".to_owned(), "../../shared".to_owned()));
+    assert_eq!(found("else/where"), ("../../..".to_owned(), "../../../shared".to_owned()));
 }
 
 #[test]

@@ -1,12 +1,22 @@
 //! What a correct space should be warned of.
 
-use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{Id as _, MetricSource, OperationId, Search, Space};
+mod system;
+mod unused;
 
-/// Warnings about a space without errors.
-pub(crate) fn check(space: &Space) -> Vec<Diagnostic> {
+use crate::diagnostic::{Code, Diagnostic};
+use crate::model::{MetricSource, Space};
+use crate::span::FileId;
+
+/// Warnings about a space without errors. Of what it imports, only what is wrong in itself is said: a file that others
+/// share holds more than each of them uses.
+pub(crate) fn check(space: &Space, root: FileId) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
-    unused_operations(space, &mut diagnostics);
+    unused::operations(space, root, &mut diagnostics);
+    unused::metrics(space, root, &mut diagnostics);
+    unused::topics(space, root, &mut diagnostics);
+    unused::evidence(space, &mut diagnostics);
+    system::misnamed_operations(space, &mut diagnostics);
+    system::two_publishers(space, &mut diagnostics);
     objectives_without_default(space, &mut diagnostics);
     if space.campaigns.is_empty() {
         let title = format!("space `{}` has no campaign", space.declaration.name);
@@ -16,25 +26,6 @@ pub(crate) fn check(space: &Space) -> Vec<Diagnostic> {
         );
     }
     diagnostics
-}
-
-fn unused_operations(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
-    let mut used = vec![false; space.operations.len()];
-    let mut mark = |id: OperationId| used[id.index()] = true;
-    for campaign in space.campaigns.values() {
-        if let Search::Nsga2 { content, .. } | Search::Random { content, .. } = &campaign.search {
-            content.operations.iter().copied().for_each(&mut mark);
-        }
-    }
-    space.tests.values().flat_map(|test| &test.operations).for_each(|operation| mark(operation.operation));
-    for (id, operation) in space.operations.iter().filter(|(id, _)| !used[id.index()]) {
-        debug_assert_eq!(space.operations[id].declaration.name, operation.declaration.name);
-        let title = format!("operation `{}` is never used", operation.declaration.name);
-        diagnostics.push(
-            Diagnostic::new(Code::UNUSED_OPERATION, operation.declaration.span, title)
-                .label("in no campaign and no known test"),
-        );
-    }
 }
 
 fn objectives_without_default(space: &Space, diagnostics: &mut Vec<Diagnostic>) {

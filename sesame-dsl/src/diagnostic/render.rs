@@ -1,9 +1,11 @@
-//! Text from diagnostics: for people, for one-line tools, for programs.
+//! Text from diagnostics: for people, for one-line tools, for programs, for GitHub.
 
+mod github;
 mod human;
 mod json;
 mod short;
 
+pub use github::github;
 pub use human::human;
 pub use json::json;
 pub use short::short;

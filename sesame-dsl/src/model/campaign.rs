@@ -1,14 +1,16 @@
 //! Campaigns: how tests are found and run.
 
 use super::condition::ConditionSpace;
-use super::{Declaration, Exploration, MetricId, OperationId, Range, StopRule, TestId};
+use super::{CampaignId, Declaration, Exploration, MetricId, OperationId, Range, StopRule, TestId};
 
 /// A campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Campaign {
     /// Its name and doc comment.
     pub declaration: Declaration,
-    /// What the search optimises, in written order; each has a direction. Empty exactly for a campaign that repeats.
+    /// The campaign that clauses it does not write come from. They are in their places here.
+    pub from: Option<CampaignId>,
+    /// What the search optimises, in written order; each has a direction. Empty exactly for a campaign without a search.
     pub objectives: Vec<MetricId>,
     /// Metrics measured besides the objectives, those of all requirements, and those of expectations.
     pub observed: Vec<MetricId>,
@@ -79,17 +81,22 @@ pub enum Search {
         /// How often: at least 1.
         times: u32,
     },
+    /// Undisturbed runs: nothing but observation.
+    Passive {
+        /// How often: at least 1.
+        times: u32,
+    },
 }
 
 impl Search {
-    /// What its tests hold; `None` where a known test is repeated.
+    /// What its tests hold; `None` where nothing is searched.
     pub fn content(&self) -> Option<&Content> {
         match self {
             Search::Nsga2 { content, .. }
             | Search::Random { content, .. }
             | Search::MapElites { content, .. }
             | Search::LatinHypercube { content, .. } => Some(content),
-            Search::Repeat { .. } => None,
+            Search::Repeat { .. } | Search::Passive { .. } => None,
         }
     }
 }

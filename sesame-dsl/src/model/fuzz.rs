@@ -1,7 +1,7 @@
 //! Fuzzing operations and the known tests that apply them.
 
 use super::condition::{Condition, Constraint};
-use super::{Bound, Declaration, FieldPath, MetricId, OperationId, Range, TopicId};
+use super::{Bound, Declaration, MetricId, OperationId, Range, TopicId};
 use crate::units::Unit;
 
 /// A fuzzing operation with its permitted ranges.
@@ -9,17 +9,20 @@ use crate::units::Unit;
 pub struct Operation {
     /// Its name and doc comment.
     pub declaration: Declaration,
-    /// What it disturbs. Operations on whole messages have no fields; `None` exactly for a custom one before the start or
-    /// after the end.
-    pub target: Option<FieldPath>,
+    /// What it disturbs; `None` exactly for a custom one before the start or after the end.
+    pub target: Option<Target>,
     /// What it does.
     pub kind: OperationKind,
+    /// The parameters a test chooses, in the order in which a plan has them.
+    pub parameters: Vec<Parameter>,
     /// The time outside of which it is never active, in seconds; `None` is the whole test, from 0 to the campaign's end.
     pub within: Option<Range>,
     /// Operations of a higher priority come first on a message; equal ones in declaration order. Default 0.
     pub priority: i32,
     /// Probability that a fresh test includes it. Default 1.
     pub inclusion: f64,
+    /// Whether its active time counts in `fuzzing_time()`. Default true.
+    pub timed: bool,
     /// What its start conditions contain in campaigns that activate by condition; in written order.
     pub constraints: Vec<Constraint>,
 }
@@ -32,74 +35,116 @@ impl Operation {
 
     /// Whether it acts before the start or after the end: a test then chooses no window for it.
     pub fn is_offline(&self) -> bool {
-        matches!(&self.kind, OperationKind::Custom { moment: Moment::BeforeStart | Moment::AfterEnd, .. })
-    }
-
-    /// The parameters a test chooses, in the order in which a plan has them.
-    pub fn parameters(&self) -> Vec<Parameter> {
-        let number = |name: &str, unit, range, shape, integer| {
-            let domain = Domain::Number { range, shape, integer };
-            vec![Parameter { name: name.to_owned(), doc: String::new(), unit, domain }]
-        };
-        match &self.kind {
-            OperationKind::RandomValue { mode, range, integer, unit } => {
-                let name = match mode {
-                    ValueMode::Absolute => "value",
-                    ValueMode::Offset => "offset",
-                };
-                number(name, unit.clone(), *range, Shape::Range, *integer)
-            }
-            OperationKind::PacketLoss { loss } => number("loss", None, *loss, Shape::Value, false),
-            OperationKind::Latency { delay, distribution, .. } => {
-                let shape = match distribution {
-                    Distribution::Fixed => Shape::Value,
-                    Distribution::Uniform => Shape::Range,
-                };
-                number("delay", Some(Unit::seconds()), *delay, shape, false)
-            }
-            OperationKind::Blackhole => Vec::new(),
-            OperationKind::Custom { parameters, .. } => parameters.clone(),
-        }
+        matches!(&self.kind, OperationKind::Custom { moment: Moment::BeforeStart | Moment::AfterEnd })
     }
 }
 
-/// What an operation does to the messages of its topic.
+/// What an operation disturbs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Target {
+    /// The topic.
+    pub topic: TopicId,
+    /// The values in each message that it changes, in written order, all of one type; none exactly where it acts on whole
+    /// messages.
+    pub places: Vec<Vec<Step>>,
+}
+
+/// One step into a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Step {
+    /// The field of this name.
+    Field(String),
+    /// The element of a list at this position, from 0.
+    Element(u32),
+    /// Each element of a list.
+    Each,
+}
+
+/// What an operation does to the messages of its topic. What its parameters are, the plan's
+/// kinds of the same names say.
 #[derive(Debug, Clone, PartialEq)]
 pub enum OperationKind {
-    /// Replaces or shifts a number by a fresh uniform draw per message.
+    /// Replaces or shifts numbers and points by fresh uniform draws per message.
     RandomValue {
         /// Whether the draw replaces the value or is added to it.
         mode: ValueMode,
-        /// What is permitted, in the field's unit.
-        range: Range,
-        /// The field's unit.
-        unit: Option<Unit>,
-        /// Whether the field is a whole number; the ends of the range then are whole as well.
+        /// Whether the values are whole numbers; the ends of the range then are whole as well.
         integer: bool,
     },
-    /// Drops each message independently.
-    PacketLoss {
-        /// Permitted probabilities to drop, within `0..=1`.
-        loss: Range,
+    /// Replaces texts by a fresh draw per message.
+    RandomText {
+        /// What is drawn from: at least one, none twice.
+        texts: Vec<String>,
     },
+    /// Replaces values by one and the same.
+    StuckAt {
+        /// The truth value, where that is what is replaced.
+        truth: Option<bool>,
+    },
+    /// Adds one and the same.
+    Bias,
+    /// Adds what grows with the time since the operation went on.
+    Drift,
+    /// Adds a fresh normal draw per message.
+    Noise,
+    /// Multiplies.
+    Scale,
+    /// Replaces reals by what is no finite number.
+    NotFinite {
+        /// By what.
+        number: NotFinite,
+    },
+    /// Repeats the values that were there last before the operation went on.
+    Freeze,
+    /// Replaces values by those that were there some time ago.
+    Stale,
+    /// Adds to time stamps.
+    ClockSkew,
+    /// Drops each message independently.
+    PacketLoss,
+    /// Drops messages in bursts.
+    BurstLoss,
+    /// Drops what comes sooner than a rate permits.
+    RateLimit,
     /// Delays each message, order kept.
     Latency {
-        /// Permitted delays in seconds, not negative.
-        delay: Range,
         /// How each message's delay is drawn.
         distribution: Distribution,
         /// What becomes of held messages when the window ends.
         drain: Drain,
     },
+    /// Delays each message by a time of its own, order not kept.
+    Reorder {
+        /// What becomes of held messages when the window ends.
+        drain: Drain,
+    },
+    /// Sends copies after each message.
+    Duplicate,
     /// Drops every message.
     Blackhole,
     /// Calls the user's code.
     Custom {
         /// When.
         moment: Moment,
-        /// Its parameters in declaration order; names are distinct.
-        parameters: Vec<Parameter>,
     },
+}
+
+impl OperationKind {
+    /// Whether its parameters are probabilities: percentages in the language, fractions in the model.
+    pub fn has_probabilities(&self) -> bool {
+        matches!(self, OperationKind::PacketLoss | OperationKind::BurstLoss)
+    }
+}
+
+/// What is no finite number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NotFinite {
+    /// Not a number.
+    Nan,
+    /// Larger than every number.
+    Infinity,
+    /// Smaller than every number.
+    MinusInfinity,
 }
 
 /// When the code of a custom operation is called.
@@ -129,6 +174,8 @@ pub enum Distribution {
     Fixed,
     /// Uniform over the test's sub-range, drawn anew per message.
     Uniform,
+    /// Normal inside the test's sub-range, drawn anew per message.
+    Normal,
 }
 
 /// What becomes of held messages when an operation's window ends.

@@ -60,6 +60,14 @@ id!(
     /// A campaign of the space.
     CampaignId
 );
+id!(
+    /// A runtime monitor of the space.
+    EddiId
+);
+id!(
+    /// A physical lab of the space.
+    PhysicalId
+);
 
 /// A list whose positions have a type of their own. Iteration is in the order of insertion.
 #[derive(Debug, Clone, PartialEq)]

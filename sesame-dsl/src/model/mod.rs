@@ -6,11 +6,13 @@
 
 mod campaign;
 pub mod condition;
+pub mod eddi;
 mod exploration;
 mod formula;
 mod fuzz;
 mod ids;
 mod measure;
+pub mod physical;
 mod system;
 mod temporal;
 
@@ -23,7 +25,9 @@ pub use measure::*;
 pub use system::*;
 pub use temporal::*;
 
-use crate::span::Span;
+use std::collections::BTreeMap;
+
+use crate::span::{FileId, Span};
 
 /// A whole space.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +36,8 @@ pub struct Space {
     pub declaration: Declaration,
     /// The simulator under test.
     pub simulator: Simulator,
+    /// What the system needs beside it, and what a relay may cost.
+    pub surroundings: Surroundings,
     /// Message types, each after the types it contains, otherwise in declaration order.
     pub messages: Arena<MessageId, Message>,
     /// Topics, in declaration order.
@@ -48,12 +54,23 @@ pub struct Space {
     pub tests: Arena<TestId, Test>,
     /// Campaigns, in declaration order.
     pub campaigns: Arena<CampaignId, Campaign>,
+    /// Runtime monitors, in declaration order.
+    pub eddis: Arena<EddiId, eddi::Eddi>,
+    /// Physical labs, in declaration order.
+    pub physicals: Arena<PhysicalId, physical::Physical>,
+    /// The names of the files it is declared in, as seen from the folder of the first.
+    pub files: BTreeMap<FileId, String>,
 }
 
 impl Space {
     /// The campaign of a name.
     pub fn campaign(&self, name: &str) -> Option<CampaignId> {
         self.campaigns.iter().find(|(_, campaign)| campaign.declaration.name == name).map(|(id, _)| id)
+    }
+
+    /// The file that something is declared in, as seen from the folder of the space's own file.
+    pub fn file_of(&self, declaration: &Declaration) -> &str {
+        self.files.get(&declaration.span.file).map_or("", String::as_str)
     }
 }
 

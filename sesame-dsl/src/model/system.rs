@@ -1,6 +1,7 @@
 //! The system under test: simulator, messages, topics, nodes.
 
 use super::{Declaration, MessageId, TopicId};
+use crate::span::Span;
 use crate::units::Unit;
 
 /// The simulator under test.
@@ -34,6 +35,57 @@ pub enum Transport {
         /// Simulation time of one step, in nanoseconds; positive.
         step_ns: u64,
     },
+}
+
+/// What a system says beside its simulator.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Surroundings {
+    /// What starts it.
+    pub launch: Option<Launch>,
+    /// What ends it.
+    pub terminate: Option<Command>,
+    /// What the relay may add to a message's way.
+    pub relay_budget: Option<RelayBudget>,
+}
+
+/// A program that starts the system.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Launch {
+    /// The program.
+    pub command: Command,
+    /// When the system counts as ready; `None` is at once.
+    pub ready: Option<Ready>,
+}
+
+/// A program to run, without a shell.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Command {
+    /// Its keyword in the file.
+    pub span: Span,
+    /// A name to be found on `PATH`, or a path with `/` in it, relative to the folder of the `.sesame` file.
+    pub program: String,
+    /// Its arguments, none empty.
+    pub arguments: Vec<String>,
+}
+
+/// When a launched system is ready: at the first message of a topic.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ready {
+    /// The topic.
+    pub topic: TopicId,
+    /// Wall time after which it has failed to start, in seconds; positive.
+    pub within: f64,
+}
+
+/// What a relay may add to a message's way, in seconds of wall time; 0 or more.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RelayBudget {
+    /// The keyword in the file.
+    pub span: Span,
+    /// Delay at most.
+    pub latency: Option<f64>,
+    /// Difference of two delays at most.
+    pub jitter: Option<f64>,
 }
 
 /// A named message type.

@@ -2,7 +2,9 @@
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, Activation, ActivationMode, Content, Id as _, MetricId, OperationId, Search, TestId};
+use crate::model::{
+    self, Activation, ActivationMode, CampaignId, Content, Id as _, MetricId, OperationId, Search, TestId,
+};
 use crate::span::Span;
 use crate::syntax::ast::{self, Count, Strategy};
 use crate::units::Unit;
@@ -17,6 +19,10 @@ impl<'a> Resolver<'a> {
     }
 
     fn campaign(&mut self, campaign: &'a ast::Campaign) -> Option<model::Campaign> {
+        let from = match &campaign.from {
+            Some(from) => self.find(from, Kind::Campaign).map(|index| Some(CampaignId::from_index(index))),
+            None => Some(None),
+        };
         let end_after = self.end(campaign);
         let objectives = self.objectives(campaign);
         let observed = match self.single(&campaign.observes, "observes") {
@@ -27,6 +33,8 @@ impl<'a> Resolver<'a> {
         self.at_most_one(&searches, "search");
         let repeats: Vec<Span> = campaign.repeats.iter().map(|repeat| repeat.span).collect();
         self.at_most_one(&repeats, "repeat");
+        let passives: Vec<Span> = campaign.passives.iter().map(|passive| passive.span).collect();
+        self.at_most_one(&passives, "passive");
         let activation = match self.single(&campaign.activates, "activate") {
             Some(ast::ActivationMode::Condition(by)) => self.condition_space(by).map(ActivationMode::Condition),
             Some(ast::ActivationMode::Time) | None => Some(ActivationMode::Time),
@@ -39,18 +47,25 @@ impl<'a> Resolver<'a> {
         let coverage = self.coverage(campaign);
         let exploration = self.exploration(campaign);
         let stop = self.stop(campaign);
-        let (search, seed) = match (campaign.searches.first(), campaign.repeats.first()) {
-            (_, Some(repeat)) => {
-                self.only_repeats(campaign, repeat);
+        let found = (campaign.searches.first(), campaign.repeats.first(), campaign.passives.first());
+        let (search, seed) = match found {
+            (_, repeat, Some(passive)) => {
+                self.only_observes(campaign, passive, repeat.map(|repeat| repeat.span));
+                let times = self.count(passive.times, 1, "the system is observed");
+                (times.map(|times| Search::Passive { times }), self.seed(&passive.seed))
+            }
+            (_, Some(repeat), None) => {
+                self.only_repeats(campaign, repeat.span, "a campaign that repeats a test", "repeats here");
                 let search = self.repeat(repeat, end_after);
                 (search, self.seed(&repeat.seed))
             }
-            (Some(search), None) => (self.search(campaign, search, content), self.seed(&search.seed)),
-            (None, None) => {
+            (Some(search), None, None) => (self.search(campaign, search, content), self.seed(&search.seed)),
+            (None, None, None) => {
                 if !campaign.damaged {
-                    let title = format!("campaign `{}` neither searches nor repeats", campaign.head.name.text);
+                    let title =
+                        format!("campaign `{}` neither searches nor repeats nor observes", campaign.head.name.text);
                     let diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, campaign.head.name.span, title)
-                        .label("add `search` or `repeat`")
+                        .label("add `search`, `repeat` or `passive`")
                         .note("for example `search nsga2 { population 10  evaluations 200  seed 42 }`");
                     self.report(diagnostic);
                 }
@@ -61,6 +76,7 @@ impl<'a> Resolver<'a> {
         let metric_ids = |found: Vec<usize>| found.into_iter().map(MetricId::from_index).collect();
         Some(model::Campaign {
             declaration: self.declaration(&campaign.head),
+            from: from?,
             objectives: metric_ids(objectives?),
             observed: metric_ids(observed?),
             search: search?,
@@ -91,15 +107,19 @@ impl<'a> Resolver<'a> {
 
     fn objectives(&mut self, campaign: &'a ast::Campaign) -> Option<Vec<usize>> {
         let Some(names) = self.single(&campaign.objectives, "objectives") else {
-            if campaign.repeats.is_empty() && !campaign.searches.is_empty() && !campaign.damaged {
+            if campaign.repeats.is_empty()
+                && campaign.passives.is_empty()
+                && !campaign.searches.is_empty()
+                && !campaign.damaged
+            {
                 self.missing(&campaign.head.name, "its objectives", "objectives fuzzing_time, collision_occurrence");
             }
             return Some(vec![]);
         };
         let found = self.find_all(names, Kind::Metric);
         let mut complete = true;
-        // A repetition optimises nothing, which is reported as that.
-        for name in names.iter().filter(|_| campaign.repeats.is_empty()) {
+        // A campaign without a search optimises nothing, which is reported as that.
+        for name in names.iter().filter(|_| campaign.repeats.is_empty() && campaign.passives.is_empty()) {
             let Some(definition) = self.names.get(name.text.as_str()).copied() else { continue };
             if definition.kind != Kind::Metric {
                 continue;
@@ -132,7 +152,11 @@ impl<'a> Resolver<'a> {
         let spans: Vec<Span> = campaign.operations.iter().map(|it| it.span).collect();
         self.at_most_one(&spans, "operations");
         let Some(operations) = campaign.operations.first() else {
-            if campaign.repeats.is_empty() && !campaign.searches.is_empty() && !campaign.damaged {
+            if campaign.repeats.is_empty()
+                && campaign.passives.is_empty()
+                && !campaign.searches.is_empty()
+                && !campaign.damaged
+            {
                 self.missing(&campaign.head.name, "the operations of its tests", "operations jitter 1..5 per test");
             }
             return None;
@@ -146,7 +170,9 @@ impl<'a> Resolver<'a> {
             if let Some(end) = end_after {
                 self.window_and_end(name, definition.index, end, campaign);
             }
-            if let Some(ActivationMode::Condition(space)) = &activation {
+            // As above: the campaign that wrote both says it.
+            let told = campaign.inherited.operations && campaign.inherited.activate;
+            if let (Some(ActivationMode::Condition(space)), false) = (&activation, told) {
                 self.constraints_and_space(name, definition.index, space, campaign);
             }
         }
@@ -167,6 +193,10 @@ impl<'a> Resolver<'a> {
 
     /// Compares the permitted window of an operation with the end of a campaign that uses it.
     fn window_and_end(&mut self, name: &ast::Name, index: usize, end: f64, campaign: &'a ast::Campaign) {
+        // It was said of the campaign that wrote both.
+        if campaign.inherited.operations && campaign.inherited.end {
+            return;
+        }
         let Some(within) = self.operations[index].as_ref().and_then(|operation| operation.within) else { return };
         let Some(body) = &self.file.operations[index].body else { return };
         let Some((_, written)) = body.within.first() else { return };
@@ -288,7 +318,19 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    fn only_repeats(&mut self, campaign: &'a ast::Campaign, repeat: &ast::Repeat) {
+    /// A campaign without disturbances has nothing that makes some.
+    fn only_observes(&mut self, campaign: &'a ast::Campaign, passive: &ast::Passive, repeats: Option<Span>) {
+        self.only_repeats(campaign, passive.span, "a campaign that only observes", "observes here");
+        if let Some(repeat) = repeats {
+            let title = "a campaign that only observes repeats no test";
+            let diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, repeat, title)
+                .label("a test disturbs")
+                .also(passive.span, "observes here");
+            self.report(diagnostic);
+        }
+    }
+
+    fn only_repeats(&mut self, campaign: &'a ast::Campaign, place: Span, who: &str, here: &str) {
         let by_condition =
             campaign.activates.iter().find(|(_, mode)| matches!(mode, ast::ActivationMode::Condition(_)));
         let clauses = [
@@ -302,10 +344,10 @@ impl<'a> Resolver<'a> {
         ];
         for (span, word) in clauses {
             let Some(span) = span else { continue };
-            let title = format!("a campaign that repeats a test has no `{word}`");
+            let title = format!("{who} has no `{word}`");
             let mut diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, span, title)
-                .label("a campaign either searches or repeats")
-                .also(repeat.span, "repeats here");
+                .label("a campaign either searches or repeats or observes")
+                .also(place, here);
             if word == "objectives" {
                 diagnostic = diagnostic.suggest("measure them with", span, "observes");
             }
@@ -326,7 +368,8 @@ impl<'a> Resolver<'a> {
         match u32::try_from(value) {
             Ok(found) if found >= min => Some(found),
             Ok(_) => {
-                let times = if what.ends_with("repeated") || what.ends_with("activated") { " times" } else { "" };
+                let repetition = ["repeated", "observed", "activated"].iter().any(|word| what.ends_with(word));
+                let times = if repetition { " times" } else { "" };
                 let title = format!("{what} at least {min}{times}, not {value}{times}");
                 let diagnostic = Diagnostic::new(Code::BAD_COUNT, count.span, title);
                 self.report(diagnostic.label(format!("expected {min} or more")));

@@ -12,7 +12,8 @@ use crate::syntax::ast::{self, Head, Simulator, System};
 impl<'a> Resolver<'a> {
     pub(super) fn collect(&mut self) {
         let mut heads = self.heads();
-        heads.sort_by_key(|(_, _, head)| head.name.span);
+        // An imported name is there before those of the file that imports it.
+        heads.sort_by_key(|(_, _, head)| (self.ranks.get(&head.name.span.file).copied(), head.name.span));
         for &(kind, index, head) in &heads {
             let name = head.name.text.as_str();
             let Some(first) = self.names.get(name).copied() else {
@@ -49,6 +50,8 @@ impl<'a> Resolver<'a> {
         add(Kind::Operation, file.operations.iter().map(|it| &it.head).collect());
         add(Kind::Test, file.tests.iter().map(|it| &it.head).collect());
         add(Kind::Campaign, file.campaigns.iter().map(|it| &it.head).collect());
+        add(Kind::Eddi, file.eddis.iter().map(|it| &it.head).collect());
+        add(Kind::Physical, file.physicals.iter().map(|it| &it.head).collect());
         heads
     }
 
@@ -104,7 +107,8 @@ impl<'a> Resolver<'a> {
     fn required(&mut self) {
         let start = Span { file: self.root, lo: 0, hi: 0 };
         let file = self.file;
-        if file.spaces.is_empty() && !file.damaged {
+        let damaged = file.damaged || file.incomplete;
+        if file.spaces.is_empty() && !damaged {
             let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, start, "this file names no space")
                 .label("expected `space` and a name")
                 .note("for example `space kuka_cell`");
@@ -112,19 +116,24 @@ impl<'a> Resolver<'a> {
         }
         let spaces: Vec<Span> = file.spaces.iter().map(|head| head.name.span).collect();
         self.only_one(&spaces, "space");
-        let systems: Vec<Span> = file.systems.iter().map(|system| system.span).collect();
-        self.only_one(&systems, "system");
+        for &id in self.ranks.keys() {
+            let systems = file.systems.iter().map(|system| system.span).filter(|span| span.file == id);
+            let systems: Vec<Span> = systems.collect();
+            self.only_one(&systems, "system");
+        }
         let simulators: Vec<Span> = self.simulators().map(|simulator| simulator.head.name.span).collect();
         self.only_one(&simulators, "simulator");
         match file.systems.first() {
-            None if !file.damaged => {
+            None if !damaged => {
                 let at = spaces.first().copied().unwrap_or(start);
                 let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, at, "this space has no system")
                     .label("nothing says what is tested")
                     .note("a `system { … }` declares simulator, messages, topics and nodes");
                 self.report(diagnostic);
             }
-            Some(System { span, damaged: false, .. }) if simulators.is_empty() => {
+            Some(System { span, .. })
+                if simulators.is_empty() && !file.incomplete && !file.systems.iter().any(|system| system.damaged) =>
+            {
                 let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, *span, "this system has no simulator")
                     .label("nothing runs it")
                     .note(
@@ -138,7 +147,7 @@ impl<'a> Resolver<'a> {
 
     fn only_one(&mut self, spans: &[Span], what: &str) {
         for &again in spans.iter().skip(1) {
-            let holder = if what == "space" { "a file" } else { "a space" };
+            let holder = if what == "simulator" { "a space" } else { "a file" };
             let title = format!("{holder} has one {what}, and this is another");
             let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, again, title)
                 .label("remove it, or move it to a file of its own")

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, Domain, FieldPath, Moment, OperationKind, Parameter, Shape};
+use crate::model::{self, Domain, Moment, OperationKind, Parameter, Shape, Target};
 use crate::span::Span;
 use crate::syntax::ast;
 use crate::units::Unit;
@@ -14,7 +14,7 @@ impl<'a> Resolver<'a> {
         &mut self,
         custom: &'a ast::Custom,
         body: &'a ast::OperationBody,
-    ) -> Option<(Option<FieldPath>, OperationKind)> {
+    ) -> Option<(Option<Target>, OperationKind, Vec<Parameter>)> {
         let parameters = self.custom_parameters(custom);
         let (target, moment) = match (&body.target, custom.moment) {
             (Some(topic), None) => (Some(self.whole_messages(topic, "a custom operation takes")?), Moment::OnMessage),
@@ -47,7 +47,7 @@ impl<'a> Resolver<'a> {
             self.report(Diagnostic::new(Code::BAD_WINDOW, *span, title).label("leave this out"));
             return None;
         }
-        Some((target, OperationKind::Custom { moment, parameters: parameters? }))
+        Some((target, OperationKind::Custom { moment }, parameters?))
     }
 
     fn custom_parameters(&mut self, custom: &'a ast::Custom) -> Option<Vec<Parameter>> {
@@ -86,26 +86,14 @@ impl<'a> Resolver<'a> {
                         return None;
                     }
                 }
+                self.one_value(permitted, range.span);
                 Some((unit, Domain::Number { range: permitted, shape: Shape::Value, integer: *integer }))
             }
             ast::Domain::Point { unit, corners } => {
                 let [low, high] = &**corners;
                 let [of_low, of_high] = [low, high].map(|point| point.coordinates[0].unit.as_ref());
                 let unit = self.declared_unit([unit.as_ref(), of_low, of_high])?;
-                let from = self.coordinates(low, unit.as_ref(), what);
-                let to = self.coordinates(high, unit.as_ref(), what);
-                let [from, to] = [from?, to?];
-                for axis in 0..3 {
-                    if from[axis] > to[axis] {
-                        let [a, b] = [low, high].map(|point| self.text(point.coordinates[axis].span).to_owned());
-                        let title = format!("this box is reversed on its {} axis", ["x", "y", "z"][axis]);
-                        let diagnostic =
-                            Diagnostic::new(Code::REVERSED_RANGE, low.coordinates[axis].span.to(high.span), title)
-                                .label(format!("`{a}` is more than `{b}`"));
-                        self.report(diagnostic);
-                        return None;
-                    }
-                }
+                let (from, to) = self.corners(corners, unit.as_ref(), what)?;
                 Some((unit, Domain::Point { low: from, high: to }))
             }
             ast::Domain::Texts(texts) => Some((None, Domain::Texts(self.items(texts)?))),
@@ -115,6 +103,30 @@ impl<'a> Resolver<'a> {
                 (good == texts.len()).then_some((None, Domain::Files(paths)))
             }
         }
+    }
+
+    /// Two opposite corners of a box in a unit, the lower one first.
+    pub(super) fn corners(
+        &mut self,
+        corners: &[ast::Point; 2],
+        unit: Option<&Unit>,
+        what: &str,
+    ) -> Option<([f64; 3], [f64; 3])> {
+        let [low, high] = corners;
+        let from = self.coordinates(low, unit, what);
+        let to = self.coordinates(high, unit, what);
+        let [from, to] = [from?, to?];
+        for axis in 0..3 {
+            if from[axis] > to[axis] {
+                let [a, b] = [low, high].map(|point| self.text(point.coordinates[axis].span).to_owned());
+                let title = format!("this box is reversed on its {} axis", ["x", "y", "z"][axis]);
+                let diagnostic = Diagnostic::new(Code::REVERSED_RANGE, low.coordinates[axis].span.to(high.span), title)
+                    .label(format!("`{a}` is more than `{b}`"));
+                self.report(diagnostic);
+                return None;
+            }
+        }
+        Some((from, to))
     }
 
     /// The first unit that is written, if any is; the outer `None` for one that does not exist.
@@ -144,7 +156,7 @@ impl<'a> Resolver<'a> {
         Some(coordinates)
     }
 
-    fn items(&mut self, texts: &'a [ast::Text]) -> Option<Vec<String>> {
+    pub(super) fn items(&mut self, texts: &'a [ast::Text]) -> Option<Vec<String>> {
         let mut first: BTreeMap<&str, Span> = BTreeMap::new();
         let mut complete = true;
         for text in texts {
@@ -180,7 +192,7 @@ impl<'a> Resolver<'a> {
         index: usize,
         operation: &model::Operation,
     ) -> bool {
-        let OperationKind::Custom { moment, .. } = &operation.kind else {
+        let OperationKind::Custom { moment } = &operation.kind else {
             return self.no_moment(test, index);
         };
         let declared = match moment {

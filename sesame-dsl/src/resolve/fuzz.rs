@@ -3,9 +3,7 @@
 use super::quantity::percent;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{
-    self, Activation, Choice, Distribution, Domain, Drain, Id as _, OperationId, OperationKind, Parameter, Range, Shape,
-};
+use crate::model::{self, Activation, Choice, Domain, Id as _, OperationId, OperationKind, Parameter, Range, Shape};
 use crate::span::Span;
 use crate::syntax::ast;
 use crate::units::{Unit, convert};
@@ -33,83 +31,55 @@ impl<'a> Resolver<'a> {
             Some(quantity) => self.inclusion(quantity),
             None => Some(1.0),
         };
+        self.at_most_one(&body.untimed, "untimed");
+        self.between_nodes(body);
         let constraints = self.constraints(&body.contains);
-        let (target, kind) = what?;
+        let (target, kind, parameters) = what?;
         Some(model::Operation {
             declaration: self.declaration(&operation.head),
             target,
             kind,
+            parameters,
             within: within?,
             priority: priority?,
             inclusion: inclusion?,
+            timed: body.untimed.is_empty(),
             constraints: constraints?,
         })
     }
 
-    fn target_and_kind(&mut self, body: &'a ast::OperationBody) -> Option<(Option<model::FieldPath>, OperationKind)> {
+    fn target_and_kind(
+        &mut self,
+        body: &'a ast::OperationBody,
+    ) -> Option<(Option<model::Target>, OperationKind, Vec<Parameter>)> {
         if let ast::OperationKind::Custom(custom) = &body.kind {
             return self.custom(custom, body);
         }
         let target = body.target.as_ref().expect("the grammar gives all kinds but custom ones a topic");
-        let (target, kind) = self.disturbance(target, body)?;
-        Some((Some(target), kind))
+        let (target, kind, parameters) = self.disturbance(target, &body.kind)?;
+        let mut said: Vec<Span> = Vec::new();
+        for parameter in &parameters {
+            let (Domain::Number { range, .. }, Some(span)) = (&parameter.domain, body.kind.written(&parameter.name))
+            else {
+                continue;
+            };
+            // The axes of a box may be fixed, as long as one is not.
+            let of_box = |it: &Parameter| matches!(&it.domain, Domain::Number { range, .. } if range.low < range.high);
+            if !said.contains(&span) && (parameter.name != "x" || !parameters.iter().any(of_box)) {
+                self.one_value(*range, span);
+            }
+            said.push(span);
+        }
+        Some((Some(target), kind, parameters))
     }
 
-    fn disturbance(
-        &mut self,
-        target: &'a ast::Path,
-        body: &'a ast::OperationBody,
-    ) -> Option<(model::FieldPath, OperationKind)> {
-        match &body.kind {
-            ast::OperationKind::Random { absolute, range } => {
-                let (field, unit, integer) = self.number_field(target, "a random value")?;
-                let what = format!("`{}`", self.text(target.span));
-                let permitted = self.range(range, unit.as_ref(), &what)?;
-                if integer {
-                    let low = self.whole(permitted.low, range.low.span, &what);
-                    if !self.whole(permitted.high, range.high.span, &what) || !low {
-                        return None;
-                    }
-                }
-                let mode = if *absolute { model::ValueMode::Absolute } else { model::ValueMode::Offset };
-                Some((field, OperationKind::RandomValue { mode, range: permitted, integer, unit }))
-            }
-            ast::OperationKind::PacketLoss(range) => {
-                let field = self.whole_messages(target, "packet loss drops");
-                let loss = self.probabilities(range, "the loss")?;
-                Some((field?, OperationKind::PacketLoss { loss }))
-            }
-            ast::OperationKind::Latency { range, uniform, drain } => {
-                let field = self.whole_messages(target, "latency delays");
-                self.at_most_one(uniform, "uniform");
-                let drain = match self.single(drain, "drain") {
-                    None | Some(ast::Drain::Finish) => Drain::Finish,
-                    Some(ast::Drain::Flush) => Drain::Flush,
-                    Some(ast::Drain::Drop) => Drain::Drop,
-                };
-                let distribution = if uniform.is_empty() { Distribution::Fixed } else { Distribution::Uniform };
-                let delay = self.times(range, "the delay")?;
-                Some((field?, OperationKind::Latency { delay, distribution, drain }))
-            }
-            ast::OperationKind::Blackhole => {
-                Some((self.whole_messages(target, "a blackhole drops")?, OperationKind::Blackhole))
-            }
-            ast::OperationKind::Custom(_) => unreachable!("custom operations are resolved apart"),
+    /// A range without width leaves nothing to choose.
+    pub(super) fn one_value(&mut self, found: Range, span: Span) {
+        if found.low == found.high {
+            let title = "this range has one value only";
+            let diagnostic = Diagnostic::new(Code::ONE_VALUE, span, title);
+            self.report(diagnostic.label("tests have nothing to choose here"));
         }
-    }
-
-    pub(super) fn whole_messages(&mut self, path: &'a ast::Path, does: &str) -> Option<model::FieldPath> {
-        let (target, _) = self.field(path)?;
-        if target.fields.is_empty() {
-            return Some(target);
-        }
-        let fields = Span { lo: path.topic.span.hi, ..path.span };
-        let diagnostic =
-            Diagnostic::new(Code::WRONG_TYPE, fields, format!("{does} whole messages, not a field of them"))
-                .label("expected a topic")
-                .suggest("leave the field out", fields, "");
-        self.report(diagnostic);
-        None
     }
 
     fn within(&mut self, range: &ast::Range) -> Option<Range> {
@@ -241,7 +211,7 @@ impl<'a> Resolver<'a> {
         operation: &model::Operation,
     ) -> Option<Vec<Choice>> {
         let name = &test.operation.text;
-        let parameters = operation.parameters();
+        let parameters = &operation.parameters;
         if parameters.is_empty() {
             let Some((word, choice)) = test.choices.first() else { return Some(Vec::new()) };
             let title = format!("`{name}` has no parameter to choose");
@@ -252,7 +222,7 @@ impl<'a> Resolver<'a> {
         let named = |name: &str| parameters.iter().any(|parameter| parameter.name == name);
         let mut unknown = test.choices.iter().filter(|(word, _)| !named(&word.text));
         let mut choices = Vec::new();
-        for parameter in &parameters {
+        for parameter in parameters {
             let example = example(parameter, &operation.kind);
             let mut written = test.choices.iter().filter(|(word, _)| word.text == parameter.name);
             let Some((_, choice)) = written.next() else {
@@ -273,14 +243,14 @@ impl<'a> Resolver<'a> {
             };
             for (again, _) in written {
                 let title = format!("`{}` is chosen twice", again.text);
-                let label = self.has_parameters(&parameters);
+                let label = self.has_parameters(parameters);
                 self.report(Diagnostic::new(Code::CLAUSE_TWICE, again.span, title).label(label));
             }
-            choices.extend(self.chosen(choice, index, parameter, &example));
+            choices.extend(self.chosen(choice, index, operation, parameter, &example));
         }
         for (other, _) in unknown {
             let title = format!("`{name}` has no parameter named `{}`", other.text);
-            let label = self.has_parameters(&parameters);
+            let label = self.has_parameters(parameters);
             self.report(Diagnostic::new(Code::WRONG_CHOICE, other.span, title).label(label));
         }
         (choices.len() == parameters.len()).then_some(choices)
@@ -297,7 +267,14 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    fn chosen(&mut self, choice: &ast::Choice, index: usize, parameter: &Parameter, example: &str) -> Option<Choice> {
+    fn chosen(
+        &mut self,
+        choice: &ast::Choice,
+        index: usize,
+        operation: &model::Operation,
+        parameter: &Parameter,
+        example: &str,
+    ) -> Option<Choice> {
         let what = format!("`{}`", parameter.name);
         let span = choice.span();
         match (choice, &parameter.domain) {
@@ -330,7 +307,8 @@ impl<'a> Resolver<'a> {
                 None
             }
             (ast::Choice::Value(_) | ast::Choice::Range(_), Domain::Number { range, shape, integer }) => {
-                self.chosen_number(choice, index, parameter, (*range, *shape, *integer), example)
+                let probability = operation.kind.has_probabilities();
+                self.chosen_number(choice, index, (parameter, probability), (*range, *shape, *integer), example)
             }
             (_, domain) => {
                 let kind = match domain {
@@ -350,12 +328,11 @@ impl<'a> Resolver<'a> {
         &mut self,
         choice: &ast::Choice,
         index: usize,
-        parameter: &Parameter,
+        (parameter, probability): (&Parameter, bool),
         (permitted_range, shape, integer): (Range, Shape, bool),
         example: &str,
     ) -> Option<Choice> {
         // Probabilities are percentages in the language and fractions in the model.
-        let probability = matches!(self.file.operations[index].body.as_ref()?.kind, ast::OperationKind::PacketLoss(_));
         let hundred = percent();
         let unit = if probability { Some(&hundred) } else { parameter.unit.as_ref() };
         let what = format!("`{}`", parameter.name);
@@ -404,20 +381,17 @@ impl<'a> Resolver<'a> {
     /// Where it is written what a parameter of an operation may be.
     fn declared(&self, index: usize, parameter: &Parameter) -> Option<Span> {
         match &self.file.operations[index].body.as_ref()?.kind {
-            ast::OperationKind::Random { range, .. }
-            | ast::OperationKind::PacketLoss(range)
-            | ast::OperationKind::Latency { range, .. } => Some(range.span),
-            ast::OperationKind::Blackhole => None,
             ast::OperationKind::Custom(custom) => {
                 custom.parameters.iter().find(|written| written.name.text == parameter.name).map(|written| written.span)
             }
+            kind => kind.written(&parameter.name),
         }
     }
 }
 
 /// A choice as the language writes it.
 fn example(parameter: &Parameter, kind: &OperationKind) -> String {
-    let probability = matches!(kind, OperationKind::PacketLoss { .. });
+    let probability = kind.has_probabilities();
     let unit = parameter.unit.as_ref().map_or("", Unit::text);
     let number = |value: f64| {
         if probability { format!("{}%", convert(value, None, Some(&percent()))) } else { format!("{value}{unit}") }

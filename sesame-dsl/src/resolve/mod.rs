@@ -3,8 +3,11 @@
 //! 1. [`collect`] has who is called what, doubles, and what a space cannot do without
 //! 2. [`system`] has message types (in an order in which each follows those it contains), topics, nodes, the simulator
 //! 3. [`measure`] has metrics (their formulas in [`formula`]) and requirements
-//! 4. [`fuzz`] has operations and known tests
-//! 5. [`campaign`] has campaigns; [`condition`] the conditions of tests and what those of campaigns are made of
+//! 4. [`fuzz`] has operations ([`disturbance`] what they disturb and permit, [`custom`] those in the user's code) and known
+//!    tests
+//! 5. [`campaign`] has campaigns, whose inherited clauses [`inherit`] has put in their places before all else;
+//!    [`condition`] the conditions of tests and what those of campaigns are made of
+//! 6. [`eddi`] has runtime monitors, [`physical`] labs, and [`surroundings`] what a system says beside its simulator
 //!
 //! Each pass reports all it finds. A declaration with a mistake is `None` from then on, and whoever mentions it says
 //! nothing: so one mistake is one diagnostic.
@@ -14,36 +17,46 @@ mod collect;
 mod condition;
 mod coverage;
 mod custom;
+mod disturbance;
+mod eddi;
 mod exploration;
 mod formula;
 mod fuzz;
+mod inherit;
 mod measure;
+mod nodes;
+mod physical;
 mod quantity;
 mod robustness;
 mod stop;
+mod surroundings;
 mod system;
 mod truth;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::diagnostic::{Code, Diagnostic, Severity};
+use crate::import::Merged;
 use crate::model::{self, Arena, Declaration, Id, Space};
 use crate::similar::most_similar;
 use crate::source::SourceMap;
 use crate::span::{FileId, Span};
 use crate::syntax::ast::{self, Name};
 
-/// Resolves a file. `None` exactly when there is an error, be it in `diagnostics` before or after.
+/// Resolves the files of a space. `None` exactly when there is an error, be it in `diagnostics` before or after.
 pub(crate) fn resolve(
     sources: &SourceMap,
     root: FileId,
-    file: &ast::File,
+    merged: Merged,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<Space> {
+    let Merged { mut file, names, ranks } = merged;
+    inherit::inherit(&mut file, diagnostics);
     let mut resolver = Resolver {
         sources,
         root,
-        file,
+        ranks: &ranks,
+        file: &file,
         diagnostics,
         names: BTreeMap::new(),
         silent: BTreeSet::new(),
@@ -54,11 +67,14 @@ pub(crate) fn resolve(
     };
     resolver.collect();
     let simulator = resolver.system();
+    let surroundings = resolver.surroundings();
     resolver.metrics();
     let requirements = resolver.requirements();
     resolver.operations();
     resolver.tests();
     let campaigns = resolver.campaigns();
+    let eddis = resolver.eddis();
+    let physicals = resolver.physicals();
 
     let Resolver { system, metrics, operations, tests, diagnostics, .. } = resolver;
     if diagnostics.iter().any(|diagnostic| diagnostic.severity() == Severity::Error) {
@@ -68,6 +84,7 @@ pub(crate) fn resolve(
     Some(Space {
         declaration: declaration(sources, file.spaces.first()?),
         simulator: simulator?,
+        surroundings: surroundings?,
         messages: arena(system.messages)?,
         topics: arena(system.topics)?,
         nodes: arena(system.nodes)?,
@@ -76,6 +93,9 @@ pub(crate) fn resolve(
         operations: arena(operations)?,
         tests: arena(tests)?,
         campaigns: arena(campaigns)?,
+        eddis: arena(eddis)?,
+        physicals: arena(physicals)?,
+        files: names,
     })
 }
 
@@ -108,6 +128,8 @@ enum Kind {
     Operation,
     Test,
     Campaign,
+    Eddi,
+    Physical,
 }
 
 impl Kind {
@@ -122,6 +144,8 @@ impl Kind {
             Kind::Operation => "operation",
             Kind::Test => "test",
             Kind::Campaign => "campaign",
+            Kind::Eddi => "monitor",
+            Kind::Physical => "lab",
         }
     }
 
@@ -152,6 +176,8 @@ struct SystemPart {
 struct Resolver<'a> {
     sources: &'a SourceMap,
     root: FileId,
+    /// The places of files in the order of declarations.
+    ranks: &'a BTreeMap<FileId, usize>,
     file: &'a ast::File,
     diagnostics: &'a mut Vec<Diagnostic>,
     names: BTreeMap<&'a str, Definition>,
@@ -194,6 +220,10 @@ impl<'a> Resolver<'a> {
             None => {}
         }
         self.silent.insert(&name.text);
+        // What an import that failed would have declared, nobody knows.
+        if self.file.incomplete {
+            return None;
+        }
         let known = self.names_of(kind);
         let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, format!("no {word} named `{}`", name.text))
             .label(format!("not {} of this space", kind.with_article()));

@@ -64,7 +64,7 @@ impl<'a> Resolver<'a> {
 
     /// A program is one text and each argument another. A path may hold spaces; with them it begins like `./my robots/`,
     /// so that a whole command line in one text is found out.
-    fn program(&mut self, program: &ast::Text) -> Option<String> {
+    pub(super) fn program(&mut self, program: &ast::Text) -> Option<String> {
         if program.text.trim().is_empty() {
             return None;
         }
@@ -285,6 +285,10 @@ impl<'a> Resolver<'a> {
         if self.names.contains_key(name.text.as_str()) || self.silent.contains(name.text.as_str()) {
             return self.find(name, Kind::Message);
         }
+        self.silent.insert(&name.text);
+        if self.file.incomplete {
+            return None;
+        }
         let messages = self.names_of(Kind::Message);
         let similar = ELSEWHERE
             .iter()
@@ -297,7 +301,6 @@ impl<'a> Resolver<'a> {
             Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
             None => diagnostic.note("types are `bool`, `int`, `real`, `text`, `point`, `list of …`, and messages"),
         };
-        self.silent.insert(&name.text);
         self.report(diagnostic);
         None
     }
@@ -372,34 +375,39 @@ impl<'a> Resolver<'a> {
         let mut ty = topic.ty.clone();
         let mut holder = format!("topic `{}`", path.topic.text);
         for name in &path.fields {
-            let Type::Message(id) = ty else {
-                let title = format!("{holder} has no fields");
-                let label = format!("it is {}", type_in_words(&ty));
-                self.report(Diagnostic::new(Code::WRONG_TYPE, name.span, title).label(label));
-                return None;
-            };
-            let message = self.system.messages[id.index()].as_ref()?;
-            let Some(field) = message.fields.iter().find(|field| field.declaration.name == name.text) else {
-                let known: Vec<&str> = message.fields.iter().map(|field| field.declaration.name.as_str()).collect();
-                let mut diagnostic = Diagnostic::new(
-                    Code::UNKNOWN_NAME,
-                    name.span,
-                    format!("message `{}` has no field named `{}`", message.declaration.name, name.text),
-                )
-                .label("no such field")
-                .also(message.declaration.span, "the message is declared here");
-                diagnostic = match most_similar(&name.text, known.iter().copied()) {
-                    Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
-                    None => diagnostic.note(format!("its fields are {}", super::list(&known))),
-                };
-                self.report(diagnostic);
-                return None;
-            };
+            ty = self.field_in(&ty, &holder, name)?;
             holder = format!("field `{}`", name.text);
-            ty = field.ty.clone();
         }
         let fields = path.fields.iter().map(|name| name.text.clone()).collect();
         Some((model::FieldPath { topic: TopicId::from_index(index), fields }, ty))
+    }
+
+    /// The type of a field of what `holder` has, which is of this type.
+    pub(super) fn field_in(&mut self, ty: &Type, holder: &str, name: &'a Name) -> Option<Type> {
+        let Type::Message(id) = ty else {
+            let title = format!("{holder} has no fields");
+            let label = format!("it is {}", type_in_words(ty));
+            self.report(Diagnostic::new(Code::WRONG_TYPE, name.span, title).label(label));
+            return None;
+        };
+        let message = self.system.messages[id.index()].as_ref()?;
+        let Some(field) = message.fields.iter().find(|field| field.declaration.name == name.text) else {
+            let known: Vec<&str> = message.fields.iter().map(|field| field.declaration.name.as_str()).collect();
+            let mut diagnostic = Diagnostic::new(
+                Code::UNKNOWN_NAME,
+                name.span,
+                format!("message `{}` has no field named `{}`", message.declaration.name, name.text),
+            )
+            .label("no such field")
+            .also(message.declaration.span, "the message is declared here");
+            diagnostic = match most_similar(&name.text, known.iter().copied()) {
+                Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
+                None => diagnostic.note(format!("its fields are {}", super::list(&known))),
+            };
+            self.report(diagnostic);
+            return None;
+        };
+        Some(field.ty.clone())
     }
 
     /// A path to a single number: with its unit, and whether it is whole.

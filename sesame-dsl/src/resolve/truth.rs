@@ -1,5 +1,7 @@
 //! Conditions of formulas: what holds at one moment, or does not.
 
+use std::cmp::Ordering;
+
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{Comparison, Condition, Expression, Id as _, Input, Type};
@@ -23,6 +25,7 @@ impl<'a> Resolver<'a> {
                 }
                 let (sides, _) = self.common(inputs, &[left, right])?;
                 let [left, right] = <[Expression; 2]>::try_from(sides).expect("two parts give two numbers");
+                self.one_outcome(expression, &left, comparison, &right);
                 Some(Condition::Compare(left, comparison, right))
             }
             ExpressionKind::Field(_) | ExpressionKind::Members(..) if self.is_condition(expression) => {
@@ -57,6 +60,26 @@ impl<'a> Resolver<'a> {
                 None
             }
         }
+    }
+
+    /// A comparison that nothing heard can change.
+    fn one_outcome(&mut self, whole: &ast::Expression, left: &Expression, by: Comparison, right: &Expression) {
+        let (order, why) = match (left, right) {
+            (Expression::Constant(left), Expression::Constant(right)) => (left.partial_cmp(right), "two numbers"),
+            _ if left == right => (Some(Ordering::Equal), "something with itself"),
+            _ => return,
+        };
+        let holds = order.is_some_and(|order| match by {
+            Comparison::AtMost => order.is_le(),
+            Comparison::Below => order.is_lt(),
+            Comparison::AtLeast => order.is_ge(),
+            Comparison::Above => order.is_gt(),
+            Comparison::Equal => order.is_eq(),
+            Comparison::NotEqual => order.is_ne(),
+        });
+        let title = format!("`{}` compares {why}", self.text(whole.span));
+        let label = if holds { "always holds" } else { "never holds" };
+        self.report(Diagnostic::new(Code::ONE_OUTCOME, whole.span, title).label(label));
     }
 
     fn of_one_moment(&mut self, word: Span) {

@@ -3,22 +3,30 @@
 //! A construct with a syntax error is not here; but the name it was about to declare is kept in [`File::broken`], and the
 //! block around it is marked as damaged, so that one mistake does not look like several.
 
+use super::eddi::Eddi;
+use super::physical::Physical;
+use super::surroundings::{Command, Launch, RelayBudget};
 use crate::span::Span;
 
 /// A whole file. Order between kinds never matters; within a kind it is the order of the file.
 #[derive(Debug, Default)]
 pub(crate) struct File {
     pub(crate) spaces: Vec<Head>,
+    pub(crate) imports: Vec<Text>,
     pub(crate) systems: Vec<System>,
     pub(crate) metrics: Vec<Metric>,
     pub(crate) requirements: Vec<Requirement>,
     pub(crate) operations: Vec<Operation>,
     pub(crate) tests: Vec<Test>,
     pub(crate) campaigns: Vec<Campaign>,
+    pub(crate) eddis: Vec<Eddi>,
+    pub(crate) physicals: Vec<Physical>,
     /// Names that a broken or unsupported construct was about to declare.
     pub(crate) broken: Vec<Name>,
     /// Whether anything at the top level could not be read.
     pub(crate) damaged: bool,
+    /// Whether an imported file is missing, and with it names that others use.
+    pub(crate) incomplete: bool,
 }
 
 /// A name, where it stands.
@@ -43,6 +51,9 @@ pub(crate) struct System {
     pub(crate) messages: Vec<Message>,
     pub(crate) topics: Vec<Topic>,
     pub(crate) nodes: Vec<Node>,
+    pub(crate) launches: Vec<(Span, Launch)>,
+    pub(crate) terminates: Vec<(Span, Command)>,
+    pub(crate) relay_budgets: Vec<(Span, RelayBudget)>,
     pub(crate) damaged: bool,
 }
 
@@ -308,12 +319,42 @@ pub(crate) struct Operation {
 #[derive(Debug)]
 pub(crate) struct OperationBody {
     /// `None` for an operation on no topic.
-    pub(crate) target: Option<Path>,
+    pub(crate) target: Option<Target>,
+    pub(crate) from: Option<(Span, Vec<Name>)>,
+    pub(crate) to: Option<(Span, Vec<Name>)>,
     pub(crate) kind: OperationKind,
     pub(crate) within: Vec<(Span, Range)>,
     pub(crate) priority: Vec<(Span, Quantity)>,
     pub(crate) inclusion: Vec<(Span, Quantity)>,
+    pub(crate) untimed: Vec<Span>,
     pub(crate) contains: Vec<(Span, Vec<Contained>)>,
+}
+
+/// What an operation disturbs.
+#[derive(Debug)]
+pub(crate) struct Target {
+    /// The topic of the first place.
+    pub(crate) topic: Name,
+    /// At least one.
+    pub(crate) places: Vec<Place>,
+    pub(crate) span: Span,
+}
+
+/// A place in the messages of a topic.
+#[derive(Debug)]
+pub(crate) struct Place {
+    pub(crate) topic: Name,
+    pub(crate) steps: Vec<Step>,
+    pub(crate) span: Span,
+}
+
+#[derive(Debug)]
+pub(crate) enum Step {
+    Field(Name),
+    /// `[3]`; the span includes the brackets.
+    Element(Count, Span),
+    /// `[*]`
+    Each(Span),
 }
 
 /// What the start condition of an operation has to contain.
@@ -326,11 +367,116 @@ pub(crate) enum Contained {
 
 #[derive(Debug)]
 pub(crate) enum OperationKind {
-    Random { absolute: bool, range: Range },
+    Random {
+        absolute: bool,
+        amounts: Amounts,
+    },
+    RandomText(Vec<Text>),
+    StuckAt(Stuck),
+    Bias(Amounts),
+    Drift(Amounts),
+    Noise(Range),
+    Scale(Range),
+    NotFinite(NotFinite),
+    Freeze,
+    Stale(Range),
+    ClockSkew(Range),
     PacketLoss(Range),
-    Latency { range: Range, uniform: Vec<Span>, drain: Vec<(Span, Drain)> },
+    /// The words `burst loss`, and the clauses as written.
+    BurstLoss {
+        span: Span,
+        enter: Vec<(Span, Range)>,
+        leave: Vec<(Span, Range)>,
+        loss: Vec<(Span, Range)>,
+    },
+    RateLimit(Range),
+    Latency {
+        range: Range,
+        distribution: Vec<(Span, Distribution)>,
+        drain: Vec<(Span, Drain)>,
+    },
+    Reorder {
+        range: Range,
+        drain: Vec<(Span, Drain)>,
+    },
+    Duplicate(Range),
     Blackhole,
     Custom(Custom),
+}
+
+impl OperationKind {
+    /// Where it is written what a parameter of a kind, other than a custom one, may be.
+    pub(crate) fn written(&self, parameter: &str) -> Option<Span> {
+        match self {
+            OperationKind::Random { amounts, .. } | OperationKind::Bias(amounts) | OperationKind::Drift(amounts) => {
+                Some(amounts.span())
+            }
+            OperationKind::StuckAt(Stuck::Amounts(amounts)) => Some(amounts.span()),
+            OperationKind::StuckAt(Stuck::Texts(texts)) => Some(texts.first()?.span.to(texts.last()?.span)),
+            OperationKind::Noise(range)
+            | OperationKind::Scale(range)
+            | OperationKind::Stale(range)
+            | OperationKind::ClockSkew(range)
+            | OperationKind::PacketLoss(range)
+            | OperationKind::RateLimit(range)
+            | OperationKind::Latency { range, .. }
+            | OperationKind::Reorder { range, .. }
+            | OperationKind::Duplicate(range) => Some(range.span),
+            OperationKind::BurstLoss { enter, leave, loss, .. } => {
+                let written = match parameter {
+                    "enter" => enter,
+                    "leave" => leave,
+                    _ => loss,
+                };
+                written.first().map(|(_, range)| range.span)
+            }
+            OperationKind::StuckAt(Stuck::Truth(..))
+            | OperationKind::RandomText(_)
+            | OperationKind::NotFinite(_)
+            | OperationKind::Freeze
+            | OperationKind::Blackhole
+            | OperationKind::Custom(_) => None,
+        }
+    }
+}
+
+/// Numbers of a range, or points of a box.
+#[derive(Debug)]
+pub(crate) enum Amounts {
+    Range(Range),
+    /// Two opposite corners; the span is that of all of it.
+    Corners(Box<[Point; 2]>, Span),
+}
+
+impl Amounts {
+    pub(crate) fn span(&self) -> Span {
+        match self {
+            Amounts::Range(range) => range.span,
+            Amounts::Corners(_, span) => *span,
+        }
+    }
+}
+
+/// What a value is stuck at.
+#[derive(Debug)]
+pub(crate) enum Stuck {
+    Amounts(Amounts),
+    Texts(Vec<Text>),
+    Truth(bool, Span),
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum NotFinite {
+    Nan,
+    Infinity,
+    MinusInfinity,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Distribution {
+    Fixed,
+    Uniform,
+    Normal,
 }
 
 /// The user's code.
@@ -456,6 +602,10 @@ pub(crate) struct Expectation {
 #[derive(Debug)]
 pub(crate) struct Campaign {
     pub(crate) head: Head,
+    /// The campaign it inherits from.
+    pub(crate) from: Option<Name>,
+    /// Clauses that stand in that one.
+    pub(crate) inherited: Inherited,
     pub(crate) objectives: Vec<(Span, Vec<Name>)>,
     pub(crate) observes: Vec<(Span, Vec<Name>)>,
     pub(crate) operations: Vec<Operations>,
@@ -465,21 +615,30 @@ pub(crate) struct Campaign {
     pub(crate) explorations: Vec<Exploration>,
     pub(crate) stops: Vec<Stop>,
     pub(crate) repeats: Vec<Repeat>,
+    pub(crate) passives: Vec<Passive>,
     pub(crate) ends: Vec<(Span, Quantity)>,
     pub(crate) records: Vec<(Span, Record)>,
     /// Something of it could not be read or is not supported: what is missing may be there.
     pub(crate) damaged: bool,
 }
 
+/// Which clauses a campaign has from another, as far as it matters for what is said of them.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Inherited {
+    pub(crate) operations: bool,
+    pub(crate) activate: bool,
+    pub(crate) end: bool,
+}
+
 /// How the tests of a search switch operations on and off.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) enum ActivationMode {
     Time,
     Condition(ByCondition),
 }
 
 /// `condition over …`, with its settings as written.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct ByCondition {
     /// The variables and their known ranges, as long as each other.
     pub(crate) variables: Vec<Name>,
@@ -496,7 +655,7 @@ pub(crate) enum Record {
     All,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Operations {
     pub(crate) span: Span,
     pub(crate) names: Vec<Name>,
@@ -504,7 +663,7 @@ pub(crate) struct Operations {
     pub(crate) max: Count,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Search {
     pub(crate) span: Span,
     /// `None` for a strategy that is not supported yet.
@@ -523,7 +682,7 @@ pub(crate) enum Strategy {
     LatinHypercube,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Coverage {
     pub(crate) span: Span,
     pub(crate) axes: Vec<CoverageAxis>,
@@ -533,7 +692,7 @@ pub(crate) struct Coverage {
     pub(crate) damaged: bool,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct CoverageAxis {
     pub(crate) dimension: Name,
     pub(crate) range: Range,
@@ -541,7 +700,7 @@ pub(crate) struct CoverageAxis {
 }
 
 /// `boost fixed { … }`, `boost linear { … }`, `construct { … }` or `predict { … }`, with the settings as written.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Exploration {
     pub(crate) span: Span,
     pub(crate) kind: ExplorationKind,
@@ -558,7 +717,7 @@ pub(crate) struct Exploration {
 }
 
 /// `stop { … }` with its rules as written.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Stop {
     pub(crate) span: Span,
     pub(crate) times: Vec<(Span, Quantity)>,
@@ -576,10 +735,18 @@ pub(crate) enum ExplorationKind {
     Predict,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Repeat {
     pub(crate) span: Span,
     pub(crate) test: Name,
+    pub(crate) times: Count,
+    pub(crate) seed: Vec<(Span, Count)>,
+}
+
+/// Runs that disturb nothing.
+#[derive(Debug, Clone)]
+pub(crate) struct Passive {
+    pub(crate) span: Span,
     pub(crate) times: Count,
     pub(crate) seed: Vec<(Span, Count)>,
 }

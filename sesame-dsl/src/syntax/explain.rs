@@ -6,10 +6,10 @@
 
 use std::collections::BTreeSet;
 
-use pest::Parser as _;
 use pest::error::{ErrorVariant, InputLocation};
-use sesame_grammar::{Rule, SesameParser};
+use sesame_grammar::Rule;
 
+use super::limits::parse_bounded;
 use super::token::{Token, TokenKind, is_keyword, token_at};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::{FileId, Span};
@@ -36,6 +36,11 @@ pub(super) enum Place {
     Predict,
     Stop,
     Repeat,
+    Launch,
+    Budget,
+    Eddi,
+    Physical,
+    Lab,
 }
 
 impl Place {
@@ -59,6 +64,11 @@ impl Place {
             Place::Predict => Rule::error_predict_setting,
             Place::Stop => Rule::error_stop_rule,
             Place::Repeat => Rule::error_repeat_setting,
+            Place::Launch => Rule::error_launch_setting,
+            Place::Budget => Rule::error_budget_setting,
+            Place::Eddi => Rule::error_eddi_member,
+            Place::Physical => Rule::error_physical_member,
+            Place::Lab => Rule::error_lab_setting,
         }
     }
 
@@ -66,17 +76,25 @@ impl Place {
         match self {
             Place::File => &[
                 Rule::space,
+                Rule::import,
                 Rule::system,
                 Rule::metric,
                 Rule::requirement,
                 Rule::operation,
                 Rule::test,
                 Rule::campaign,
-                Rule::unsupported_item,
+                Rule::eddi,
+                Rule::physical,
             ],
-            Place::System => {
-                &[Rule::simulator, Rule::message, Rule::topic, Rule::node, Rule::unsupported_system_member]
-            }
+            Place::System => &[
+                Rule::simulator,
+                Rule::message,
+                Rule::topic,
+                Rule::node,
+                Rule::launch,
+                Rule::terminate,
+                Rule::relay_budget,
+            ],
             Place::Simulator => &[Rule::setting_crate, Rule::setting_step],
             Place::Process => &[Rule::setting_step],
             Place::Message => &[Rule::field],
@@ -97,6 +115,7 @@ impl Place {
                 Rule::stop,
                 Rule::end,
                 Rule::repeat,
+                Rule::passive,
                 Rule::record,
             ],
             Place::Condition => &[Rule::setting_depth, Rule::setting_integers],
@@ -115,6 +134,22 @@ impl Place {
             Place::Predict => &[Rule::predict_candidates],
             Place::Stop => &[Rule::stop_time, Rule::stop_stagnation, Rule::stop_discovery, Rule::stop_completeness],
             Place::Repeat => &[Rule::setting_seed],
+            Place::Launch => &[Rule::ready],
+            Place::Budget => &[Rule::setting_latency, Rule::setting_jitter],
+            Place::Eddi => &[Rule::demand, Rule::evidence, Rule::guarantee, Rule::otherwise],
+            Place::Physical => &[
+                Rule::lab_simulator,
+                Rule::repeats,
+                Rule::cost,
+                Rule::exclude,
+                Rule::rank,
+                Rule::budget,
+                Rule::tolerance,
+                Rule::interlock,
+                Rule::shape,
+                Rule::fit,
+            ],
+            Place::Lab => &[Rule::lab_setting],
         }
     }
 
@@ -138,6 +173,11 @@ impl Place {
             Place::Predict => Rule::one_predict_setting,
             Place::Stop => Rule::one_stop_rule,
             Place::Repeat => Rule::one_repeat_setting,
+            Place::Launch => Rule::one_launch_setting,
+            Place::Budget => Rule::one_budget_setting,
+            Place::Eddi => Rule::one_eddi_member,
+            Place::Physical => Rule::one_physical_member,
+            Place::Lab => Rule::one_lab_setting,
         }
     }
 
@@ -145,9 +185,10 @@ impl Place {
     fn members(self) -> &'static str {
         match self {
             Place::File => {
-                "a declaration: `space`, `system`, `metric`, `requirement`, `operation`, `test` or `campaign`"
+                "a declaration: `space`, `import`, `system`, `metric`, `requirement`, `operation`, `test`, `campaign`, \
+                 `eddi` or `physical`"
             }
-            Place::System => "`simulator`, `message`, `topic` or `node`",
+            Place::System => "`simulator`, `message`, `topic`, `node`, `launch`, `terminate` or `relay budget`",
             Place::Simulator => "`crate` or `step`",
             Place::Process => "`step`",
             Place::Message => "a field such as `level: real[mm]`",
@@ -156,8 +197,8 @@ impl Place {
             Place::Custom => "a parameter such as `points: int [3, 20]`",
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
             Place::Campaign => {
-                "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `boost`, `construct`, `predict`, `stop`, `repeat`, `record` \
-                 or `end after`"
+                "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `boost`, `construct`, `predict`, \
+                 `stop`, `repeat`, `passive`, `record` or `end after`"
             }
             Place::Condition => "`depth` or `integers`",
             Place::Search => "`population`, `evaluations` or `seed`",
@@ -167,17 +208,35 @@ impl Place {
             Place::Predict => "`candidates`",
             Place::Stop => "`time`, `stagnation`, `discovery` or `completeness`",
             Place::Repeat => "`seed`",
+            Place::Launch => "`ready when topic`",
+            Place::Budget => "`latency` or `jitter`",
+            Place::Eddi => "`demand`, `evidence`, `guarantee` or `otherwise`",
+            Place::Physical => {
+                "`simulator`, `repeats`, `cost`, `exclude`, `rank`, `budget`, `tolerance`, `interlock`, `shape` or `fit`"
+            }
+            Place::Lab => "a setting such as `step 20ms`",
         }
     }
 
     /// The words that begin something here.
     fn starters(self) -> &'static [&'static str] {
         match self {
-            Place::File => &["space", "system", "metric", "requirement", "operation", "test", "campaign"],
-            Place::System => &["simulator", "message", "topic", "node"],
+            Place::File => &[
+                "space",
+                "import",
+                "system",
+                "metric",
+                "requirement",
+                "operation",
+                "test",
+                "campaign",
+                "eddi",
+                "physical",
+            ],
+            Place::System => &["simulator", "message", "topic", "node", "launch", "terminate", "relay"],
             Place::Simulator => &["crate", "step"],
             Place::Process => &["step"],
-            Place::Message | Place::Custom => &[],
+            Place::Message | Place::Custom | Place::Lab => &[],
             Place::Node => &["publishes", "subscribes"],
             Place::Hook => &["hook"],
             Place::Test => &["expect"],
@@ -193,6 +252,7 @@ impl Place {
                 "predict",
                 "stop",
                 "repeat",
+                "passive",
                 "record",
                 "end",
             ],
@@ -204,6 +264,12 @@ impl Place {
             Place::Predict => &["candidates"],
             Place::Stop => &["time", "stagnation", "discovery", "completeness"],
             Place::Repeat => &["seed"],
+            Place::Launch => &["ready"],
+            Place::Budget => &["latency", "jitter"],
+            Place::Eddi => &["demand", "evidence", "guarantee", "otherwise"],
+            Place::Physical => {
+                &["simulator", "repeats", "cost", "exclude", "rank", "budget", "tolerance", "interlock", "shape", "fit"]
+            }
         }
     }
 }
@@ -215,7 +281,7 @@ struct Failure {
 }
 
 fn read(text: &str, lo: usize, hi: usize, rule: Rule) -> Option<Failure> {
-    let error = SesameParser::parse(rule, &text[lo..hi]).err()?;
+    let error = parse_bounded(rule, &text[lo..hi]).err()?;
     let at = match error.location {
         InputLocation::Pos(at) | InputLocation::Span((at, _)) => lo + at,
     };
@@ -249,7 +315,7 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
     }
 
     let begins = place.starters().contains(&first.text)
-        || matches!(place, Place::Message | Place::Custom | Place::Test | Place::Coverage);
+        || matches!(place, Place::Message | Place::Custom | Place::Test | Place::Coverage | Place::Lab);
     let continued = previous
         .and_then(|previous| read(text, previous.lo as usize, hi, place.one_rule()))
         .filter(|failure| token_at(text, failure.at).lo >= first.lo);
@@ -260,10 +326,9 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, place: Place, prev
     let found = token_at(text, failure.at);
     let span = span_of(found);
     let words: BTreeSet<&'static str> = failure.expected.iter().filter_map(|&rule| keyword_of(rule)).collect();
-    let wants_name = failure
-        .expected
-        .iter()
-        .any(|&rule| matches!(rule, Rule::name | Rule::names | Rule::path | Rule::condition_variable));
+    let wants_name = failure.expected.iter().any(|&rule| {
+        matches!(rule, Rule::name | Rule::names | Rule::path | Rule::target | Rule::targets | Rule::condition_variable)
+    });
     let expected = describe(&failure, place, found.lo == first.lo);
 
     let before = text[..found.lo].chars().next_back();
@@ -392,9 +457,19 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::construct_settings
         | Rule::predict_settings
         | Rule::stop_settings
+        | Rule::launch_settings
+        | Rule::budget_settings
+        | Rule::lab_settings
+        | Rule::repeat_settings
         | Rule::condition_settings => "`{`",
         Rule::close => "`}`",
-        Rule::name | Rule::names | Rule::path | Rule::identifier | Rule::condition_variable => "a name",
+        Rule::name
+        | Rule::names
+        | Rule::path
+        | Rule::target
+        | Rule::targets
+        | Rule::identifier
+        | Rule::condition_variable => "a name",
         Rule::field_name | Rule::field => "a field such as `level: real[mm]`",
         Rule::text | Rule::texts => "a text in double quotes",
         Rule::number | Rule::count => "a number",
@@ -412,7 +487,7 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::above => "`>`",
         Rule::bound_within => "`in`",
         Rule::parameter_name | Rule::choice => "a parameter such as `offset`, `value`, `loss` or `delay`",
-        Rule::window | Rule::boost_children => "`from`",
+        Rule::window | Rule::from_nodes | Rule::campaign_from | Rule::boost_children => "`from`",
         Rule::moment => "`before start`",
         Rule::until_condition | Rule::construct_until => "`until`",
         Rule::for_length | Rule::for_lengths => "`for`",
@@ -446,6 +521,22 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::within => "`within`",
         Rule::priority => "`priority`",
         Rule::inclusion => "`inclusion`",
+        Rule::untimed => "`untimed`",
+        Rule::to_nodes => "`to`",
+        Rule::held => "`held`",
+        Rule::stale => "`stale after`",
+        Rule::mitigation => "`mitigate with`",
+        Rule::lab_transport => "a simulator kind such as `simlog`",
+        Rule::lab_setting | Rule::lab_setting_name => "a setting such as `step 20ms`",
+        Rule::rank_key | Rule::tolerated => "a metric",
+        Rule::per_operation => "`, plus … per operation`",
+        Rule::sphere => "`sphere`",
+        Rule::cuboid => "`box`",
+        Rule::carried => "`on pose`",
+        Rule::fixed => "`at`",
+        Rule::expand => "`expand`",
+        Rule::fit_delay => "`relay delay`",
+        Rule::fit_parameter => "`parameter`",
         Rule::drain => "`drain`",
         Rule::direction => "`maximise` or `minimise`",
         Rule::default_value => "`default`",
@@ -454,6 +545,24 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::process => "`process`",
         Rule::random_value => "`random`",
         Rule::packet_loss | Rule::k_packet => "`packet loss`",
+        Rule::stuck_at | Rule::k_stuck => "`stuck at`",
+        Rule::bias => "`bias`",
+        Rule::drift => "`drift`",
+        Rule::noise => "`noise`",
+        Rule::scale => "`scale`",
+        Rule::not_finite => "`nan` or `infinity`",
+        Rule::freeze => "`freeze`",
+        Rule::stale_value => "`stale`",
+        Rule::clock_skew | Rule::k_clock => "`clock skew`",
+        Rule::burst_loss | Rule::k_burst => "`burst loss`",
+        Rule::burst_enter => "`enter`",
+        Rule::burst_leave => "`leave`",
+        Rule::burst_drops => "`loss`",
+        Rule::rate_limit | Rule::k_rate => "`rate limit`",
+        Rule::reorder => "`reorder`",
+        Rule::duplicate => "`duplicate`",
+        Rule::distribution => "a distribution such as `uniform`",
+        Rule::corners => "a box such as `[(0, 0, 0)m, (1, 1, 1)m]`",
         Rule::latency => "`latency`",
         Rule::blackhole => "`blackhole`",
         Rule::formula => "a formula such as `last(cycle)`",
@@ -473,7 +582,7 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::members
         | Rule::truth => "a value such as `link0 - 2.5rad`",
         Rule::plus => "`+`",
-        Rule::times => "`*`",
+        Rule::times | Rule::each_element => "`*`",
         Rule::over => "`/`",
         Rule::trigger | Rule::when_then | Rule::formula_when => "`when`",
         Rule::formula_every => "`every`",
@@ -485,14 +594,9 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::k_always
         | Rule::k_eventually
         | Rule::k_implies
-        | Rule::k_import
-        | Rule::k_eddi
-        | Rule::k_physical
-        | Rule::k_launch
-        | Rule::k_terminate
-        | Rule::k_relay
         | Rule::k_node
-        | Rule::k_parameter => return None,
+        | Rule::k_parameter
+        | Rule::element => return None,
         _ => return keyword_of(rule).map(|word| format!("`{word}`")),
     };
     Some(words.to_owned())

@@ -30,7 +30,7 @@ impl Reader<'_> {
         Formula { kind, when, every, per, outbound }
     }
 
-    fn expression(&mut self, pair: &Pair<'_>) -> Expression {
+    pub(super) fn expression(&mut self, pair: &Pair<'_>) -> Expression {
         let mut sides = children(pair, Rule::disjunction)
             .map(|side| self.joined(&side, Rule::conjunction, Self::conjunction, ExpressionKind::Any));
         let first = sides.next().expect("an expression has a side");

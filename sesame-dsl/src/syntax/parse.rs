@@ -1,17 +1,16 @@
 //! From the grammar's pairs to the syntax tree.
 
-use pest::Parser as _;
 use pest::iterators::Pair as PestPair;
-use sesame_grammar::{Rule, SesameParser};
+use sesame_grammar::Rule;
 
 use super::ast::{
     ActivationMode, Bound, Campaign, Comparison, Count, Coverage, CoverageAxis, Custom, CustomParameter, Direction,
-    Domain, Drain, Expectation, Field, File, Head, InProcess, Message, Metric, MetricSource, Moment, Name, Node,
-    Operation, OperationBody, OperationKind, Operations, Process, Record, Repeat, Requirement, Search, Simulator,
-    Strategy, System, Test, Topic, Transport, Type, TypeKind,
+    Domain, Expectation, Field, File, Head, InProcess, Inherited, Message, Metric, MetricSource, Moment, Name, Node,
+    Operation, OperationBody, Operations, Passive, Process, Record, Repeat, Requirement, Search, Simulator, Strategy,
+    System, Test, Topic, Transport, Type, TypeKind,
 };
 use super::explain::{Place, explain};
-use super::limits::{MAX_BYTES, MAX_CALLS, too_deep};
+use super::limits::{MAX_BYTES, parse_bounded, too_deep};
 use super::token::{TokenKind, token_at};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::{FileId, Span};
@@ -29,9 +28,7 @@ pub(crate) fn parse(file: FileId, text: &str, diagnostics: &mut Vec<Diagnostic>)
         let span = reader.span_of(at, at + 1);
         reader.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, span, title).label("this one is too deep"));
     } else {
-        // Process-wide in pest; every caller sets the same value.
-        pest::set_call_limit(Some(MAX_CALLS));
-        match SesameParser::parse(Rule::file, text) {
+        match parse_bounded(Rule::file, text) {
             Ok(mut pairs) => {
                 let root = pairs.next().expect("a parse that succeeds has its rule's pair");
                 reader.file(&root);
@@ -208,6 +205,8 @@ impl Reader<'_> {
                     | "operation"
                     | "test"
                     | "campaign"
+                    | "eddi"
+                    | "physical"
             );
             if declares {
                 let name = token_at(self.text, at);
@@ -229,7 +228,6 @@ impl Reader<'_> {
             Rule::unsupported_transport => format!("simulator kind `{word}`"),
             Rule::unsupported_operation => format!("an operation on a `{word}`"),
             Rule::unsupported_kind => format!("operation kind `{word}`"),
-            Rule::unsupported_from => "a campaign `from` another".to_owned(),
             Rule::unsupported_strategy => format!("search strategy `{word}`"),
             _ => format!("`{word}`"),
         };
@@ -282,9 +280,17 @@ impl Reader<'_> {
                 let campaign = reader.campaign(&item);
                 reader.out.campaigns.push(campaign);
             }
-            Rule::unsupported_item => {
-                reader.unsupported(&item);
-                reader.out.damaged = true;
+            Rule::import => {
+                let import = reader.text_of(&expect_child(&item, Rule::text));
+                reader.out.imports.push(import);
+            }
+            Rule::eddi => {
+                let eddi = reader.eddi(&item);
+                reader.out.eddis.push(eddi);
+            }
+            Rule::physical => {
+                let physical = reader.physical(&item);
+                reader.out.physicals.push(physical);
             }
             other => unreachable!("{other:?} is no declaration"),
         });
@@ -295,8 +301,17 @@ impl Reader<'_> {
 
     fn system(&mut self, pair: &Pair<'_>) -> System {
         let span = self.span(&expect_child(pair, Rule::k_system));
-        let mut system =
-            System { span, simulators: vec![], messages: vec![], topics: vec![], nodes: vec![], damaged: false };
+        let mut system = System {
+            span,
+            simulators: vec![],
+            messages: vec![],
+            topics: vec![],
+            nodes: vec![],
+            launches: vec![],
+            terminates: vec![],
+            relay_budgets: vec![],
+            damaged: false,
+        };
         system.damaged = self.members(pair, Place::System, |reader, member| match member.as_rule() {
             Rule::simulator => system.simulators.push(reader.simulator(&member)),
             Rule::message => system.messages.push(reader.message(&member)),
@@ -306,7 +321,9 @@ impl Reader<'_> {
                 ty: reader.type_of(&expect_child(&member, Rule::type_of)),
             }),
             Rule::node => system.nodes.push(reader.node(&member)),
-            _ => reader.unsupported(&member),
+            Rule::launch => system.launches.push((reader.keyword_span(&member), reader.launch(&member))),
+            Rule::terminate => system.terminates.push((reader.keyword_span(&member), reader.command(&member))),
+            _ => system.relay_budgets.push((reader.keyword_span(&member), reader.relay_budget(&member))),
         });
         system
     }
@@ -440,7 +457,7 @@ impl Reader<'_> {
         Metric { head, ty, directions, defaults, initials, source }
     }
 
-    fn bound(&mut self, pair: &Pair<'_>) -> Bound {
+    pub(super) fn bound(&mut self, pair: &Pair<'_>) -> Bound {
         if let Some(within) = child(pair, Rule::bound_within) {
             return Bound::Within(self.range(&expect_child(&within, Rule::range)));
         }
@@ -457,33 +474,7 @@ impl Reader<'_> {
             self.unsupported(&unsupported);
             return Operation { head, body: None };
         }
-        let kinds = [Rule::random_value, Rule::packet_loss, Rule::latency, Rule::blackhole, Rule::custom];
-        let kind = first_of(pair, &kinds).expect("an operation has a kind");
-        let kind = match kind.as_rule() {
-            Rule::random_value => OperationKind::Random {
-                absolute: child(&expect_child(&kind, Rule::value_mode), Rule::k_absolute).is_some(),
-                range: self.range(&expect_child(&kind, Rule::range)),
-            },
-            Rule::packet_loss => OperationKind::PacketLoss(self.range(&expect_child(&kind, Rule::range))),
-            Rule::latency => OperationKind::Latency {
-                range: self.range(&expect_child(&kind, Rule::range)),
-                uniform: children(&kind, Rule::k_uniform).map(|uniform| self.span(&uniform)).collect(),
-                drain: children(&kind, Rule::drain)
-                    .map(|drain| {
-                        let mode = if child(&drain, Rule::k_finish).is_some() {
-                            Drain::Finish
-                        } else if child(&drain, Rule::k_flush).is_some() {
-                            Drain::Flush
-                        } else {
-                            Drain::Drop
-                        };
-                        (self.keyword_span(&drain), mode)
-                    })
-                    .collect(),
-            },
-            Rule::custom => OperationKind::Custom(self.custom(&kind)),
-            _ => OperationKind::Blackhole,
-        };
+        let kind = self.operation_kind(pair);
         let mut signed = |rule| {
             let clauses = children(pair, rule);
             clauses.map(|it| (self.keyword_span(&it), self.signed(&expect_child(&it, Rule::signed)))).collect()
@@ -496,11 +487,18 @@ impl Reader<'_> {
         let contains = children(pair, Rule::start_contains)
             .map(|clause| (self.keyword_span(&clause), self.contained(&clause)))
             .collect();
-        let target = child(pair, Rule::path).map(|path| self.path(&path));
-        Operation { head, body: Some(OperationBody { target, kind, within, priority, inclusion, contains }) }
+        let untimed = children(pair, Rule::untimed).map(|untimed| self.span(&untimed)).collect();
+        let mut nodes = |rule| child(pair, rule).map(|nodes| (self.keyword_span(&nodes), self.names(&nodes)));
+        let from = nodes(Rule::from_nodes);
+        let to = nodes(Rule::to_nodes);
+        let target = child(pair, Rule::targets).map(|targets| self.target(&targets));
+        Operation {
+            head,
+            body: Some(OperationBody { target, from, to, kind, within, priority, inclusion, untimed, contains }),
+        }
     }
 
-    fn custom(&mut self, pair: &Pair<'_>) -> Custom {
+    pub(super) fn custom(&mut self, pair: &Pair<'_>) -> Custom {
         let span = self.keyword_span(pair);
         let moment = child(pair, Rule::moment).map(|moment| self.moment(&moment));
         let mut custom = Custom { span, moment, parameters: vec![], damaged: false };
@@ -563,6 +561,8 @@ impl Reader<'_> {
     fn campaign(&mut self, pair: &Pair<'_>) -> Campaign {
         let mut campaign = Campaign {
             head: self.head(pair),
+            from: child(pair, Rule::campaign_from).map(|from| self.name(&expect_child(&from, Rule::name))),
+            inherited: Inherited::default(),
             objectives: vec![],
             observes: vec![],
             operations: vec![],
@@ -572,15 +572,12 @@ impl Reader<'_> {
             explorations: vec![],
             stops: vec![],
             repeats: vec![],
+            passives: vec![],
             ends: vec![],
             records: vec![],
             damaged: false,
         };
-        let from = child(pair, Rule::unsupported_from);
-        if let Some(from) = &from {
-            self.unsupported(from);
-        }
-        let damaged = self.members(pair, Place::Campaign, |reader, member| {
+        campaign.damaged = self.members(pair, Place::Campaign, |reader, member| {
             let span = reader.keyword_span(&member);
             match member.as_rule() {
                 Rule::objectives => campaign.objectives.push((span, reader.names(&member))),
@@ -610,14 +607,8 @@ impl Reader<'_> {
                     let all = child(&member, Rule::k_all).is_some();
                     campaign.records.push((span, if all { Record::All } else { Record::Failing }));
                 }
-                _ => {
-                    let mut seed = Vec::new();
-                    if let Some(settings) = child(&member, Rule::repeat_settings) {
-                        reader.members(&settings, Place::Repeat, |reader, setting| {
-                            let span = reader.keyword_span(&setting);
-                            seed.push((span, reader.count(&expect_child(&setting, Rule::number))));
-                        });
-                    }
+                Rule::repeat => {
+                    let seed = reader.seeds(&member);
                     campaign.repeats.push(Repeat {
                         span,
                         test: reader.name(&expect_child(&member, Rule::name)),
@@ -625,10 +616,14 @@ impl Reader<'_> {
                         seed,
                     });
                 }
+                Rule::passive => {
+                    let seed = reader.seeds(&member);
+                    let times = reader.count(&expect_child(&member, Rule::number));
+                    campaign.passives.push(Passive { span, times, seed });
+                }
+                other => unreachable!("{other:?} is no member of a campaign"),
             }
         });
-        // A `from` brings clauses that are not written here; the other unsupported ones replace none.
-        campaign.damaged = damaged || from.is_some();
         campaign
     }
 
@@ -656,6 +651,18 @@ impl Reader<'_> {
             }
         });
         coverage
+    }
+
+    /// The seeds in the settings of a repetition.
+    fn seeds(&mut self, pair: &Pair<'_>) -> Vec<(Span, Count)> {
+        let mut seeds = Vec::new();
+        if let Some(settings) = child(pair, Rule::repeat_settings) {
+            self.members(&settings, Place::Repeat, |reader, setting| {
+                let span = reader.keyword_span(&setting);
+                seeds.push((span, reader.count(&expect_child(&setting, Rule::number))));
+            });
+        }
+        seeds
     }
 
     fn search(&mut self, pair: &Pair<'_>, span: Span) -> Search {

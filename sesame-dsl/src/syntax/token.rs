@@ -1,18 +1,19 @@
 //! What stands at a place, for messages: words, texts, numbers, signs.
 
-use pest::Parser as _;
-use sesame_grammar::{Rule, SesameParser};
+use sesame_grammar::Rule;
+
+use super::limits::parse_bounded;
 
 /// The token at or after an offset, comments skipped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Token<'t> {
+pub(crate) struct Token<'t> {
     pub(super) kind: TokenKind,
-    pub(super) lo: usize,
-    pub(super) text: &'t str,
+    pub(crate) lo: usize,
+    pub(crate) text: &'t str,
 }
 
 impl Token<'_> {
-    pub(super) fn hi(&self) -> usize {
+    pub(crate) fn hi(&self) -> usize {
         self.lo + self.text.len()
     }
 }
@@ -30,7 +31,7 @@ pub(super) enum TokenKind {
 }
 
 /// The token at or after an offset.
-pub(super) fn token_at(text: &str, offset: usize) -> Token<'_> {
+pub(crate) fn token_at(text: &str, offset: usize) -> Token<'_> {
     let mut at = offset;
     loop {
         let rest = &text[at..];
@@ -53,7 +54,7 @@ pub(super) fn token_at(text: &str, offset: usize) -> Token<'_> {
         },
         _ if is_doc(rest) => token(TokenKind::Doc, line()),
         _ if first.is_ascii_digit() => {
-            let length = SesameParser::parse(Rule::quantity, rest).map_or(1, |pairs| pairs.as_str().len());
+            let length = parse_bounded(Rule::quantity, rest).map_or(1, |pairs| pairs.as_str().len());
             token(TokenKind::Number, length)
         }
         _ if first.is_alphabetic() || first == '_' => token(TokenKind::Word, word(rest)),
@@ -82,6 +83,6 @@ pub(super) fn text_end(text: &str, open: usize) -> Option<usize> {
 }
 
 /// Whether a word is reserved.
-pub(super) fn is_keyword(word: &str) -> bool {
-    SesameParser::parse(Rule::keyword, word).is_ok_and(|pairs| pairs.as_str() == word)
+pub(crate) fn is_keyword(word: &str) -> bool {
+    parse_bounded(Rule::keyword, word).is_ok_and(|pairs| pairs.as_str() == word)
 }

@@ -73,16 +73,23 @@ impl Reader<'_> {
     }
 
     pub(super) fn point(&mut self, pair: &Pair<'_>) -> Point {
-        let unit = child(&expect_child(pair, Rule::point_end), Rule::unit).map(|unit| self.unit(&unit));
-        let mut coordinates = children(pair, Rule::coordinate).map(|coordinate| {
-            let mut quantity = self.quantity(&coordinate);
-            if child(&coordinate, Rule::minus).is_some() && quantity.value != 0.0 {
-                quantity.value = -quantity.value;
-            }
-            Quantity { unit: unit.clone(), ..quantity }
-        });
-        let mut next = || coordinates.next().expect("a point has three coordinates");
-        let coordinates = [next(), next(), next()];
+        let mut unit = child(&expect_child(pair, Rule::point_end), Rule::unit).map(|unit| self.unit(&unit));
+        let mut written = children(pair, Rule::coordinate).map(|coordinate| self.signed(&coordinate));
+        let mut next = || written.next().expect("a point has three coordinates");
+        let mut coordinates = [next(), next(), next()];
+        drop(written);
+        if let Some(own) = coordinates.iter().find_map(|coordinate| coordinate.unit.clone()) {
+            let title = "a unit stands after the parenthesis, once for all three";
+            let diagnostic = Diagnostic::new(Code::WRONG_UNIT, own.span, title);
+            self.report(match unit {
+                Some(_) => diagnostic.label("here it is one too many").suggest("leave it out", own.span, ""),
+                None => diagnostic.label("expected behind the `)`").note("for example `(1, 0, -0.5)m`"),
+            });
+            unit = unit.or(Some(own));
+        }
+        for coordinate in &mut coordinates {
+            coordinate.unit.clone_from(&unit);
+        }
         Point { coordinates, span: self.span(pair) }
     }
 

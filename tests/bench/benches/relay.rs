@@ -58,12 +58,24 @@ fn relay(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("per_message");
     group.throughput(Throughput::Elements(u64::from(MESSAGES)));
 
-    let cases: [(&str, &str, Value, &[&str]); 9] = [
+    let cases: [(&str, &str, Value, &[&str]); 21] = [
         ("number, untouched", "arm/command", Value::Real(1.0), &[]),
         ("number, offset", "arm/command", Value::Real(1.0), &["jitter"]),
         ("number, loss", "arm/command", Value::Real(1.0), &["lose"]),
         ("number, latency", "arm/command", Value::Real(1.0), &["lag"]),
         ("number, four operations", "arm/command", Value::Real(1.0), &["jitter", "jitter", "lose", "lag"]),
+        ("number, four operations on values", "arm/command", Value::Real(1.0), &["jitter", "offset", "wander", "gain"]),
+        ("number, bias", "arm/command", Value::Real(1.0), &["offset"]),
+        ("number, drift", "arm/command", Value::Real(1.0), &["wander"]),
+        ("number, noise", "arm/command", Value::Real(1.0), &["blur"]),
+        ("number, scale", "arm/command", Value::Real(1.0), &["gain"]),
+        ("number, freeze", "arm/command", Value::Real(1.0), &["hold"]),
+        ("number, stale", "arm/command", Value::Real(1.0), &["behind"]),
+        ("number, burst loss", "arm/command", Value::Real(1.0), &["bursts"]),
+        ("number, rate limit", "arm/command", Value::Real(1.0), &["thin"]),
+        ("number, reorder", "arm/command", Value::Real(1.0), &["mix"]),
+        ("number, duplicate", "arm/command", Value::Real(1.0), &["twice"]),
+        ("message, four operations on values", "zones/Z1", zone(), &["shift", "shift", "shift", "shift"]),
         ("number, offset by condition", "arm/command", Value::Real(1.0), &["jitter"]),
         ("number, four operations by condition", "arm/command", Value::Real(1.0), &["jitter", "jitter", "lose", "lag"]),
         ("message, untouched and measured", "zones/Z1", zone(), &[]),

@@ -114,7 +114,7 @@ fn campaigns() -> impl Strategy<Value = CampaignPlan> {
     (any_timed_plan(), 1u32..4, any::<bool>()).prop_map(|(mut plan, most, alike)| {
         let kinds = [
             OperationKind::PacketLoss,
-            OperationKind::RandomValue { path: vec![], mode: ValueMode::Offset, integer: false },
+            OperationKind::RandomValue { mode: ValueMode::Offset, integer: false },
             OperationKind::Latency { distribution: Distribution::Uniform, drain: Drain::Finish },
         ];
         for (operation, kind) in plan.operations.iter_mut().zip(kinds.into_iter().cycle()) {

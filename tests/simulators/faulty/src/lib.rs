@@ -28,6 +28,10 @@ impl Simulator for Faulty {
     fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError> {
         match self.fault.as_str() {
             "crash" => panic!("the reference run is to crash"),
+            "kill" => {
+                let itself = std::process::id().to_string();
+                std::process::Command::new("kill").args(["-9", &itself]).status().expect("there is a `kill`");
+            }
             "wrong type" => bus.publish(self.level, "high"),
             "flood" => (0..1_000_000).for_each(|_| bus.publish(self.level, 1.0)),
             "early end" if bus.now().seconds() >= 0.5 => return Ok(Progress::Ended),

@@ -133,13 +133,13 @@ fn an_operation_stands_between_publisher_and_subscriber() {
 
 #[test]
 fn a_changed_message_keeps_what_is_not_declared() {
-    let kind = crate::fixture::offset(&["level"], sesame_plan::ValueMode::Absolute, false);
+    let kind = crate::fixture::offset(sesame_plan::ValueMode::Absolute, false);
     let uses = vec![use_of(0, 0.0, 1.0, vec![Choice::Range { low: 5.0, high: 5.0 }], 1)];
     let said = format!(
         "{READY}\n{}\n{{\"done\":{{}}}}\n",
         r#"{"publish":[{"topic":"zones/Z1","value":{"x":[1.0,null],"level":1,"count":2}}]}"#
     );
-    let talk = talk_about(vec![operation(1, kind)], &test_of(uses), 1, &said);
+    let talk = talk_about(vec![crate::fixture::at(&["level"], operation(1, kind))], &test_of(uses), 1, &said);
     assert_eq!(talk.orders[2], r#"{"deliver":[{"topic":"zones/Z1","value":{"x":[1.0,null],"level":5.0,"count":2}}]}"#);
 }
 

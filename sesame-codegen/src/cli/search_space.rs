@@ -1,0 +1,210 @@
+//! What a campaign's tests can be, and what it costs to run them: the part of `sesamec explain` that needs the search.
+
+use std::fmt::Write as _;
+
+use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace};
+use sesame_plan::{CampaignPlan, Dimension, Search, Shape};
+use sesame_runtime::coverage::{Feasible, Grid};
+use sesame_runtime::search::Permitted;
+use sesame_runtime::search::choice::PermittedChoice;
+use sesame_runtime::search::permitted::{PermittedActivation, PermittedOperation};
+use sesame_runtime::sspr::extent;
+
+/// A number that may be anything in a range counts as so many values.
+const STEPS: f64 = 100.0;
+/// Undisturbed runs of a campaign, one before and one after its tests.
+const REFERENCE_RUNS: u64 = 2;
+
+/// The space that a campaign searches, and its cost in simulated time, as comments of a `.sesame` file.
+pub(super) fn described(plan: &CampaignPlan) -> String {
+    let mut lines = Vec::new();
+    let runs = match plan.campaign.search {
+        Search::Nsga2 { evaluations, .. }
+        | Search::MapElites { evaluations, .. }
+        | Search::Random { evaluations }
+        | Search::LatinHypercube { evaluations } => {
+            match Permitted::of(plan) {
+                Ok(permitted) => space(plan, &permitted, &mut lines),
+                Err(error) => lines.push(("tests", error.to_string())),
+            }
+            u64::from(evaluations)
+        }
+        Search::Repeat { times, .. } => u64::from(times),
+        Search::Known { ref tests } => tests.len() as u64,
+    };
+    let runs = runs + REFERENCE_RUNS;
+    let end = plan.campaign.end_after;
+    lines.push((
+        "cost",
+        format!(
+            "at most {runs} runs of {end} s, {REFERENCE_RUNS} of them undisturbed: {} of simulated time",
+            duration(runs as f64 * end)
+        ),
+    ));
+    let mut out = String::new();
+    for (name, line) in lines {
+        writeln!(out, "// {name:<15} {line}").expect("a string takes all text");
+    }
+    out
+}
+
+fn space(plan: &CampaignPlan, permitted: &Permitted, lines: &mut Vec<(&str, String)>) {
+    let kinds = permitted.operations();
+    let (fewest, most) = (permitted.fewest(), permitted.most());
+    let ways = total(&chosen(&vec![0.0; kinds.len()], most)[fewest..]);
+    let count = if fewest == most { format!("{fewest}") } else { format!("{fewest} to {most}") };
+    lines.push(("operations", format!("{count} per test, of {}: {} ways to choose them", kinds.len(), power(ways))));
+    let numbers: Vec<usize> = kinds.iter().map(numbers).collect();
+    let per_operation = match (numbers.iter().min(), numbers.iter().max()) {
+        (Some(least), Some(greatest)) if least < greatest => format!("{least} to {greatest}"),
+        (Some(least), _) => format!("{least}"),
+        (None, _) => "0".to_owned(),
+    };
+    let chosen_by_each = if permitted.conditions().is_some() { "numbers and conditions" } else { "numbers" };
+    lines.push(("choices", format!("{per_operation} {chosen_by_each} per operation, and a seed for its draws")));
+    let sizes: Vec<f64> = kinds.iter().map(size).collect();
+    let size = total(&chosen(&sizes, most)[fewest..]);
+    lines.push(("size", format!("{} tests, seeds left out, with numbers in steps of 1 %", power(size))));
+
+    let extents = Dimension::ALL.iter().filter_map(|&dimension| {
+        let (low, high) = extent(plan, permitted, dimension)?;
+        Some(format!("{} [{}, {}]", dimension.name(), rounded(low), rounded(high)))
+    });
+    let extents: Vec<String> = extents.collect();
+    lines.push(("reduced (SSPR)", extents.join("  ")));
+    let goal = plan.campaign.coverage.as_ref();
+    if let Some(grid) = goal.and_then(|goal| Grid::new(goal.axes.clone()).ok()) {
+        let feasible = Feasible::of(plan, &grid);
+        let known = if feasible.is_exact() { "" } else { ", as far as known" };
+        lines.push(("cells", format!("{} of {} can be reached{known}", feasible.count(), grid.len())));
+    }
+}
+
+/// How many numbers, points' coordinates, texts and conditions a test chooses for an operation.
+fn numbers(operation: &PermittedOperation) -> usize {
+    let activation = match operation.activation {
+        PermittedActivation::Offline => 0,
+        PermittedActivation::Time(_) | PermittedActivation::Condition { .. } => 2,
+    };
+    let parameters = operation.parameters.iter().map(|parameter| match parameter {
+        PermittedChoice::Number(_, Shape::Range) => 2,
+        PermittedChoice::Number(_, Shape::Value) | PermittedChoice::Items(_) => 1,
+        PermittedChoice::Point(_) => 3,
+    });
+    activation + parameters.sum::<usize>()
+}
+
+/// The decimal logarithm of the number of ways to choose all of an operation.
+fn size(operation: &PermittedOperation) -> f64 {
+    // Two ordered ends in so many steps.
+    let pair = |steps: f64| (steps * (steps + 1.0) / 2.0).log10();
+    let activation = match &operation.activation {
+        PermittedActivation::Offline => 0.0,
+        PermittedActivation::Time(_) => pair(STEPS),
+        PermittedActivation::Condition { space, .. } => {
+            let end = match space.end {
+                ConditionEnd::Condition => conditions(space),
+                ConditionEnd::Length { low, high } => {
+                    if low < high {
+                        STEPS.log10()
+                    } else {
+                        0.0
+                    }
+                }
+            };
+            conditions(space) + end
+        }
+    };
+    let parameters = operation.parameters.iter().map(|parameter| match parameter {
+        PermittedChoice::Number(range, shape) => {
+            let steps = match (range.integer, range.high - range.low) {
+                (_, width) if width <= 0.0 => 1.0,
+                (true, width) => (width + 1.0).min(STEPS),
+                (false, _) => STEPS,
+            };
+            match shape {
+                Shape::Value => steps.log10(),
+                Shape::Range => pair(steps),
+            }
+        }
+        PermittedChoice::Point(axes) => axes.iter().filter(|axis| axis.low < axis.high).count() as f64 * STEPS.log10(),
+        PermittedChoice::Items(items) => (items.len() as f64).log10(),
+    });
+    activation + parameters.sum::<f64>()
+}
+
+/// The decimal logarithm of the number of condition trees of a grammar, constant ones among them.
+fn conditions(space: &ConditionSpace) -> f64 {
+    let signs = [Comparison::Below, Comparison::Above, Comparison::Equal].len() as f64;
+    let variables = space.variables.len() as f64;
+    let integers = space.integers.highest as f64 - space.integers.lowest as f64 + 1.0;
+    let comparisons = (signs * variables * (variables - 1.0 + integers)).log10();
+    (1..space.depth).fold(comparisons, |smaller, _| total(&[comparisons, 2f64.log10() + 2.0 * smaller]))
+}
+
+/// Per number of operations, from none to `most`, the decimal logarithm of the number of ways to choose them, of kinds
+/// each of which has so many variants (a logarithm too). Their order does not matter, and a kind may come repeatedly.
+fn chosen(kinds: &[f64], most: usize) -> Vec<f64> {
+    let mut ways = vec![f64::NEG_INFINITY; most + 1];
+    ways[0] = 0.0;
+    for size in kinds {
+        ways = (0..=most)
+            .map(|count| {
+                let with = (0..=count).map(|of_this| ways[count - of_this] + of_this as f64 * size);
+                total(&with.collect::<Vec<_>>())
+            })
+            .collect();
+    }
+    ways
+}
+
+/// The logarithm of the sum of numbers given by their logarithms.
+fn total(logarithms: &[f64]) -> f64 {
+    let greatest = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if greatest == f64::NEG_INFINITY {
+        return greatest;
+    }
+    greatest + logarithms.iter().map(|it| 10f64.powf(it - greatest)).sum::<f64>().log10()
+}
+
+/// A number given by its logarithm: whole as far as people count, then as a power of ten.
+fn power(logarithm: f64) -> String {
+    if logarithm < 6.0 { format!("{:.0}", 10f64.powf(logarithm)) } else { format!("about 10^{logarithm:.0}") }
+}
+
+fn rounded(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}
+
+/// A length of time in the units that people use for it.
+fn duration(seconds: f64) -> String {
+    let (hours, rest) = ((seconds / 3600.0).floor(), seconds % 3600.0);
+    let (minutes, seconds) = ((rest / 60.0).floor(), (rest % 60.0 * 10.0).round() / 10.0);
+    match (hours > 0.0, minutes > 0.0) {
+        (true, _) => format!("{hours} h {minutes} min"),
+        (false, true) => format!("{minutes} min {seconds} s"),
+        (false, false) => format!("{seconds} s"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ways_to_choose_are_multisets() {
+        // Of two kinds 2, 3, 4, 5 and 6 multisets of 1 to 5.
+        let ways: Vec<f64> = chosen(&[0.0, 0.0], 5).iter().map(|it| 10f64.powf(*it).round()).collect();
+        assert_eq!(ways, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(power(total(&chosen(&[0.0, 0.0], 5)[1..])), "20");
+        // Ten and a hundred variants: two of them are 100, 1000 or 10000.
+        assert!((10f64.powf(chosen(&[1.0, 2.0], 2)[2]) - 11_100.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn long_times_are_told_in_hours() {
+        assert_eq!(duration(14_840.0), "4 h 7 min");
+        assert_eq!(duration(212.0), "3 min 32 s");
+        assert_eq!(duration(7.25), "7.3 s");
+    }
+}

@@ -1,0 +1,142 @@
+//! What is declared and not used.
+
+use std::collections::BTreeSet;
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::model::eddi::Gate;
+use crate::model::{ActivationMode, MetricId, MetricSource, Operation, OperationId, Search, Space, TopicId};
+use crate::span::FileId;
+
+/// Operations of the file itself that no campaign and no known test uses.
+pub(super) fn operations(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnostic>) {
+    let mut used: BTreeSet<OperationId> = BTreeSet::new();
+    for campaign in space.campaigns.values() {
+        if let Search::Nsga2 { content, .. } | Search::Random { content, .. } = &campaign.search {
+            used.extend(&content.operations);
+        }
+    }
+    used.extend(space.tests.values().flat_map(|test| &test.operations).map(|operation| operation.operation));
+    for (id, operation) in space.operations.iter() {
+        let declaration = &operation.declaration;
+        if !used.contains(&id) && declaration.span.file == root {
+            let title = format!("operation `{}` is never used", declaration.name);
+            diagnostics.push(
+                Diagnostic::new(Code::UNUSED_OPERATION, declaration.span, title)
+                    .label("in no campaign and no known test"),
+            );
+        }
+    }
+}
+
+/// Metrics of the file itself that are never measured.
+pub(super) fn metrics(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnostic>) {
+    let used = used_metrics(space);
+    for (id, metric) in space.metrics.iter() {
+        let declaration = &metric.declaration;
+        if !used.contains(&id) && declaration.span.file == root {
+            let title = format!("metric `{}` is never measured", declaration.name);
+            let diagnostic = Diagnostic::new(Code::UNUSED_METRIC, declaration.span, title)
+                .label("in no campaign, requirement, condition or expectation");
+            diagnostics.push(diagnostic.note("a campaign measures it with `observes`"));
+        }
+    }
+}
+
+fn used_metrics(space: &Space) -> BTreeSet<MetricId> {
+    let mut used = BTreeSet::new();
+    for campaign in space.campaigns.values() {
+        used.extend(&campaign.objectives);
+        used.extend(&campaign.observed);
+        if let Search::Nsga2 { content, .. } | Search::Random { content, .. } = &campaign.search
+            && let ActivationMode::Condition(grown) = &content.activation
+        {
+            used.extend(grown.variables.iter().map(|variable| variable.metric));
+        }
+    }
+    for activation in space.tests.values().flat_map(|test| &test.operations).map(|operation| &operation.activation) {
+        let mut compared = Vec::new();
+        activation.conditions().for_each(|condition| condition.metrics_into(&mut compared));
+        used.extend(compared);
+    }
+    used.extend(space.requirements.values().map(|requirement| requirement.metric));
+    used.extend(space.tests.values().flat_map(|test| &test.expectations).map(|expectation| expectation.metric));
+    for lab in space.physicals.values() {
+        used.extend(lab.exclude.iter().map(|(metric, _)| metric));
+        used.extend(lab.rank.iter().map(|(metric, _)| metric));
+        used.extend(lab.tolerance.iter().map(|(metric, _)| metric));
+        used.extend(&lab.interlock);
+    }
+    used
+}
+
+/// Topics of the file itself that are in no node and used by nothing, where nodes say who publishes what.
+pub(super) fn topics(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnostic>) {
+    if space.nodes.is_empty() {
+        return;
+    }
+    let used = used_topics(space);
+    for (id, topic) in space.topics.iter() {
+        let declaration = &topic.declaration;
+        if !used.contains(&id) && declaration.span.file == root {
+            let title = format!("topic `{}` has no node and no use", declaration.name);
+            diagnostics.push(
+                Diagnostic::new(Code::UNUSED_TOPIC, declaration.span, title)
+                    .label("no node publishes it, and nothing uses it"),
+            );
+        }
+    }
+}
+
+fn used_topics(space: &Space) -> BTreeSet<TopicId> {
+    let mut used = BTreeSet::new();
+    for node in space.nodes.values() {
+        used.extend(&node.publishes);
+        used.extend(&node.subscribes);
+    }
+    used.extend(space.operations.values().filter_map(Operation::topic));
+    for metric in space.metrics.values() {
+        match &metric.source {
+            MetricSource::FuzzingTime => {}
+            MetricSource::Hook(topics) => used.extend(topics),
+            MetricSource::Last(input) => used.extend([input.topic]),
+            MetricSource::Robustness(robustness) => {
+                used.extend(robustness.inputs.iter().map(|input| input.field.topic));
+            }
+            MetricSource::Formula(formula) => used.extend(formula.inputs.iter().map(|input| input.field.topic)),
+        }
+    }
+    for eddi in space.eddis.values() {
+        used.extend(eddi.evidence.iter().flat_map(|evidence| &evidence.inputs).map(|input| input.field.topic));
+        used.extend(eddi.otherwise.mitigation.iter().map(|mitigation| mitigation.field.topic));
+    }
+    used.extend(space.eddis.values().map(|eddi| eddi.publishes));
+    used.extend(space.surroundings.launch.iter().filter_map(|launch| launch.ready).map(|ready| ready.topic));
+    used
+}
+
+/// Evidence and demands that no guarantee of their monitor needs.
+pub(super) fn evidence(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
+    for eddi in space.eddis.values() {
+        let mut gates: Vec<&Gate> = eddi.guarantees.iter().map(|guarantee| &guarantee.gate).collect();
+        let mut needed = BTreeSet::new();
+        while let Some(gate) = gates.pop() {
+            match gate {
+                Gate::Evidence(at) => {
+                    needed.insert((false, *at));
+                }
+                Gate::Demand(at) => {
+                    needed.insert((true, *at));
+                }
+                Gate::All(parts) | Gate::Any(parts) => gates.extend(parts),
+            }
+        }
+        let evidence = eddi.evidence.iter().enumerate().map(|(at, it)| ((false, at), &it.declaration));
+        let demands = eddi.demands.iter().enumerate().map(|(at, it)| ((true, at), &it.declaration));
+        for (key, declaration) in evidence.chain(demands).filter(|(key, _)| !needed.contains(key)) {
+            let what = if key.0 { "demand" } else { "evidence" };
+            let title = format!("no guarantee of `{}` needs {what} `{}`", eddi.declaration.name, declaration.name);
+            let diagnostic = Diagnostic::new(Code::UNUSED_EVIDENCE, declaration.span, title);
+            diagnostics.push(diagnostic.label("the monitor's state does not depend on it"));
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! For GitHub: commands that a workflow prints, and that become annotations at lines of a pull request.
+
+use std::fmt::Write as _;
+
+use crate::diagnostic::{Diagnostic, Severity};
+use crate::source::SourceMap;
+
+/// One workflow command per diagnostic and line.
+pub fn github(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
+    let mut out = String::new();
+    for diagnostic in diagnostics {
+        let file = sources.file(diagnostic.span.file);
+        let (start, end) = (file.position(diagnostic.span.lo), file.position(diagnostic.span.hi));
+        let severity = match diagnostic.severity() {
+            Severity::Error => "error",
+            Severity::Warning => "warning",
+        };
+        write!(out, "::{severity} file={},line={},col={}", property(file.name()), start.line, start.column)
+            .expect("a string takes everything");
+        // Columns say where a stretch ends only if it ends on its line; the last is inclusive.
+        if start.line == end.line && start.column < end.column {
+            write!(out, ",endColumn={}", end.column - 1).expect("a string takes everything");
+        } else if start.line < end.line {
+            write!(out, ",endLine={}", end.line).expect("a string takes everything");
+        }
+        write!(out, ",title={}::{}", diagnostic.code, message(&diagnostic.title)).expect("a string takes everything");
+        let suggestions = diagnostic.suggestions.iter().map(|suggestion| &suggestion.message);
+        for line in std::iter::once(&diagnostic.label).chain(&diagnostic.notes).chain(suggestions) {
+            if !line.is_empty() {
+                write!(out, "%0A{}", message(line)).expect("a string takes everything");
+            }
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// Text that stays a command's message.
+fn message(text: &str) -> String {
+    text.replace('%', "%25").replace('\r', "%0D").replace('\n', "%0A")
+}
+
+/// Text that stays a property of a command.
+fn property(text: &str) -> String {
+    message(text).replace(':', "%3A").replace(',', "%2C")
+}

@@ -1,0 +1,117 @@
+//! Runtime monitors: conditional safety certificates that watch evidence and publish which guarantee holds.
+
+use super::{Condition, Declaration, EddiId, FieldPath, Input, TopicId};
+
+/// A runtime monitor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Eddi {
+    /// Its name and doc comment.
+    pub declaration: Declaration,
+    /// Where it publishes what holds: a topic that carries a `bool` (whether any guarantee holds), an `int` (the integrity
+    /// of the best one) or a `text` (its name).
+    pub publishes: TopicId,
+    /// Guarantees of other monitors that it relies on, in written order.
+    pub demands: Vec<Demand>,
+    /// What it watches, in written order.
+    pub evidence: Vec<Evidence>,
+    /// What it can guarantee, highest integrity first; at least one, no two of one integrity.
+    pub guarantees: Vec<Guarantee>,
+    /// What holds when no guarantee does.
+    pub otherwise: Otherwise,
+}
+
+/// A guarantee of another monitor that one relies on. Its name is that of the guarantee.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Demand {
+    /// Its name and doc comment.
+    pub declaration: Declaration,
+    /// Whose it is: never, by any chain of demands, the monitor that demands.
+    pub eddi: EddiId,
+}
+
+/// A condition on messages, with three values: true, false, unknown. Before each of its topics had a message it is
+/// unknown.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evidence {
+    /// Its name and doc comment.
+    pub declaration: Declaration,
+    /// What [`Evidence::condition`] refers to by position; at least one.
+    pub inputs: Vec<Input>,
+    /// When it is true.
+    pub condition: Condition,
+    /// How long the condition must have held without a break, in seconds. Default 0.
+    pub held: f64,
+    /// When it has become too old to be believed; `None` is never.
+    pub stale: Option<Stale>,
+}
+
+/// When evidence is too old.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stale {
+    /// Longest time since the last message of any of its topics, in seconds; positive.
+    pub after: f64,
+    /// What it is then.
+    pub is: StaleIs,
+}
+
+/// What stale evidence is taken for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StaleIs {
+    /// It does not hold.
+    False,
+    /// Nobody knows.
+    Unknown,
+}
+
+/// Something a monitor can vouch for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Guarantee {
+    /// Its name and doc comment.
+    pub declaration: Declaration,
+    /// Its integrity: 1 or more, larger is stronger.
+    pub integrity: u32,
+    /// What it needs.
+    pub gate: Gate,
+}
+
+/// What a guarantee needs, in three-valued logic.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Gate {
+    /// Evidence, by its position in [`Eddi::evidence`].
+    Evidence(usize),
+    /// A demand, by its position in [`Eddi::demands`].
+    Demand(usize),
+    /// All of two or more.
+    All(Vec<Gate>),
+    /// At least one of two or more.
+    Any(Vec<Gate>),
+}
+
+/// What holds when no guarantee does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Otherwise {
+    /// Its name and doc comment.
+    pub declaration: Declaration,
+    /// What is sent then.
+    pub mitigation: Option<Mitigation>,
+}
+
+/// A message that is to make the system safe.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mitigation {
+    /// What is set.
+    pub field: FieldPath,
+    /// What it is set to, of the field's type and in its unit.
+    pub value: Literal,
+}
+
+/// A value written in a space.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Literal {
+    /// True or false.
+    Bool(bool),
+    /// A number; whole where the field is.
+    Number(f64),
+    /// A text.
+    Text(String),
+}

@@ -1,0 +1,163 @@
+//! Physical labs: how tests are chosen for one, run in it, and compared with simulation.
+
+use super::{Bound, Declaration, MetricId, Range};
+
+/// A lab.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Physical {
+    /// Its name and doc comment.
+    pub declaration: Declaration,
+    /// How the lab is reached; `None` for a lab whose results come in by hand.
+    pub simulator: Option<LabSimulator>,
+    /// How often each chosen test is run; at least 1. Default 1.
+    pub repeats: u32,
+    /// What running a test costs.
+    pub cost: Cost,
+    /// Tests of which one of these holds are not run in the lab.
+    pub exclude: Vec<(MetricId, Bound)>,
+    /// What makes a test interesting, the most important first. Each metric once.
+    pub rank: Vec<(MetricId, Order)>,
+    /// How many tests are chosen, and by what; `None` for a lab that chooses by hand.
+    pub budget: Option<Budget>,
+    /// Differences between simulation and lab that do not matter, in the metric's unit; 0 or more. Each metric once.
+    pub tolerance: Vec<(MetricId, f64)>,
+    /// Metrics of which only the presence is compared: in the lab an interlock ends the test.
+    pub interlock: Vec<MetricId>,
+    /// Bodies that are not in the lab, or only there.
+    pub shapes: Vec<Shape>,
+    /// What may be fitted to make simulation and lab agree.
+    pub fits: Vec<Fit>,
+}
+
+/// How a lab is reached. Its transports are those of a simulator.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LabSimulator {
+    /// Its name and doc comment; the name is the lab's own.
+    pub declaration: Declaration,
+    /// The word of the transport, for example `simlog`.
+    pub transport: String,
+    /// Its address or program, and the program's arguments.
+    pub arguments: Vec<String>,
+    /// Its settings by name, in written order.
+    pub settings: Vec<(String, LabSetting)>,
+}
+
+/// The value of a setting.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LabSetting {
+    /// It is on.
+    Flag,
+    /// A whole number.
+    Count(u32),
+    /// A time in seconds; positive.
+    Seconds(f64),
+    /// A text.
+    Text(String),
+}
+
+/// What running a test costs, in the unit of the budget.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cost {
+    /// Any test; 0 or more. Default 1.
+    pub base: f64,
+    /// Each of its operations; 0 or more. Default 0. One of the two is positive.
+    pub per_operation: f64,
+}
+
+/// Which values come first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// Small ones.
+    Ascending,
+    /// Large ones.
+    Descending,
+}
+
+/// How tests are chosen: as different and as interesting as the budget allows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Budget {
+    /// The sum of costs at most; positive.
+    pub limit: f64,
+    /// The weight of difference against interest, in `0..=1`.
+    pub lambda: f64,
+    /// What tests differ in; at least one, each once.
+    pub over: Vec<Feature>,
+}
+
+/// A number that says where a test lies among all possible ones (semantics of the search-space reduction).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Feature {
+    /// Mean of the midpoints of activations.
+    T1,
+    /// Mean of their lengths.
+    T2,
+    /// Spread of their midpoints.
+    T3,
+    /// Mean of normalised parameters.
+    P1,
+    /// Spread of normalised parameters.
+    P2,
+    /// Number of operations.
+    O0,
+    /// Number of operations on values.
+    O1,
+    /// Number of losses.
+    O2,
+    /// Number of delays.
+    O3,
+}
+
+impl Feature {
+    /// Every feature with its name.
+    pub const ALL: [(&'static str, Feature); 9] = [
+        ("T1", Feature::T1),
+        ("T2", Feature::T2),
+        ("T3", Feature::T3),
+        ("P1", Feature::P1),
+        ("P2", Feature::P2),
+        ("O0", Feature::O0),
+        ("O1", Feature::O1),
+        ("O2", Feature::O2),
+        ("O3", Feature::O3),
+    ];
+}
+
+/// A body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shape {
+    /// Its name and doc comment; the name is the lab's own.
+    pub declaration: Declaration,
+    /// What it looks like.
+    pub form: Form,
+    /// Where it is.
+    pub place: Place,
+    /// How much larger it is taken to be on every side, in metres; 0 or more. Default 0.
+    pub expand: f64,
+}
+
+/// What a body looks like. Lengths are in metres and positive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Form {
+    /// A sphere of this radius.
+    Sphere(f64),
+    /// A box with these edges.
+    Box([f64; 3]),
+}
+
+/// Where a body is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Place {
+    /// It moves with the pose of this name.
+    Pose(String),
+    /// Its centre is here, in metres.
+    Point([f64; 3]),
+}
+
+/// Something that may be fitted within a range.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Fit {
+    /// A delay of all messages, in seconds; 0 or more.
+    RelayDelay(Range),
+    /// A parameter of the simulator, a plain number.
+    Parameter(String, Range),
+}

@@ -1,0 +1,477 @@
+//! What operations disturb, and what they permit tests to choose: each kind with its units and bounds.
+
+use super::Resolver;
+use super::system::type_in_words;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::model::{
+    Distribution, Domain, Drain, Id as _, NotFinite, OperationKind, Parameter, Range, Shape, Step, Target, TopicId,
+    Type, ValueMode,
+};
+use crate::span::Span;
+use crate::syntax::ast;
+use crate::units::{Dimension, Unit, dimension};
+
+/// The most copies of a message that one operation makes.
+const MOST_COPIES: f64 = 100.0;
+
+/// What the places of an operation hold.
+enum Held {
+    Number { unit: Option<Unit>, integer: bool },
+    Point { unit: Option<Unit> },
+}
+
+/// What an operation disturbs, how, and with which parameters.
+pub(super) type Resolved = (Target, OperationKind, Vec<Parameter>);
+
+impl<'a> Resolver<'a> {
+    /// An operation of any kind but a custom one.
+    pub(super) fn disturbance(&mut self, target: &'a ast::Target, kind: &'a ast::OperationKind) -> Option<Resolved> {
+        match kind {
+            ast::OperationKind::Random { absolute, amounts } => self.random_value(target, *absolute, amounts),
+            ast::OperationKind::RandomText(texts) => {
+                let found = self.values(target, "a random text", "a text", |ty| matches!(ty, Type::Text));
+                let texts = self.items(texts)?;
+                Some((found?.0, OperationKind::RandomText { texts }, Vec::new()))
+            }
+            ast::OperationKind::StuckAt(at) => self.stuck_at(target, at),
+            ast::OperationKind::Bias(amounts) => {
+                let (target, held) = self.amounts_of(target, "a bias")?;
+                let parameter = self.one_amount("bias", amounts, &held, &target)?;
+                Some((target.found, OperationKind::Bias, vec![parameter]))
+            }
+            ast::OperationKind::Drift(amounts) => {
+                let (target, held) = self.amounts_of(target, "a drift")?;
+                let per_second = |unit: Option<Unit>| {
+                    let text = unit.map_or("Hz".to_owned(), |unit| format!("{}/s", unit.text()));
+                    Some(Unit::parse(&text).expect("a unit of a field goes through being divided by a second"))
+                };
+                let rate = match held {
+                    Held::Number { unit, .. } => Held::Number { unit: per_second(unit), integer: false },
+                    Held::Point { unit } => Held::Point { unit: per_second(unit) },
+                };
+                let parameter = self.one_amount("rate", amounts, &rate, &target)?;
+                Some((target.found, OperationKind::Drift, vec![parameter]))
+            }
+            ast::OperationKind::Noise(range) => {
+                let (target, held) = self.amounts_of(target, "noise")?;
+                let (Held::Number { unit, .. } | Held::Point { unit }) = held;
+                let sigma = self.range(range, unit.as_ref(), "`sigma`")?;
+                let all = Range { low: 0.0, high: f64::INFINITY };
+                let parameter = number("sigma", unit, sigma);
+                let fits = self.inside(sigma, range.span, all, "a standard deviation", "0 and more", None);
+                fits.then_some((target.found, OperationKind::Noise, vec![parameter]))
+            }
+            ast::OperationKind::Scale(range) => {
+                let found = self.amounts_of(target, "a scale");
+                let factor = self.range(range, None, "`factor`")?;
+                Some((found?.0.found, OperationKind::Scale, vec![number("factor", None, factor)]))
+            }
+            ast::OperationKind::NotFinite(written) => {
+                let wants = "a real number or a point";
+                let real = |ty: &Type| matches!(ty, Type::Real(_) | Type::Point(_));
+                let (target, _) = self.values(target, "an operation that makes numbers not finite", wants, real)?;
+                let number = match written {
+                    ast::NotFinite::Nan => NotFinite::Nan,
+                    ast::NotFinite::Infinity => NotFinite::Infinity,
+                    ast::NotFinite::MinusInfinity => NotFinite::MinusInfinity,
+                };
+                Some((target, OperationKind::NotFinite { number }, Vec::new()))
+            }
+            ast::OperationKind::Freeze => {
+                let (target, _) = self.values(target, "a freeze", "anything", |_| true)?;
+                Some((whole_or_parts(target), OperationKind::Freeze, Vec::new()))
+            }
+            ast::OperationKind::Stale(range) => {
+                let found = self.values(target, "a stale value", "anything", |_| true);
+                let age = self.times(range, "the age")?;
+                let parameter = number("age", Some(Unit::seconds()), age);
+                Some((whole_or_parts(found?.0), OperationKind::Stale, vec![parameter]))
+            }
+            ast::OperationKind::ClockSkew(range) => self.clock_skew(target, range),
+            _ => self.on_messages(target, kind),
+        }
+    }
+
+    /// An operation on whole messages.
+    fn on_messages(&mut self, target: &'a ast::Target, kind: &'a ast::OperationKind) -> Option<Resolved> {
+        let seconds = || Some(Unit::seconds());
+        let (target, kind, parameters) = match kind {
+            ast::OperationKind::PacketLoss(range) => {
+                let target = self.whole_messages(target, "packet loss drops");
+                let loss = self.probabilities(range, "the loss")?;
+                (target?, OperationKind::PacketLoss, vec![number("loss", None, loss)])
+            }
+            ast::OperationKind::BurstLoss { span, enter, leave, loss } => {
+                let target = self.whole_messages(target, "burst loss drops");
+                let mut parameters = Vec::new();
+                let mut complete = true;
+                for (name, clauses, what) in [
+                    ("enter", enter, "the probability that a burst begins"),
+                    ("leave", leave, "the probability that a burst ends"),
+                    ("loss", loss, "the loss in a burst"),
+                ] {
+                    match self.single(clauses, name) {
+                        Some(range) => match self.probabilities(range, what) {
+                            Some(range) => parameters.push(number(name, None, range)),
+                            None => complete = false,
+                        },
+                        None if name == "loss" => {}
+                        None => {
+                            let title = format!("burst loss does not say `{name}`: {what} with a message");
+                            let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, *span, title)
+                                .label(format!("expected in its braces for example `{name} [0%, 20%]`"));
+                            self.report(diagnostic);
+                            complete = false;
+                        }
+                    }
+                }
+                if !complete {
+                    return None;
+                }
+                (target?, OperationKind::BurstLoss, parameters)
+            }
+            ast::OperationKind::RateLimit(range) => {
+                let target = self.whole_messages(target, "a rate limit drops");
+                let unit = Unit::parse("Hz").expect("`Hz` is in the table");
+                let rate = self.range(range, Some(&unit), "the rate")?;
+                let all = Range { low: f64::MIN_POSITIVE, high: f64::INFINITY };
+                if !self.inside(rate, range.span, all, "a rate limit", "more than 0Hz", None) {
+                    return None;
+                }
+                (target?, OperationKind::RateLimit, vec![number("rate", Some(unit), rate)])
+            }
+            ast::OperationKind::Latency { range, distribution, drain } => {
+                let target = self.whole_messages(target, "latency delays");
+                if let [(first, _), (again, _), ..] = distribution.as_slice() {
+                    let title = "a latency has one distribution";
+                    let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, *again, title)
+                        .label("remove this one or the other")
+                        .also(*first, "first here");
+                    self.report(diagnostic);
+                }
+                let (distribution, shape) = match distribution.first() {
+                    None | Some((_, ast::Distribution::Fixed)) => (Distribution::Fixed, Shape::Value),
+                    Some((_, ast::Distribution::Uniform)) => (Distribution::Uniform, Shape::Range),
+                    Some((_, ast::Distribution::Normal)) => (Distribution::Normal, Shape::Range),
+                };
+                let drain = self.drain(drain);
+                let domain = Domain::Number { range: self.times(range, "the delay")?, shape, integer: false };
+                let parameter = Parameter { name: "delay".to_owned(), doc: String::new(), unit: seconds(), domain };
+                (target?, OperationKind::Latency { distribution, drain }, vec![parameter])
+            }
+            ast::OperationKind::Reorder { range, drain } => {
+                let target = self.whole_messages(target, "reordering delays");
+                let drain = self.drain(drain);
+                let window = number("window", seconds(), self.times(range, "the window")?);
+                (target?, OperationKind::Reorder { drain }, vec![window])
+            }
+            ast::OperationKind::Duplicate(range) => {
+                let target = self.whole_messages(target, "duplication copies");
+                let copies = self.range(range, None, "`copies`")?;
+                let all = Range { low: 1.0, high: MOST_COPIES };
+                if !self.whole_ends(copies, range, "`copies`")
+                    || !self.inside(copies, range.span, all, "the copies of a message", "1 to 100", None)
+                {
+                    return None;
+                }
+                let domain = Domain::Number { range: copies, shape: Shape::Value, integer: true };
+                let parameter = Parameter { name: "copies".to_owned(), doc: String::new(), unit: None, domain };
+                (target?, OperationKind::Duplicate, vec![parameter])
+            }
+            ast::OperationKind::Blackhole => {
+                (self.whole_messages(target, "a blackhole drops")?, OperationKind::Blackhole, Vec::new())
+            }
+            _ => unreachable!("operations on values and custom ones are resolved apart"),
+        };
+        Some((target, kind, parameters))
+    }
+
+    fn drain(&mut self, drain: &'a [(Span, ast::Drain)]) -> Drain {
+        match self.single(drain, "drain") {
+            None | Some(ast::Drain::Finish) => Drain::Finish,
+            Some(ast::Drain::Flush) => Drain::Flush,
+            Some(ast::Drain::Drop) => Drain::Drop,
+        }
+    }
+
+    fn random_value(&mut self, target: &'a ast::Target, absolute: bool, amounts: &'a ast::Amounts) -> Option<Resolved> {
+        let (target, held) = self.amounts_of(target, "a random value")?;
+        let (mode, name) = if absolute { (ValueMode::Absolute, "value") } else { (ValueMode::Offset, "offset") };
+        let permitted = self.one_amount(name, amounts, &held, &target)?;
+        let sub_range = |name: &str, range, integer| Parameter {
+            name: name.to_owned(),
+            doc: String::new(),
+            unit: permitted.unit.clone(),
+            domain: Domain::Number { range, shape: Shape::Range, integer },
+        };
+        let (integer, parameters) = match &permitted.domain {
+            Domain::Number { range, integer, .. } => (*integer, vec![sub_range(name, *range, *integer)]),
+            Domain::Point { low, high } => {
+                let axes = [("x", 0), ("y", 1), ("z", 2)];
+                let range = |axis: usize| Range { low: low[axis], high: high[axis] };
+                (false, axes.map(|(name, axis)| sub_range(name, range(axis), false)).to_vec())
+            }
+            Domain::Texts(_) | Domain::Files(_) => unreachable!("amounts are numbers or points"),
+        };
+        Some((target.found, OperationKind::RandomValue { mode, integer }, parameters))
+    }
+
+    fn stuck_at(&mut self, target: &'a ast::Target, at: &'a ast::Stuck) -> Option<Resolved> {
+        match at {
+            ast::Stuck::Amounts(amounts) => {
+                let (target, held) = self.amounts_of(target, "`stuck at` a range")?;
+                let parameter = self.one_amount("value", amounts, &held, &target)?;
+                Some((target.found, OperationKind::StuckAt { truth: None }, vec![parameter]))
+            }
+            ast::Stuck::Texts(texts) => {
+                let found = self.values(target, "`stuck at` texts", "a text", |ty| matches!(ty, Type::Text));
+                let domain = Domain::Texts(self.items(texts)?);
+                let parameter = Parameter { name: "value".to_owned(), doc: String::new(), unit: None, domain };
+                Some((found?.0, OperationKind::StuckAt { truth: None }, vec![parameter]))
+            }
+            ast::Stuck::Truth(truth, span) => {
+                let user = format!("`stuck at {}`", self.text(*span));
+                let (target, _) = self.values(target, &user, "a `bool`", |ty| matches!(ty, Type::Bool))?;
+                Some((target, OperationKind::StuckAt { truth: Some(*truth) }, Vec::new()))
+            }
+        }
+    }
+
+    fn clock_skew(&mut self, target: &'a ast::Target, range: &ast::Range) -> Option<Resolved> {
+        let stamp = |ty: &Type| match ty {
+            Type::Int(unit) | Type::Real(unit) => dimension(unit.as_ref()) == Dimension::TIME,
+            _ => false,
+        };
+        let wants = "a number with a unit of time, such as `real[s]` or `int[ns]`";
+        let (found, ty) = self.values(target, "a clock skew", wants, stamp)?;
+        let (unit, integer) = match ty {
+            Type::Int(unit) => (unit, true),
+            Type::Real(unit) => (unit, false),
+            _ => unreachable!("a time stamp is a number"),
+        };
+        let skew = self.range(range, unit.as_ref(), "`skew`")?;
+        if integer && !self.whole_ends(skew, range, "`skew`") {
+            return None;
+        }
+        let domain = Domain::Number { range: skew, shape: Shape::Value, integer };
+        let parameter = Parameter { name: "skew".to_owned(), doc: String::new(), unit, domain };
+        Some((found, OperationKind::ClockSkew, vec![parameter]))
+    }
+
+    /// Numbers or points.
+    fn amounts_of(&mut self, target: &'a ast::Target, user: &str) -> Option<(Amounted, Held)> {
+        let is = |ty: &Type| matches!(ty, Type::Int(_) | Type::Real(_) | Type::Point(_));
+        let (found, ty) = self.values(target, user, "a number or a point", is)?;
+        let held = match ty {
+            Type::Int(unit) => Held::Number { unit, integer: true },
+            Type::Real(unit) => Held::Number { unit, integer: false },
+            Type::Point(unit) => Held::Point { unit },
+            _ => unreachable!("it is a number or a point"),
+        };
+        Some((Amounted { found, first: target.places[0].span }, held))
+    }
+
+    /// A parameter for one amount of what is held: a range of numbers, or a box of points.
+    fn one_amount(
+        &mut self,
+        name: &str,
+        amounts: &'a ast::Amounts,
+        held: &Held,
+        target: &Amounted,
+    ) -> Option<Parameter> {
+        // A rate is in another unit than what it is a rate of.
+        let what = if name == "rate" { "the rate".to_owned() } else { format!("`{}`", self.text(target.first)) };
+        let (unit, domain) = match (held, amounts) {
+            (Held::Number { unit, integer }, ast::Amounts::Range(range)) => {
+                let permitted = self.range(range, unit.as_ref(), &what)?;
+                if *integer && !self.whole_ends(permitted, range, &what) {
+                    return None;
+                }
+                (unit, Domain::Number { range: permitted, shape: Shape::Value, integer: *integer })
+            }
+            (Held::Point { unit }, ast::Amounts::Corners(corners, _)) => {
+                let (low, high) = self.corners(corners, unit.as_ref(), &what)?;
+                (unit, Domain::Point { low, high })
+            }
+            (held, amounts) => {
+                let (Held::Number { unit, .. } | Held::Point { unit }) = held;
+                let unit = unit.as_ref().map_or("", Unit::text);
+                let (title, example) = match held {
+                    Held::Number { .. } => ("is a number, so", format!("[0{unit}, 1{unit}]")),
+                    Held::Point { .. } => ("is a point, so", format!("[(0, 0, 0){unit}, (1, 1, 1){unit}]")),
+                };
+                let permits = if matches!(held, Held::Point { .. }) { "a box between two points" } else { "a range" };
+                let title = format!("`{}` {title} its `{name}` is permitted in {permits}", self.text(target.first));
+                let diagnostic = Diagnostic::new(Code::WRONG_TYPE, amounts.span(), title)
+                    .label(format!("expected for example `{example}`"));
+                self.report(diagnostic);
+                return None;
+            }
+        };
+        Some(Parameter { name: name.to_owned(), doc: String::new(), unit: unit.clone(), domain })
+    }
+
+    fn whole_ends(&mut self, range: Range, written: &ast::Range, what: &str) -> bool {
+        let low = self.whole(range.low, written.low.span, what);
+        self.whole(range.high, written.high.span, what) && low
+    }
+
+    // ----- targets
+
+    /// Whole messages of one topic.
+    pub(super) fn whole_messages(&mut self, target: &'a ast::Target, does: &str) -> Option<Target> {
+        let (found, _) = self.values(target, does, "whole messages", |_| true)?;
+        let [place] = target.places.as_slice() else {
+            let title = format!("{does} whole messages of one topic");
+            let diagnostic = Diagnostic::new(Code::WRONG_TYPE, target.span, title).label("expected a topic");
+            self.report(diagnostic);
+            return None;
+        };
+        if place.steps.is_empty() {
+            return Some(Target { topic: found.topic, places: Vec::new() });
+        }
+        let parts = Span { lo: place.topic.span.hi, ..place.span };
+        let title = format!("{does} whole messages, not a part of them");
+        let diagnostic = Diagnostic::new(Code::WRONG_TYPE, parts, title).label("expected a topic").suggest(
+            "leave this out",
+            parts,
+            "",
+        );
+        self.report(diagnostic);
+        None
+    }
+
+    /// The values at the places of a target, all of one topic and one type, of which an operation is for the types that
+    /// `is_for` says, `wants` in words.
+    fn values(
+        &mut self,
+        target: &'a ast::Target,
+        user: &str,
+        wants: &str,
+        is_for: impl Fn(&Type) -> bool,
+    ) -> Option<(Target, Type)> {
+        let mut found: Vec<(TopicId, Vec<Step>, Type)> = Vec::new();
+        for place in &target.places {
+            let (topic, steps, ty) = self.place(place)?;
+            let written = self.text(place.span);
+            if let Some((first_topic, _, first_type)) = found.first() {
+                let first = target.places[0].span;
+                let first_words = self.text(first);
+                let wrong = if *first_topic != topic {
+                    Some((
+                        Code::WRONG_TYPE,
+                        format!("`{written}` is of another topic than `{first_words}`"),
+                        "an operation disturbs one topic: declare another one for this".to_owned(),
+                    ))
+                } else if *first_type != ty {
+                    let label =
+                        format!("it is {}, and `{first_words}` is {}", type_in_words(&ty), type_in_words(first_type));
+                    Some((Code::WRONG_TYPE, format!("`{written}` is of another type than `{first_words}`"), label))
+                } else if found.iter().any(|(_, before, _)| *before == steps) {
+                    Some((
+                        Code::LISTED_TWICE,
+                        format!("`{written}` stands twice in this list"),
+                        "again here".to_owned(),
+                    ))
+                } else {
+                    None
+                };
+                if let Some((code, title, label)) = wrong {
+                    self.report(Diagnostic::new(code, place.span, title).label(label));
+                    return None;
+                }
+            }
+            if !is_for(&ty) {
+                self.report_unfit(place, user, wants, &ty, &is_for);
+                return None;
+            }
+            found.push((topic, steps, ty));
+        }
+        let (topic, _, ty) = found.first().cloned()?;
+        Some((Target { topic, places: found.into_iter().map(|(_, steps, _)| steps).collect() }, ty))
+    }
+
+    fn report_unfit(&mut self, place: &ast::Place, user: &str, wants: &str, ty: &Type, is_for: impl Fn(&Type) -> bool) {
+        let written = self.text(place.span);
+        let title = format!("{user} needs {wants}, but `{written}` is not one");
+        let mut diagnostic =
+            Diagnostic::new(Code::WRONG_TYPE, place.span, title).label(format!("it is {}", type_in_words(ty)));
+        match ty {
+            Type::Message(id) => {
+                if let Some(message) = self.system.messages[id.index()].as_ref() {
+                    for field in message.fields.iter().filter(|field| is_for(&field.ty)).take(3) {
+                        let name = &field.declaration.name;
+                        diagnostic = diagnostic.suggest(
+                            format!("its field `{name}` is one"),
+                            place.span.end(),
+                            format!(".{name}"),
+                        );
+                    }
+                }
+            }
+            Type::List(of) if is_for(of) => {
+                diagnostic = diagnostic.suggest("each of its elements is one", place.span.end(), "[*]");
+            }
+            _ => {}
+        }
+        self.report(diagnostic);
+    }
+
+    /// Where a place is, and of which type.
+    fn place(&mut self, place: &'a ast::Place) -> Option<(TopicId, Vec<Step>, Type)> {
+        let index = self.find(&place.topic, super::Kind::Topic)?;
+        let mut ty = self.system.topics[index].as_ref()?.ty.clone();
+        let mut holder = format!("topic `{}`", place.topic.text);
+        let mut steps = Vec::new();
+        for step in &place.steps {
+            let (span, step) = match step {
+                ast::Step::Field(name) => {
+                    ty = self.field_in(&ty, &holder, name)?;
+                    holder = format!("field `{}`", name.text);
+                    steps.push(Step::Field(name.text.clone()));
+                    continue;
+                }
+                ast::Step::Each(span) => (*span, Step::Each),
+                ast::Step::Element(at, span) => {
+                    let Ok(index) = u32::try_from(at.value?) else {
+                        let title = format!("`{}` is not the position of an element", self.text(at.span));
+                        let label = "expected a whole number below 2^32";
+                        self.report(Diagnostic::new(Code::BAD_NUMBER, at.span, title).label(label));
+                        return None;
+                    };
+                    (*span, Step::Element(index))
+                }
+            };
+            let Type::List(of) = ty else {
+                let title = format!("{holder} has no elements");
+                let label = format!("it is {}", type_in_words(&ty));
+                self.report(Diagnostic::new(Code::WRONG_TYPE, span, title).label(label));
+                return None;
+            };
+            ty = *of;
+            "an element".clone_into(&mut holder);
+            steps.push(step);
+        }
+        Some((TopicId::from_index(index), steps, ty))
+    }
+}
+
+/// A target with where its first place is written.
+struct Amounted {
+    found: Target,
+    first: Span,
+}
+
+/// A target that is one whole message has no places.
+fn whole_or_parts(target: Target) -> Target {
+    match target.places.as_slice() {
+        [only] if only.is_empty() => Target { places: Vec::new(), ..target },
+        _ => target,
+    }
+}
+
+/// A parameter of which a test chooses one number.
+fn number(name: &str, unit: Option<Unit>, range: Range) -> Parameter {
+    let domain = Domain::Number { range, shape: Shape::Value, integer: false };
+    Parameter { name: name.to_owned(), doc: String::new(), unit, domain }
+}

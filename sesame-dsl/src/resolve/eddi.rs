@@ -1,0 +1,348 @@
+//! Runtime monitors.
+
+use std::collections::BTreeMap;
+
+use super::{Kind, Resolver};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::model::eddi::{Demand, Eddi, Evidence, Gate, Guarantee, Literal, Mitigation, Otherwise, Stale, StaleIs};
+use crate::model::{EddiId, Id as _, TopicId, Type};
+use crate::similar::most_similar;
+use crate::span::Span;
+use crate::syntax::ast::{self, ExpressionKind, Name};
+use crate::syntax::eddi as written;
+use crate::units::Unit;
+
+/// The names inside of a monitor, and what each stands for.
+type Members<'a> = BTreeMap<&'a str, (Member, Span)>;
+
+#[derive(Clone, Copy)]
+enum Member {
+    Evidence(usize),
+    Demand(usize),
+    /// A guarantee, or what holds otherwise.
+    State,
+}
+
+impl<'a> Resolver<'a> {
+    pub(super) fn eddis(&mut self) -> Vec<Option<Eddi>> {
+        let file = self.file;
+        self.circles_of_demands();
+        file.eddis.iter().map(|eddi| self.eddi(eddi)).collect()
+    }
+
+    fn eddi(&mut self, eddi: &'a written::Eddi) -> Option<Eddi> {
+        let name = &eddi.head.name;
+        let publishes = self.published(&eddi.publishes);
+        let members = self.members_of_eddi(eddi);
+        let demands: Vec<_> = eddi.demands.iter().map(|demand| self.demand(demand)).collect();
+        let evidence: Vec<_> = eddi.evidence.iter().map(|evidence| self.evidence(evidence)).collect();
+        let mut guarantees = self.guarantees(eddi, &members);
+        if eddi.otherwise.is_empty() && !eddi.damaged {
+            self.missing(name, "what holds when no guarantee does", "otherwise not_safe");
+        }
+        let otherwise = self.single(&eddi.otherwise, "otherwise").and_then(|otherwise| self.otherwise(otherwise));
+        if eddi.guarantees.is_empty() && !eddi.damaged {
+            self.missing(name, "a guarantee", "guarantee safe  integrity 1 = brakes_ok");
+            return None;
+        }
+        if let Some(guarantees) = &mut guarantees {
+            guarantees.sort_by_key(|guarantee| std::cmp::Reverse(guarantee.integrity));
+        }
+        Some(Eddi {
+            declaration: self.declaration(&eddi.head),
+            publishes: publishes?,
+            demands: demands.into_iter().collect::<Option<_>>()?,
+            evidence: evidence.into_iter().collect::<Option<_>>()?,
+            guarantees: guarantees?,
+            otherwise: otherwise?,
+        })
+    }
+
+    fn published(&mut self, name: &'a Name) -> Option<TopicId> {
+        let index = self.find(name, Kind::Topic)?;
+        let topic = self.system.topics[index].as_ref()?;
+        let fits = matches!(topic.ty, Type::Bool | Type::Int(None) | Type::Text) && topic.paths.len() == 1;
+        if fits {
+            return Some(TopicId::from_index(index));
+        }
+        let is = if topic.paths.len() > 1 {
+            "a group of topics".to_owned()
+        } else {
+            super::system::type_in_words(&topic.ty)
+        };
+        let title = format!("a monitor cannot publish its state on `{}`", name.text);
+        let diagnostic = Diagnostic::new(Code::WRONG_TYPE, name.span, title).label(format!("it is {is}"));
+        self.report(diagnostic.note(
+            "one topic of type `bool` (whether a guarantee holds), `int` (its integrity) or `text` (its name) fits",
+        ));
+        None
+    }
+
+    fn members_of_eddi(&mut self, eddi: &'a written::Eddi) -> Members<'a> {
+        let mut members: Members<'a> = BTreeMap::new();
+        let demands = eddi.demands.iter().enumerate().map(|(at, it)| (&it.head.name, Member::Demand(at)));
+        let evidence = eddi.evidence.iter().enumerate().map(|(at, it)| (&it.head.name, Member::Evidence(at)));
+        let states = eddi.guarantees.iter().map(|it| &it.head.name);
+        let states = states.chain(eddi.otherwise.iter().map(|(_, it)| &it.head.name));
+        let mut all: Vec<_> = demands.chain(evidence).chain(states.map(|name| (name, Member::State))).collect();
+        all.sort_by_key(|(name, _)| name.span);
+        for (name, member) in all {
+            if let Some((_, first)) = members.get(name.text.as_str()) {
+                let title = format!("`{}` is defined twice in monitor `{}`", name.text, eddi.head.name.text);
+                let diagnostic = Diagnostic::new(Code::DEFINED_TWICE, name.span, title)
+                    .label("again here")
+                    .also(*first, "first defined here");
+                self.report(diagnostic);
+            } else {
+                members.insert(&name.text, (member, name.span));
+            }
+        }
+        members
+    }
+
+    /// A demand names a guarantee of another monitor.
+    fn demand(&mut self, demand: &'a written::Demand) -> Option<Demand> {
+        let name = &demand.head.name;
+        let index = self.find(&demand.eddi, Kind::Eddi)?;
+        let other = &self.file.eddis[index];
+        let guarantees: Vec<&str> = other.guarantees.iter().map(|it| it.head.name.text.as_str()).collect();
+        if !guarantees.contains(&name.text.as_str()) && !other.damaged {
+            let title = format!("monitor `{}` has no guarantee named `{}`", demand.eddi.text, name.text);
+            let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title)
+                .label("no such guarantee")
+                .also(other.head.name.span, "the monitor is declared here");
+            diagnostic = match most_similar(&name.text, guarantees.iter().copied()) {
+                Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
+                None => diagnostic.note(format!("its guarantees: {}", super::list(&guarantees))),
+            };
+            self.report(diagnostic);
+            return None;
+        }
+        Some(Demand { declaration: self.declaration(&demand.head), eddi: EddiId::from_index(index) })
+    }
+
+    /// Monitors that would have to know their own state to know it.
+    fn circles_of_demands(&mut self) {
+        let file = self.file;
+        let demanded = |index: usize| {
+            let names = file.eddis[index].demands.iter().map(|demand| &demand.eddi);
+            names.filter_map(|name| {
+                let definition = self.names.get(name.text.as_str())?;
+                (definition.kind == Kind::Eddi).then_some((definition.index, name.span))
+            })
+        };
+        let edges: Vec<Vec<(usize, Span)>> = (0..file.eddis.len()).map(|index| demanded(index).collect()).collect();
+        // Whoever is left when monitors without open demands are taken away is in a circle, or demands of one.
+        let mut settled = vec![false; edges.len()];
+        let mut before = usize::MAX;
+        let mut open = edges.len();
+        while open < before {
+            before = open;
+            for index in 0..edges.len() {
+                if !settled[index] && edges[index].iter().all(|&(to, _)| settled[to]) {
+                    settled[index] = true;
+                    open -= 1;
+                }
+            }
+        }
+        let mut told = vec![false; edges.len()];
+        for start in 0..edges.len() {
+            if settled[start] || told[start] {
+                continue;
+            }
+            let mut chain: Vec<(usize, Span)> = Vec::new();
+            let mut at = start;
+            while !chain.iter().any(|&(member, _)| member == at) && !told[at] {
+                let Some(&(to, span)) = edges[at].iter().find(|&&(to, _)| !settled[to]) else { break };
+                chain.push((at, span));
+                at = to;
+            }
+            for &(member, _) in &chain {
+                told[member] = true;
+            }
+            let Some(begin) = chain.iter().position(|&(member, _)| member == at) else { continue };
+            let name = |index: usize| &file.eddis[index].head.name;
+            let circle = &chain[begin..];
+            let by: Vec<String> = circle[1..].iter().map(|&(member, _)| format!("`{}`", name(member).text)).collect();
+            let first = name(circle[0].0);
+            let title = if by.is_empty() {
+                format!("monitor `{}` demands something of itself", first.text)
+            } else {
+                format!("monitor `{}` demands something of itself by way of {}", first.text, by.join(", "))
+            };
+            let closing = circle[circle.len() - 1].1;
+            let mut diagnostic = Diagnostic::new(Code::CIRCLE, closing, title).label("this demand closes the circle");
+            if !by.is_empty() {
+                diagnostic = diagnostic.also(first.span, "declared here");
+            }
+            self.report(diagnostic);
+        }
+    }
+
+    fn evidence(&mut self, evidence: &'a written::Evidence) -> Option<Evidence> {
+        let mut inputs = Vec::new();
+        let before = self.diagnostics.len();
+        let condition = self.condition(&mut inputs, &evidence.condition);
+        if condition.is_some() && inputs.is_empty() {
+            // That its comparisons have one outcome is the same mistake as the one below.
+            self.diagnostics.truncate(before);
+        }
+        let seconds = Unit::seconds();
+        let held = match self.single(&evidence.held, "held") {
+            Some(held) => self.positive(held, &seconds, "the time that evidence holds"),
+            None => Some(0.0),
+        };
+        let stale = match self.single(&evidence.stale, "stale after") {
+            Some((after, unknown)) => self
+                .positive(after, &seconds, "the age of evidence")
+                .map(|after| Some(Stale { after, is: if *unknown { StaleIs::Unknown } else { StaleIs::False } })),
+            None => Some(None),
+        };
+        let condition = condition?;
+        if inputs.is_empty() {
+            let title = "this evidence hears no topic";
+            let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, evidence.condition.span, title);
+            self.report(diagnostic.label("always the same").note("evidence is a condition on messages"));
+            return None;
+        }
+        Some(Evidence { declaration: self.declaration(&evidence.head), inputs, condition, held: held?, stale: stale? })
+    }
+
+    /// A quantity of more than zero.
+    pub(super) fn positive(&mut self, quantity: &ast::Quantity, unit: &Unit, what: &str) -> Option<f64> {
+        let value = self.value(quantity, Some(unit), what)?;
+        if value > 0.0 {
+            return Some(value);
+        }
+        let title = format!("`{}` is out of range for {what}", self.text(quantity.span));
+        let label = format!("expected more than 0{}", unit.text());
+        self.report(Diagnostic::new(Code::OUT_OF_RANGE, quantity.span, title).label(label));
+        None
+    }
+
+    fn guarantees(&mut self, eddi: &'a written::Eddi, members: &Members<'a>) -> Option<Vec<Guarantee>> {
+        let mut first: BTreeMap<u32, Span> = BTreeMap::new();
+        let mut guarantees = Vec::new();
+        let mut complete = true;
+        for guarantee in &eddi.guarantees {
+            let gate = self.gate(eddi, members, &guarantee.gate);
+            let integrity = self.count(guarantee.integrity, 1, "an integrity is");
+            if let Some(integrity) = integrity {
+                if let Some(&before) = first.get(&integrity) {
+                    let title = format!("two guarantees have integrity {integrity}");
+                    let diagnostic = Diagnostic::new(Code::BAD_MONITOR, guarantee.integrity.span, title)
+                        .label("again here")
+                        .also(before, "first here")
+                        .note("the strongest guarantee that holds is the monitor's state, so they need an order");
+                    self.report(diagnostic);
+                    complete = false;
+                }
+                first.entry(integrity).or_insert(guarantee.integrity.span);
+            }
+            match (gate, integrity) {
+                (Some(gate), Some(integrity)) => {
+                    let declaration = self.declaration(&guarantee.head);
+                    guarantees.push(Guarantee { declaration, integrity, gate });
+                }
+                _ => complete = false,
+            }
+        }
+        complete.then_some(guarantees)
+    }
+
+    fn gate(
+        &mut self,
+        eddi: &'a written::Eddi,
+        members: &Members<'a>,
+        expression: &'a ast::Expression,
+    ) -> Option<Gate> {
+        let (parts, all) = match &expression.kind {
+            ExpressionKind::All(parts) => (parts, true),
+            ExpressionKind::Any(parts) => (parts, false),
+            ExpressionKind::Field(path) if path.fields.is_empty() => {
+                return self.gate_member(eddi, members, &path.topic);
+            }
+            _ => {
+                let title = "a guarantee needs evidence and demands, joined by `and` and `or`";
+                let diagnostic = Diagnostic::new(Code::BAD_MONITOR, expression.span, title);
+                self.report(diagnostic.label("neither").note("a condition on messages is `evidence` with a name"));
+                return None;
+            }
+        };
+        let parts: Vec<Option<Gate>> = parts.iter().map(|part| self.gate(eddi, members, part)).collect();
+        let parts = parts.into_iter().collect::<Option<Vec<Gate>>>()?;
+        Some(if all { Gate::All(parts) } else { Gate::Any(parts) })
+    }
+
+    fn gate_member(&mut self, eddi: &'a written::Eddi, members: &Members<'a>, name: &Name) -> Option<Gate> {
+        match members.get(name.text.as_str()) {
+            Some((Member::Evidence(at), _)) => return Some(Gate::Evidence(*at)),
+            Some((Member::Demand(at), _)) => return Some(Gate::Demand(*at)),
+            Some((Member::State, declared)) => {
+                let title = format!("`{}` is not evidence and not a demand", name.text);
+                let diagnostic = Diagnostic::new(Code::OTHER_KIND, name.span, title)
+                    .label("a guarantee needs evidence and demands")
+                    .also(*declared, "it is declared here");
+                self.report(diagnostic);
+                return None;
+            }
+            None => {}
+        }
+        let known: Vec<&str> = members
+            .iter()
+            .filter(|(_, (member, _))| !matches!(member, Member::State))
+            .map(|(known, _)| *known)
+            .collect();
+        if eddi.damaged {
+            return None;
+        }
+        let title = format!("monitor `{}` has no evidence and no demand named `{}`", eddi.head.name.text, name.text);
+        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("not of this monitor");
+        diagnostic = match most_similar(&name.text, known.iter().copied()) {
+            Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
+            None if known.is_empty() => diagnostic.note("it has none at all"),
+            None => diagnostic.note(format!("it has {}", super::list(&known))),
+        };
+        self.report(diagnostic);
+        None
+    }
+
+    fn otherwise(&mut self, otherwise: &'a written::Otherwise) -> Option<Otherwise> {
+        let mitigation = match &otherwise.mitigation {
+            Some((path, value)) => Some(self.mitigation(path, value)?),
+            None => None,
+        };
+        Some(Otherwise { declaration: self.declaration(&otherwise.head), mitigation })
+    }
+
+    fn mitigation(&mut self, path: &'a ast::Path, value: &'a written::Mitigation) -> Option<Mitigation> {
+        let (field, ty) = self.field(path)?;
+        let what = format!("`{}`", self.text(path.span));
+        let value = match (value, ty) {
+            (written::Mitigation::Truth(truth, _), Type::Bool) => Literal::Bool(*truth),
+            (written::Mitigation::Text(text), Type::Text) => Literal::Text(text.text.clone()),
+            (written::Mitigation::Number(number), Type::Real(unit)) => {
+                Literal::Number(self.value(number, unit.as_ref(), &what)?)
+            }
+            (written::Mitigation::Number(number), Type::Int(unit)) => {
+                let value = self.value(number, unit.as_ref(), &what)?;
+                if !self.whole(value, number.span, &what) {
+                    return None;
+                }
+                Literal::Number(value)
+            }
+            (value, ty) => {
+                let span = match value {
+                    written::Mitigation::Truth(_, span) => *span,
+                    written::Mitigation::Number(number) => number.span,
+                    written::Mitigation::Text(text) => text.span,
+                };
+                let title = format!("`{}` cannot be the value of {what}", self.text(span));
+                let label = format!("{what} is {}", super::system::type_in_words(&ty));
+                self.report(Diagnostic::new(Code::WRONG_TYPE, span, title).label(label));
+                return None;
+            }
+        };
+        Some(Mitigation { field, value })
+    }
+}

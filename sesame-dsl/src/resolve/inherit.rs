@@ -1,0 +1,113 @@
+//! `campaign x from y`: the clauses that a campaign does not write itself, before anything is resolved.
+
+use std::collections::BTreeMap;
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::syntax::ast::{Campaign, File};
+
+/// Hands clauses down. A clause that a campaign writes replaces the inherited one whole; `search`, `repeat` and
+/// `passive` are one clause in this, and what belongs to a search only is not handed to a campaign that has none.
+///
+/// A base that is none is left for resolution to report.
+pub(super) fn inherit(file: &mut File, diagnostics: &mut Vec<Diagnostic>) {
+    let mut positions: BTreeMap<&str, usize> = BTreeMap::new();
+    for (index, campaign) in file.campaigns.iter().enumerate() {
+        positions.entry(&campaign.head.name.text).or_insert(index);
+    }
+    let bases = file.campaigns.iter().map(|campaign| positions.get(campaign.from.as_ref()?.text.as_str()).copied());
+    let mut bases: Vec<Option<usize>> = bases.collect();
+    let mut done = vec![false; bases.len()];
+    for start in 0..bases.len() {
+        let mut chain = Vec::new();
+        let mut next = Some(start);
+        while let Some(index) = next.filter(|&index| !done[index]) {
+            if let Some(at) = chain.iter().position(|&before| before == index) {
+                let circle = chain[at..].to_vec();
+                diagnostics.push(circle_of(file, &circle));
+                for &member in &circle {
+                    bases[member] = None;
+                }
+                break;
+            }
+            chain.push(index);
+            next = bases[index];
+        }
+        for &index in chain.iter().rev() {
+            match bases[index] {
+                Some(base) => {
+                    let [child, base] =
+                        file.campaigns.get_disjoint_mut([index, base]).expect("no campaign is its base");
+                    hand_down(base, child);
+                }
+                // What is inherited is not known, so nothing is missing.
+                None if file.campaigns[index].from.is_some() => file.campaigns[index].damaged = true,
+                None => {}
+            }
+            done[index] = true;
+        }
+    }
+}
+
+fn circle_of(file: &File, circle: &[usize]) -> Diagnostic {
+    let name = |index: usize| &file.campaigns[index].head.name;
+    let first = name(circle[0]);
+    let title = if circle.len() == 1 {
+        format!("campaign `{}` inherits from itself", first.text)
+    } else {
+        let by: Vec<String> = circle[1..].iter().map(|&index| format!("`{}`", name(index).text)).collect();
+        format!("campaign `{}` inherits from itself by way of {}", first.text, by.join(", "))
+    };
+    let last = circle[circle.len() - 1];
+    let closes = file.campaigns[last].from.as_ref().map_or(first.span, |from| from.span);
+    let diagnostic = Diagnostic::new(Code::CIRCLE, closes, title).label("this closes the circle");
+    if circle.len() == 1 { diagnostic } else { diagnostic.also(first.span, "declared here") }
+}
+
+/// Whether a campaign says how its tests are found.
+fn finds(campaign: &Campaign) -> bool {
+    !(campaign.searches.is_empty() && campaign.repeats.is_empty() && campaign.passives.is_empty())
+}
+
+fn hand_down(base: &Campaign, child: &mut Campaign) {
+    let own = finds(child);
+    if !own {
+        child.searches.clone_from(&base.searches);
+        child.repeats.clone_from(&base.repeats);
+        child.passives.clone_from(&base.passives);
+    }
+    let searches = !child.searches.is_empty();
+    // What the base lacks was said of it.
+    child.damaged |= base.damaged || !own || searches != base.searches.is_empty();
+    if child.observes.is_empty() {
+        child.observes.clone_from(&base.observes);
+    }
+    if child.records.is_empty() {
+        child.records.clone_from(&base.records);
+    }
+    if child.ends.is_empty() {
+        child.ends.clone_from(&base.ends);
+        child.inherited.end = true;
+    }
+    if searches || !own {
+        if child.objectives.is_empty() {
+            child.objectives.clone_from(&base.objectives);
+        }
+        if child.operations.is_empty() {
+            child.operations.clone_from(&base.operations);
+            child.inherited.operations = true;
+        }
+        if child.activates.is_empty() {
+            child.activates.clone_from(&base.activates);
+            child.inherited.activate = true;
+        }
+        if child.coverages.is_empty() {
+            child.coverages.clone_from(&base.coverages);
+        }
+        if child.explorations.is_empty() {
+            child.explorations.clone_from(&base.explorations);
+        }
+        if child.stops.is_empty() {
+            child.stops.clone_from(&base.stops);
+        }
+    }
+}

@@ -1,0 +1,338 @@
+//! Physical labs.
+
+use std::collections::BTreeMap;
+
+use super::{Kind, Resolver};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::model::physical::{
+    Budget, Cost, Feature, Fit, Form, LabSetting, LabSimulator, Order, Physical, Place, Shape,
+};
+use crate::model::{Id as _, MetricId};
+use crate::similar::most_similar;
+use crate::span::Span;
+use crate::syntax::ast::{self, Name, Quantity};
+use crate::syntax::physical as written;
+use crate::units::Unit;
+
+/// What a setting of a transport takes.
+#[derive(Clone, Copy)]
+enum Takes {
+    Nothing,
+    Count,
+    Time,
+    Text,
+}
+
+/// What a transport is told.
+struct LabTransport {
+    word: &'static str,
+    /// How many texts it takes: at least, at most.
+    texts: (usize, usize),
+    settings: &'static [(&'static str, Takes)],
+}
+
+const TRANSPORTS: [LabTransport; 8] = [
+    LabTransport { word: "in_process", texts: (1, 1), settings: &[("crate", Takes::Text), ("step", Takes::Time)] },
+    LabTransport { word: "process", texts: (1, usize::MAX), settings: &[("step", Takes::Time)] },
+    LabTransport { word: "ros2", texts: (0, 0), settings: &[("domain", Takes::Count), ("types", Takes::Text)] },
+    LabTransport { word: "ros1", texts: (1, 1), settings: &[] },
+    LabTransport { word: "rosbridge", texts: (1, 1), settings: &[("clock", Takes::Text)] },
+    LabTransport { word: "simlog", texts: (1, 1), settings: &[("step", Takes::Time), ("lockstep", Takes::Nothing)] },
+    LabTransport { word: "zenoh", texts: (0, 1), settings: &[] },
+    LabTransport { word: "grpc", texts: (1, 1), settings: &[] },
+];
+
+impl<'a> Resolver<'a> {
+    pub(super) fn physicals(&mut self) -> Vec<Option<Physical>> {
+        let file = self.file;
+        file.physicals.iter().map(|lab| self.physical(lab)).collect()
+    }
+
+    fn physical(&mut self, lab: &'a written::Physical) -> Option<Physical> {
+        self.own_names(lab);
+        let simulator = match self.single(&lab.simulators, "simulator") {
+            Some(simulator) => self.lab_simulator(simulator).map(Some),
+            None => Some(None),
+        };
+        let repeats = match self.single(&lab.repeats, "repeats") {
+            Some(repeats) => self.count(*repeats, 1, "a test is repeated"),
+            None => Some(1),
+        };
+        let cost = match self.single(&lab.costs, "cost") {
+            Some((base, each)) => self.cost(base, each.as_ref()),
+            None => Some(Cost { base: 1.0, per_operation: 0.0 }),
+        };
+        let exclude: Vec<_> = lab.excludes.iter().map(|(name, bound)| self.bound(name, bound)).collect();
+        let rank = match self.single(&lab.ranks, "rank by") {
+            Some(keys) => self.rank(keys),
+            None => Some(vec![]),
+        };
+        let budget = match self.single(&lab.budgets, "budget") {
+            Some(budget) => self.budget(budget).map(Some),
+            None => Some(None),
+        };
+        let tolerance = match self.single(&lab.tolerances, "tolerance") {
+            Some(tolerances) => self.tolerance(tolerances),
+            None => Some(vec![]),
+        };
+        let interlock = match self.single(&lab.interlocks, "interlock") {
+            Some(names) => self.find_all(names, Kind::Metric),
+            None => Some(vec![]),
+        };
+        let shapes: Vec<_> = lab.shapes.iter().map(|shape| self.shape(shape)).collect();
+        let fits = match self.single(&lab.fits, "fit") {
+            Some(fits) => fits.iter().map(|fit| self.fit(fit)).collect::<Vec<_>>().into_iter().collect(),
+            None => Some(vec![]),
+        };
+        Some(Physical {
+            declaration: self.declaration(&lab.head),
+            simulator: simulator?,
+            repeats: repeats?,
+            cost: cost?,
+            exclude: exclude.into_iter().collect::<Option<_>>()?,
+            rank: rank?,
+            budget: budget?,
+            tolerance: tolerance?,
+            interlock: interlock?.into_iter().map(MetricId::from_index).collect(),
+            shapes: shapes.into_iter().collect::<Option<_>>()?,
+            fits: fits?,
+        })
+    }
+
+    /// The names inside of a lab are its own, and each is there once.
+    fn own_names(&mut self, lab: &'a written::Physical) {
+        let mut first: BTreeMap<&str, Span> = BTreeMap::new();
+        let simulators = lab.simulators.iter().map(|(_, simulator)| &simulator.head.name);
+        for name in simulators.chain(lab.shapes.iter().map(|shape| &shape.head.name)) {
+            if let Some(&before) = first.get(name.text.as_str()) {
+                let title = format!("`{}` is defined twice in lab `{}`", name.text, lab.head.name.text);
+                let diagnostic = Diagnostic::new(Code::DEFINED_TWICE, name.span, title)
+                    .label("again here")
+                    .also(before, "first defined here");
+                self.report(diagnostic);
+            }
+            first.entry(&name.text).or_insert(name.span);
+        }
+    }
+
+    fn lab_simulator(&mut self, simulator: &'a written::LabSimulator) -> Option<LabSimulator> {
+        let transport = &simulator.transport;
+        let LabTransport { word, texts: (least, most), settings: known } = TRANSPORTS
+            .into_iter()
+            .find(|known| known.word == transport.text)
+            .expect("the grammar has these transports");
+        let mut complete = true;
+        let given = simulator.arguments.len();
+        if given < least || given > most {
+            let expected = match (least, most) {
+                (0, 0) => "no text".to_owned(),
+                (0, _) => "at most one text".to_owned(),
+                (1, 1) => "one text, its address".to_owned(),
+                _ => "a program and its arguments".to_owned(),
+            };
+            let title = format!("`{word}` takes {expected}, not {given}");
+            self.report(Diagnostic::new(Code::BAD_LAB, transport.span, title).label(format!("expected {expected}")));
+            complete = false;
+        }
+        let mut settings: Vec<(String, LabSetting)> = Vec::new();
+        let mut first: BTreeMap<&str, Span> = BTreeMap::new();
+        for (name, value) in &simulator.settings {
+            if let Some(&before) = first.get(name.text.as_str()) {
+                self.at_most_one(&[before, name.span], &name.text);
+                complete = false;
+                continue;
+            }
+            first.insert(&name.text, name.span);
+            let Some((_, takes)) = known.iter().find(|(word, _)| *word == name.text) else {
+                let known: Vec<&str> = known.iter().map(|(word, _)| *word).collect();
+                let title = format!("`{word}` has no setting `{}`", name.text);
+                let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("no such setting");
+                diagnostic = match most_similar(&name.text, known.iter().copied()) {
+                    Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
+                    None if known.is_empty() => diagnostic.note("it has none"),
+                    None => diagnostic.note(format!("its settings: {}", super::list(&known))),
+                };
+                self.report(diagnostic);
+                complete = false;
+                continue;
+            };
+            match self.setting(name, value.as_ref(), *takes) {
+                Some(value) => settings.push((name.text.clone(), value)),
+                None => complete = false,
+            }
+        }
+        complete.then(|| LabSimulator {
+            declaration: self.declaration(&simulator.head),
+            transport: word.to_owned(),
+            arguments: simulator.arguments.iter().map(|text| text.text.clone()).collect(),
+            settings,
+        })
+    }
+
+    fn setting(&mut self, name: &Name, value: Option<&written::Setting>, takes: Takes) -> Option<LabSetting> {
+        let what = format!("`{}`", name.text);
+        let expected = match (takes, value) {
+            (Takes::Nothing, None) => return Some(LabSetting::Flag),
+            (Takes::Text, Some(written::Setting::Text(text))) => return Some(LabSetting::Text(text.text.clone())),
+            (Takes::Time, Some(written::Setting::Quantity(time))) => {
+                return self.positive(time, &Unit::seconds(), &what).map(LabSetting::Seconds);
+            }
+            (Takes::Count, Some(written::Setting::Quantity(number))) => {
+                let value = self.value(number, None, &what)?;
+                if !self.whole(value, number.span, &what) {
+                    return None;
+                }
+                if (0.0..=f64::from(u32::MAX)).contains(&value) {
+                    #[expect(
+                        clippy::cast_possible_truncation,
+                        clippy::cast_sign_loss,
+                        reason = "it is whole and in the range of u32"
+                    )]
+                    return Some(LabSetting::Count(value as u32));
+                }
+                "a whole number, 0 or more"
+            }
+            (Takes::Nothing, Some(_)) => "nothing after it",
+            (Takes::Text, _) => "a text",
+            (Takes::Time, _) => "a time such as `20ms`",
+            (Takes::Count, _) => "a whole number",
+        };
+        let title = format!("the setting {what} takes {expected}");
+        self.report(Diagnostic::new(Code::BAD_LAB, name.span, title).label(format!("expected {expected}")));
+        None
+    }
+
+    /// A plain number, 0 or more.
+    fn not_negative(&mut self, quantity: &Quantity, unit: Option<&Unit>, what: &str) -> Option<f64> {
+        let value = self.value(quantity, unit, what)?;
+        if value >= 0.0 {
+            return Some(value);
+        }
+        let title = format!("`{}` is out of range for {what}", self.text(quantity.span));
+        self.report(Diagnostic::new(Code::OUT_OF_RANGE, quantity.span, title).label("expected 0 or more"));
+        None
+    }
+
+    fn cost(&mut self, base: &Quantity, each: Option<&Quantity>) -> Option<Cost> {
+        let per_operation = match each {
+            Some(each) => self.not_negative(each, None, "the cost of an operation"),
+            None => Some(0.0),
+        };
+        let cost = Cost { base: self.not_negative(base, None, "the cost of a test")?, per_operation: per_operation? };
+        if cost.base + cost.per_operation > 0.0 {
+            return Some(cost);
+        }
+        let title = "tests that cost nothing need no budget";
+        self.report(Diagnostic::new(Code::OUT_OF_RANGE, base.span, title).label("expected more than 0"));
+        None
+    }
+
+    fn rank(&mut self, keys: &'a [(Name, bool)]) -> Option<Vec<(MetricId, Order)>> {
+        self.once(keys.iter().map(|(name, _)| name));
+        let found = keys.iter().map(|(name, descending)| {
+            let order = if *descending { Order::Descending } else { Order::Ascending };
+            Some((MetricId::from_index(self.find(name, Kind::Metric)?), order))
+        });
+        found.collect::<Vec<_>>().into_iter().collect()
+    }
+
+    /// Reports metrics that stand twice.
+    fn once(&mut self, names: impl Iterator<Item = &'a Name>) {
+        let mut first: BTreeMap<&str, Span> = BTreeMap::new();
+        for name in names {
+            if let Some(&before) = first.get(name.text.as_str()) {
+                let title = format!("`{}` stands twice in this list", name.text);
+                let diagnostic = Diagnostic::new(Code::LISTED_TWICE, name.span, title)
+                    .label("again here")
+                    .also(before, "first here");
+                self.report(diagnostic);
+            }
+            first.entry(&name.text).or_insert(name.span);
+        }
+    }
+
+    fn budget(&mut self, budget: &'a written::Budget) -> Option<Budget> {
+        let limit = self.value(&budget.limit, None, "the budget");
+        if limit.is_some_and(|limit| limit <= 0.0) {
+            let title = format!("a budget of `{}` buys nothing", self.text(budget.limit.span));
+            self.report(Diagnostic::new(Code::OUT_OF_RANGE, budget.limit.span, title).label("expected more than 0"));
+            return None;
+        }
+        let lambda = self.value(&budget.lambda, None, "`lambda`");
+        if lambda.is_some_and(|lambda| !(0.0..=1.0).contains(&lambda)) {
+            let title = format!("`{}` is out of range for `lambda`", self.text(budget.lambda.span));
+            self.report(Diagnostic::new(Code::OUT_OF_RANGE, budget.lambda.span, title).label("permitted is 0 to 1"));
+            return None;
+        }
+        self.once(budget.over.iter());
+        let over: Vec<_> = budget.over.iter().map(|name| self.feature(name)).collect();
+        Some(Budget { limit: limit?, lambda: lambda?, over: over.into_iter().collect::<Option<_>>()? })
+    }
+
+    fn feature(&mut self, name: &Name) -> Option<Feature> {
+        if let Some((_, feature)) = Feature::ALL.iter().find(|(known, _)| *known == name.text) {
+            return Some(*feature);
+        }
+        let known: Vec<&str> = Feature::ALL.iter().map(|(known, _)| *known).collect();
+        let title = format!("no dimension of the search space is named `{}`", name.text);
+        let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("no such dimension");
+        self.report(diagnostic.note(format!("there are {}", super::list(&known))));
+        None
+    }
+
+    fn tolerance(&mut self, tolerances: &'a [(Name, Quantity)]) -> Option<Vec<(MetricId, f64)>> {
+        self.once(tolerances.iter().map(|(name, _)| name));
+        let found = tolerances.iter().map(|(name, quantity)| {
+            let index = self.find(name, Kind::Metric)?;
+            let unit = self.metrics[index].as_ref()?.unit.clone();
+            let what = format!("the tolerance of `{}`", name.text);
+            Some((MetricId::from_index(index), self.not_negative(quantity, unit.as_ref(), &what)?))
+        });
+        found.collect::<Vec<_>>().into_iter().collect()
+    }
+
+    fn shape(&mut self, shape: &'a written::Shape) -> Option<Shape> {
+        let metre = metre();
+        let form = match &shape.form {
+            written::Form::Sphere(radius) => self.positive(radius, &metre, "the radius of a sphere").map(Form::Sphere),
+            written::Form::Box(edges) => self.vector(edges, true).map(Form::Box),
+        };
+        let place = match &shape.place {
+            // An empty text was reported where it was read.
+            written::ShapePlace::Carried(pose) => Some(Place::Pose(pose.text.clone())),
+            written::ShapePlace::Fixed(point) => self.vector(point, false).map(Place::Point),
+        };
+        let expand = match &shape.expand {
+            Some(expand) => self.not_negative(expand, Some(&metre), "the margin of a shape"),
+            None => Some(0.0),
+        };
+        Some(Shape { declaration: self.declaration(&shape.head), form: form?, place: place?, expand: expand? })
+    }
+
+    /// Three lengths, in metres.
+    fn vector(&mut self, point: &'a ast::Point, positive: bool) -> Option<[f64; 3]> {
+        let metre = metre();
+        let what = if positive { "an edge of a box" } else { "a coordinate" };
+        let lengths = self.coordinates(point, Some(&metre), what)?;
+        if positive {
+            for edge in &point.coordinates {
+                self.positive(edge, &metre, what)?;
+            }
+        }
+        Some(lengths)
+    }
+
+    fn fit(&mut self, fit: &'a written::Fit) -> Option<Fit> {
+        match fit {
+            written::Fit::Delay(range) => Some(Fit::RelayDelay(self.times(range, "the delay of a relay")?)),
+            written::Fit::Parameter(name, range) => {
+                let permitted = self.range(range, None, &format!("parameter \"{}\"", name.text))?;
+                Some(Fit::Parameter(name.text.clone(), permitted))
+            }
+        }
+    }
+}
+
+fn metre() -> Unit {
+    Unit::parse("m").expect("`m` is in the table")
+}

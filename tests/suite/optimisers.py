@@ -1,0 +1,62 @@
+"""What other implementations of NSGA-II make of published problems, and pymoo of sorting and crowding.
+
+Reads requests, one JSON object per line, and answers each with one line of JSON.
+"""
+
+import json
+import sys
+import time
+
+import numpy as np
+
+
+def pygmo_run(problem, population, evaluations, seed):
+    import pygmo as pg
+
+    udp = pg.dtlz(2, 12, 3) if problem == "dtlz2" else pg.zdt(int(problem[3]), 30)
+    variables = 12 if problem == "dtlz2" else 30
+    start = time.perf_counter()
+    members = pg.population(pg.problem(udp), population, seed=seed)
+    algorithm = pg.algorithm(
+        pg.nsga2(gen=evaluations // population - 1, cr=0.9, eta_c=15.0, m=1.0 / variables, eta_m=20.0, seed=seed)
+    )
+    members = algorithm.evolve(members)
+    seconds = time.perf_counter() - start
+    return seconds, members.get_f()
+
+
+def pymoo_run(problem, population, evaluations, seed):
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.operators.crossover.sbx import SBX
+    from pymoo.operators.mutation.pm import PM
+    from pymoo.optimize import minimize
+    from pymoo.problems import get_problem
+
+    posed = get_problem(problem, n_var=12, n_obj=3) if problem == "dtlz2" else get_problem(problem, n_var=30)
+    algorithm = NSGA2(pop_size=population, crossover=SBX(prob=0.9, eta=15), mutation=PM(eta=20))
+    start = time.perf_counter()
+    result = minimize(posed, algorithm, ("n_eval", evaluations), seed=seed)
+    seconds = time.perf_counter() - start
+    return seconds, result.pop.get("F")
+
+
+def sort(points):
+    from pymoo.operators.survival.rank_and_crowding.metrics import calc_crowding_distance
+    from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
+
+    points = np.array(points, dtype=float)
+    fronts = [sorted(int(i) for i in front) for front in NonDominatedSorting().do(points)]
+    crowding = [calc_crowding_distance(points[front]) for front in fronts]
+    # JSON has no infinity.
+    return fronts, [[-1.0 if np.isinf(x) else float(x) for x in front] for front in crowding]
+
+
+for line in sys.stdin:
+    request = json.loads(line)
+    if "points" in request:
+        fronts, crowding = sort(request["points"])
+        print(json.dumps({"fronts": fronts, "crowding": crowding}), flush=True)
+    else:
+        run = {"pygmo": pygmo_run, "pymoo": pymoo_run}[request["library"]]
+        seconds, front = run(request["problem"], request["population"], request["evaluations"], request["seed"])
+        print(json.dumps({"seconds": seconds, "front": np.asarray(front).tolist()}), flush=True)
