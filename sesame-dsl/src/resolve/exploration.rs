@@ -129,9 +129,10 @@ impl<'a> Resolver<'a> {
 
     /// Whether a campaign has what its strategies work on.
     pub(super) fn explorable(&mut self, campaign: &'a ast::Campaign, search: &Search) -> bool {
+        // A campaign that searches nothing was told so.
+        let Some(content) = search.content() else { return true };
         let mut complete = true;
-        let by_condition =
-            search.content().is_some_and(|content| matches!(content.activation, ActivationMode::Condition(_)));
+        let by_condition = matches!(content.activation, ActivationMode::Condition(_));
         let mut refuse = |resolver: &mut Self, span: Span, what: &str, lacks: &str, label: &str| {
             let title = format!("{what} {lacks}");
             resolver.report(Diagnostic::new(Code::NOTHING_TO_EXPLORE, span, title).label(label));
@@ -139,7 +140,7 @@ impl<'a> Resolver<'a> {
         };
         let written = campaign.searches.first();
         let strategy = written.and_then(|search| Some((search.span, search.strategy?)));
-        let without_cells = campaign.coverages.is_empty() && !campaign.damaged;
+        let without_cells = campaign.coverages.is_empty() && !campaign.unread;
         match strategy {
             Some((span, Strategy::MapElites)) if without_cells => {
                 refuse(self, span, "MAP-Elites", "has no cells to keep tests in", "add a `coverage`");

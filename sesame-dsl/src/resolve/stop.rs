@@ -28,7 +28,8 @@ impl<'a> Resolver<'a> {
         let by_cells = by_cells.or(written.completenesses.first().map(|(span, _)| (*span, "completeness")));
         if let Some((span, word)) = by_cells
             && campaign.coverages.is_empty()
-            && !campaign.damaged
+            && !campaign.searches.is_empty()
+            && !campaign.unread
         {
             let diagnostic = Diagnostic::new(Code::NOTHING_TO_EXPLORE, span, format!("`{word}` has no cells to go by"));
             self.report(diagnostic.label("add a `coverage`"));

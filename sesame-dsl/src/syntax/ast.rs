@@ -618,8 +618,11 @@ pub(crate) struct Campaign {
     pub(crate) passives: Vec<Passive>,
     pub(crate) ends: Vec<(Span, Quantity)>,
     pub(crate) records: Vec<(Span, Record)>,
-    /// Something of it could not be read or is not supported: what is missing may be there.
+    /// Something of it could not be read or is not supported: what is missing may be there. So too with a `from`, since
+    /// what the other campaign lacks is said of that one.
     pub(crate) damaged: bool,
+    /// Something of it, or of what it inherits from, could not be read: nothing is known of what it has not.
+    pub(crate) unread: bool,
 }
 
 /// Which clauses a campaign has from another, as far as it matters for what is said of them.

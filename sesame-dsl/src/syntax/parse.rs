@@ -576,6 +576,7 @@ impl Reader<'_> {
             ends: vec![],
             records: vec![],
             damaged: false,
+            unread: false,
         };
         campaign.damaged = self.members(pair, Place::Campaign, |reader, member| {
             let span = reader.keyword_span(&member);
@@ -624,6 +625,7 @@ impl Reader<'_> {
                 other => unreachable!("{other:?} is no member of a campaign"),
             }
         });
+        campaign.unread = campaign.damaged;
         campaign
     }
 
