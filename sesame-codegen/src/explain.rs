@@ -484,12 +484,12 @@ mod tests {
                 .any(|word| line.starts_with(&format!("{word} ")))
         });
         insta::assert_snapshot!(clauses.collect::<Vec<_>>().join("\n"), @r"
-coverage   { T1 [0, 1] cells 6  O0 [0.5, 3.5] cells 3  hits 2  stop at 50% }
+coverage   { T1 [0, 1] cells 6   O0 [0.5, 3.5] cells 3   hits 2   stop at 50% }
 boost      linear { every 3 generations  from 4 to 1  drop 1  tries 10 }
-coverage   { T1 [0, 1] cells 6  hits 1 }
+coverage   { T1 [0, 1] cells 6   hits 1 }
 construct  { share 30%  until 7% }
 stop       { time 5400s  stagnation 5 generations below 2%  discovery below 3%  completeness 90% }
-coverage   { T1 [0, 1] cells 6  hits 1 }
+coverage   { T1 [0, 1] cells 6   hits 1 }
 predict    { candidates 20 }
         ");
     }
