@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
-    ActivationMode, BoostedChildren, CampaignPlan, CoverageGoal, Distribution, Domain, Drain, Exploration, MetricSource,
-    Operation, OperationKind, Parameter, Recorded, Search, StopRule, place_in_words,
+    ActivationMode, BoostedChildren, CampaignPlan, CoverageGoal, Distribution, Domain, Drain, Exploration,
+    MetricSource, Operation, OperationKind, Parameter, Recorded, Search, StopRule, place_in_words,
 };
 
 /// More whole numbers than these are not written out one by one.
