@@ -76,6 +76,8 @@ pub fn campaigns(repositories: &[Repository]) -> Result<Dataset, RecordError> {
 fn search_word(search: &Search) -> &'static str {
     match search {
         Search::Nsga2 { .. } => "nsga2",
+        Search::MapElites { .. } => "map_elites",
+        Search::LatinHypercube { .. } => "latin_hypercube",
         Search::Random { .. } => "random",
         Search::Repeat { .. } => "repeat",
         Search::Known { .. } => "known tests",

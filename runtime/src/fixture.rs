@@ -62,6 +62,8 @@ pub(crate) fn plan(operations: Vec<Operation>) -> CampaignPlan {
             activation: ActivationMode::Time,
             search: Search::Random { evaluations: 1 },
             coverage: None,
+            exploration: None,
+            stop: Vec::new(),
             seed: 1,
             end_after: 10.0,
             record: None,

@@ -20,27 +20,48 @@ pub mod range;
 pub mod real;
 pub mod selection;
 pub mod sorting;
+pub mod stop;
 pub mod vary;
 
+mod boost;
+mod cells;
+mod construct;
+mod constructing;
 mod known;
+mod latin_hypercube;
+mod map_elites;
+mod predict;
 mod random;
 mod repeat;
 
 #[cfg(test)]
+mod explored;
+#[cfg(test)]
 pub(crate) mod landscape;
 
-use sesame_plan::{ActivationMode, CampaignPlan, Direction, KnownTestId, MetricId, Search, Test};
+use sesame_plan::{ActivationMode, CampaignPlan, Direction, Exploration, KnownTestId, MetricId, Search, Test};
 
+use crate::coverage::Grid;
 use crate::observation::{Observation, Outcome};
-use crate::search::nsga2::Survival;
+use crate::sspr::Point;
+use boost::{Boosted, Boosting};
+use cells::Cells;
+use construct::Constructor;
+use constructing::{Constructing, Construction};
+use nsga2::{Survival, Variation};
+use predict::Predicting;
 
 pub use dominance::{Fitness, Unfit};
 pub use front::Front;
 pub use known::Known;
+pub use latin_hypercube::LatinHypercube;
+pub use map_elites::MapElites;
 pub use nsga2::Nsga2;
 pub use permitted::{Permitted, SearchError};
+pub use predict::Course;
 pub use random::Random;
 pub use repeat::Repeat;
+pub use stop::StopRules;
 pub use vary::TestVariation;
 
 /// How tests are found, by ask and tell.
@@ -53,6 +74,9 @@ pub trait Strategy: Send {
 
     /// Takes the results of exactly the generation asked last, in its order.
     fn tell(&mut self, results: &[Evaluated]);
+
+    /// Takes how the condition variables went in the undisturbed run, before the first generation is asked.
+    fn reference(&mut self, _: Course) {}
 }
 
 /// A test to be evaluated.
@@ -77,22 +101,66 @@ pub struct Evaluated {
     pub test: Test,
     /// Its fitness, from [`fitness`].
     pub fitness: Fitness,
+    /// Where its run lies in the reduced parameter space, if it counts for coverage.
+    pub point: Option<Point>,
+    /// How the condition variables went in its run, where the campaign [predicts](needs_courses).
+    pub course: Option<Course>,
+}
+
+/// Whether the strategy of a plan asks for the courses of runs.
+pub fn needs_courses(plan: &CampaignPlan) -> bool {
+    matches!(plan.campaign.exploration, Some(Exploration::Predict { .. }))
 }
 
 /// The strategy that a plan names. `seed` is the campaign's, or what `run --seed` put in its place.
 pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, SearchError> {
     Ok(match &plan.campaign.search {
-        Search::Nsga2 { population: 0, .. } => {
+        Search::Nsga2 { population: 0, .. } | Search::MapElites { population: 0, .. } => {
             return Err(SearchError::NoPopulation { campaign: plan.campaign.name.clone() });
         }
         &Search::Nsga2 { population, evaluations } => {
-            // Conditions hold or not: many tests are active equally long, and change nothing that is measured.
-            let (rates, survival) = match plan.campaign.activation {
-                ActivationMode::Time => (vary::Rates::default(), Survival::Crowded),
-                ActivationMode::Condition { .. } => (vary::Rates::by_condition(), Survival::Distinct),
-            };
-            let variation = TestVariation::new(Permitted::of(plan)?, rates, seed);
-            Box::new(Nsga2::new(nsga2::Settings { population, evaluations, seed, survival }, variation))
+            let permitted = Permitted::of(plan)?;
+            let tests = variation(plan, permitted.clone(), seed);
+            let settings = nsga2::Settings { population, evaluations, seed, survival: survival(plan) };
+            let by_time = plan.campaign.activation == ActivationMode::Time;
+            match &plan.campaign.exploration {
+                Some(Exploration::Predict { .. }) if by_time => {
+                    return Err(SearchError::NotByCondition { campaign: plan.campaign.name.clone() });
+                }
+                Some(Exploration::Boost { .. } | Exploration::Construct { .. }) if !by_time => {
+                    return Err(SearchError::NotByTime { campaign: plan.campaign.name.clone() });
+                }
+                &Some(Exploration::Predict { candidates }) => {
+                    let predicting = Predicting::new(tests, permitted, cells(plan)?, candidates, seed);
+                    Box::new(Nsga2::new(settings, predicting))
+                }
+                None => Box::new(Nsga2::new(settings, tests)),
+                &Some(Exploration::Boost { every_generations, children, tries }) => {
+                    let boosting = Boosting { every_generations, children, tries };
+                    Box::new(Nsga2::new(settings, Boosted::new(tests, cells(plan)?, boosting, seed)))
+                }
+                &Some(Exploration::Construct { share, until }) => {
+                    let cells = cells(plan)?;
+                    let constructor = Constructor::new(permitted, cells.grid().clone());
+                    let construction = Construction { share, until: until.unwrap_or(1.0) };
+                    Box::new(Nsga2::new(settings, Constructing::new(tests, cells, constructor, construction, seed)))
+                }
+            }
+        }
+        &Search::MapElites { population, evaluations } => {
+            let campaign = || plan.campaign.name.clone();
+            let goal = plan.campaign.coverage.as_ref();
+            let goal = goal.ok_or_else(|| SearchError::NoCoverage { campaign: campaign() })?;
+            let grid =
+                Grid::new(goal.axes.clone()).map_err(|reason| SearchError::Grid { campaign: campaign(), reason })?;
+            let settings = nsga2::Settings { population, evaluations, seed, survival: Survival::Crowded };
+            Box::new(MapElites::new(settings, variation(plan, Permitted::of(plan)?, seed), grid))
+        }
+        &Search::LatinHypercube { evaluations } => {
+            if plan.campaign.activation != ActivationMode::Time {
+                return Err(SearchError::NotByTime { campaign: plan.campaign.name.clone() });
+            }
+            Box::new(LatinHypercube::new(Permitted::of(plan)?, evaluations, seed))
         }
         &Search::Random { evaluations } => Box::new(Random::new(Permitted::of(plan)?, evaluations, seed)),
         &Search::Repeat { test, times } => Box::new(Repeat::new(plan.test(test).test.clone(), times)),
@@ -100,6 +168,29 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
             Box::new(Known::new(tests.iter().map(|&id| (id, plan.test(id).test.clone())).collect()))
         }
     })
+}
+
+fn variation(plan: &CampaignPlan, permitted: Permitted, seed: u64) -> TestVariation {
+    let rates = match plan.campaign.activation {
+        ActivationMode::Time => vary::Rates::default(),
+        ActivationMode::Condition { .. } => vary::Rates::by_condition(),
+    };
+    TestVariation::new(permitted, rates, seed)
+}
+
+/// Conditions hold or not: many tests are active equally long, and change nothing that is measured.
+fn survival(plan: &CampaignPlan) -> Survival {
+    match plan.campaign.activation {
+        ActivationMode::Time => Survival::Crowded,
+        ActivationMode::Condition { .. } => Survival::Distinct,
+    }
+}
+
+/// The cells that an exploration is about.
+fn cells(plan: &CampaignPlan) -> Result<Cells, SearchError> {
+    let campaign = || plan.campaign.name.clone();
+    let goal = plan.campaign.coverage.as_ref().ok_or_else(|| SearchError::NoCoverage { campaign: campaign() })?;
+    Cells::of(plan, goal).map_err(|reason| SearchError::Grid { campaign: campaign(), reason })
 }
 
 /// The fitness of a run: its objective values in the campaign's order, negated where more is sought; or why it has none.
@@ -127,14 +218,33 @@ pub fn fitness_of(plan: &CampaignPlan, outcome: &Outcome, value: impl Fn(MetricI
     oriented.collect::<Option<Vec<f64>>>().map_or(Fitness::Unfit(Unfit::Unmeasured), Fitness::Measured)
 }
 
-impl Strategy for Nsga2<TestVariation> {
+/// Variation of tests that is told what came of them.
+pub(crate) trait Learning: Variation<Genome = Test> {
+    /// Takes the results of the generation asked last, in its order.
+    fn learn(&mut self, results: &[Evaluated]);
+
+    /// Takes how the condition variables went in the undisturbed run.
+    fn reference(&mut self, _: Course) {}
+}
+
+impl Learning for TestVariation {
+    /// Selection alone decides what becomes of results.
+    fn learn(&mut self, _: &[Evaluated]) {}
+}
+
+impl<V: Learning + Send> Strategy for Nsga2<V> {
     fn ask(&mut self) -> Vec<Candidate> {
         let generation = self.generation();
         let asked = Nsga2::ask(self);
         asked.into_iter().map(|a| Candidate { test: a.genome, parents: a.parents, generation, known: None }).collect()
     }
 
+    fn reference(&mut self, course: Course) {
+        self.variation_mut().reference(course);
+    }
+
     fn tell(&mut self, results: &[Evaluated]) {
+        self.variation_mut().learn(results);
         Nsga2::tell(
             self,
             results.iter().map(|result| nsga2::Told {

@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
-    ActivationMode, CampaignPlan, CoverageGoal, Distribution, Domain, Drain, MetricSource, Operation, OperationKind,
-    Parameter, Recorded, Search, place_in_words,
+    ActivationMode, BoostedChildren, CampaignPlan, CoverageGoal, Distribution, Domain, Drain, Exploration,
+    MetricSource, Operation, OperationKind, Parameter, Recorded, Search, StopRule, place_in_words,
 };
 
 /// More whole numbers than these are not written out one by one.
@@ -54,6 +54,12 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
         Search::Nsga2 { population, evaluations } => {
             format!("nsga2 {{ population {population}  evaluations {evaluations}  seed {seed} }}")
         }
+        Search::MapElites { population, evaluations } => {
+            format!("map_elites {{ population {population}  evaluations {evaluations}  seed {seed} }}")
+        }
+        Search::LatinHypercube { evaluations } => {
+            format!("latin_hypercube {{ evaluations {evaluations}  seed {seed} }}")
+        }
         Search::Random { evaluations } => format!("random {{ evaluations {evaluations}  seed {seed} }}"),
         // Only a runner's command line makes one, and no `.sesame` text does.
         Search::Known { .. } => return clauses,
@@ -78,6 +84,13 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
     if let Some(goal) = &campaign.coverage {
         clauses.push(("coverage", coverage(goal)));
     }
+    if let Some(exploration) = &campaign.exploration {
+        clauses.push(explored(exploration));
+    }
+    if !campaign.stop.is_empty() {
+        let rules: Vec<String> = campaign.stop.iter().map(stop_rule).collect();
+        clauses.push(("stop", format!("{{ {} }}", rules.join("  "))));
+    }
     clauses.extend(record(plan));
     clauses.push(("end", format!("after {}s", campaign.end_after)));
     clauses
@@ -91,6 +104,37 @@ fn coverage(goal: &CoverageGoal) -> String {
         .map(|axis| format!("{} [{}, {}] cells {}   ", axis.dimension.name(), axis.low, axis.high, axis.cells));
     let stop = goal.stop_at.map(|share| format!("   stop at {}%", percent(share))).unwrap_or_default();
     format!("{{ {}hits {}{stop} }}", axes.collect::<String>(), goal.hits)
+}
+
+/// The clause of an exploration.
+fn explored(exploration: &Exploration) -> (&'static str, String) {
+    match exploration {
+        Exploration::Boost { every_generations, children, tries } => {
+            let (kind, children) = match children {
+                BoostedChildren::Every { iterations } => ("fixed", format!("every {iterations} iterations")),
+                BoostedChildren::Falling { first, last, drop } => {
+                    ("linear", format!("from {first} to {last}  drop {drop}"))
+                }
+            };
+            ("boost", format!("{kind} {{ every {every_generations} generations  {children}  tries {tries} }}"))
+        }
+        Exploration::Construct { share, until } => {
+            let until = until.map_or(String::new(), |until| format!("  until {}%", percent(until)));
+            ("construct", format!("{{ share {}%{until} }}", percent(*share)))
+        }
+        Exploration::Predict { candidates } => ("predict", format!("{{ candidates {candidates} }}")),
+    }
+}
+
+fn stop_rule(rule: &StopRule) -> String {
+    match *rule {
+        StopRule::WallTime { seconds } => format!("time {seconds}s"),
+        StopRule::Stagnation { generations, below } => {
+            format!("stagnation {generations} generations below {}%", percent(below))
+        }
+        StopRule::Discovery { below } => format!("discovery below {}%", percent(below)),
+        StopRule::Completeness { share } => format!("completeness {}%", percent(share)),
+    }
 }
 
 fn record(plan: &CampaignPlan) -> Option<(&'static str, String)> {
@@ -374,6 +418,27 @@ mod tests {
         campaign timed { objectives time  operations cut, swing 1 per test  observes pace
           search random { evaluations 8 }  record mcap failing  end after 70s
           coverage { T1 [0, 1] cells 6  O0 [0.5, 1.5] cells 1  hits 2  stop at 7%  failsafe 30 } }";
+    const BOOSTED: &str = "
+        campaign boosted { objectives time  operations cut, swing 1..3 per test
+          search nsga2 { population 4  evaluations 8 }
+          coverage { T1 [0, 1] cells 6  O0 [0.5, 3.5] cells 3  hits 2  stop at 50% }
+          boost linear { every 3 generations  from 4 to 1 }  end after 70s }";
+    const CONSTRUCTED: &str = "
+        campaign constructed { objectives time  operations cut, swing 1..3 per test
+          search nsga2 { population 4  evaluations 8 }
+          coverage { T1 [0, 1] cells 6 }  construct { share 30%  until 7% }
+          stop { time 1.5h  stagnation 5 generations below 2%  discovery below 3%  completeness 90% }  end after 70s }";
+    const PREDICTED: &str = "
+        campaign predicted { objectives time  operations cut, swing 1..3 per test
+          activate by condition over near, collisions
+          search nsga2 { population 4  evaluations 8 }
+          coverage { T1 [0, 1] cells 6 }  predict { }  end after 70s }";
+    const ELITES: &str = "
+        campaign elites { objectives time  operations cut, swing 1..3 per test
+          search map_elites { population 4  evaluations 8 }  coverage { T1 [0, 1] cells 6 }  end after 70s }";
+    const LATIN: &str = "
+        campaign latin { objectives time  operations cut, swing 1..3 per test
+          search latin_hypercube { evaluations 8 }  end after 70s }";
     const AGAIN: &str = "campaign again { repeat still 3 times  end after 70s  record mcap failing }";
     const WATCH: &str = "campaign watch { passive 3 times { seed 4 }  observes near  end after 70s  record mcap all }";
 
@@ -388,7 +453,7 @@ mod tests {
 
     #[test]
     fn what_is_explained_has_the_same_plan() {
-        for text in [EVERYTHING, DEFAULTS, BY_TIME, AGAIN, WATCH] {
+        for text in [EVERYTHING, DEFAULTS, BY_TIME, BOOSTED, CONSTRUCTED, PREDICTED, ELITES, LATIN, AGAIN, WATCH] {
             // Operations that a campaign leaves out are still needed by the known test.
             let original = plan(&format!("{OPERATIONS}{text}"));
             let explained = campaign(&original);
@@ -408,6 +473,25 @@ mod tests {
     #[test]
     fn a_campaign_by_condition_with_defaults() {
         insta::assert_snapshot!(campaign(&plan(&format!("{OPERATIONS}{DEFAULTS}"))));
+    }
+
+    #[test]
+    fn explorations_with_their_defaults() {
+        let explained = [BOOSTED, CONSTRUCTED, PREDICTED].map(|text| campaign(&plan(&format!("{OPERATIONS}{text}"))));
+        let clauses = explained.iter().flat_map(|text| text.lines()).map(str::trim).filter(|line| {
+            ["coverage", "boost", "construct", "predict", "stop"]
+                .iter()
+                .any(|word| line.starts_with(&format!("{word} ")))
+        });
+        insta::assert_snapshot!(clauses.collect::<Vec<_>>().join("\n"), @r"
+coverage   { T1 [0, 1] cells 6   O0 [0.5, 3.5] cells 3   hits 2   stop at 50% }
+boost      linear { every 3 generations  from 4 to 1  drop 1  tries 10 }
+coverage   { T1 [0, 1] cells 6   hits 1 }
+construct  { share 30%  until 7% }
+stop       { time 5400s  stagnation 5 generations below 2%  discovery below 3%  completeness 90% }
+coverage   { T1 [0, 1] cells 6   hits 1 }
+predict    { candidates 20 }
+        ");
     }
 
     #[test]

@@ -73,7 +73,10 @@ struct Selection {
 impl Selection {
     fn of(space: &Space, campaign: &model::Campaign) -> Self {
         let mut operations: Vec<model::OperationId> = match &campaign.search {
-            model::Search::Nsga2 { content, .. } | model::Search::Random { content, .. } => content.operations.clone(),
+            model::Search::Nsga2 { content, .. }
+            | model::Search::MapElites { content, .. }
+            | model::Search::LatinHypercube { content, .. }
+            | model::Search::Random { content, .. } => content.operations.clone(),
             model::Search::Repeat { test, .. } => {
                 space.tests[*test].operations.iter().map(|operation| operation.operation).collect()
             }
@@ -159,30 +162,30 @@ impl Selection {
         // A search that is to stop at a coverage goes on until then or until its failsafe.
         let failsafe = campaign.coverage.as_ref().and_then(|coverage| coverage.failsafe);
         let limit = |evaluations: u32| failsafe.unwrap_or(evaluations);
-        let (search, operations, count) = match &campaign.search {
-            model::Search::Nsga2 { content, population, evaluations } => (
-                plan::Search::Nsga2 { population: *population, evaluations: limit(*evaluations) },
-                &content.operations,
-                plan::Count { min: content.min, max: content.max },
-            ),
-            model::Search::Random { content, evaluations } => (
-                plan::Search::Random { evaluations: limit(*evaluations) },
-                &content.operations,
-                plan::Count { min: content.min, max: content.max },
-            ),
+        let (search, (operations, count)) = match &campaign.search {
+            model::Search::Nsga2 { content, population, evaluations } => {
+                (plan::Search::Nsga2 { population: *population, evaluations: limit(*evaluations) }, held(content))
+            }
+            model::Search::MapElites { content, population, evaluations } => {
+                (plan::Search::MapElites { population: *population, evaluations: limit(*evaluations) }, held(content))
+            }
+            model::Search::Random { content, evaluations } => {
+                (plan::Search::Random { evaluations: limit(*evaluations) }, held(content))
+            }
+            model::Search::LatinHypercube { content, evaluations } => {
+                (plan::Search::LatinHypercube { evaluations: limit(*evaluations) }, held(content))
+            }
             model::Search::Repeat { test, times } => {
                 let held = space.tests[*test].operations.len();
                 let held = u32::try_from(held).expect("a file holds fewer than 2^32 operations");
                 (
                     plan::Search::Repeat { test: plan::KnownTestId(position(&self.tests, *test)), times: *times },
-                    &self.operations,
-                    plan::Count { min: held, max: held },
+                    (&self.operations, plan::Count { min: held, max: held }),
                 )
             }
             model::Search::Passive { times } => (
                 plan::Search::Repeat { test: plan::KnownTestId(0), times: *times },
-                &self.operations,
-                plan::Count { min: 0, max: 0 },
+                (&self.operations, plan::Count { min: 0, max: 0 }),
             ),
         };
         plan::Campaign {
@@ -198,6 +201,8 @@ impl Selection {
             },
             search,
             coverage: campaign.coverage.as_ref().map(coverage),
+            exploration: campaign.exploration.map(exploration),
+            stop: campaign.stop.iter().copied().map(stop_rule).collect(),
             seed: campaign.seed,
             end_after: campaign.end_after,
             record: campaign.record.map(|record| match record {
@@ -220,10 +225,12 @@ fn undisturbed() -> plan::KnownTest {
 
 /// What the tests of a search hold; `None` for a campaign that repeats.
 fn content(campaign: &model::Campaign) -> Option<&model::Content> {
-    match &campaign.search {
-        model::Search::Nsga2 { content, .. } | model::Search::Random { content, .. } => Some(content),
-        model::Search::Repeat { .. } | model::Search::Passive { .. } => None,
-    }
+    campaign.search.content()
+}
+
+/// Which operations the tests of a search hold, and how many.
+fn held(content: &model::Content) -> (&Vec<model::OperationId>, plan::Count) {
+    (&content.operations, plan::Count { min: content.min, max: content.max })
 }
 
 /// What a campaign grows conditions from, if it does.
@@ -390,6 +397,31 @@ fn coverage(coverage: &model::Coverage) -> plan::CoverageGoal {
         cells: axis.cells,
     });
     plan::CoverageGoal { axes: axes.collect(), hits: coverage.hits, stop_at: coverage.stop_at }
+}
+
+fn exploration(exploration: model::Exploration) -> plan::Exploration {
+    match exploration {
+        model::Exploration::Boost { every_generations, children, tries } => {
+            let children = match children {
+                model::BoostedChildren::Every { iterations } => plan::BoostedChildren::Every { iterations },
+                model::BoostedChildren::Falling { first, last, drop } => {
+                    plan::BoostedChildren::Falling { first, last, drop }
+                }
+            };
+            plan::Exploration::Boost { every_generations, children, tries }
+        }
+        model::Exploration::Construct { share, until } => plan::Exploration::Construct { share, until },
+        model::Exploration::Predict { candidates } => plan::Exploration::Predict { candidates },
+    }
+}
+
+fn stop_rule(rule: model::StopRule) -> plan::StopRule {
+    match rule {
+        model::StopRule::WallTime { seconds } => plan::StopRule::WallTime { seconds },
+        model::StopRule::Stagnation { generations, below } => plan::StopRule::Stagnation { generations, below },
+        model::StopRule::Discovery { below } => plan::StopRule::Discovery { below },
+        model::StopRule::Completeness { share } => plan::StopRule::Completeness { share },
+    }
 }
 
 fn dimension(dimension: model::CoverageDimension) -> plan::Dimension {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use sesame_dsl::diagnostic::render;
-use sesame_dsl::model::{ActivationMode, Recorded, Search, Space};
+use sesame_dsl::model::{ActivationMode, Exploration, Recorded, Search, Space};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::{Analysis, analyse, load_imports};
 
@@ -166,6 +166,32 @@ fn a_campaign_that_does_not_search_inherits_nothing_of_a_search() {
     assert_eq!((repeats.objectives.len(), repeats.observed.len(), repeats.end_after), (0, 1, 70.0));
     let (_, watches) = campaign("campaign d from c { passive 5 times { seed 8 } }", "d");
     assert_eq!((watches.search, watches.seed, watches.objectives.len()), (Search::Passive { times: 5 }, 8, 0));
+}
+
+#[test]
+fn explorations_are_inherited_where_they_can_work_and_reasons_to_stop_by_every_search() {
+    let base = "metric near = last(spare)
+        test t { jitter offset [0rad, 0.1rad] from 1s to 2s }
+        campaign base from c { search nsga2 { population 4  evaluations 20 }  coverage { T1 [0, 1] cells 6 }
+          construct { share 30% }  stop { completeness 90% } }";
+    let inherited = |text: &str| {
+        let (_, campaign) = campaign(&format!("{base} campaign d from base {{ {text} }}"), "d");
+        let explores = campaign.exploration.map(|exploration| match exploration {
+            Exploration::Boost { .. } => "boost",
+            Exploration::Construct { .. } => "construct",
+            Exploration::Predict { .. } => "predict",
+        });
+        (explores, campaign.coverage.is_some(), campaign.stop.len())
+    };
+    assert_eq!(inherited(""), (Some("construct"), true, 1));
+    assert_eq!(inherited("search nsga2 { population 6  evaluations 30 }"), (Some("construct"), true, 1));
+    assert_eq!(inherited("boost fixed { }"), (Some("boost"), true, 1), "one way replaces the other");
+    assert_eq!(inherited("search random { evaluations 20 }"), (None, true, 1), "a baseline");
+    assert_eq!(inherited("search map_elites { population 4  evaluations 20 }"), (None, true, 1));
+    assert_eq!(inherited("activate by condition over near"), (None, true, 1));
+    assert_eq!(inherited("activate by condition over near  predict { }"), (Some("predict"), true, 1));
+    assert_eq!(inherited("repeat t 2 times"), (None, false, 0));
+    assert_eq!(inherited("passive 2 times"), (None, false, 0));
 }
 
 #[test]

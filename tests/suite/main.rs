@@ -18,6 +18,7 @@ mod random_models;
 mod regeneration;
 mod search;
 mod stl;
+mod strategies;
 mod tampering;
 mod traces;
 mod vendored;

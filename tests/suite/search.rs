@@ -36,14 +36,16 @@ fn run(runner: &Runner, seed: u32, results: &str) -> f64 {
 }
 
 /// Quartiles by linear interpolation between order statistics.
-fn quartiles(values: &[f64]) -> [f64; 3] {
+pub(crate) fn quartiles(values: &[f64]) -> [f64; 3] {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     [0.25, 0.5, 0.75].map(|share| {
         let last = sorted.len() - 1;
         let at = share * last as f64;
         let below = (0..=last).rev().find(|&below| below as f64 <= at).unwrap();
-        sorted[below] + (sorted[last.min(below + 1)] - sorted[below]) * at.fract()
+        let (low, high) = (sorted[below], sorted[last.min(below + 1)]);
+        // Of two that were never reached there is nothing between.
+        if low == high { low } else { low + (high - low) * at.fract() }
     })
 }
 

@@ -10,14 +10,18 @@
 
 pub mod condition;
 mod coverage;
+mod exploration;
 mod formula;
 mod model;
 pub mod stl;
+mod stop;
 mod test;
 
 pub use coverage::*;
+pub use exploration::*;
 pub use formula::*;
 pub use model::*;
+pub use stop::*;
 pub use test::*;
 
 /// The version of this schema. A runner refuses a plan of another version: both come from one release.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::condition::{ConditionSpace, Constraint};
-use crate::{CoverageGoal, Formula, KnownTest};
+use crate::{CoverageGoal, Exploration, Formula, KnownTest, StopRule};
 
 macro_rules! id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -700,6 +700,12 @@ pub struct Campaign {
     /// How coverage of the space is counted; `None` for a campaign that does not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coverage: Option<CoverageGoal>,
+    /// What an evolution does to cover more cells; `None` for one that only counts them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exploration: Option<Exploration>,
+    /// What stops the search besides its number of tests and its coverage.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stop: Vec<StopRule>,
     /// The one seed that decides everything; `run --seed` overrides it.
     pub seed: u64,
     /// Simulation time at which a test ends, in seconds.
@@ -757,6 +763,18 @@ pub enum Search {
         /// Tests in total.
         evaluations: u32,
     },
+    /// MAP-Elites over the cells of the campaign's coverage.
+    MapElites {
+        /// Tests per generation.
+        population: u32,
+        /// Tests in total.
+        evaluations: u32,
+    },
+    /// Latin hypercube sampling: tests spread evenly over each of their choices.
+    LatinHypercube {
+        /// Tests in total.
+        evaluations: u32,
+    },
     /// One known test again and again.
     Repeat {
         /// Which.
@@ -776,7 +794,10 @@ impl Search {
     /// How many tests the campaign evaluates.
     pub fn evaluations(&self) -> u32 {
         match self {
-            Search::Nsga2 { evaluations, .. } | Search::Random { evaluations } => *evaluations,
+            Search::Nsga2 { evaluations, .. }
+            | Search::MapElites { evaluations, .. }
+            | Search::Random { evaluations }
+            | Search::LatinHypercube { evaluations } => *evaluations,
             Search::Repeat { times, .. } => *times,
             Search::Known { tests } => u32::try_from(tests.len()).unwrap_or(u32::MAX),
         }

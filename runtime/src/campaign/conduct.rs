@@ -4,7 +4,7 @@ use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use sesame_plan::{CampaignPlan, CoverageGoal, Recorded, Search, Test};
 
@@ -17,8 +17,8 @@ use crate::record::{
     ResultSet, Status, TestRecord, Verdict, differences, verdict,
 };
 use crate::rng::derive_seed;
-use crate::search::{self, Candidate, Evaluated, Front, SearchError};
-use crate::sspr;
+use crate::search::{self, Candidate, Course, Evaluated, Front, SearchError, StopRules};
+use crate::sspr::{self, Point};
 
 /// A test that runs this many times as long as the undisturbed run is taken to hang.
 const PATIENCE: f64 = 20.0;
@@ -153,9 +153,15 @@ pub fn conduct(
         desk.recorder.put_event(&Event { kind: EventKind::Warning, test: None, text })?;
     }
 
+    let courses = search::needs_courses(plan);
+    if let Some(course) = Course::of(plan, &reference).filter(|_| courses) {
+        strategy.reference(course);
+    }
     let total = plan.campaign.search.evaluations();
     let repeats = matches!(plan.campaign.search, Search::Repeat { .. });
     let mut front = Front::default();
+    let mut rules = StopRules::of(plan);
+    let begun = Instant::now();
     let mut earlier = Earlier::default();
     let mut numbered = 0;
     let mut done = 0;
@@ -182,10 +188,12 @@ pub fn conduct(
             let fitness = search::fitness(plan, &record.observation);
             done += 1;
             front.add(record.number, &fitness);
-            told.push(Evaluated { number: record.number, test: record.test.clone(), fitness });
-            if let Some(tracking) = &mut tracking {
-                tracking.add(plan, record);
+            let point = counted_point(plan, record);
+            if let (Some(tracking), Some(point)) = (&mut tracking, &point) {
+                tracking.coverage.add(point);
             }
+            let course = if courses { Course::of(plan, &record.observation) } else { None };
+            told.push(Evaluated { number: record.number, test: record.test.clone(), fitness, point, course });
             let coverage = tracking.as_ref().map(|it| &it.coverage);
             progress(Progress { done, total, latest: Some(record), front: &front, coverage });
         })?;
@@ -194,6 +202,7 @@ pub fn conduct(
         }
         told.sort_by_key(|evaluated| evaluated.number);
         strategy.tell(&told);
+        rules.tell(&told);
         if !plan.campaign.objectives.is_empty() {
             desk.recorder.put_result_set(&ResultSet {
                 name: format!("generation-{generation}"),
@@ -208,6 +217,10 @@ pub fn conduct(
                 stop = reached;
                 break;
             }
+        }
+        if let Some(reached) = rules.reached(begun.elapsed()) {
+            stop = reached;
+            break;
         }
     }
 
@@ -261,14 +274,6 @@ impl Tracking {
         Ok(Tracking { coverage: Coverage::new(grid, goal.hits), feasible, stop_at: goal.stop_at })
     }
 
-    fn add(&mut self, plan: &CampaignPlan, record: &TestRecord) {
-        if coverage::counts(&record.observation.outcome, record.duplicate_of.is_some())
-            && let Some(point) = sspr::observed_point(plan, &record.test, &record.observation)
-        {
-            self.coverage.add(&point);
-        }
-    }
-
     fn after(&self, generation: u32, evaluations: u32) -> GenerationCoverage {
         GenerationCoverage {
             generation,
@@ -297,6 +302,14 @@ impl Tracking {
             )
         })
     }
+}
+
+/// Where a run lies in the reduced parameter space, if it counts for coverage.
+fn counted_point(plan: &CampaignPlan, record: &TestRecord) -> Option<Point> {
+    if !coverage::counts(&record.observation.outcome, record.duplicate_of.is_some()) {
+        return None;
+    }
+    sspr::observed_point(plan, &record.test, &record.observation)
 }
 
 /// A test that has its number and waits for its run.
@@ -481,8 +494,11 @@ mod tests {
         let records = sample::records(&plan, 40);
         let (mut forth, mut back) = (tracking(0.1), tracking(0.1));
         for (first, last) in records.iter().zip(records.iter().rev()) {
-            forth.add(&plan, first);
-            back.add(&plan, last);
+            for (tracking, record) in [(&mut forth, first), (&mut back, last)] {
+                if let Some(point) = counted_point(&plan, record) {
+                    tracking.coverage.add(&point);
+                }
+            }
         }
         assert_eq!(forth.after(3, 40), back.after(3, 40));
         assert!(forth.reached().is_some_and(|why| why.starts_with("its coverage was reached: ")));

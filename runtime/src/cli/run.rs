@@ -54,7 +54,10 @@ pub(super) fn run(
     let mut plan = plan.clone();
     if let Some(wanted) = options.evaluations {
         match &mut plan.campaign.search {
-            Search::Nsga2 { evaluations, .. } | Search::Random { evaluations } => *evaluations = wanted,
+            Search::Nsga2 { evaluations, .. }
+            | Search::MapElites { evaluations, .. }
+            | Search::Random { evaluations }
+            | Search::LatinHypercube { evaluations } => *evaluations = wanted,
             Search::Repeat { times, .. } => *times = wanted,
             Search::Known { tests } => tests.truncate(usize::try_from(wanted).unwrap_or(usize::MAX)),
         }

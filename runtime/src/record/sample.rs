@@ -123,6 +123,8 @@ pub(crate) fn plan() -> CampaignPlan {
             activation: ActivationMode::Time,
             search: Search::Nsga2 { population: 10, evaluations: 210 },
             coverage: None,
+            exploration: None,
+            stop: Vec::new(),
             seed: 42,
             end_after: 70.0,
             record: None,

@@ -151,6 +151,10 @@ fn header(body: &mut Markup, repository: &Repository, summary: &Summary) -> Resu
         Search::Nsga2 { population, evaluations } => {
             format!("NSGA-II, population {population}, {evaluations} evaluations")
         }
+        Search::MapElites { population, evaluations } => {
+            format!("MAP-Elites, {population} tests per generation, {evaluations} evaluations")
+        }
+        Search::LatinHypercube { evaluations } => format!("Latin hypercube, {evaluations} evaluations"),
         Search::Random { evaluations } => format!("random, {evaluations} evaluations"),
         Search::Repeat { test, times } => format!("{} repeated {times} times", plan.test(*test).name),
         Search::Known { tests } => plural(tests.len(), "known test", "known tests"),

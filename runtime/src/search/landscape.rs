@@ -12,8 +12,10 @@ use sesame_plan::{
 };
 
 use crate::activation::Activity;
+use crate::observation::{MetricObservation, Observation, Outcome, WallTime};
 use crate::search::hypervolume::hypervolume;
-use crate::search::{Evaluated, Fitness, Front, Strategy, Unfit};
+use crate::search::{Course, Evaluated, Fitness, Front, Strategy, Unfit, needs_courses};
+use crate::sspr::{self, Convention, Point};
 use crate::time::SimTime;
 
 /// Where and to what the robot is vulnerable.
@@ -127,6 +129,8 @@ impl Landscape {
                 activation: ActivationMode::Time,
                 search,
                 coverage: None,
+                exploration: None,
+                stop: Vec::new(),
                 seed: 0,
                 end_after: 70.0,
                 record: None,
@@ -207,8 +211,42 @@ impl Landscape {
         (time, hits as f64)
     }
 
+    /// Where a test lies when it is run.
+    pub(crate) fn point(plan: &CampaignPlan, test: &Test) -> Option<Point> {
+        let disturbances = test.operations.iter().map(|it| {
+            let intervals = Self::active(it).into_iter().map(|(start, end)| Span { start, end }).collect();
+            sspr::disturbance(plan, it.operation, &it.parameters, intervals)
+        });
+        Point::of(&disturbances.collect::<Vec<_>>(), Convention::Ours)
+    }
+
+    /// What is recorded of a run: nothing that a test does changes what conditions see.
+    pub(crate) fn undisturbed(plan: &CampaignPlan) -> Observation {
+        let series =
+            |metric| (0u32..350).map(|slot| f64::from(slot) * 0.2).map(|t| (t, Self::signal(metric, t))).collect();
+        let metrics = (0u32..).map(MetricId).take(plan.metrics.len());
+        Observation {
+            outcome: Outcome::Completed,
+            end: 70.0,
+            operations: Vec::new(),
+            metrics: metrics.map(|id| MetricObservation { value: None, set: false, series: series(id) }).collect(),
+            messages: 0,
+            warnings: Vec::new(),
+            wall: WallTime::default(),
+        }
+    }
+
     /// The share of the ideal hypervolume (all hits in no time) that the front of a whole campaign reaches.
     pub(crate) fn campaign(&self, strategy: &mut dyn Strategy) -> Run {
+        self.campaign_of(&self.plan(Search::Random { evaluations: 1 }), strategy)
+    }
+
+    /// As [`Landscape::campaign`], of a plan that is by condition perhaps.
+    pub(crate) fn campaign_of(&self, plan: &CampaignPlan, strategy: &mut dyn Strategy) -> Run {
+        let course = needs_courses(plan).then(|| Course::of(plan, &Self::undisturbed(plan))).flatten();
+        if let Some(course) = course.clone() {
+            strategy.reference(course);
+        }
         let mut front = Front::default();
         let mut tests = Vec::new();
         loop {
@@ -224,7 +262,8 @@ impl Landscape {
                     // As in a real campaign, a disturbance too weak to be noticed has no effect at all.
                     let fitness =
                         if time < 0.05 { Fitness::Unfit(Unfit::Void) } else { Fitness::Measured(vec![time, -hits]) };
-                    Evaluated { number, test: candidate.test, fitness }
+                    let point = if time < 0.05 { None } else { Self::point(plan, &candidate.test) };
+                    Evaluated { number, test: candidate.test, fitness, point, course: course.clone() }
                 })
                 .collect();
             for result in &results {
@@ -344,6 +383,8 @@ mod tests {
                     number,
                     test: candidate.test.clone(),
                     fitness: Fitness::Unfit(Unfit::Unmeasured),
+                    point: None,
+                    course: None,
                 })
                 .collect();
             strategy.tell(&results);

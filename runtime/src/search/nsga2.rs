@@ -119,6 +119,11 @@ impl<V: Variation> Nsga2<V> {
         self.generation
     }
 
+    /// How its genomes are varied, to be told what else came of them.
+    pub fn variation_mut(&mut self) -> &mut V {
+        &mut self.variation
+    }
+
     /// The surviving genomes, by the order in which they were asked.
     pub fn population(&self) -> &[Told<V::Genome>] {
         &self.population

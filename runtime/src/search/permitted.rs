@@ -4,6 +4,7 @@ use sesame_plan::condition::{Condition, ConditionSpace, Constraint};
 use sesame_plan::{ActivationMode, CampaignPlan, Count, OperationId};
 use thiserror::Error;
 
+use crate::coverage::GridError;
 use crate::rng::Stream;
 use crate::search::choice::PermittedChoice;
 use crate::search::condition::grown;
@@ -14,7 +15,7 @@ use crate::search::range::Range;
 const FIRST_TRIES: u64 = 100;
 
 /// Why a plan cannot be searched. The generator refuses such campaigns, so a plan that is one was edited.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, PartialEq, Error)]
 pub enum SearchError {
     /// No operation can be active in a test.
     #[error("campaign `{campaign}` has no operation that may be active before its end; give it one, or end it later")]
@@ -50,6 +51,32 @@ pub enum SearchError {
         campaign: String,
         /// The operation.
         operation: String,
+    },
+    /// An exploration of cells that the campaign does not count.
+    #[error("campaign `{campaign}` explores cells but does not say which; give it a `coverage`")]
+    NoCoverage {
+        /// The campaign.
+        campaign: String,
+    },
+    /// A strategy that has to choose when operations are active, of a campaign in which conditions do.
+    #[error("campaign `{campaign}` is by condition: when its operations are active only a run can tell")]
+    NotByTime {
+        /// The campaign.
+        campaign: String,
+    },
+    /// A strategy that predicts when conditions hold, of a campaign that has none.
+    #[error("campaign `{campaign}` is by time: there are no conditions whose outcome could be predicted")]
+    NotByCondition {
+        /// The campaign.
+        campaign: String,
+    },
+    /// Cells that are no grid.
+    #[error("the coverage of campaign `{campaign}` cannot be counted: {reason}")]
+    Grid {
+        /// The campaign.
+        campaign: String,
+        /// Why not.
+        reason: GridError,
     },
     /// A population of nobody.
     #[error("campaign `{campaign}` has a population of 0; give it at least 1")]

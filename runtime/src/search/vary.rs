@@ -119,6 +119,16 @@ impl TestVariation {
     pub fn new(permitted: Permitted, rates: Rates, seed: u64) -> Self {
         TestVariation { permitted, rates, seed, made: BTreeSet::new() }
     }
+
+    /// Mutates a permitted test once more.
+    pub(crate) fn mutate_again(&self, test: &mut Test, stream: &mut Stream) {
+        mutate(test, &self.permitted, &self.rates, stream);
+    }
+
+    /// Notes a test that was made elsewhere. False if it was made before.
+    pub(crate) fn claim(&mut self, test: &Test) -> bool {
+        self.made.insert(identity(test))
+    }
 }
 
 impl Variation for TestVariation {

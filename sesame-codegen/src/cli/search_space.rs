@@ -19,7 +19,10 @@ const REFERENCE_RUNS: u64 = 2;
 pub(super) fn described(plan: &CampaignPlan) -> String {
     let mut lines = Vec::new();
     let runs = match plan.campaign.search {
-        Search::Nsga2 { evaluations, .. } | Search::Random { evaluations } => {
+        Search::Nsga2 { evaluations, .. }
+        | Search::MapElites { evaluations, .. }
+        | Search::Random { evaluations }
+        | Search::LatinHypercube { evaluations } => {
             match Permitted::of(plan) {
                 Ok(permitted) => space(plan, &permitted, &mut lines),
                 Err(error) => lines.push(("tests", error.to_string())),

@@ -100,6 +100,8 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 activation: ActivationMode::Time,
                 search: Search::Random { evaluations: 10 },
                 coverage: None,
+                exploration: None,
+                stop: Vec::new(),
                 seed: 42,
                 end_after: 70.0,
                 record: None,

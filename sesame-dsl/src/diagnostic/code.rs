@@ -88,6 +88,7 @@ codes! {
     SEARCH_OR_REPEAT = "E0503": "A campaign does two of search, repeat and observe, or none.",
     NOTHING_TO_GROW = "E0504": "No condition that may hold and may not can be made of what a campaign offers.",
     CANNOT_CONTAIN = "E0505": "An operation asks for something that the campaign's conditions cannot contain.",
+    NOTHING_TO_EXPLORE = "E0506": "A strategy lacks what it works on: cells, windows of time, or an evolution.",
     BAD_MONITOR = "E0601": "A monitor's guarantees are not in order.",
     BAD_LAB = "E0602": "A setting does not fit the lab's transport.",
     OUTLASTS_THE_END = "W0001": "A window goes on after the campaign's end.",

@@ -1,7 +1,7 @@
 //! Campaigns: how tests are found and run.
 
 use super::condition::ConditionSpace;
-use super::{CampaignId, Declaration, MetricId, OperationId, Range, TestId};
+use super::{CampaignId, Declaration, Exploration, MetricId, OperationId, Range, StopRule, TestId};
 
 /// A campaign.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +18,10 @@ pub struct Campaign {
     pub search: Search,
     /// How coverage is counted; `None` where the campaign does not say.
     pub coverage: Option<Coverage>,
+    /// What the search does to cover more cells. Default nothing.
+    pub exploration: Option<Exploration>,
+    /// What else stops the search, in the order of [`StopRule`].
+    pub stop: Vec<StopRule>,
     /// The one seed that decides everything. Default 1.
     pub seed: u64,
     /// Simulation time at which a test ends, in seconds; positive.
@@ -54,6 +58,22 @@ pub enum Search {
         /// Tests in total: at least 1.
         evaluations: u32,
     },
+    /// MAP-Elites over the cells of the campaign's coverage, which it has.
+    MapElites {
+        /// What a test holds.
+        content: Content,
+        /// Tests per generation: even, at least 2.
+        population: u32,
+        /// Tests in total: at least `population`.
+        evaluations: u32,
+    },
+    /// Latin hypercube sampling of tests by time.
+    LatinHypercube {
+        /// What a test holds.
+        content: Content,
+        /// Tests in total: at least 1.
+        evaluations: u32,
+    },
     /// One known test again and again.
     Repeat {
         /// Which.
@@ -66,6 +86,19 @@ pub enum Search {
         /// How often: at least 1.
         times: u32,
     },
+}
+
+impl Search {
+    /// What its tests hold; `None` where nothing is searched.
+    pub fn content(&self) -> Option<&Content> {
+        match self {
+            Search::Nsga2 { content, .. }
+            | Search::Random { content, .. }
+            | Search::MapElites { content, .. }
+            | Search::LatinHypercube { content, .. } => Some(content),
+            Search::Repeat { .. } | Search::Passive { .. } => None,
+        }
+    }
 }
 
 /// How a search's coverage of the reduced parameter space is counted, and when it suffices.

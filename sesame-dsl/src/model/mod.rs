@@ -7,6 +7,7 @@
 mod campaign;
 pub mod condition;
 pub mod eddi;
+mod exploration;
 mod formula;
 mod fuzz;
 mod ids;
@@ -16,6 +17,7 @@ mod system;
 mod temporal;
 
 pub use campaign::*;
+pub use exploration::*;
 pub use formula::*;
 pub use fuzz::*;
 pub use ids::*;

@@ -45,6 +45,8 @@ impl<'a> Resolver<'a> {
         });
         let content = self.content(campaign, end_after, activation);
         let coverage = self.coverage(campaign);
+        let exploration = self.exploration(campaign);
+        let stop = self.stop(campaign);
         let found = (campaign.searches.first(), campaign.repeats.first(), campaign.passives.first());
         let (search, seed) = match found {
             (_, repeat, Some(passive)) => {
@@ -70,6 +72,7 @@ impl<'a> Resolver<'a> {
                 return None;
             }
         };
+        let search = search.filter(|search| self.explorable(campaign, search));
         let metric_ids = |found: Vec<usize>| found.into_iter().map(MetricId::from_index).collect();
         Some(model::Campaign {
             declaration: self.declaration(&campaign.head),
@@ -78,6 +81,8 @@ impl<'a> Resolver<'a> {
             observed: metric_ids(observed?),
             search: search?,
             coverage: coverage?,
+            exploration: exploration?,
+            stop: stop?,
             seed: seed?,
             end_after: end_after?,
             record,
@@ -225,18 +230,23 @@ impl<'a> Resolver<'a> {
         }
         let found = evaluations.and_then(|count| self.count(count, 1, "a search evaluates"));
         match strategy {
-            Strategy::Random => {
+            Strategy::Random | Strategy::LatinHypercube => {
                 if let Some((span, _)) = search.population.first() {
-                    let title = "a random search has no setting `population`";
+                    let what = if strategy == Strategy::Random { "random search" } else { "Latin hypercube" };
+                    let title = format!("a {what} has no setting `population`");
                     let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, *span, title)
                         .label("leave it out")
                         .note("its settings are `evaluations` and `seed`");
                     self.report(diagnostic);
                     return None;
                 }
-                Some(Search::Random { content: content?, evaluations: found? })
+                let (content, evaluations) = (content?, found?);
+                Some(match strategy {
+                    Strategy::Random => Search::Random { content, evaluations },
+                    _ => Search::LatinHypercube { content, evaluations },
+                })
             }
-            Strategy::Nsga2 => {
+            Strategy::Nsga2 | Strategy::MapElites => {
                 let Some(count) = population else {
                     if !search.damaged {
                         self.missing(&campaign.head.name, "the size of its population", "population 10");
@@ -262,7 +272,11 @@ impl<'a> Resolver<'a> {
                     self.report(diagnostic);
                     return None;
                 }
-                Some(Search::Nsga2 { content: content?, population: size, evaluations: found })
+                let (content, population, evaluations) = (content?, size, found);
+                Some(match strategy {
+                    Strategy::Nsga2 => Search::Nsga2 { content, population, evaluations },
+                    _ => Search::MapElites { content, population, evaluations },
+                })
             }
         }
     }
@@ -325,6 +339,8 @@ impl<'a> Resolver<'a> {
             (campaign.operations.first().map(|operations| operations.span), "operations"),
             (campaign.objectives.first().map(|(span, _)| *span), "objectives"),
             (campaign.coverages.first().map(|coverage| coverage.span), "coverage"),
+            (campaign.explorations.first().map(|exploration| exploration.span), exploring(campaign)),
+            (campaign.stops.first().map(|stop| stop.span), "stop"),
         ];
         for (span, word) in clauses {
             let Some(span) = span else { continue };
@@ -366,5 +382,14 @@ impl<'a> Resolver<'a> {
                 None
             }
         }
+    }
+}
+
+/// The word that a campaign's exploration begins with.
+fn exploring(campaign: &ast::Campaign) -> &'static str {
+    match campaign.explorations.first().map(|exploration| exploration.kind) {
+        Some(ast::ExplorationKind::Construct) => "construct",
+        Some(ast::ExplorationKind::Predict) => "predict",
+        _ => "boost",
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::syntax::ast::{Campaign, File};
+use crate::syntax::ast::{ActivationMode, Campaign, Exploration, ExplorationKind, File, Strategy};
 
 /// Hands clauses down. A clause that a campaign writes replaces the inherited one whole; `search`, `repeat` and
 /// `passive` are one clause in this, and what belongs to a search only is not handed to a campaign that has none.
@@ -40,7 +40,10 @@ pub(super) fn inherit(file: &mut File, diagnostics: &mut Vec<Diagnostic>) {
                     hand_down(base, child);
                 }
                 // What is inherited is not known, so nothing is missing.
-                None if file.campaigns[index].from.is_some() => file.campaigns[index].damaged = true,
+                None if file.campaigns[index].from.is_some() => {
+                    file.campaigns[index].damaged = true;
+                    file.campaigns[index].unread = true;
+                }
                 None => {}
             }
             done[index] = true;
@@ -78,6 +81,7 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
     let searches = !child.searches.is_empty();
     // What the base lacks was said of it.
     child.damaged |= base.damaged || !own || searches != base.searches.is_empty();
+    child.unread |= base.unread;
     if child.observes.is_empty() {
         child.observes.clone_from(&base.observes);
     }
@@ -103,5 +107,19 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
         if child.coverages.is_empty() {
             child.coverages.clone_from(&base.coverages);
         }
+        if child.explorations.is_empty() {
+            child.explorations = base.explorations.iter().filter(|it| suits(it, child)).cloned().collect();
+        }
+        if child.stops.is_empty() {
+            child.stops.clone_from(&base.stops);
+        }
     }
+}
+
+/// Whether a campaign can explore like its base: a search that is no evolution has nothing to be changed, and of windows
+/// of time and conditions each is explored in its own way. Where the base itself is like that, it is said of the base.
+fn suits(exploration: &Exploration, child: &Campaign) -> bool {
+    let evolves = child.searches.iter().all(|search| search.strategy.is_none_or(|it| it == Strategy::Nsga2));
+    let by_condition = child.activates.iter().any(|(_, mode)| matches!(mode, ActivationMode::Condition(_)));
+    evolves && by_condition == (exploration.kind == ExplorationKind::Predict)
 }

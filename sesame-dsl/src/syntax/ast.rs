@@ -612,12 +612,17 @@ pub(crate) struct Campaign {
     pub(crate) activates: Vec<(Span, ActivationMode)>,
     pub(crate) searches: Vec<Search>,
     pub(crate) coverages: Vec<Coverage>,
+    pub(crate) explorations: Vec<Exploration>,
+    pub(crate) stops: Vec<Stop>,
     pub(crate) repeats: Vec<Repeat>,
     pub(crate) passives: Vec<Passive>,
     pub(crate) ends: Vec<(Span, Quantity)>,
     pub(crate) records: Vec<(Span, Record)>,
-    /// Something of it could not be read or is not supported: what is missing may be there.
+    /// Something of it could not be read or is not supported: what is missing may be there. So too with a `from`, since
+    /// what the other campaign lacks is said of that one.
     pub(crate) damaged: bool,
+    /// Something of it, or of what it inherits from, could not be read: nothing is known of what it has not.
+    pub(crate) unread: bool,
 }
 
 /// Which clauses a campaign has from another, as far as it matters for what is said of them.
@@ -676,6 +681,8 @@ pub(crate) struct Search {
 pub(crate) enum Strategy {
     Nsga2,
     Random,
+    MapElites,
+    LatinHypercube,
 }
 
 #[derive(Debug, Clone)]
@@ -693,6 +700,42 @@ pub(crate) struct CoverageAxis {
     pub(crate) dimension: Name,
     pub(crate) range: Range,
     pub(crate) cells: Count,
+}
+
+/// `boost fixed { … }`, `boost linear { … }`, `construct { … }` or `predict { … }`, with the settings as written.
+#[derive(Debug, Clone)]
+pub(crate) struct Exploration {
+    pub(crate) span: Span,
+    pub(crate) kind: ExplorationKind,
+    pub(crate) generations: Vec<(Span, Count)>,
+    pub(crate) iterations: Vec<(Span, Count)>,
+    pub(crate) tries: Vec<(Span, Count)>,
+    /// How many children at the beginning, and at the end.
+    pub(crate) children: Vec<(Span, [Count; 2])>,
+    pub(crate) drops: Vec<(Span, Count)>,
+    pub(crate) shares: Vec<(Span, Quantity)>,
+    pub(crate) untils: Vec<(Span, Quantity)>,
+    pub(crate) candidates: Vec<(Span, Count)>,
+    pub(crate) damaged: bool,
+}
+
+/// `stop { … }` with its rules as written.
+#[derive(Debug, Clone)]
+pub(crate) struct Stop {
+    pub(crate) span: Span,
+    pub(crate) times: Vec<(Span, Quantity)>,
+    pub(crate) stagnations: Vec<(Span, (Count, Quantity))>,
+    pub(crate) discoveries: Vec<(Span, Quantity)>,
+    pub(crate) completenesses: Vec<(Span, Quantity)>,
+    pub(crate) damaged: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ExplorationKind {
+    BoostFixed,
+    BoostLinear,
+    Construct,
+    Predict,
 }
 
 #[derive(Debug, Clone)]

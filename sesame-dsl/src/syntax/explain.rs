@@ -31,6 +31,10 @@ pub(super) enum Place {
     Condition,
     Search,
     Coverage,
+    Boost,
+    Construct,
+    Predict,
+    Stop,
     Repeat,
     Launch,
     Budget,
@@ -55,6 +59,10 @@ impl Place {
             Place::Condition => Rule::error_condition_setting,
             Place::Search => Rule::error_search_setting,
             Place::Coverage => Rule::error_coverage_member,
+            Place::Boost => Rule::error_boost_setting,
+            Place::Construct => Rule::error_construct_setting,
+            Place::Predict => Rule::error_predict_setting,
+            Place::Stop => Rule::error_stop_rule,
             Place::Repeat => Rule::error_repeat_setting,
             Place::Launch => Rule::error_launch_setting,
             Place::Budget => Rule::error_budget_setting,
@@ -101,17 +109,30 @@ impl Place {
                 Rule::activate,
                 Rule::search,
                 Rule::coverage,
+                Rule::boost,
+                Rule::construct,
+                Rule::predict,
+                Rule::stop,
                 Rule::end,
                 Rule::repeat,
                 Rule::passive,
                 Rule::record,
-                Rule::unsupported_campaign_member,
             ],
             Place::Condition => &[Rule::setting_depth, Rule::setting_integers],
             Place::Search => &[Rule::setting_population, Rule::setting_evaluations, Rule::setting_seed],
             Place::Coverage => {
                 &[Rule::coverage_axis, Rule::coverage_hits, Rule::coverage_stop, Rule::coverage_failsafe]
             }
+            Place::Boost => &[
+                Rule::boost_generations,
+                Rule::boost_iterations,
+                Rule::boost_tries,
+                Rule::boost_children,
+                Rule::boost_drop,
+            ],
+            Place::Construct => &[Rule::construct_share, Rule::construct_until],
+            Place::Predict => &[Rule::predict_candidates],
+            Place::Stop => &[Rule::stop_time, Rule::stop_stagnation, Rule::stop_discovery, Rule::stop_completeness],
             Place::Repeat => &[Rule::setting_seed],
             Place::Launch => &[Rule::ready],
             Place::Budget => &[Rule::setting_latency, Rule::setting_jitter],
@@ -147,6 +168,10 @@ impl Place {
             Place::Condition => Rule::one_condition_setting,
             Place::Search => Rule::one_search_setting,
             Place::Coverage => Rule::one_coverage_member,
+            Place::Boost => Rule::one_boost_setting,
+            Place::Construct => Rule::one_construct_setting,
+            Place::Predict => Rule::one_predict_setting,
+            Place::Stop => Rule::one_stop_rule,
             Place::Repeat => Rule::one_repeat_setting,
             Place::Launch => Rule::one_launch_setting,
             Place::Budget => Rule::one_budget_setting,
@@ -172,11 +197,16 @@ impl Place {
             Place::Custom => "a parameter such as `points: int [3, 20]`",
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
             Place::Campaign => {
-                "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `repeat`, `passive`, `record` or `end after`"
+                "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `boost`, `construct`, `predict`, \
+                 `stop`, `repeat`, `passive`, `record` or `end after`"
             }
             Place::Condition => "`depth` or `integers`",
             Place::Search => "`population`, `evaluations` or `seed`",
             Place::Coverage => "a dimension such as `T1 [0, 1] cells 6`, `hits`, `stop at` or `failsafe`",
+            Place::Boost => "`every N generations`, `every N iterations`, `from N to N`, `drop N` or `tries N`",
+            Place::Construct => "`share` or `until`",
+            Place::Predict => "`candidates`",
+            Place::Stop => "`time`, `stagnation`, `discovery` or `completeness`",
             Place::Repeat => "`seed`",
             Place::Launch => "`ready when topic`",
             Place::Budget => "`latency` or `jitter`",
@@ -217,6 +247,10 @@ impl Place {
                 "activate",
                 "search",
                 "coverage",
+                "boost",
+                "construct",
+                "predict",
+                "stop",
                 "repeat",
                 "passive",
                 "record",
@@ -225,6 +259,10 @@ impl Place {
             Place::Condition => &["depth", "integers"],
             Place::Search => &["population", "evaluations", "seed"],
             Place::Coverage => &["hits", "stop", "failsafe"],
+            Place::Boost => &["every", "from", "drop", "tries"],
+            Place::Construct => &["share", "until"],
+            Place::Predict => &["candidates"],
+            Place::Stop => &["time", "stagnation", "discovery", "completeness"],
             Place::Repeat => &["seed"],
             Place::Launch => &["ready"],
             Place::Budget => &["latency", "jitter"],
@@ -415,6 +453,10 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::simulator_settings
         | Rule::process_settings
         | Rule::search_settings
+        | Rule::boost_settings
+        | Rule::construct_settings
+        | Rule::predict_settings
+        | Rule::stop_settings
         | Rule::launch_settings
         | Rule::budget_settings
         | Rule::lab_settings
@@ -445,9 +487,9 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::above => "`>`",
         Rule::bound_within => "`in`",
         Rule::parameter_name | Rule::choice => "a parameter such as `offset`, `value`, `loss` or `delay`",
-        Rule::window | Rule::from_nodes | Rule::campaign_from => "`from`",
+        Rule::window | Rule::from_nodes | Rule::campaign_from | Rule::boost_children => "`from`",
         Rule::moment => "`before start`",
-        Rule::until_condition => "`until`",
+        Rule::until_condition | Rule::construct_until => "`until`",
         Rule::for_length | Rule::for_lengths => "`for`",
         Rule::at_most_times => "`at most`",
         Rule::by_condition => "`condition`",
@@ -466,6 +508,16 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::coverage_hits => "`hits`",
         Rule::coverage_stop => "`stop at`",
         Rule::coverage_failsafe => "`failsafe`",
+        Rule::boost_generations => "`every 2 generations`",
+        Rule::boost_iterations => "`every 2 iterations`",
+        Rule::boost_tries => "`tries`",
+        Rule::boost_drop => "`drop`",
+        Rule::construct_share => "`share`",
+        Rule::predict_candidates => "`candidates`",
+        Rule::stop_time => "`time`",
+        Rule::stop_stagnation => "`stagnation`",
+        Rule::stop_discovery => "`discovery`",
+        Rule::stop_completeness => "`completeness`",
         Rule::within => "`within`",
         Rule::priority => "`priority`",
         Rule::inclusion => "`inclusion`",
@@ -542,7 +594,6 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::k_always
         | Rule::k_eventually
         | Rule::k_implies
-        | Rule::k_boost
         | Rule::k_node
         | Rule::k_parameter
         | Rule::element => return None,

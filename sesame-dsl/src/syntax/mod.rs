@@ -4,6 +4,7 @@ mod activation;
 pub(crate) mod ast;
 pub(crate) mod eddi;
 mod explain;
+mod exploration;
 mod formula;
 mod limits;
 mod operation;

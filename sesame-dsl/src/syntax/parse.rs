@@ -569,11 +569,14 @@ impl Reader<'_> {
             activates: vec![],
             searches: vec![],
             coverages: vec![],
+            explorations: vec![],
+            stops: vec![],
             repeats: vec![],
             passives: vec![],
             ends: vec![],
             records: vec![],
             damaged: false,
+            unread: false,
         };
         campaign.damaged = self.members(pair, Place::Campaign, |reader, member| {
             let span = reader.keyword_span(&member);
@@ -596,6 +599,10 @@ impl Reader<'_> {
                 }
                 Rule::search => campaign.searches.push(reader.search(&member, span)),
                 Rule::coverage => campaign.coverages.push(reader.coverage(&member, span)),
+                Rule::boost => campaign.explorations.push(reader.boost(&member, span)),
+                Rule::predict => campaign.explorations.push(reader.predict(&member, span)),
+                Rule::stop => campaign.stops.push(reader.stop(&member, span)),
+                Rule::construct => campaign.explorations.push(reader.construct(&member, span)),
                 Rule::end => campaign.ends.push((span, reader.signed(&expect_child(&member, Rule::signed)))),
                 Rule::record => {
                     let all = child(&member, Rule::k_all).is_some();
@@ -615,11 +622,10 @@ impl Reader<'_> {
                     let times = reader.count(&expect_child(&member, Rule::number));
                     campaign.passives.push(Passive { span, times, seed });
                 }
-                _ => {
-                    reader.unsupported(&member);
-                }
+                other => unreachable!("{other:?} is no member of a campaign"),
             }
         });
+        campaign.unread = campaign.damaged;
         campaign
     }
 
@@ -668,8 +674,13 @@ impl Reader<'_> {
             self.unsupported(&strategy);
             return search;
         }
-        let nsga2 = child(pair, Rule::k_nsga2).is_some();
-        search.strategy = Some(if nsga2 { Strategy::Nsga2 } else { Strategy::Random });
+        let strategies = [
+            (Rule::k_nsga2, Strategy::Nsga2),
+            (Rule::k_map_elites, Strategy::MapElites),
+            (Rule::k_latin_hypercube, Strategy::LatinHypercube),
+            (Rule::k_random, Strategy::Random),
+        ];
+        search.strategy = strategies.into_iter().find(|(rule, _)| child(pair, *rule).is_some()).map(|(_, it)| it);
         let settings = expect_child(pair, Rule::search_settings);
         search.damaged = self.members(&settings, Place::Search, |reader, setting| {
             let value = (reader.keyword_span(&setting), reader.count(&expect_child(&setting, Rule::number)));

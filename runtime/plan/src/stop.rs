@@ -1,0 +1,31 @@
+//! When a search stops before all its tests were evaluated.
+
+use serde::{Deserialize, Serialize};
+
+/// A reason for a search to stop after a generation. Of several the first that holds stops it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum StopRule {
+    /// It has gone on for so long. The only rule by which results depend on how fast the machine is.
+    WallTime {
+        /// Seconds of wall time since it was started or taken up again; positive.
+        seconds: f64,
+    },
+    /// The hypervolume of its front has hardly grown.
+    Stagnation {
+        /// Over so many generations; at least 1.
+        generations: u32,
+        /// By less than this share of what it is now; above 0.
+        below: f64,
+    },
+    /// A next test would hardly fall into a cell that none has fallen into, as Good and Turing estimate it.
+    Discovery {
+        /// Less likely than this, in `0..=1` and above 0.
+        below: f64,
+    },
+    /// It has hit nearly all the cells that it would ever hit, as Chao estimates it.
+    Completeness {
+        /// At least this share of them, in `0..=1` and above 0.
+        share: f64,
+    },
+}

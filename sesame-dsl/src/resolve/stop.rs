@@ -1,0 +1,59 @@
+//! When a campaign's search stops before its tests are used up.
+
+use super::Resolver;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::model::StopRule;
+use crate::syntax::ast;
+use crate::units::Unit;
+
+impl<'a> Resolver<'a> {
+    /// The campaign's rules to stop by; `None` where they are not in order.
+    pub(super) fn stop(&mut self, campaign: &'a ast::Campaign) -> Option<Vec<StopRule>> {
+        let spans: Vec<_> = campaign.stops.iter().map(|stop| stop.span).collect();
+        self.at_most_one(&spans, "stop");
+        let Some(written) = campaign.stops.first() else { return Some(vec![]) };
+        let time = self.single(&written.times, "time").map(|quantity| self.wall_time(quantity));
+        let stagnation = self.single(&written.stagnations, "stagnation").map(|(count, quantity)| {
+            let generations = self.count(*count, 1, "a search stagnates over");
+            let below = self.share(quantity, "the growth of a stagnating search");
+            Some(StopRule::Stagnation { generations: generations?, below: below? })
+        });
+        let discovery = self
+            .single(&written.discoveries, "discovery")
+            .map(|quantity| Some(StopRule::Discovery { below: self.share(quantity, "the discovery probability")? }));
+        let completeness = self
+            .single(&written.completenesses, "completeness")
+            .map(|quantity| Some(StopRule::Completeness { share: self.share(quantity, "the completeness")? }));
+        let by_cells = written.discoveries.first().map(|(span, _)| (*span, "discovery"));
+        let by_cells = by_cells.or(written.completenesses.first().map(|(span, _)| (*span, "completeness")));
+        if let Some((span, word)) = by_cells
+            && campaign.coverages.is_empty()
+            && !campaign.searches.is_empty()
+            && !campaign.unread
+        {
+            let diagnostic = Diagnostic::new(Code::NOTHING_TO_EXPLORE, span, format!("`{word}` has no cells to go by"));
+            self.report(diagnostic.label("add a `coverage`"));
+            return None;
+        }
+        let rules = [time, stagnation, discovery, completeness];
+        let none = rules.iter().all(Option::is_none);
+        if none && !written.damaged {
+            let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, written.span, "this `stop` lacks a rule")
+                .label("say when the search is to stop")
+                .note("for example `stop { time 2h  stagnation 10 generations below 1% }`");
+            self.report(diagnostic);
+            return None;
+        }
+        rules.into_iter().flatten().collect()
+    }
+
+    fn wall_time(&mut self, quantity: &ast::Quantity) -> Option<StopRule> {
+        let seconds = self.value(quantity, Some(&Unit::seconds()), "the time a search may take")?;
+        if seconds > 0.0 {
+            return Some(StopRule::WallTime { seconds });
+        }
+        let title = format!("a search cannot stop after `{}`", self.text(quantity.span));
+        self.report(Diagnostic::new(Code::OUT_OF_RANGE, quantity.span, title).label("expected more than 0s"));
+        None
+    }
+}

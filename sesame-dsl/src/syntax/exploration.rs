@@ -1,0 +1,93 @@
+//! What a campaign does to cover more cells, and when it has done enough.
+
+use sesame_grammar::Rule;
+
+use super::ast::{Count, Exploration, ExplorationKind, Stop};
+use super::explain::Place;
+use super::parse::{Pair, Reader, child, children, expect_child};
+use crate::span::Span;
+
+impl Reader<'_> {
+    pub(super) fn boost(&mut self, pair: &Pair<'_>, span: Span) -> Exploration {
+        let fixed = child(pair, Rule::k_fixed).is_some();
+        let kind = if fixed { ExplorationKind::BoostFixed } else { ExplorationKind::BoostLinear };
+        let mut boost = empty(span, kind);
+        boost.damaged = self.members(&expect_child(pair, Rule::boost_settings), Place::Boost, |reader, setting| {
+            let span = reader.keyword_span(&setting);
+            let mut counts = children(&setting, Rule::number).map(|it| reader.count(&it)).collect::<Vec<Count>>();
+            let last = counts.pop().expect("a setting of `boost` has a number");
+            match setting.as_rule() {
+                Rule::boost_generations => boost.generations.push((span, last)),
+                Rule::boost_iterations => boost.iterations.push((span, last)),
+                Rule::boost_tries => boost.tries.push((span, last)),
+                Rule::boost_drop => boost.drops.push((span, last)),
+                _ => boost.children.push((span, [counts.pop().expect("there are two numbers"), last])),
+            }
+        });
+        boost
+    }
+
+    pub(super) fn construct(&mut self, pair: &Pair<'_>, span: Span) -> Exploration {
+        let mut construct = empty(span, ExplorationKind::Construct);
+        construct.damaged =
+            self.members(&expect_child(pair, Rule::construct_settings), Place::Construct, |reader, setting| {
+                let share = (reader.keyword_span(&setting), reader.signed(&expect_child(&setting, Rule::signed)));
+                match setting.as_rule() {
+                    Rule::construct_share => construct.shares.push(share),
+                    _ => construct.untils.push(share),
+                }
+            });
+        construct
+    }
+
+    pub(super) fn predict(&mut self, pair: &Pair<'_>, span: Span) -> Exploration {
+        let mut predict = empty(span, ExplorationKind::Predict);
+        predict.damaged =
+            self.members(&expect_child(pair, Rule::predict_settings), Place::Predict, |reader, setting| {
+                let count = reader.count(&expect_child(&setting, Rule::number));
+                predict.candidates.push((reader.keyword_span(&setting), count));
+            });
+        predict
+    }
+
+    pub(super) fn stop(&mut self, pair: &Pair<'_>, span: Span) -> Stop {
+        let mut stop = Stop {
+            span,
+            times: vec![],
+            stagnations: vec![],
+            discoveries: vec![],
+            completenesses: vec![],
+            damaged: false,
+        };
+        stop.damaged = self.members(&expect_child(pair, Rule::stop_settings), Place::Stop, |reader, rule| {
+            let span = reader.keyword_span(&rule);
+            let quantity = reader.signed(&expect_child(&rule, Rule::signed));
+            match rule.as_rule() {
+                Rule::stop_time => stop.times.push((span, quantity)),
+                Rule::stop_stagnation => {
+                    let generations = reader.count(&expect_child(&rule, Rule::number));
+                    stop.stagnations.push((span, (generations, quantity)));
+                }
+                Rule::stop_discovery => stop.discoveries.push((span, quantity)),
+                _ => stop.completenesses.push((span, quantity)),
+            }
+        });
+        stop
+    }
+}
+
+fn empty(span: Span, kind: ExplorationKind) -> Exploration {
+    Exploration {
+        span,
+        kind,
+        generations: vec![],
+        iterations: vec![],
+        tries: vec![],
+        children: vec![],
+        drops: vec![],
+        shares: vec![],
+        untils: vec![],
+        candidates: vec![],
+        damaged: false,
+    }
+}
