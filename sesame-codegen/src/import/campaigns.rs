@@ -365,7 +365,17 @@ fn held_by(writer: &mut Writer<'_>, test: &Test) -> Option<String> {
     (!lines.is_empty()).then_some(lines)
 }
 
-/// What a test chooses, in words, each after a blank.
+/// A delay as far as a template permits it, in seconds.
+fn permitted_delay(template: &Operation, delay: f64) -> f64 {
+    let delay = match template.kind {
+        OperationKind::Latency { delay: of, .. } => delay.clamp(of.0.min(of.1), of.0.max(of.1)),
+        _ => delay,
+    };
+    delay.max(0.0)
+}
+
+/// What a test chooses, in words, each after a blank. What its template does not permit is the nearest that it does, so
+/// that the space is right.
 fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Result<String, String> {
     let sets = |operation: &Operation| match &operation.kind {
         OperationKind::RandomValue { values: sets, .. } | OperationKind::Custom { parameters: sets } => sets.clone(),
@@ -379,6 +389,10 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
     let within = |low: f64, high: f64, at: usize| match permitted.get(at).map(|set| &set.domain) {
         Some(&Domain::Reals(from, to)) => {
             let (from, to) = (from.min(to), from.max(to));
+            (low.clamp(from, to), high.clamp(from, to))
+        }
+        Some(&Domain::Integers(from, to)) => {
+            let (from, to) = (from.min(to) as f64, from.max(to) as f64);
             (low.clamp(from, to), high.clamp(from, to))
         }
         _ => (low, high),
@@ -395,13 +409,18 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
             format!(" {word} [{}, {}]", number(low), number(high))
         }
         (Effect::Loss, OperationKind::PacketLoss { keep }) => {
-            format!(" loss {}", percent(1.0 - keep.0.min(keep.1).clamp(0.0, 1.0)))
+            let chosen = match template.kind {
+                OperationKind::PacketLoss { keep: of } => keep.0.min(keep.1).clamp(of.0.min(of.1), of.0.max(of.1)),
+                _ => keep.0.min(keep.1),
+            };
+            format!(" loss {}", percent(1.0 - chosen.clamp(0.0, 1.0)))
         }
         (Effect::Delay { randomised: false }, OperationKind::Latency { delay, .. }) => {
-            format!(" delay {}s", number(delay.0.min(delay.1).max(0.0)))
+            format!(" delay {}s", number(permitted_delay(template, delay.0.min(delay.1))))
         }
         (Effect::Delay { randomised: true }, OperationKind::Latency { delay, .. }) => {
-            let (low, high) = (delay.0.min(delay.1).max(0.0), delay.0.max(delay.1).max(0.0));
+            let (low, high) = (delay.0.min(delay.1), delay.0.max(delay.1));
+            let (low, high) = (permitted_delay(template, low), permitted_delay(template, high));
             format!(" delay [{}s, {}s]", number(low), number(high))
         }
         (Effect::Custom { parameters, .. }, _) => {
@@ -409,12 +428,32 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
             for (name, at) in parameters {
                 let chosen = match domain(*at)? {
                     Domain::Reals(low, high) => number(within(low.min(*high), *high, *at).0),
-                    Domain::Integers(low, high) => low.min(high).to_string(),
-                    Domain::Points(low, _) => format!("({}, {}, {})", number(low[0]), number(low[1]), number(low[2])),
-                    Domain::Texts(texts) => match texts.first() {
-                        Some(text) => quoted_text(text),
-                        None => return Err("it chooses no text".to_owned()),
-                    },
+                    Domain::Integers(low, high) => {
+                        let low = *low.min(high);
+                        match permitted.get(*at).map(|set| &set.domain) {
+                            Some(&Domain::Integers(from, to)) => low.clamp(from.min(to), from.max(to)).to_string(),
+                            _ => low.to_string(),
+                        }
+                    }
+                    Domain::Points(low, _) => {
+                        let mut point = *low;
+                        if let Some(Domain::Points(from, to)) = permitted.get(*at).map(|set| &set.domain) {
+                            for axis in 0..3 {
+                                point[axis] = point[axis].clamp(from[axis].min(to[axis]), from[axis].max(to[axis]));
+                            }
+                        }
+                        format!("({}, {}, {})", number(point[0]), number(point[1]), number(point[2]))
+                    }
+                    Domain::Texts(texts) => {
+                        let offered = |text: &Box<str>| match permitted.get(*at).map(|set| &set.domain) {
+                            Some(Domain::Texts(offered)) => offered.contains(text),
+                            _ => true,
+                        };
+                        match texts.first().filter(|text| offered(text)) {
+                            Some(text) => quoted_text(text),
+                            None => return Err("it chooses no text that its template offers".to_owned()),
+                        }
+                    }
                     Domain::Other(_) => return Err("it chooses something that nothing is like".to_owned()),
                 };
                 let _ = write!(text, " {name} {chosen}");

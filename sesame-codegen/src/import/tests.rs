@@ -250,7 +250,7 @@ fn a_broken_file_gives_one_diagnostic_with_its_place() {
 fn whatever_bytes_are_in_a_file_it_is_imported_or_refused() {
     use proptest::prelude::*;
     let words = whole().into_bytes();
-    let config = ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() };
+    let config = ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() };
     proptest!(config, |(at in 0..words.len(), bytes in prop::collection::vec(any::<u8>(), 1..6))| {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("arm.model");
@@ -259,7 +259,8 @@ fn whatever_bytes_are_in_a_file_it_is_imported_or_refused() {
         std::fs::write(&path, &damaged).unwrap();
         if let Ok(imported) = Imported::read(&path) {
             let checked = (crate::language::SESAME.check)("arm.sesame", imported.text(), Look::Human { colour: false });
-            prop_assert_eq!(checked.errors, 0, "{}\n{}", checked.diagnostics, imported.text());
+            // A test that does not fit its template any more is a mistake that the command tells, and nothing worse.
+            prop_assert_eq!(checked.errors == 0, !checked.plans.is_empty(), "{}", imported.text());
         }
     });
 }
