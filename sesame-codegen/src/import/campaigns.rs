@@ -445,8 +445,8 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
                         format!("({}, {}, {})", number(point[0]), number(point[1]), number(point[2]))
                     }
                     Domain::Texts(texts) => {
-                        let offered = |text: &Box<str>| match permitted.get(*at).map(|set| &set.domain) {
-                            Some(Domain::Texts(offered)) => offered.contains(text),
+                        let offered = |text: &str| match permitted.get(*at).map(|set| &set.domain) {
+                            Some(Domain::Texts(offered)) => offered.iter().any(|it| **it == *text),
                             _ => true,
                         };
                         match texts.first().filter(|text| offered(text)) {
