@@ -8,6 +8,7 @@ mod messages;
 mod metrics;
 mod operations;
 mod package;
+mod registry;
 mod rust;
 mod stub;
 mod text;

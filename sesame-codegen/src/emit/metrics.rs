@@ -6,6 +6,7 @@ use sesame_plan::{Direction, Type};
 
 use super::handlers::{handlers, paths};
 use super::messages::{self, Messages, Place};
+use super::registry::{self, Registered};
 use super::rust;
 use crate::names;
 use crate::plan::{HookPlan, RunnerPlan};
@@ -102,46 +103,21 @@ fn hook_trait(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -> Tok
 /// `hooks` is where the hook files are, as seen from the file's folder.
 pub(super) fn registry(runner: &RunnerPlan, types: &Messages<'_>, header: &str, hooks: &str) -> String {
     let used: Vec<&HookPlan> = runner.hooks.iter().filter(|hook| runner.uses(hook)).collect();
-    let modules = used.iter().map(|hook| {
-        let file = format!("{hooks}/{}.rs", names::snake(&hook.metric));
-        let module = module(hook);
-        quote! { #[path = #file] mod #module; }
-    });
-    let imports = used.iter().enumerate().map(|(at, hook)| {
-        let (module, user, here) = (module(hook), names::ident(&names::hook_type(&hook.metric)), here(at));
-        quote! { use self::#module::#user as #here; }
-    });
-    let notes: Vec<(String, String)> = used
-        .iter()
-        .map(|hook| (format!("use self::{}::", names::written(&names::snake(&hook.metric))), declared(hook)))
-        .collect();
-    let entries = used.iter().enumerate().map(|(at, hook)| {
-        let (metric, build, here) = (&hook.metric, build(hook), here(at));
-        quote! { ::sesame_runtime::metric::HookEntry { metric: #metric, build: #build::<#here> } }
-    });
+    let registered: Vec<Registered<'_>> =
+        used.iter().map(|hook| Registered { name: &hook.metric, declared: declared(hook) }).collect();
     let adapters = used.iter().map(|hook| adapter(runner, types, hook));
     let docs = rust::module_docs([format!("The metric hooks of `{}`, for the runtime.", runner.plan.campaign.name)]);
-    let source = rust::file(
-        header,
+    registry::registry(header, &docs, hooks, &registered, |registered| {
+        let entries = used.iter().zip(registered).map(|(hook, here)| {
+            let (metric, build) = (&hook.metric, build(hook));
+            quote! { ::sesame_runtime::metric::HookEntry { metric: #metric, build: #build::<#here> } }
+        });
         quote! {
-            #docs
-            #(#modules)*
-            #(#imports)*
             /// One entry for each hook metric of this campaign.
             pub(super) static HOOKS: &[::sesame_runtime::metric::HookEntry] = &[#(#entries),*];
             #(#adapters)*
-        },
-    );
-    rust::note_lines(&source, &notes)
-}
-
-fn module(hook: &HookPlan) -> proc_macro2::Ident {
-    names::ident(&names::snake(&hook.metric))
-}
-
-/// The user's struct as the registry calls it: short, so that rustc shows the note at the end of its line too.
-fn here(at: usize) -> proc_macro2::Ident {
-    format_ident!("Hook{at}")
+        }
+    })
 }
 
 fn build(hook: &HookPlan) -> proc_macro2::Ident {

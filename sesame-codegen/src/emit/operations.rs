@@ -9,6 +9,7 @@ use sesame_plan::{Domain, Moment, Parameter, Topic, Type};
 use super::Problem;
 use super::handlers::{self, handlers, paths};
 use super::messages::{self, Messages, Place};
+use super::registry::{self, Registered};
 use super::rust::{self, one_line};
 use super::text::Templates;
 use crate::names::{self, Scope};
@@ -164,42 +165,21 @@ fn hook_trait(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPl
 /// `hooks` is where the hook files are, as seen from the file's folder.
 pub(super) fn registry(runner: &RunnerPlan, types: &Messages<'_>, header: &str, hooks: &str) -> String {
     let used: Vec<&OperationPlan> = runner.operations.iter().filter(|operation| runner.applies(operation)).collect();
-    let module = |operation: &OperationPlan| names::ident(&names::snake(&operation.operation));
-    let modules = used.iter().map(|operation| {
-        let file = format!("{hooks}/{}.rs", names::snake(&operation.operation));
-        let module = module(operation);
-        quote! { #[path = #file] mod #module; }
-    });
-    let here = |at: usize| quote::format_ident!("Hook{at}");
-    let imports = used.iter().enumerate().map(|(at, operation)| {
-        let (module, user, here) = (module(operation), names::ident(&names::hook_type(&operation.operation)), here(at));
-        quote! { use self::#module::#user as #here; }
-    });
-    let notes: Vec<(String, String)> = used
-        .iter()
-        .map(|operation| {
-            let module = names::written(&names::snake(&operation.operation));
-            (format!("use self::{module}::"), declared(operation))
-        })
-        .collect();
-    let entries = used.iter().enumerate().map(|(at, operation)| {
-        let (name, build, here) = (&operation.operation, build(operation), here(at));
-        quote! { ::sesame_runtime::fuzz::OperationEntry { operation: #name, build: #build::<#here> } }
-    });
+    let registered: Vec<Registered<'_>> =
+        used.iter().map(|operation| Registered { name: &operation.operation, declared: declared(operation) }).collect();
     let adapters = used.iter().map(|operation| adapter(runner, types, operation));
     let docs = rust::module_docs([format!("The operation hooks of `{}`, for the runtime.", runner.plan.campaign.name)]);
-    let source = rust::file(
-        header,
+    registry::registry(header, &docs, hooks, &registered, |registered| {
+        let entries = used.iter().zip(registered).map(|(operation, here)| {
+            let (name, build) = (&operation.operation, build(operation));
+            quote! { ::sesame_runtime::fuzz::OperationEntry { operation: #name, build: #build::<#here> } }
+        });
         quote! {
-            #docs
-            #(#modules)*
-            #(#imports)*
             /// One entry for each custom operation of this campaign.
             pub(super) static OPERATIONS: &[::sesame_runtime::fuzz::OperationEntry] = &[#(#entries),*];
             #(#adapters)*
-        },
-    );
-    rust::note_lines(&source, &notes)
+        }
+    })
 }
 
 fn build(operation: &OperationPlan) -> proc_macro2::Ident {
