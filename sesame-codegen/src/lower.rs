@@ -424,17 +424,17 @@ fn stop_rule(rule: model::StopRule) -> plan::StopRule {
     }
 }
 
-fn dimension(dimension: model::CoverageDimension) -> plan::Dimension {
+fn dimension(dimension: model::ReducedDimension) -> plan::Dimension {
     match dimension {
-        model::CoverageDimension::T1 => plan::Dimension::T1,
-        model::CoverageDimension::T2 => plan::Dimension::T2,
-        model::CoverageDimension::T3 => plan::Dimension::T3,
-        model::CoverageDimension::P1 => plan::Dimension::P1,
-        model::CoverageDimension::P2 => plan::Dimension::P2,
-        model::CoverageDimension::O0 => plan::Dimension::O0,
-        model::CoverageDimension::O1 => plan::Dimension::O1,
-        model::CoverageDimension::O2 => plan::Dimension::O2,
-        model::CoverageDimension::O3 => plan::Dimension::O3,
+        model::ReducedDimension::T1 => plan::Dimension::T1,
+        model::ReducedDimension::T2 => plan::Dimension::T2,
+        model::ReducedDimension::T3 => plan::Dimension::T3,
+        model::ReducedDimension::P1 => plan::Dimension::P1,
+        model::ReducedDimension::P2 => plan::Dimension::P2,
+        model::ReducedDimension::O0 => plan::Dimension::O0,
+        model::ReducedDimension::O1 => plan::Dimension::O1,
+        model::ReducedDimension::O2 => plan::Dimension::O2,
+        model::ReducedDimension::O3 => plan::Dimension::O3,
     }
 }
 

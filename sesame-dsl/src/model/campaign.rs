@@ -1,7 +1,7 @@
 //! Campaigns: how tests are found and run.
 
 use super::condition::ConditionSpace;
-use super::{CampaignId, Declaration, Exploration, MetricId, OperationId, Range, StopRule, TestId};
+use super::{CampaignId, Declaration, Exploration, MetricId, OperationId, Range, ReducedDimension, StopRule, TestId};
 
 /// A campaign.
 #[derive(Debug, Clone, PartialEq)]
@@ -119,49 +119,11 @@ pub struct Coverage {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CoverageAxis {
     /// Which.
-    pub dimension: CoverageDimension,
+    pub dimension: ReducedDimension,
     /// From the beginning of the first cell to the end of the last, not empty.
     pub range: Range,
     /// How many cells: 1 or more.
     pub cells: u32,
-}
-
-/// A dimension of the reduced parameter space.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CoverageDimension {
-    /// Mean of midpoints.
-    T1,
-    /// Mean of lengths.
-    T2,
-    /// Spread of midpoints.
-    T3,
-    /// Mean of normalised parameters.
-    P1,
-    /// Spread of normalised parameters.
-    P2,
-    /// Operations.
-    O0,
-    /// Operations that change values.
-    O1,
-    /// Operations that lose messages.
-    O2,
-    /// Operations that delay messages.
-    O3,
-}
-
-impl CoverageDimension {
-    /// All of them with their names.
-    pub const ALL: [(&'static str, CoverageDimension); 9] = [
-        ("T1", CoverageDimension::T1),
-        ("T2", CoverageDimension::T2),
-        ("T3", CoverageDimension::T3),
-        ("P1", CoverageDimension::P1),
-        ("P2", CoverageDimension::P2),
-        ("O0", CoverageDimension::O0),
-        ("O1", CoverageDimension::O1),
-        ("O2", CoverageDimension::O2),
-        ("O3", CoverageDimension::O3),
-    ];
 }
 
 /// What a searched test holds.

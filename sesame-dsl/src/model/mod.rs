@@ -13,6 +13,7 @@ mod fuzz;
 mod ids;
 mod measure;
 pub mod physical;
+mod reduced;
 mod system;
 mod temporal;
 
@@ -22,6 +23,7 @@ pub use formula::*;
 pub use fuzz::*;
 pub use ids::*;
 pub use measure::*;
+pub use reduced::*;
 pub use system::*;
 pub use temporal::*;
 

@@ -1,6 +1,6 @@
 //! Physical labs: how tests are chosen for one, run in it, and compared with simulation.
 
-use super::{Bound, Declaration, MetricId, Range};
+use super::{Bound, Declaration, MetricId, Range, ReducedDimension};
 
 /// A lab.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,45 +81,7 @@ pub struct Budget {
     /// The weight of difference against interest, in `0..=1`.
     pub lambda: f64,
     /// What tests differ in; at least one, each once.
-    pub over: Vec<Feature>,
-}
-
-/// A number that says where a test lies among all possible ones (semantics of the search-space reduction).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Feature {
-    /// Mean of the midpoints of activations.
-    T1,
-    /// Mean of their lengths.
-    T2,
-    /// Spread of their midpoints.
-    T3,
-    /// Mean of normalised parameters.
-    P1,
-    /// Spread of normalised parameters.
-    P2,
-    /// Number of operations.
-    O0,
-    /// Number of operations on values.
-    O1,
-    /// Number of losses.
-    O2,
-    /// Number of delays.
-    O3,
-}
-
-impl Feature {
-    /// Every feature with its name.
-    pub const ALL: [(&'static str, Feature); 9] = [
-        ("T1", Feature::T1),
-        ("T2", Feature::T2),
-        ("T3", Feature::T3),
-        ("P1", Feature::P1),
-        ("P2", Feature::P2),
-        ("O0", Feature::O0),
-        ("O1", Feature::O1),
-        ("O2", Feature::O2),
-        ("O3", Feature::O3),
-    ];
+    pub over: Vec<ReducedDimension>,
 }
 
 /// A body.

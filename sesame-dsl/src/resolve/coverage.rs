@@ -3,7 +3,7 @@
 use super::Resolver;
 use super::quantity::percent;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, CoverageAxis, CoverageDimension};
+use crate::model::{self, CoverageAxis, ReducedDimension};
 use crate::similar::most_similar;
 use crate::syntax::ast;
 
@@ -75,13 +75,13 @@ impl<'a> Resolver<'a> {
 
     fn axis(&mut self, axis: &ast::CoverageAxis) -> Option<CoverageAxis> {
         let name = &axis.dimension;
-        let known = CoverageDimension::ALL.iter().find(|(known, _)| *known == name.text);
+        let known = ReducedDimension::named(&name.text);
         if known.is_none() {
             let mut diagnostic =
                 Diagnostic::new(Code::UNKNOWN_NAME, name.span, format!("no dimension named `{}`", name.text))
                     .label("not a dimension of tests")
                     .note("there are T1, T2, T3 (timing), P1, P2 (parameters), O0, O1, O2 and O3 (operations)");
-            if let Some(similar) = most_similar(&name.text, CoverageDimension::ALL.iter().map(|(known, _)| *known)) {
+            if let Some(similar) = most_similar(&name.text, ReducedDimension::NAMES) {
                 diagnostic = diagnostic.suggest(format!("`{similar}` is"), name.span, similar);
             }
             self.report(diagnostic);
@@ -89,7 +89,7 @@ impl<'a> Resolver<'a> {
         let what = format!("the dimension `{}`", name.text);
         let range = self.range(&axis.range, None, &what);
         let cells = self.count(axis.cells, 1, "the cells of a dimension are");
-        let (range, cells, &(_, dimension)) = (range?, cells?, known?);
+        let (range, cells, dimension) = (range?, cells?, known?);
         if range.low == range.high {
             let title = format!("`{}` has no width to divide into cells", self.text(axis.range.span));
             let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, axis.range.span, title);

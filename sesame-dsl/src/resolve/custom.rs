@@ -57,10 +57,7 @@ impl<'a> Resolver<'a> {
             let name = &written.name;
             if let Some(&before) = first.get(name.text.as_str()) {
                 let title = format!("parameter `{}` is defined twice", name.text);
-                let diagnostic = Diagnostic::new(Code::DEFINED_TWICE, name.span, title)
-                    .label("again here")
-                    .also(before, "first defined here");
-                self.report(diagnostic);
+                self.defined_twice(title, name.span, before);
                 continue;
             }
             first.insert(&name.text, name.span);
@@ -161,11 +158,7 @@ impl<'a> Resolver<'a> {
         let mut complete = true;
         for text in texts {
             if let Some(before) = first.insert(&text.text, text.span) {
-                let title = format!("`{}` stands twice in this list", self.text(text.span));
-                let diagnostic = Diagnostic::new(Code::LISTED_TWICE, text.span, title)
-                    .label("again here")
-                    .also(before, "first here");
-                self.report(diagnostic);
+                self.listed_twice(text.span, before);
                 complete = false;
             }
         }

@@ -87,12 +87,9 @@ impl<'a> Resolver<'a> {
         let mut all: Vec<_> = demands.chain(evidence).chain(states.map(|name| (name, Member::State))).collect();
         all.sort_by_key(|(name, _)| name.span);
         for (name, member) in all {
-            if let Some((_, first)) = members.get(name.text.as_str()) {
+            if let Some(&(_, first)) = members.get(name.text.as_str()) {
                 let title = format!("`{}` is defined twice in monitor `{}`", name.text, eddi.head.name.text);
-                let diagnostic = Diagnostic::new(Code::DEFINED_TWICE, name.span, title)
-                    .label("again here")
-                    .also(*first, "first defined here");
-                self.report(diagnostic);
+                self.defined_twice(title, name.span, first);
             } else {
                 members.insert(&name.text, (member, name.span));
             }

@@ -252,11 +252,7 @@ impl<'a> Resolver<'a> {
         let mut complete = true;
         for name in names {
             if let Some(&before) = first.get(name.text.as_str()) {
-                let title = format!("`{}` stands twice in this list", name.text);
-                let diagnostic = Diagnostic::new(Code::LISTED_TWICE, name.span, title)
-                    .label("again here")
-                    .also(before, "first here");
-                self.report(diagnostic);
+                self.listed_twice(name.span, before);
                 complete = false;
                 continue;
             }
@@ -267,6 +263,19 @@ impl<'a> Resolver<'a> {
             }
         }
         complete.then_some(found)
+    }
+
+    fn listed_twice(&mut self, again: Span, first: Span) {
+        let title = format!("`{}` stands twice in this list", self.text(again));
+        let diagnostic =
+            Diagnostic::new(Code::LISTED_TWICE, again, title).label("again here").also(first, "first here");
+        self.report(diagnostic);
+    }
+
+    fn defined_twice(&mut self, title: String, again: Span, first: Span) {
+        let diagnostic =
+            Diagnostic::new(Code::DEFINED_TWICE, again, title).label("again here").also(first, "first defined here");
+        self.report(diagnostic);
     }
 
     /// The one clause of a list of at most one; further ones are reported.

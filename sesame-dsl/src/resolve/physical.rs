@@ -4,10 +4,8 @@ use std::collections::BTreeMap;
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::physical::{
-    Budget, Cost, Feature, Fit, Form, LabSetting, LabSimulator, Order, Physical, Place, Shape,
-};
-use crate::model::{Id as _, MetricId};
+use crate::model::physical::{Budget, Cost, Fit, Form, LabSetting, LabSimulator, Order, Physical, Place, Shape};
+use crate::model::{Id as _, MetricId, ReducedDimension};
 use crate::similar::most_similar;
 use crate::span::Span;
 use crate::syntax::ast::{self, Name, Quantity};
@@ -106,10 +104,7 @@ impl<'a> Resolver<'a> {
         for name in simulators.chain(lab.shapes.iter().map(|shape| &shape.head.name)) {
             if let Some(&before) = first.get(name.text.as_str()) {
                 let title = format!("`{}` is defined twice in lab `{}`", name.text, lab.head.name.text);
-                let diagnostic = Diagnostic::new(Code::DEFINED_TWICE, name.span, title)
-                    .label("again here")
-                    .also(before, "first defined here");
-                self.report(diagnostic);
+                self.defined_twice(title, name.span, before);
             }
             first.entry(&name.text).or_insert(name.span);
         }
@@ -241,11 +236,7 @@ impl<'a> Resolver<'a> {
         let mut first: BTreeMap<&str, Span> = BTreeMap::new();
         for name in names {
             if let Some(&before) = first.get(name.text.as_str()) {
-                let title = format!("`{}` stands twice in this list", name.text);
-                let diagnostic = Diagnostic::new(Code::LISTED_TWICE, name.span, title)
-                    .label("again here")
-                    .also(before, "first here");
-                self.report(diagnostic);
+                self.listed_twice(name.span, before);
             }
             first.entry(&name.text).or_insert(name.span);
         }
@@ -265,19 +256,18 @@ impl<'a> Resolver<'a> {
             return None;
         }
         self.once(budget.over.iter());
-        let over: Vec<_> = budget.over.iter().map(|name| self.feature(name)).collect();
+        let over: Vec<_> = budget.over.iter().map(|name| self.dimension(name)).collect();
         Some(Budget { limit: limit?, lambda: lambda?, over: over.into_iter().collect::<Option<_>>()? })
     }
 
-    fn feature(&mut self, name: &Name) -> Option<Feature> {
-        if let Some((_, feature)) = Feature::ALL.iter().find(|(known, _)| *known == name.text) {
-            return Some(*feature);
+    fn dimension(&mut self, name: &Name) -> Option<ReducedDimension> {
+        let found = ReducedDimension::named(&name.text);
+        if found.is_none() {
+            let title = format!("no dimension of the search space is named `{}`", name.text);
+            let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("no such dimension");
+            self.report(diagnostic.note(format!("there are {}", super::list(&ReducedDimension::NAMES))));
         }
-        let known: Vec<&str> = Feature::ALL.iter().map(|(known, _)| *known).collect();
-        let title = format!("no dimension of the search space is named `{}`", name.text);
-        let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("no such dimension");
-        self.report(diagnostic.note(format!("there are {}", super::list(&known))));
-        None
+        found
     }
 
     fn tolerance(&mut self, tolerances: &'a [(Name, Quantity)]) -> Option<Vec<(MetricId, f64)>> {

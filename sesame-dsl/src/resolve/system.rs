@@ -219,10 +219,7 @@ impl<'a> Resolver<'a> {
             let name = &field.head.name;
             if let Some(&before) = first.get(name.text.as_str()) {
                 let title = format!("field `{}` of `{}` is defined twice", name.text, message.head.name.text);
-                let diagnostic = Diagnostic::new(Code::DEFINED_TWICE, name.span, title)
-                    .label("again here")
-                    .also(before, "first defined here");
-                self.report(diagnostic);
+                self.defined_twice(title, name.span, before);
                 complete = false;
             }
             first.entry(&name.text).or_insert(name.span);
