@@ -27,6 +27,7 @@ mod boost;
 mod cells;
 mod construct;
 mod constructing;
+mod in_turn;
 mod known;
 mod latin_hypercube;
 mod map_elites;

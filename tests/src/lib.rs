@@ -5,6 +5,7 @@
 
 pub mod models;
 pub mod optimisers;
+mod python;
 pub mod python_mcap;
 pub mod rtamt;
 

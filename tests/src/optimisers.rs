@@ -1,11 +1,8 @@
 //! The Python packages pygmo and pymoo, whose NSGA-II ours is compared with.
 
-use std::io::Write as _;
-use std::process::{Command, Stdio};
-
 use serde::{Deserialize, Serialize};
 
-use crate::workspace;
+use crate::python::asked;
 
 /// The variable that names a Python with pygmo and pymoo; `./test --long` makes one and sets it.
 pub const PYTHON: &str = "SESAME_OPTIMISERS_PYTHON";
@@ -54,24 +51,12 @@ pub struct Sorted {
 /// The answers to requests, in their order; `None` where nobody named a Python that has the packages. One that is named
 /// has to work.
 pub fn ask<Request: Serialize, Answer: for<'a> Deserialize<'a>>(requests: &[Request]) -> Option<Vec<Answer>> {
-    let python = std::env::var_os(PYTHON)?;
-    let mut child = Command::new(&python)
-        .arg(workspace().join("tests/suite/optimisers.py"))
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap_or_else(|error| panic!("{PYTHON} names {}, which does not start: {error}", python.display()));
-    let mut asked = Vec::new();
+    let mut lines = Vec::new();
     for request in requests {
-        serde_json::to_writer(&mut asked, request).expect("a request is data");
-        asked.push(b'\n');
+        serde_json::to_writer(&mut lines, request).expect("a request is data");
+        lines.push(b'\n');
     }
-    let mut input = child.stdin.take().expect("it is piped");
-    let asking = std::thread::spawn(move || input.write_all(&asked));
-    let output = child.wait_with_output().expect("a process that started ends");
-    assert!(output.status.success(), "pygmo or pymoo failed; make them anew with `./test --long`");
-    asking.join().expect("writing does not panic").expect("all requests are read");
-    let said = String::from_utf8(output.stdout).expect("Python prints JSON");
+    let said = asked(PYTHON, "optimisers.py", lines)?;
     let answers: Vec<Answer> =
         said.lines().map(|line| serde_json::from_str(line).expect("an answer is JSON of its kind")).collect();
     assert_eq!(answers.len(), requests.len(), "every request has an answer");

@@ -1,10 +1,8 @@
 //! The Python package rtamt, whose robustness of signal temporal logic ours is compared with.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
-use std::process::{Command, Stdio};
 
-use crate::workspace;
+use crate::python::asked;
 
 /// The variable that names a Python with rtamt; `./test --long` makes one and sets it.
 pub const PYTHON: &str = "SESAME_RTAMT_PYTHON";
@@ -32,24 +30,12 @@ pub struct Answer {
 /// What rtamt makes of these cases, by its offline monitor for discrete time; `None` where nobody named a Python that
 /// has it. One that is named has to work.
 pub fn answers(cases: &[Case]) -> Option<Vec<Answer>> {
-    let python = std::env::var_os(PYTHON)?;
-    let mut child = Command::new(&python)
-        .arg(workspace().join("tests/suite/robustness.py"))
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap_or_else(|error| panic!("{PYTHON} names {}, which does not start: {error}", python.display()));
-    let mut asked = String::new();
+    let mut lines = String::new();
     for Case { formula, x, y } in cases {
         // Both print finite numbers so that reading gives the very same ones.
-        writeln!(asked, "{{\"formula\": {formula:?}, \"x\": {x:?}, \"y\": {y:?}}}").expect("a String takes all text");
+        writeln!(lines, "{{\"formula\": {formula:?}, \"x\": {x:?}, \"y\": {y:?}}}").expect("a String takes all text");
     }
-    let mut input = child.stdin.take().expect("it is piped");
-    let asking = std::thread::spawn(move || input.write_all(asked.as_bytes()));
-    let output = child.wait_with_output().expect("a process that started ends");
-    assert!(output.status.success(), "rtamt failed; make it anew with `./test --long`");
-    asking.join().expect("writing does not panic").expect("rtamt read all cases");
-    let said = String::from_utf8(output.stdout).expect("Python prints numbers");
+    let said = asked(PYTHON, "robustness.py", lines.into_bytes())?;
     let number = |word: Option<&str>| word.and_then(|word| word.parse().ok()).expect("an answer has two numbers");
     let answers: Vec<Answer> = said
         .lines()

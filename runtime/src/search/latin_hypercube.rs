@@ -8,40 +8,36 @@ use sesame_plan::{Activation, Choice, Shape, Test, TestOperation};
 
 use crate::rng::{Stream, derive_seed, keyed_unit};
 use crate::search::choice::PermittedChoice;
+use crate::search::in_turn::InTurn;
 use crate::search::permitted::{PermittedActivation, PermittedOperation};
 use crate::search::range::Range;
 use crate::search::{Candidate, Evaluated, Permitted, Strategy};
-
-/// Tests per generation: enough to keep many workers busy, few enough to see progress.
-const GENERATION: u32 = 50;
 
 /// As many tests as evaluations, spread evenly over each choice, in generations of 50. Nothing is learned from results.
 #[derive(Debug, Clone)]
 pub struct LatinHypercube {
     permitted: Permitted,
-    evaluations: u32,
     seed: u64,
     /// Per choice, the order in which its strata are taken.
     strata: Vec<Vec<usize>>,
-    asked: u32,
-    awaited: usize,
+    turn: InTurn,
 }
 
 impl LatinHypercube {
     /// So many tests of what is permitted.
     pub fn new(permitted: Permitted, evaluations: u32, seed: u64) -> Self {
-        LatinHypercube { permitted, evaluations, seed, strata: Vec::new(), asked: 0, awaited: 0 }
+        LatinHypercube { permitted, seed, strata: Vec::new(), turn: InTurn::new(evaluations) }
     }
 
     /// The value of the `index`th test for a choice, in `0..1`: each of as many equal parts holds one test's.
     fn value(&mut self, choice: usize, index: u32) -> f64 {
         while self.strata.len() <= choice {
             let mut stream = Stream::derive(self.seed, "latin hypercube", &[self.strata.len() as u64]);
-            self.strata.push(stream.permutation(self.evaluations as usize));
+            self.strata.push(stream.permutation(self.turn.evaluations as usize));
         }
         let stratum = self.strata[choice][index as usize] as f64;
         let within = keyed_unit(derive_seed(self.seed, "in stratum", &[]), u64::from(index), choice as u64);
-        ((stratum + within) / f64::from(self.evaluations)).min(BELOW_ONE)
+        ((stratum + within) / f64::from(self.turn.evaluations)).min(BELOW_ONE)
     }
 
     fn test(&mut self, index: u32) -> Test {
@@ -130,20 +126,14 @@ fn choice(permitted: &PermittedChoice, mut value: impl FnMut() -> f64) -> Choice
 
 impl Strategy for LatinHypercube {
     fn ask(&mut self) -> Vec<Candidate> {
-        assert!(self.awaited == 0, "a generation is told before the next is asked");
-        let generation = self.asked / GENERATION;
-        let end = self.evaluations.min(self.asked + GENERATION);
-        let batch: Vec<Candidate> = (self.asked..end)
-            .map(|index| Candidate { test: self.test(index), parents: Vec::new(), generation, known: None })
-            .collect();
-        self.asked = end;
-        self.awaited = batch.len();
+        let mut turn = self.turn;
+        let batch = turn.ask(|index| self.test(index));
+        self.turn = turn;
         batch
     }
 
     fn tell(&mut self, results: &[Evaluated]) {
-        assert!(results.len() == self.awaited, "exactly the generation asked last is told");
-        self.awaited = 0;
+        self.turn.tell(results.len());
     }
 }
 
