@@ -14,11 +14,13 @@ mod extent;
 mod legacy;
 #[cfg(test)]
 mod tests;
+mod window;
 
 use sesame_plan::{Dimension, Shape, Span};
 
 pub use adapt::{class_of, disturbance, observed, observed_point, planned};
 pub use extent::extent;
+pub(crate) use window::Window;
 
 /// What an operation does to messages, as far as the dimensions O1 to O3 tell it apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -259,8 +259,7 @@ fn permitted(parameter: &Parameter, probability: bool) -> String {
 }
 
 fn quoted(items: &[String]) -> String {
-    let quoted = items.iter().map(|item| format!("\"{}\"", item.replace('\\', "\\\\").replace('"', "\\\"")));
-    quoted.collect::<Vec<_>>().join(", ")
+    items.iter().map(|item| sesame_dsl::quoted(item)).collect::<Vec<_>>().join(", ")
 }
 
 /// What a parameter of a custom operation permits.

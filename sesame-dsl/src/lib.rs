@@ -53,6 +53,11 @@ pub fn analyse(sources: &SourceMap, root: FileId) -> Analysis {
     Analysis { model, diagnostics }
 }
 
+/// A text as the language writes it, in quotes.
+pub fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
+}
+
 /// Whether a word is reserved, so that nothing but a message field can be named by it.
 pub fn is_reserved(word: &str) -> bool {
     syntax::is_keyword(word)

@@ -9,7 +9,7 @@ use crate::coverage::spread::{self, Member};
 use crate::search::choice::PermittedChoice;
 use crate::search::permitted::{Permitted, PermittedActivation};
 use crate::search::range::Range;
-use crate::sspr::{Class, class_of};
+use crate::sspr::{Class, Window, class_of};
 
 /// Ways to make up a test of operations that differ, at most; beyond, every cell counts as feasible.
 const MOST_MIXTURES: usize = 20_000;
@@ -118,14 +118,6 @@ struct KindOfOperation {
     class: Class,
 }
 
-/// Where an operation's interval lies, in shares of its permitted window.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Window {
-    start: f64,
-    end: f64,
-    shortest: f64,
-}
-
 /// What a normalised parameter can be.
 #[derive(Debug, Clone, PartialEq)]
 enum Values {
@@ -217,19 +209,8 @@ impl Sectors {
         let mut kinds: Vec<KindOfOperation> = Vec::new();
         for it in permitted.operations() {
             let operation = plan.operation(it.operation);
-            let share = |time: f64| (time - operation.within.start) / operation.within.length();
-            let window = match &it.activation {
-                PermittedActivation::Offline => continue,
-                PermittedActivation::Time(range) if self.one_interval_each => Window {
-                    start: share(range.low),
-                    end: share(range.high),
-                    shortest: range.shortest / operation.within.length(),
-                },
-                PermittedActivation::Time(_) | PermittedActivation::Condition { .. } => {
-                    let end = operation.within.end.min(plan.campaign.end_after);
-                    Window { start: share(operation.within.start), end: share(end), shortest: 0.0 }
-                }
-            };
+            let Some(window) = Window::of(plan, it) else { continue };
+            let window = if self.one_interval_each { window } else { Window { shortest: 0.0, ..window } };
             let parameters = operation.parameters.iter().zip(&it.parameters);
             let kind = KindOfOperation {
                 window: if timed { window } else { Window { start: 0.0, end: 1.0, shortest: 0.0 } },

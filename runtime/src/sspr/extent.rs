@@ -2,9 +2,9 @@
 
 use sesame_plan::{ActivationMode, CampaignPlan, Dimension, Shape};
 
-use super::{Class, class_of};
+use super::{Class, Window, class_of};
 use crate::search::choice::PermittedChoice;
-use crate::search::permitted::{Permitted, PermittedActivation};
+use crate::search::permitted::{Permitted, PermittedOperation};
 
 /// The least and the greatest value of a dimension over all tests that a campaign permits; `None` where no test has one.
 ///
@@ -23,11 +23,14 @@ pub fn extent(plan: &CampaignPlan, permitted: &Permitted, dimension: Dimension) 
     let fewest = if offline || by_condition { 1 } else { fewest };
     let least = |of: fn(&Timing) -> f64| timed.iter().map(of).fold(f64::INFINITY, f64::min);
     let greatest = |of: fn(&Timing) -> f64| timed.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
-    let midpoints = (least(|it| it.start + it.shortest / 2.0), greatest(|it| it.end - it.shortest / 2.0));
+    let midpoints = (
+        least(|it| it.window.start + it.window.shortest / 2.0),
+        greatest(|it| it.window.end - it.window.shortest / 2.0),
+    );
     let several = most > 1 || by_condition;
     match dimension {
         Dimension::T1 => Some(midpoints),
-        Dimension::T2 => Some((least(|it| it.shortest), greatest(|it| it.end - it.start))),
+        Dimension::T2 => Some((least(|it| it.window.shortest), greatest(|it| it.window.end - it.window.start))),
         Dimension::T3 => Some((0.0, if several { (midpoints.1 - midpoints.0) / 2.0 } else { 0.0 })),
         Dimension::P1 => shares(plan, permitted).into_iter().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))),
         Dimension::P2 => {
@@ -43,31 +46,18 @@ pub fn extent(plan: &CampaignPlan, permitted: &Permitted, dimension: Dimension) 
     }
 }
 
-/// An operation that is active during the run: its window in shares of what is permitted, its class, and how many
-/// numbers it has that count.
+/// An operation that is active during the run: its window, its class, and how many numbers it has that count.
 struct Timing {
-    start: f64,
-    end: f64,
-    shortest: f64,
+    window: Window,
     class: Class,
     numbers: usize,
 }
 
 impl Timing {
-    fn of(plan: &CampaignPlan, it: &crate::search::permitted::PermittedOperation) -> Option<Timing> {
-        let operation = plan.operation(it.operation);
-        let share = |time: f64| (time - operation.within.start) / operation.within.length();
-        let (start, end, shortest) = match &it.activation {
-            PermittedActivation::Offline => return None,
-            PermittedActivation::Time(range) => {
-                (share(range.low), share(range.high), range.shortest / operation.within.length())
-            }
-            PermittedActivation::Condition { .. } => {
-                (0.0, share(operation.within.end.min(plan.campaign.end_after)), 0.0)
-            }
-        };
+    fn of(plan: &CampaignPlan, it: &PermittedOperation) -> Option<Timing> {
+        let window = Window::of(plan, it)?;
         let numbers = it.parameters.iter().map(|parameter| shares_of(parameter).len()).sum();
-        Some(Timing { start, end, shortest, class: class_of(&operation.kind), numbers })
+        Some(Timing { window, class: class_of(&plan.operation(it.operation).kind), numbers })
     }
 }
 

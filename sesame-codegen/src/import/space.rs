@@ -520,5 +520,5 @@ pub(super) fn percent(share: f64) -> String {
 
 /// A text as the language writes it.
 pub(super) fn quoted_text(text: &str) -> String {
-    format!("\"{}\"", cleaned(text).replace('\\', "\\\\").replace('"', "\\\""))
+    sesame_dsl::quoted(&cleaned(text))
 }

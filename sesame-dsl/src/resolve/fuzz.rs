@@ -4,6 +4,7 @@ use super::quantity::percent;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{self, Activation, Choice, Domain, Id as _, OperationId, OperationKind, Parameter, Range, Shape};
+use crate::quoted;
 use crate::span::Span;
 use crate::syntax::ast;
 use crate::units::{Unit, convert};
@@ -403,9 +404,4 @@ fn example(parameter: &Parameter, kind: &OperationKind) -> String {
         Domain::Texts(items) | Domain::Files(items) => quoted(items.first().map_or("", String::as_str)),
     };
     format!("{} {chosen}", parameter.name)
-}
-
-/// A text as the language writes it.
-fn quoted(text: &str) -> String {
-    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }
