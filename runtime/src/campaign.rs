@@ -4,6 +4,7 @@
 //! hangs takes nothing with it. Nothing here depends on how many workers there are: tests are numbered when they are
 //! asked for, and told in that order.
 
+mod again;
 mod alone;
 mod conduct;
 mod frames;

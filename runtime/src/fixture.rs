@@ -63,6 +63,8 @@ pub(crate) fn plan(operations: Vec<Operation>) -> CampaignPlan {
             search: Search::Random { evaluations: 1 },
             coverage: None,
             exploration: None,
+            confirm: None,
+            neighbours: None,
             stop: Vec::new(),
             seed: 1,
             end_after: 10.0,

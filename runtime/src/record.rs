@@ -12,6 +12,7 @@ mod digest;
 mod error;
 mod folder;
 mod recorder;
+mod repetitions;
 mod repository;
 #[cfg(test)]
 pub(crate) mod sample;
@@ -31,6 +32,7 @@ pub use digest::digest;
 pub use error::RecordError;
 pub use folder::{Claim, DATABASE, LOCK, TRACES, claim_folder, latest_folder, trace_file};
 pub use recorder::Recorder;
+pub use repetitions::confirmed_fitness;
 pub use repository::{CampaignFacts, Repository};
 pub use scan::{ScannedOperation, ScannedTest};
 pub use schema::SCHEMA;
@@ -58,6 +60,46 @@ pub struct TestRecord {
     pub duplicate_of: Option<u32>,
     /// What its run showed.
     pub observation: Observation,
+}
+
+/// A run of a recorded test again, with a fresh seed of the simulator and all else the same: to confirm what was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Repetition {
+    /// The test's number.
+    pub test: u32,
+    /// Which of its repetitions, from 1.
+    pub position: u32,
+    /// The simulator's seed.
+    pub simulator_seed: u64,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Simulation time at which it ended, in seconds.
+    pub end: f64,
+    /// Messages the relay handled.
+    pub messages: u64,
+    /// Per metric of the plan, in its order; empty after a crash of the worker.
+    pub values: Vec<MetricValue>,
+}
+
+impl Repetition {
+    /// A repetition from what its run showed. Time series are not kept.
+    pub fn of(test: u32, position: u32, simulator_seed: u64, observation: &Observation) -> Repetition {
+        let values = observation.metrics.iter().map(|shown| MetricValue { value: shown.value, set: shown.set });
+        Repetition {
+            test,
+            position,
+            simulator_seed,
+            outcome: observation.outcome.clone(),
+            end: observation.end,
+            messages: observation.messages,
+            values: values.collect(),
+        }
+    }
+
+    /// The value of the plan's metric at this position; unmeasured when the run reported none.
+    pub fn value(&self, metric: sesame_plan::MetricId) -> MetricValue {
+        self.values.get(metric.index()).copied().unwrap_or_default()
+    }
 }
 
 /// Where a test comes from.

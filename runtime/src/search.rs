@@ -8,11 +8,13 @@
 
 pub mod choice;
 pub mod condition;
+pub mod confirming;
 pub mod crowding;
 pub mod dominance;
 pub mod front;
 pub mod hypervolume;
 pub mod initial;
+pub mod neighbours;
 pub mod nsga2;
 pub mod permitted;
 pub mod problems;
@@ -52,11 +54,13 @@ use constructing::{Constructing, Construction};
 use nsga2::{Survival, Variation};
 use predict::Predicting;
 
+pub use confirming::Confirming;
 pub use dominance::{Fitness, Unfit};
 pub use front::Front;
 pub use known::Known;
 pub use latin_hypercube::LatinHypercube;
 pub use map_elites::MapElites;
+pub use neighbours::Neighbours;
 pub use nsga2::Nsga2;
 pub use permitted::{Permitted, SearchError};
 pub use predict::Course;

@@ -7,8 +7,9 @@ use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
-    ActivationMode, BoostedChildren, CampaignPlan, CoverageGoal, Distribution, Domain, Drain, Exploration,
-    MetricSource, Operation, OperationKind, Parameter, Recorded, Search, StopRule, place_in_words,
+    ActivationMode, BoostedChildren, CampaignPlan, Confirmation, CoverageGoal, Distribution, Domain, Drain,
+    Exploration, MetricSource, Operation, OperationKind, Parameter, Recorded, Search, StopRule, Typical,
+    place_in_words,
 };
 
 /// More whole numbers than these are not written out one by one.
@@ -50,12 +51,13 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
         clauses.push(("observes", observed.join(", ")));
     }
     let seed = campaign.seed;
+    let neighbours = campaign.neighbours.map_or(String::new(), |count| format!("  neighbours {count}"));
     let searches = match &campaign.search {
         Search::Nsga2 { population, evaluations } => {
-            format!("nsga2 {{ population {population}  evaluations {evaluations}  seed {seed} }}")
+            format!("nsga2 {{ population {population}  evaluations {evaluations}  seed {seed}{neighbours} }}")
         }
         Search::MapElites { population, evaluations } => {
-            format!("map_elites {{ population {population}  evaluations {evaluations}  seed {seed} }}")
+            format!("map_elites {{ population {population}  evaluations {evaluations}  seed {seed}{neighbours} }}")
         }
         Search::LatinHypercube { evaluations } => {
             format!("latin_hypercube {{ evaluations {evaluations}  seed {seed} }}")
@@ -86,6 +88,14 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
     }
     if let Some(exploration) = &campaign.exploration {
         clauses.push(explored(exploration));
+    }
+    if let Some(Confirmation { times, by }) = campaign.confirm {
+        let by = match by {
+            Typical::Mean => "mean".to_owned(),
+            Typical::Median => "median".to_owned(),
+            Typical::Quantile { share } => format!("quantile {}%", percent(share)),
+        };
+        clauses.push(("confirm", format!("{times} times {{ by {by} }}")));
     }
     if !campaign.stop.is_empty() {
         let rules: Vec<String> = campaign.stop.iter().map(stop_rule).collect();
@@ -419,12 +429,12 @@ mod tests {
           coverage { T1 [0, 1] cells 6  O0 [0.5, 1.5] cells 1  hits 2  stop at 7%  failsafe 30 } }";
     const BOOSTED: &str = "
         campaign boosted { objectives time  operations cut, swing 1..3 per test
-          search nsga2 { population 4  evaluations 8 }
+          search nsga2 { population 4  evaluations 8 }  confirm 5 times
           coverage { T1 [0, 1] cells 6  O0 [0.5, 3.5] cells 3  hits 2  stop at 50% }
           boost linear { every 3 generations  from 4 to 1 }  end after 70s }";
     const CONSTRUCTED: &str = "
         campaign constructed { objectives time  operations cut, swing 1..3 per test
-          search nsga2 { population 4  evaluations 8 }
+          search nsga2 { population 4  evaluations 8  neighbours 3 }  confirm 10 times { by quantile 90% }
           coverage { T1 [0, 1] cells 6 }  construct { share 30%  until 7% }
           stop { time 1.5h  stagnation 5 generations below 2%  discovery below 3%  completeness 90% }  end after 70s }";
     const PREDICTED: &str = "
@@ -434,7 +444,7 @@ mod tests {
           coverage { T1 [0, 1] cells 6 }  predict { }  end after 70s }";
     const ELITES: &str = "
         campaign elites { objectives time  operations cut, swing 1..3 per test
-          search map_elites { population 4  evaluations 8 }  coverage { T1 [0, 1] cells 6 }  end after 70s }";
+          search map_elites { population 4  evaluations 8 }  confirm 2 times { by median }  coverage { T1 [0, 1] cells 6 }  end after 70s }";
     const LATIN: &str = "
         campaign latin { objectives time  operations cut, swing 1..3 per test
           search latin_hypercube { evaluations 8 }  end after 70s }";
@@ -478,15 +488,17 @@ mod tests {
     fn explorations_with_their_defaults() {
         let explained = [BOOSTED, CONSTRUCTED, PREDICTED].map(|text| campaign(&plan(&format!("{OPERATIONS}{text}"))));
         let clauses = explained.iter().flat_map(|text| text.lines()).map(str::trim).filter(|line| {
-            ["coverage", "boost", "construct", "predict", "stop"]
+            ["coverage", "boost", "construct", "predict", "confirm", "stop"]
                 .iter()
                 .any(|word| line.starts_with(&format!("{word} ")))
         });
         insta::assert_snapshot!(clauses.collect::<Vec<_>>().join("\n"), @r"
 coverage   { T1 [0, 1] cells 6   O0 [0.5, 3.5] cells 3   hits 2   stop at 50% }
 boost      linear { every 3 generations  from 4 to 1  drop 1  tries 10 }
+confirm    5 times { by mean }
 coverage   { T1 [0, 1] cells 6   hits 1 }
 construct  { share 30%  until 7% }
+confirm    10 times { by quantile 90% }
 stop       { time 5400s  stagnation 5 generations below 2%  discovery below 3%  completeness 90% }
 coverage   { T1 [0, 1] cells 6   hits 1 }
 predict    { candidates 20 }

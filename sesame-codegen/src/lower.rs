@@ -202,6 +202,8 @@ impl Selection {
             search,
             coverage: campaign.coverage.as_ref().map(coverage),
             exploration: campaign.exploration.map(exploration),
+            confirm: campaign.confirm.map(confirmation),
+            neighbours: campaign.neighbours,
             stop: campaign.stop.iter().copied().map(stop_rule).collect(),
             seed: campaign.seed,
             end_after: campaign.end_after,
@@ -413,6 +415,15 @@ fn exploration(exploration: model::Exploration) -> plan::Exploration {
         model::Exploration::Construct { share, until } => plan::Exploration::Construct { share, until },
         model::Exploration::Predict { candidates } => plan::Exploration::Predict { candidates },
     }
+}
+
+fn confirmation(confirmation: model::Confirmation) -> plan::Confirmation {
+    let by = match confirmation.by {
+        model::Typical::Mean => plan::Typical::Mean,
+        model::Typical::Median => plan::Typical::Median,
+        model::Typical::Quantile(share) => plan::Typical::Quantile { share },
+    };
+    plan::Confirmation { times: confirmation.times, by }
 }
 
 fn stop_rule(rule: model::StopRule) -> plan::StopRule {

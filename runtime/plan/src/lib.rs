@@ -9,6 +9,7 @@
 //! the wire), probabilities are in `0..=1`.
 
 pub mod condition;
+mod confirmation;
 mod coverage;
 mod exploration;
 mod formula;
@@ -17,6 +18,7 @@ pub mod stl;
 mod stop;
 mod test;
 
+pub use confirmation::*;
 pub use coverage::*;
 pub use exploration::*;
 pub use formula::*;

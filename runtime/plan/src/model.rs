@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::condition::{ConditionSpace, Constraint};
-use crate::{CoverageGoal, Exploration, Formula, KnownTest, StopRule};
+use crate::{Confirmation, CoverageGoal, Exploration, Formula, KnownTest, StopRule};
 
 macro_rules! id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -703,6 +703,13 @@ pub struct Campaign {
     /// What an evolution does to cover more cells; `None` for one that only counts them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exploration: Option<Exploration>,
+    /// How tests that enter the front are confirmed; `None` for a campaign that believes each first run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub confirm: Option<Confirmation>,
+    /// Over how many nearest tests the search averages what it is told of each; `None` for a search that is told what
+    /// came out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub neighbours: Option<u32>,
     /// What stops the search besides its number of tests and its coverage.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stop: Vec<StopRule>,

@@ -8,16 +8,17 @@ use std::time::{Duration, Instant};
 
 use sesame_plan::{CampaignPlan, CoverageGoal, Recorded, Search, Test};
 
+use super::again::{Again, LIKE_BEFORE};
 use super::pool::{Ended, Job, Pool, PoolError, PoolSettings};
 use super::traced::TraceOrder;
 use crate::coverage::{self, Coverage, Feasible, Grid, GridError};
 use crate::observation::{Observation, Outcome};
 use crate::record::{
-    self, Difference, Event, EventKind, GenerationCoverage, MetricValue, Origin, RecordError, Recorder, Repository,
-    ResultSet, Status, TestRecord, Verdict, differences, verdict,
+    self, Difference, Event, EventKind, GenerationCoverage, MetricValue, Origin, RecordError, Recorder, Repetition,
+    Repository, ResultSet, Status, TestRecord, Verdict, differences, verdict,
 };
 use crate::rng::derive_seed;
-use crate::search::{self, Candidate, Course, Evaluated, Front, SearchError, StopRules};
+use crate::search::{self, Candidate, Confirming, Course, Evaluated, Front, Neighbours, SearchError, StopRules};
 use crate::sspr::{self, Point};
 
 /// A test that runs this many times as long as the undisturbed run is taken to hang.
@@ -54,6 +55,8 @@ pub struct Progress<'a> {
     pub total: u32,
     /// The test evaluated last; `None` at the start.
     pub latest: Option<&'a TestRecord>,
+    /// Runs to confirm tests, beside those.
+    pub repetitions: u32,
     /// The front so far.
     pub front: &'a Front,
     /// The cells covered so far, where the campaign counts them.
@@ -119,6 +122,7 @@ pub fn conduct(
     let mut strategy = search::strategy(plan, settings.seed)?;
     let mut tracking = plan.campaign.coverage.as_ref().map(|goal| Tracking::of(plan, goal)).transpose()?;
     let recorded = recorder.repository().tests()?.iter().map(|row| row.number).collect();
+    let repeated = recorder.repository().repetitions()?;
     let pool = Pool::start(&PoolSettings {
         workers: settings.workers,
         program: settings.program.clone(),
@@ -129,7 +133,7 @@ pub fn conduct(
         Some(keep) => Some(Traces { folder: recorder.repository().make_trace_folder()?, keep }),
         None => None,
     };
-    let mut desk = Desk { recorder: &mut recorder, recorded, pool, traces, interrupted };
+    let mut desk = Desk { recorder: &mut recorder, recorded, repeated, pool, traces, interrupted };
 
     let mut ended = None;
     if !desk.evaluate(vec![undisturbed(0, settings.seed)], &mut |record| ended = Some(record.observation.clone()))? {
@@ -163,10 +167,21 @@ pub fn conduct(
     let mut rules = StopRules::of(plan);
     let begun = Instant::now();
     let mut earlier = Earlier::default();
+    let mut confirming = plan.campaign.confirm.map(|confirmation| (confirmation, Confirming::default()));
+    let mut again = Again::default();
+    let mut neighbours = Neighbours::of(plan);
+    let mut originals = BTreeMap::new();
     let mut numbered = 0;
     let mut done = 0;
     let mut stop = "all tests were evaluated".to_owned();
-    progress(Progress { done, total, latest: None, front: &front, coverage: tracking.as_ref().map(|it| &it.coverage) });
+    progress(Progress {
+        done,
+        total,
+        repetitions: 0,
+        latest: None,
+        front: &front,
+        coverage: tracking.as_ref().map(|it| &it.coverage),
+    });
     loop {
         let candidates = strategy.ask();
         let Some(generation) = candidates.first().map(|candidate| candidate.generation) else { break };
@@ -184,9 +199,13 @@ pub fn conduct(
             });
         }
         let mut told = Vec::with_capacity(planned.len());
+        originals.extend(planned.iter().filter_map(|test| Some((test.number, test.duplicate_of?))));
         let complete = desk.evaluate(planned, &mut |record| {
             let fitness = search::fitness(plan, &record.observation);
             done += 1;
+            if confirming.is_some() {
+                again.remember(record);
+            }
             front.add(record.number, &fitness);
             let point = counted_point(plan, record);
             if let (Some(tracking), Some(point)) = (&mut tracking, &point) {
@@ -195,14 +214,45 @@ pub fn conduct(
             let course = if courses { Course::of(plan, &record.observation) } else { None };
             told.push(Evaluated { number: record.number, test: record.test.clone(), fitness, point, course });
             let coverage = tracking.as_ref().map(|it| &it.coverage);
-            progress(Progress { done, total, latest: Some(record), front: &front, coverage });
+            let repetitions = again.runs();
+            progress(Progress { done, total, repetitions, latest: Some(record), front: &front, coverage });
         })?;
         if !complete {
             return interrupt(recorder);
         }
         told.sort_by_key(|evaluated| evaluated.number);
-        strategy.tell(&told);
+        let stands_for = |number: u32| originals.get(&number).copied().unwrap_or(number);
+        if let Some((confirmation, confirming)) = &mut confirming {
+            confirming.begin(told.iter().map(|it| (it.number, stands_for(it.number), it.fitness.clone())));
+            loop {
+                let wanted = confirming.unconfirmed();
+                if wanted.is_empty() {
+                    break;
+                }
+                let coverage = tracking.as_ref().map(|it| &it.coverage);
+                let before = confirming.front();
+                let complete =
+                    desk.repeat(&mut again, &wanted, 1..=confirmation.times, settings.seed, &mut |repetitions| {
+                        progress(Progress { done, total, repetitions, latest: None, front: &before, coverage });
+                    })?;
+                if !complete {
+                    return interrupt(recorder);
+                }
+                for number in wanted {
+                    let fitness = record::confirmed_fitness(plan, desk.repetitions(number));
+                    confirming.confirm(number, fitness.expect("all repetitions of the test have just been run"));
+                }
+            }
+            for (evaluated, fitness) in told.iter_mut().zip(confirming.fitness()) {
+                evaluated.fitness = fitness.clone();
+            }
+            front = confirming.front();
+        }
         rules.tell(&told);
+        if let Some(neighbours) = &mut neighbours {
+            neighbours.average(&mut told, stands_for);
+        }
+        strategy.tell(&told);
         if !plan.campaign.objectives.is_empty() {
             desk.recorder.put_result_set(&ResultSet {
                 name: format!("generation-{generation}"),
@@ -224,12 +274,16 @@ pub fn conduct(
         }
     }
 
-    let mut again = None;
+    if again.all_like_before() {
+        let text = LIKE_BEFORE.to_owned();
+        desk.recorder.put_event(&Event { kind: EventKind::Warning, test: None, text })?;
+    }
+    let mut ended = None;
     let last = undisturbed(numbered + 1, settings.seed);
-    if !desk.evaluate(vec![last], &mut |record| again = Some(record.observation.clone()))? {
+    if !desk.evaluate(vec![last], &mut |record| ended = Some(record.observation.clone()))? {
         return interrupt(recorder);
     }
-    let differing = again.map(|again| differences(plan, &Test::default(), &reference, &again)).unwrap_or_default();
+    let differing = ended.map(|ended| differences(plan, &Test::default(), &reference, &ended)).unwrap_or_default();
     if let Some(Difference { what, before, after }) = differing.first() {
         let text = format!(
             "an undisturbed run after the campaign differs from the one before it: {what} was {before} and is {after}; \
@@ -369,13 +423,15 @@ impl Earlier {
 }
 
 /// Where tests are handed out and their results recorded.
-struct Desk<'a> {
-    recorder: &'a mut Recorder,
+pub(super) struct Desk<'a> {
+    pub(super) recorder: &'a mut Recorder,
     /// Numbers of the tests already recorded when the campaign was taken up again.
     recorded: BTreeSet<u32>,
-    pool: Pool,
+    /// What is recorded of repetitions, by test.
+    pub(super) repeated: BTreeMap<u32, Vec<Repetition>>,
+    pub(super) pool: Pool,
     traces: Option<Traces>,
-    interrupted: &'a AtomicBool,
+    pub(super) interrupted: &'a AtomicBool,
 }
 
 /// Which traces are kept, and in which folder of results.

@@ -40,6 +40,7 @@ pub(super) fn known(
     // Nothing is sought, so there is no front.
     plan.campaign.objectives.clear();
     plan.campaign.coverage = None;
+    plan.campaign.confirm = None;
     let files = claim_files(runner, &plan)?;
     refuse_unfilled(runner, &plan, true)?;
     let seed = options.seed.unwrap_or(plan.campaign.seed);

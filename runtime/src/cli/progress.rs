@@ -75,6 +75,9 @@ impl<'a> Display<'a> {
         if !self.plan.campaign.objectives.is_empty() {
             parts.push(format!("front of {}", progress.front.numbers().len()));
         }
+        if progress.repetitions > 0 {
+            parts.push(format!("{} runs to confirm", progress.repetitions));
+        }
         if let Some(coverage) = progress.coverage {
             parts.push(format!("coverage {:.0} %", 100.0 * coverage.share()));
         }

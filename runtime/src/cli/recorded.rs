@@ -38,6 +38,8 @@ pub(super) fn same_model(recorded: &CampaignPlan, plan: &CampaignPlan) -> bool {
     comparable.campaign.search = plan.campaign.search.clone();
     comparable.campaign.objectives.clone_from(&plan.campaign.objectives);
     comparable.campaign.coverage.clone_from(&plan.campaign.coverage);
+    comparable.campaign.confirm = plan.campaign.confirm;
+    comparable.campaign.neighbours = plan.campaign.neighbours;
     comparable.campaign.seed = plan.campaign.seed;
     comparable.campaign.doc.clone_from(&plan.campaign.doc);
     for (metric, today) in comparable.metrics.iter_mut().zip(&plan.metrics) {

@@ -98,6 +98,7 @@ fn repeating(plan: &mut CampaignPlan, name: &str, test: Test, times: u32) {
     // Nothing is sought, so there is no front.
     plan.campaign.objectives.clear();
     plan.campaign.coverage = None;
+    plan.campaign.confirm = None;
 }
 
 #[cfg(test)]

@@ -183,7 +183,8 @@ pub(super) fn carry_out(
     match conducted? {
         Conducted::Finished(repository) => {
             let code = conclude(&repository, folder, &folder.join("report.html"), ending)?;
-            let (took, tests) = (started.elapsed(), repository.tests()?.len());
+            let repetitions: usize = repository.repetitions()?.values().map(Vec::len).sum();
+            let (took, tests) = (started.elapsed(), repository.tests()?.len() + repetitions);
             let took =
                 if took.as_secs() < 90 { format!("{:.1} s", took.as_secs_f64()) } else { wait(took.as_secs_f64()) };
             eprintln!("      Took {took} for {tests} runs");

@@ -45,6 +45,15 @@ const CONTENT: &[(&str, &str)] = &[
         "change_points",
         "SELECT test, metric, position, time_s, value FROM change_points ORDER BY test, metric, position",
     ),
+    (
+        "repetitions",
+        "SELECT test, position, simulator_seed, outcome, outcome_detail, end_s, messages FROM repetitions \
+         ORDER BY test, position",
+    ),
+    (
+        "repetition_values",
+        "SELECT test, position, metric, value, is_set FROM repetition_values ORDER BY test, position, metric",
+    ),
     ("result_sets", "SELECT name, generation, status FROM result_sets ORDER BY name"),
     ("result_set_members", "SELECT result_set, position, test FROM result_set_members ORDER BY result_set, position"),
     ("coverage", "SELECT generation, evaluations, covered, cells, feasible FROM coverage ORDER BY generation"),

@@ -88,6 +88,10 @@ impl Recorder {
         &self.repository
     }
 
+    pub(super) fn connection(&mut self) -> &mut Connection {
+        &mut self.repository.connection
+    }
+
     /// Records a test that has ended: all of it in one transaction, or nothing.
     pub fn commit(&mut self, record: &TestRecord) -> Result<(), RecordError> {
         let plan = &self.repository.facts.plan;
@@ -461,7 +465,7 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
     Ok(())
 }
 
-fn write_event(transaction: &Transaction<'_>, event: &Event) -> rusqlite::Result<()> {
+pub(super) fn write_event(transaction: &Transaction<'_>, event: &Event) -> rusqlite::Result<()> {
     transaction
         .prepare_cached(
             "INSERT INTO events (kind, test, position, text) \

@@ -441,11 +441,11 @@ impl Repository {
         }
     }
 
-    fn seed(&self, text: &str) -> Result<u64, RecordError> {
+    pub(super) fn seed(&self, text: &str) -> Result<u64, RecordError> {
         text.parse().map_err(|_| RecordError::damaged(&self.path, format!("`{text}` is no seed")))
     }
 
-    fn read<T>(
+    pub(super) fn read<T>(
         &self,
         sql: &str,
         parameters: impl rusqlite::Params,
@@ -460,7 +460,7 @@ impl Repository {
 }
 
 /// A count; a negative one is an error of conversion, not a huge number.
-fn unsigned(row: &Row<'_>, column: usize) -> rusqlite::Result<u64> {
+pub(super) fn unsigned(row: &Row<'_>, column: usize) -> rusqlite::Result<u64> {
     let value = row.get_ref(column)?;
     let count = i64::column_result(value)
         .map_err(|e| rusqlite::Error::FromSqlConversionFailure(column, value.data_type(), Box::new(e)))?;

@@ -124,6 +124,8 @@ pub(crate) fn plan() -> CampaignPlan {
             search: Search::Nsga2 { population: 10, evaluations: 210 },
             coverage: None,
             exploration: None,
+            confirm: None,
+            neighbours: None,
             stop: Vec::new(),
             seed: 42,
             end_after: 70.0,

@@ -3,7 +3,7 @@
 -- Times are seconds of simulation time since the start of a run (columns ending in _s), unless the table says wall time.
 -- Values of metrics and parameters are in the unit that stands beside their name. Numbers that need 64 unsigned bits
 -- (seeds) are decimal text, since SQLite's integers are signed.
--- Questions most people have are answered by the views: results, front, findings, verdicts, series.
+-- Questions most people have are answered by the views: results, front, findings, confirmations, verdicts, series.
 
 -- The campaign: one row.
 CREATE TABLE campaign (
@@ -138,6 +138,29 @@ CREATE TABLE change_points (
     PRIMARY KEY (test, metric, position)
 ) STRICT, WITHOUT ROWID;
 
+-- Runs of tests again, each with a fresh seed of the simulator and all else the same: to confirm what was found. They are
+-- no tests: no search asked for them.
+CREATE TABLE repetitions (
+    test            INTEGER NOT NULL REFERENCES tests,
+    position        INTEGER NOT NULL, -- among the repetitions of its test, from 1
+    simulator_seed  TEXT NOT NULL,
+    outcome         TEXT NOT NULL CHECK (outcome IN ('completed', 'void', 'crash', 'timeout')),
+    outcome_detail  TEXT,           -- what is known of a crash
+    time_limit_s    REAL,           -- of a timeout, in seconds of wall time
+    end_s           REAL NOT NULL,  -- when the run ended
+    messages        INTEGER NOT NULL, -- handled by the relay
+    PRIMARY KEY (test, position)
+) STRICT, WITHOUT ROWID;
+
+CREATE TABLE repetition_values (
+    test            INTEGER NOT NULL REFERENCES tests,
+    position        INTEGER NOT NULL, -- of the repetition
+    metric          INTEGER NOT NULL REFERENCES metrics,
+    value           REAL,           -- NULL: neither set nor defaulted
+    is_set          INTEGER NOT NULL, -- 0: the value is the default
+    PRIMARY KEY (test, position, metric)
+) STRICT, WITHOUT ROWID;
+
 CREATE TABLE result_sets (
     name            TEXT PRIMARY KEY,
     generation      INTEGER,
@@ -208,6 +231,17 @@ CREATE VIEW findings AS
     SELECT number, name, outcome, NULL, NULL, outcome_detail
       FROM tests WHERE outcome IN ('crash', 'timeout') AND duplicate_of IS NULL
      ORDER BY 1, 3, 4;
+
+-- Violated requirements of tests that were repeated: how many of the repetitions violate the same requirement.
+CREATE VIEW confirmations AS
+    SELECT f.test AS test, f.test_name AS test_name, f.requirement AS requirement,
+           count(*) FILTER (WHERE (v.value < r.low OR v.value > r.high OR (r.low_excluded AND v.value = r.low)
+                                   OR (r.high_excluded AND v.value = r.high))
+                              AND (n.outcome IN ('completed', 'void') OR v.is_set)) AS confirmed,
+           count(*) AS repetitions
+      FROM findings f JOIN requirements r ON r.name = f.requirement JOIN repetitions n ON n.test = f.test
+           LEFT JOIN repetition_values v ON v.test = n.test AND v.position = n.position AND v.metric = r.metric
+     GROUP BY f.test, r.id ORDER BY f.test, r.id;
 
 -- Time series with the names of their metrics.
 CREATE VIEW series AS

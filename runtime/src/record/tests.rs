@@ -251,9 +251,9 @@ fn what_is_no_repository_of_this_release_is_refused_with_what_to_do() {
     let open = Connection::open(&path).unwrap();
     open.pragma_update(None, "user_version", SCHEMA + 1).unwrap();
     drop(open);
-    assert!(matches!(refused("schema 4, this release reads 3"), RecordError::Newer { found: 4, known: 3, .. }));
+    assert!(matches!(refused("schema 5, this release reads 4"), RecordError::Newer { found: 5, known: 4, .. }));
     Connection::open(&path).unwrap().pragma_update(None, "user_version", 1).unwrap();
-    let earlier = refused("schema 1, this release reads 3; read them with the release that wrote them");
+    let earlier = refused("schema 1, this release reads 4; read them with the release that wrote them");
     assert!(matches!(earlier, RecordError::Older { found: 1, known: 3, .. }));
     for length in [whole.len() / 2, 4096, 700] {
         std::fs::write(&path, &whole[..length]).unwrap();

@@ -130,6 +130,8 @@ impl Landscape {
                 search,
                 coverage: None,
                 exploration: None,
+                confirm: None,
+                neighbours: None,
                 stop: Vec::new(),
                 seed: 0,
                 end_after: 70.0,

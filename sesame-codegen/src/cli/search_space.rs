@@ -41,6 +41,20 @@ pub(super) fn described(plan: &CampaignPlan) -> String {
             duration(runs as f64 * end)
         ),
     ));
+    if let Some(confirmation) = plan.campaign.confirm {
+        let times = f64::from(confirmation.times);
+        let tests = plan.campaign.search.evaluations();
+        let likely = (entering(tests, plan.campaign.objectives.len()) * times).round();
+        lines.push((
+            "confirming",
+            format!(
+                "at most {} more runs, {} for each test that enters the front: about {likely} if tests were drawn \
+                 independently, more where a search improves",
+                f64::from(tests) * times,
+                confirmation.times
+            ),
+        ));
+    }
     let mut out = String::new();
     for (name, line) in lines {
         writeln!(out, "// {name:<15} {line}").expect("a string takes all text");
@@ -78,6 +92,24 @@ fn space(plan: &CampaignPlan, permitted: &Permitted, lines: &mut Vec<(&str, Stri
         let known = if feasible.is_exact() { "" } else { ", as far as known" };
         lines.push(("cells", format!("{} of {} can be reached{known}", feasible.count(), grid.len())));
     }
+}
+
+/// How many tests can be expected to enter a front as they come, of so many whose values of so many objectives are
+/// independent of each other and of the other tests'.
+///
+/// Of n such tests with m objectives, E(n, m) are expected to be on the front: E(n, 1) = 1, and E(n, m) is the sum of
+/// E(i, m − 1) / i over i up to n (Bentley et al. 1978). The nth is as likely on it as each other, so E(n, m) / n is the
+/// probability that it enters, and the sum of these is E(n, m + 1).
+fn entering(tests: u32, objectives: usize) -> f64 {
+    let mut expected = vec![1.0; tests as usize];
+    for _ in 0..objectives {
+        let mut sum = 0.0;
+        for (at, value) in expected.iter_mut().enumerate() {
+            sum += *value / (at + 1) as f64;
+            *value = sum;
+        }
+    }
+    expected.last().copied().unwrap_or_default()
 }
 
 /// How many numbers, points' coordinates, texts and conditions a test chooses for an operation.
@@ -199,6 +231,14 @@ mod tests {
         assert_eq!(power(total(&chosen(&[0.0, 0.0], 5)[1..])), "20");
         // Ten and a hundred variants: two of them are 100, 1000 or 10000.
         assert!((10f64.powf(chosen(&[1.0, 2.0], 2)[2]) - 11_100.0).abs() < 1e-6);
+    }
+
+    /// Of n tests the nth is the best so far with a probability of 1/n; with two objectives, by hand: 1, 3/4 and 11/18.
+    #[test]
+    fn tests_that_enter_a_front_are_as_many_as_there_are_records() {
+        assert!((entering(4, 1) - (1.0 + 1.0 / 2.0 + 1.0 / 3.0 + 1.0 / 4.0)).abs() < 1e-12);
+        assert!((entering(3, 2) - (1.0 + 3.0 / 4.0 + 11.0 / 18.0)).abs() < 1e-12);
+        assert!(entering(0, 2).abs() < 1e-12);
     }
 
     #[test]

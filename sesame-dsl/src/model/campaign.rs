@@ -1,7 +1,10 @@
 //! Campaigns: how tests are found and run.
 
 use super::condition::ConditionSpace;
-use super::{CampaignId, Declaration, Exploration, MetricId, OperationId, Range, ReducedDimension, StopRule, TestId};
+use super::{
+    CampaignId, Confirmation, Declaration, Exploration, MetricId, OperationId, Range, ReducedDimension, StopRule,
+    TestId,
+};
 
 /// A campaign.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +23,11 @@ pub struct Campaign {
     pub coverage: Option<Coverage>,
     /// What the search does to cover more cells. Default nothing.
     pub exploration: Option<Exploration>,
+    /// How tests that enter the front are confirmed. Default not at all.
+    pub confirm: Option<Confirmation>,
+    /// Over how many nearest tests the search averages what it is told of each, 1 or more; only where a search learns.
+    /// Default it does not.
+    pub neighbours: Option<u32>,
     /// What else stops the search, in the order of [`StopRule`].
     pub stop: Vec<StopRule>,
     /// The one seed that decides everything. Default 1.

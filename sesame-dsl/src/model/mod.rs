@@ -6,6 +6,7 @@
 
 mod campaign;
 pub mod condition;
+mod confirmation;
 pub mod eddi;
 mod exploration;
 mod formula;
@@ -18,6 +19,7 @@ mod system;
 mod temporal;
 
 pub use campaign::*;
+pub use confirmation::*;
 pub use exploration::*;
 pub use formula::*;
 pub use fuzz::*;

@@ -46,6 +46,11 @@ impl<'a> Resolver<'a> {
         let content = self.content(campaign, end_after, activation);
         let coverage = self.coverage(campaign);
         let exploration = self.exploration(campaign);
+        let confirm = self.confirm(campaign);
+        let neighbours = match campaign.searches.first() {
+            Some(search) => self.neighbours(search),
+            None => Some(None),
+        };
         let stop = self.stop(campaign);
         let found = (campaign.searches.first(), campaign.repeats.first(), campaign.passives.first());
         let (search, seed) = match found {
@@ -82,6 +87,8 @@ impl<'a> Resolver<'a> {
             search: search?,
             coverage: coverage?,
             exploration: exploration?,
+            confirm: confirm?,
+            neighbours: neighbours?,
             stop: stop?,
             seed: seed?,
             end_after: end_after?,
@@ -340,6 +347,7 @@ impl<'a> Resolver<'a> {
             (campaign.objectives.first().map(|(span, _)| *span), "objectives"),
             (campaign.coverages.first().map(|coverage| coverage.span), "coverage"),
             (campaign.explorations.first().map(|exploration| exploration.span), exploring(campaign)),
+            (campaign.confirms.first().map(|confirm| confirm.span), "confirm"),
             (campaign.stops.first().map(|stop| stop.span), "stop"),
         ];
         for (span, word) in clauses {

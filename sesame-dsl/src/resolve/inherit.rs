@@ -110,6 +110,9 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
         if child.explorations.is_empty() {
             child.explorations = base.explorations.iter().filter(|it| suits(it, child)).cloned().collect();
         }
+        if child.confirms.is_empty() {
+            child.confirms.clone_from(&base.confirms);
+        }
         if child.stops.is_empty() {
             child.stops.clone_from(&base.stops);
         }

@@ -15,6 +15,7 @@
 mod campaign;
 mod collect;
 mod condition;
+mod confirmation;
 mod coverage;
 mod custom;
 mod disturbance;

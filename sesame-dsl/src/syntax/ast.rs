@@ -613,6 +613,7 @@ pub(crate) struct Campaign {
     pub(crate) searches: Vec<Search>,
     pub(crate) coverages: Vec<Coverage>,
     pub(crate) explorations: Vec<Exploration>,
+    pub(crate) confirms: Vec<Confirm>,
     pub(crate) stops: Vec<Stop>,
     pub(crate) repeats: Vec<Repeat>,
     pub(crate) passives: Vec<Passive>,
@@ -674,6 +675,7 @@ pub(crate) struct Search {
     pub(crate) population: Vec<(Span, Count)>,
     pub(crate) evaluations: Vec<(Span, Count)>,
     pub(crate) seed: Vec<(Span, Count)>,
+    pub(crate) neighbours: Vec<(Span, Count)>,
     pub(crate) damaged: bool,
 }
 
@@ -717,6 +719,22 @@ pub(crate) struct Exploration {
     pub(crate) untils: Vec<(Span, Quantity)>,
     pub(crate) candidates: Vec<(Span, Count)>,
     pub(crate) damaged: bool,
+}
+
+/// `confirm 5 times { … }` with its settings as written.
+#[derive(Debug, Clone)]
+pub(crate) struct Confirm {
+    pub(crate) span: Span,
+    pub(crate) times: Count,
+    pub(crate) by: Vec<(Span, Typical)>,
+}
+
+/// What the values of several runs are taken for.
+#[derive(Debug, Clone)]
+pub(crate) enum Typical {
+    Mean,
+    Median,
+    Quantile(Quantity),
 }
 
 /// `stop { … }` with its rules as written.

@@ -34,6 +34,7 @@ pub(super) enum Place {
     Boost,
     Construct,
     Predict,
+    Confirm,
     Stop,
     Repeat,
     Launch,
@@ -62,6 +63,7 @@ impl Place {
             Place::Boost => Rule::error_boost_setting,
             Place::Construct => Rule::error_construct_setting,
             Place::Predict => Rule::error_predict_setting,
+            Place::Confirm => Rule::error_confirm_setting,
             Place::Stop => Rule::error_stop_rule,
             Place::Repeat => Rule::error_repeat_setting,
             Place::Launch => Rule::error_launch_setting,
@@ -112,6 +114,7 @@ impl Place {
                 Rule::boost,
                 Rule::construct,
                 Rule::predict,
+                Rule::confirm,
                 Rule::stop,
                 Rule::end,
                 Rule::repeat,
@@ -119,7 +122,9 @@ impl Place {
                 Rule::record,
             ],
             Place::Condition => &[Rule::setting_depth, Rule::setting_integers],
-            Place::Search => &[Rule::setting_population, Rule::setting_evaluations, Rule::setting_seed],
+            Place::Search => {
+                &[Rule::setting_population, Rule::setting_evaluations, Rule::setting_seed, Rule::setting_neighbours]
+            }
             Place::Coverage => {
                 &[Rule::coverage_axis, Rule::coverage_hits, Rule::coverage_stop, Rule::coverage_failsafe]
             }
@@ -132,6 +137,7 @@ impl Place {
             ],
             Place::Construct => &[Rule::construct_share, Rule::construct_until],
             Place::Predict => &[Rule::predict_candidates],
+            Place::Confirm => &[Rule::confirm_by],
             Place::Stop => &[Rule::stop_time, Rule::stop_stagnation, Rule::stop_discovery, Rule::stop_completeness],
             Place::Repeat => &[Rule::setting_seed],
             Place::Launch => &[Rule::ready],
@@ -171,6 +177,7 @@ impl Place {
             Place::Boost => Rule::one_boost_setting,
             Place::Construct => Rule::one_construct_setting,
             Place::Predict => Rule::one_predict_setting,
+            Place::Confirm => Rule::one_confirm_setting,
             Place::Stop => Rule::one_stop_rule,
             Place::Repeat => Rule::one_repeat_setting,
             Place::Launch => Rule::one_launch_setting,
@@ -198,14 +205,15 @@ impl Place {
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
             Place::Campaign => {
                 "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `boost`, `construct`, `predict`, \
-                 `stop`, `repeat`, `passive`, `record` or `end after`"
+                 `confirm`, `stop`, `repeat`, `passive`, `record` or `end after`"
             }
             Place::Condition => "`depth` or `integers`",
-            Place::Search => "`population`, `evaluations` or `seed`",
+            Place::Search => "`population`, `evaluations`, `seed` or `neighbours`",
             Place::Coverage => "a dimension such as `T1 [0, 1] cells 6`, `hits`, `stop at` or `failsafe`",
             Place::Boost => "`every N generations`, `every N iterations`, `from N to N`, `drop N` or `tries N`",
             Place::Construct => "`share` or `until`",
             Place::Predict => "`candidates`",
+            Place::Confirm => "`by mean`, `by median` or `by quantile` and a share",
             Place::Stop => "`time`, `stagnation`, `discovery` or `completeness`",
             Place::Repeat => "`seed`",
             Place::Launch => "`ready when topic`",
@@ -250,6 +258,7 @@ impl Place {
                 "boost",
                 "construct",
                 "predict",
+                "confirm",
                 "stop",
                 "repeat",
                 "passive",
@@ -257,11 +266,12 @@ impl Place {
                 "end",
             ],
             Place::Condition => &["depth", "integers"],
-            Place::Search => &["population", "evaluations", "seed"],
+            Place::Search => &["population", "evaluations", "seed", "neighbours"],
             Place::Coverage => &["hits", "stop", "failsafe"],
             Place::Boost => &["every", "from", "drop", "tries"],
             Place::Construct => &["share", "until"],
             Place::Predict => &["candidates"],
+            Place::Confirm => &["by"],
             Place::Stop => &["time", "stagnation", "discovery", "completeness"],
             Place::Repeat => &["seed"],
             Place::Launch => &["ready"],
@@ -456,6 +466,7 @@ fn in_words(rule: Rule) -> Option<String> {
         | Rule::boost_settings
         | Rule::construct_settings
         | Rule::predict_settings
+        | Rule::confirm_settings
         | Rule::stop_settings
         | Rule::launch_settings
         | Rule::budget_settings
@@ -514,6 +525,7 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::boost_drop => "`drop`",
         Rule::construct_share => "`share`",
         Rule::predict_candidates => "`candidates`",
+        Rule::confirm_by => "`by`",
         Rule::stop_time => "`time`",
         Rule::stop_stagnation => "`stagnation`",
         Rule::stop_discovery => "`discovery`",

@@ -1,8 +1,8 @@
-//! What a campaign does to cover more cells, and when it has done enough.
+//! What a campaign does to cover more cells, how it confirms what it finds, and when it has done enough.
 
 use sesame_grammar::Rule;
 
-use super::ast::{Count, Exploration, ExplorationKind, Stop};
+use super::ast::{Confirm, Count, Exploration, ExplorationKind, Stop, Typical};
 use super::explain::Place;
 use super::parse::{Pair, Reader, child, children, expect_child};
 use crate::span::Span;
@@ -48,6 +48,24 @@ impl Reader<'_> {
                 predict.candidates.push((reader.keyword_span(&setting), count));
             });
         predict
+    }
+
+    pub(super) fn confirm(&mut self, pair: &Pair<'_>, span: Span) -> Confirm {
+        let times = self.count(&expect_child(pair, Rule::number));
+        let mut confirm = Confirm { span, times, by: vec![] };
+        if let Some(settings) = child(pair, Rule::confirm_settings) {
+            self.members(&settings, Place::Confirm, |reader, setting| {
+                let typical = if child(&setting, Rule::k_mean).is_some() {
+                    Typical::Mean
+                } else if child(&setting, Rule::k_median).is_some() {
+                    Typical::Median
+                } else {
+                    Typical::Quantile(reader.signed(&expect_child(&setting, Rule::signed)))
+                };
+                confirm.by.push((reader.keyword_span(&setting), typical));
+            });
+        }
+        confirm
     }
 
     pub(super) fn stop(&mut self, pair: &Pair<'_>, span: Span) -> Stop {

@@ -570,6 +570,7 @@ impl Reader<'_> {
             searches: vec![],
             coverages: vec![],
             explorations: vec![],
+            confirms: vec![],
             stops: vec![],
             repeats: vec![],
             passives: vec![],
@@ -601,6 +602,7 @@ impl Reader<'_> {
                 Rule::coverage => campaign.coverages.push(reader.coverage(&member, span)),
                 Rule::boost => campaign.explorations.push(reader.boost(&member, span)),
                 Rule::predict => campaign.explorations.push(reader.predict(&member, span)),
+                Rule::confirm => campaign.confirms.push(reader.confirm(&member, span)),
                 Rule::stop => campaign.stops.push(reader.stop(&member, span)),
                 Rule::construct => campaign.explorations.push(reader.construct(&member, span)),
                 Rule::end => campaign.ends.push((span, reader.signed(&expect_child(&member, Rule::signed)))),
@@ -668,8 +670,15 @@ impl Reader<'_> {
     }
 
     fn search(&mut self, pair: &Pair<'_>, span: Span) -> Search {
-        let mut search =
-            Search { span, strategy: None, population: vec![], evaluations: vec![], seed: vec![], damaged: false };
+        let mut search = Search {
+            span,
+            strategy: None,
+            population: vec![],
+            evaluations: vec![],
+            seed: vec![],
+            neighbours: vec![],
+            damaged: false,
+        };
         if let Some(strategy) = child(pair, Rule::unsupported_strategy) {
             self.unsupported(&strategy);
             return search;
@@ -687,6 +696,7 @@ impl Reader<'_> {
             match setting.as_rule() {
                 Rule::setting_population => search.population.push(value),
                 Rule::setting_evaluations => search.evaluations.push(value),
+                Rule::setting_neighbours => search.neighbours.push(value),
                 _ => search.seed.push(value),
             }
         });

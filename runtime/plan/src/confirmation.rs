@@ -1,0 +1,28 @@
+//! How a campaign makes sure of what it finds where a simulator does not always do the same.
+
+use serde::{Deserialize, Serialize};
+
+/// How tests that enter the front are confirmed: each is run again, the same disturbance with fresh seeds of the
+/// simulator, and its fitness is then what these runs say.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Confirmation {
+    /// How often each is run again; at least 1.
+    pub times: u32,
+    /// How the values of these runs become one.
+    pub by: Typical,
+}
+
+/// How the values of an objective in several runs become one. The run that selected a test is none of them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Typical {
+    /// Their mean.
+    Mean,
+    /// Their median; the mean of the two in the middle of an even number.
+    Median,
+    /// The value that this share of the runs reach or go beyond in the objective's direction.
+    Quantile {
+        /// In `0..=1` and above 0.
+        share: f64,
+    },
+}

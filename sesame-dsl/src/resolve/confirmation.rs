@@ -1,0 +1,42 @@
+//! How a campaign confirms what it finds, and how its search is told of it.
+
+use super::Resolver;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::model::{Confirmation, Typical};
+use crate::syntax::ast::{self, Strategy};
+
+impl<'a> Resolver<'a> {
+    /// The campaign's confirmation. The outer `None` says that it is not in order.
+    #[expect(clippy::option_option, reason = "the outer says whether it was in order, the inner is the model's")]
+    pub(super) fn confirm(&mut self, campaign: &'a ast::Campaign) -> Option<Option<Confirmation>> {
+        let spans: Vec<_> = campaign.confirms.iter().map(|confirm| confirm.span).collect();
+        self.at_most_one(&spans, "confirm");
+        let Some(written) = campaign.confirms.first() else { return Some(None) };
+        let times = self.count(written.times, 1, "a test is confirmed by being repeated");
+        let by = match self.single(&written.by, "by") {
+            None | Some(ast::Typical::Mean) => Some(Typical::Mean),
+            Some(ast::Typical::Median) => Some(Typical::Median),
+            Some(ast::Typical::Quantile(share)) => self.share(share, "the share of a quantile").map(Typical::Quantile),
+        };
+        Some(Some(Confirmation { times: times?, by: by? }))
+    }
+
+    /// Over how many neighbours the search averages. The outer `None` says that it is not in order.
+    #[expect(clippy::option_option, reason = "the outer says whether it was in order, the inner is the model's")]
+    pub(super) fn neighbours(&mut self, search: &'a ast::Search) -> Option<Option<u32>> {
+        let Some(&count) = self.single(&search.neighbours, "neighbours") else { return Some(None) };
+        let learns_nothing = match search.strategy? {
+            Strategy::Random => "random search",
+            Strategy::LatinHypercube => "Latin hypercube",
+            Strategy::Nsga2 | Strategy::MapElites => {
+                return self.count(count, 1, "a search averages over").map(Some);
+            }
+        };
+        let title = format!("a {learns_nothing} has no setting `neighbours`");
+        let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, search.neighbours[0].0, title)
+            .label("leave it out")
+            .note("what came of its tests changes nothing that it does");
+        self.report(diagnostic);
+        None
+    }
+}
