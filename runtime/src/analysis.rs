@@ -12,7 +12,8 @@ use std::collections::BTreeSet;
 use sesame_plan::{CampaignPlan, Dimension, GridAxis, MetricId, Search};
 
 use crate::coverage::{Coverage, CurvePoint, Feasible, Grid, curve};
-use crate::record::{Origin, RecordError, Repository, ScannedTest};
+use crate::record::{Origin, RecordError, Repository, ScannedTest, confirmed_fitness};
+use crate::report::confirmed_tests;
 use crate::search::{Front, fitness_of};
 use crate::sspr::Convention;
 
@@ -123,26 +124,43 @@ fn operations(plan: &CampaignPlan, test: &ScannedTest) -> String {
     names.join(" ")
 }
 
-/// The tests of a selection that no other of it dominates, by their recorded values. Equal tests are all there;
-/// `same_as` names the one that stands for them in the campaign's own fronts. Without a selection these are the tests of
-/// the whole file.
+/// The tests of a selection that no other of it dominates, by their recorded values, or those of their repetitions where
+/// the campaign confirmed them. Equal tests are all there; `same_as` names the one that stands for them in the campaign's
+/// own fronts. Without a selection these are the tests of the whole file.
+///
+/// Where tests were run again, `confirmed` says in how many of the `repetitions` came again what was found, from
+/// `confirmed_low` to `confirmed_high` is the 95 % Wilson interval, and `standing` is `confirmed`, `flaky` or
+/// `not confirmed`.
 pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, RecordError> {
     let plan = repository.plan();
     let objectives = &plan.campaign.objectives;
     let mut front = Front::default();
     let mut measured = Vec::new();
+    let repetitions = repository.repetitions()?;
     repository.scan(&mut |test| {
         if test.origin == Origin::Reference || !selection.holds(test.number) {
             return;
         }
-        let fitness = fitness_of(plan, &test.outcome, |id| test.value(id).value);
+        // A duplicate is what its original is.
+        let runs = repetitions.get(&test.duplicate_of.unwrap_or(test.number));
+        let fitness = runs
+            .and_then(|runs| confirmed_fitness(plan, runs))
+            .unwrap_or_else(|| fitness_of(plan, &test.outcome, |id| test.value(id).value));
         front.add(test.number, &fitness);
         if let Some(values) = fitness.objectives() {
             measured.push((test.number, values.to_vec()));
         }
     })?;
     let names = objectives.iter().map(|&id| plan.metric(id).name.clone());
-    let mut dataset = Dataset::new(["test".to_owned()].into_iter().chain(names).chain(["same_as".to_owned()]));
+    let confirmed =
+        if repetitions.is_empty() { Vec::new() } else { confirmed_tests(repository, &repository.tests()?, &[])? };
+    let again: &[&str] = match confirmed.len() {
+        0 => &[],
+        _ => &["confirmed", "repetitions", "confirmed_low", "confirmed_high", "standing"],
+    };
+    let again_columns = again.iter().map(|&column| column.to_owned());
+    let mut dataset =
+        Dataset::new(["test".to_owned()].into_iter().chain(names).chain(["same_as".to_owned()]).chain(again_columns));
     if objectives.is_empty() {
         return Ok(dataset);
     }
@@ -153,7 +171,17 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, 
             Datum::real(Some(0.0 + sign * value))
         });
         let same = if member.number == number { Datum::Missing } else { name(member.number) };
-        dataset.row([name(number)].into_iter().chain(values).chain([same]));
+        let of = confirmed.iter().find(|test| test.number == number);
+        let ends = of.and_then(|test| test.interval);
+        let came_again = [
+            of.filter(|test| test.standing.is_some()).map_or(Datum::Missing, |test| Datum::count(test.again)),
+            of.map_or(Datum::Missing, |test| Datum::count(test.repetitions)),
+            Datum::real(ends.map(|[low, _]| low)),
+            Datum::real(ends.map(|[_, high]| high)),
+            of.and_then(|test| test.standing).map_or(Datum::Missing, |it| Datum::Text(it.words().to_owned())),
+        ];
+        let came_again = came_again.into_iter().take(again.len());
+        dataset.row([name(number)].into_iter().chain(values).chain([same]).chain(came_again));
     }
     Ok(dataset)
 }

@@ -6,6 +6,7 @@
 
 mod axis;
 mod cells;
+mod confirmed;
 mod coverage;
 mod export;
 mod junit;
@@ -22,6 +23,8 @@ mod table;
 mod text;
 mod timeline;
 
+pub(crate) use confirmed::confirmed_tests;
+pub use confirmed::{ConfirmedTest, FindingAgain, Standing};
 pub use coverage::CoverageSummary;
 #[cfg(feature = "campaign")]
 pub(crate) use export::is_name;

@@ -173,7 +173,7 @@ fn explorations_are_inherited_where_they_can_work_and_reasons_to_stop_by_every_s
     let base = "metric near = last(spare)
         test t { jitter offset [0rad, 0.1rad] from 1s to 2s }
         campaign base from c { search nsga2 { population 4  evaluations 20 }  coverage { T1 [0, 1] cells 6 }
-          construct { share 30% }  stop { completeness 90% } }";
+          construct { share 30% }  stop { completeness 90% }  confirm 3 times }";
     let inherited = |text: &str| {
         let (_, campaign) = campaign(&format!("{base} campaign d from base {{ {text} }}"), "d");
         let explores = campaign.exploration.map(|exploration| match exploration {
@@ -181,6 +181,11 @@ fn explorations_are_inherited_where_they_can_work_and_reasons_to_stop_by_every_s
             Exploration::Construct { .. } => "construct",
             Exploration::Predict { .. } => "predict",
         });
+        assert_eq!(
+            campaign.confirm.is_some(),
+            campaign.search.content().is_some(),
+            "every search confirms what it finds"
+        );
         (explores, campaign.coverage.is_some(), campaign.stop.len())
     };
     assert_eq!(inherited(""), (Some("construct"), true, 1));

@@ -111,6 +111,12 @@ impl Repository {
         self.rows(None)
     }
 
+    /// One test without its time series and effects.
+    pub fn row(&self, number: u32) -> Result<TestRow, RecordError> {
+        let missing = || RecordError::NoSuchTest { name: format!("T{number}"), path: self.path.clone() };
+        self.rows(Some(number))?.pop().ok_or_else(missing)
+    }
+
     /// The number of the test that a user calls `T158`, `158`, by the name of a known test or by the one it had before it
     /// was imported, or `reference` (the first undisturbed run).
     pub fn find(&self, name: &str) -> Result<u32, RecordError> {
@@ -131,7 +137,7 @@ impl Repository {
     /// One test, whole.
     pub fn test(&self, number: u32) -> Result<TestRecord, RecordError> {
         let missing = || RecordError::NoSuchTest { name: format!("T{number}"), path: self.path.clone() };
-        let row = self.rows(Some(number))?.pop().ok_or_else(missing)?;
+        let row = self.row(number)?;
         let (simulator_seed, messages, run): (String, u64, f64) = self
             .read(
                 "SELECT simulator_seed, messages, run_s FROM tests JOIN wall_times ON test = number WHERE number = ?1",

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::record::{RecordError, Repository, Verdict};
+use crate::report::confirmed::ConfirmedTest;
 use crate::report::markup::Markup;
 use crate::report::number;
 use crate::report::page::write_aside;
@@ -22,7 +23,9 @@ pub fn write_junit(repository: &Repository, path: &Path) -> Result<(), RecordErr
 pub fn junit(summary: &Summary) -> String {
     let class = format!("{}.{}", summary.space, summary.campaign);
     let mut cases = Vec::new();
-    cases.extend(summary.requirements.iter().map(|requirement| requirement_case(&class, requirement)));
+    cases.extend(
+        summary.requirements.iter().map(|requirement| requirement_case(&class, requirement, &summary.confirmed)),
+    );
     cases.extend(summary.expectations.iter().map(|expectation| expectation_case(&class, expectation)));
     cases.extend(summary.failures.iter().map(|failure| failure_case(&class, failure)));
     let count = |tag: &str| {
@@ -82,13 +85,21 @@ struct Outcome {
     text: String,
 }
 
-fn requirement_case(class: &str, requirement: &RequirementSummary) -> Case {
+fn requirement_case(class: &str, requirement: &RequirementSummary, confirmed: &[ConfirmedTest]) -> Case {
     let RequirementSummary { requirement: name, text, metric, bound, kept, violated, unsaid, worst, .. } = requirement;
     let counts = format!("{violated} violated, {kept} kept, {unsaid} unsaid");
     let result = if *violated > 0 {
         let tests = number::plural(*violated, "test", "tests");
         let worst = worst.as_ref().map_or(String::new(), |worst| format!("; worst is {}: {}", worst.test, worst.text));
-        let message = format!("violated by {tests}{worst}, required is {metric} {bound}");
+        let again: Vec<String> = confirmed
+            .iter()
+            .filter_map(|test| {
+                let finding = test.findings.iter().find(|finding| finding.finding == *name)?;
+                Some(format!("{} {} of {}", test.test, finding.again, test.repetitions))
+            })
+            .collect();
+        let again = if again.is_empty() { String::new() } else { format!("; came again: {}", again.join(", ")) };
+        let message = format!("violated by {tests}{worst}, required is {metric} {bound}{again}");
         Some(Outcome { tag: "failure", kind: Some("requirement"), message, text: counts })
     } else if *kept == 0 {
         let message = "no test says anything about it".to_owned();

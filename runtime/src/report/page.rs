@@ -8,14 +8,15 @@ use sesame_plan::Search;
 use crate::observation::Outcome;
 use crate::record::{MetricValue, Origin, RecordError, Repository, TestRow, Verdict, trace_file};
 use crate::report::cells;
+use crate::report::confirmed::{confirmation_sentence, values_sentence};
 use crate::report::markup::{Markup, coordinate, fill};
 use crate::report::number::{self, plural, with_unit};
 use crate::report::scatter::{Detail, Dimension, Kind, Point, scatter};
 use crate::report::show::{TestReport, report_on};
 use crate::report::summary::{Objective, RequirementSummary, Summary, summarise, value_text};
 use crate::report::text::{
-    came_out, choices_text, counts_sentence, effect_text, expectation_value, headline, objective_columns,
-    outcome_sentence, planned_text, rate_text, spans_text,
+    came_out, choices_text, confirmed_column, counts_sentence, effect_text, expectation_value, headline,
+    objective_columns, outcome_sentence, planned_text, rate_text, spans_text,
 };
 use crate::report::timeline::timeline;
 
@@ -266,14 +267,13 @@ fn front(body: &mut Markup, repository: &Repository, summary: &Summary, rows: &[
     let pairs: Vec<(usize, usize)> = (0..objectives.len()).flat_map(|y| (0..y).map(move |x| (x, y))).take(10).collect();
     if objectives.len() == 1 {
         let x = Dimension { title: "test".to_owned(), direction: None };
-        let points =
-            points(summary, rows, drawn, |row| Some((f64::from(row.number), row.value(objectives[0].id).value?)));
+        let points = points(summary, rows, drawn, |row| Some((f64::from(row.number), shown_value(summary, row, 0)?)));
         scatter(body, &x, &dimension(&objectives[0]), &points, Detail { named: true, points: 2500 });
     }
     let detail = Detail { named: pairs.len() == 1, points: 2500 / pairs.len().max(1) };
     body.open("div", &[("class", if pairs.len() > 1 { "charts" } else { "charts one" })]);
     for (x, y) in pairs {
-        let value = |row: &TestRow, at: usize| row.value(objectives[at].id).value;
+        let value = |row: &TestRow, at: usize| shown_value(summary, row, at);
         let points = points(summary, rows, drawn, |row| Some((value(row, x)?, value(row, y)?)));
         scatter(body, &dimension(&objectives[x]), &dimension(&objectives[y]), &points, detail);
     }
@@ -289,6 +289,15 @@ fn dimension(objective: &Objective) -> Dimension {
         None => objective.metric.clone(),
     };
     Dimension { title, direction: objective.direction }
+}
+
+/// The value of an objective by which a test is judged: that of its repetitions where the campaign confirmed it.
+fn shown_value(summary: &Summary, row: &TestRow, objective: usize) -> Option<f64> {
+    let repeated = summary.confirmed.iter().find(|test| test.number == row.number);
+    match repeated.and_then(|test| test.values.as_ref()) {
+        Some(values) => values.get(objective).copied(),
+        None => row.value(summary.objectives[objective].id).value,
+    }
 }
 
 fn points(
@@ -313,8 +322,9 @@ fn points(
             let values: Vec<String> = summary
                 .objectives
                 .iter()
-                .map(|objective| {
-                    let value = row.value(objective.id).value.map_or("–".to_owned(), number::number);
+                .enumerate()
+                .map(|(at, objective)| {
+                    let value = shown_value(summary, row, at).map_or("–".to_owned(), number::number);
                     format!("{} {}", objective.metric, with_unit(value, objective.unit.as_deref()))
                 })
                 .collect();
@@ -349,6 +359,13 @@ fn caption(summary: &Summary, repository: &Repository) -> String {
         "Each dot is a test; emphasised: no other test is better in one objective without being worse in another. \
          The ring is the undisturbed run. Point at a dot to see its values, click it to see it over time."
             .to_owned();
+    if let Some(confirmation) = summary.confirmation {
+        let _ = write!(
+            caption,
+            " {} Tests that never came near the front are where their one run was.",
+            values_sentence(confirmation)
+        );
+    }
     if !hidden.is_empty() {
         let _ = write!(caption, " Not shown: {}.", number::join_words(&hidden));
     }
@@ -364,7 +381,10 @@ fn front_table(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     let columns = objective_columns(summary);
     let mut titles = vec!["Test"];
     titles.extend(summary.objectives.iter().map(|objective| objective.metric.as_str()));
-    titles.extend(["Violates", "Operations"]);
+    titles.push("Violates");
+    let again = confirmed_column(summary);
+    titles.extend(again.is_some().then_some("Confirmed"));
+    titles.push("Operations");
     heading_row(body, &titles, 1..1 + columns.len());
     body.open("tbody", &[]);
     for (at, test) in summary.front.iter().enumerate() {
@@ -376,12 +396,20 @@ fn front_table(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
             body.element("td", &[("class", "number")], &column[at]);
         }
         body.element("td", &[("class", "bad keep")], &test.violates.join(" "));
+        if let Some(column) = &again {
+            body.element("td", &[("class", "keep")], &column[at]);
+        }
         body.element("td", &[("class", "sentence")], &test.operations);
         body.close();
     }
     body.close();
     body.close();
     body.close();
+    if let Some(sentence) = confirmation_sentence(&summary.confirmed) {
+        let sentence =
+            format!("{sentence}. In brackets the 95 % Wilson interval of the probability that a run shows it again.");
+        body.element("p", &[("class", "quiet")], &sentence);
+    }
 }
 
 fn spreads(body: &mut Markup, summary: &Summary) {

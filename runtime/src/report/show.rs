@@ -9,6 +9,7 @@ use crate::observation::Counters;
 use crate::record::{
     EventKind, MetricValue, Origin, RecordError, Repository, TestRecord, TestRow, Verdict, verdict, violation_spans,
 };
+use crate::report::confirmed::{ConfirmedTest, confirmed_test};
 use crate::report::{export, number, summary};
 
 /// A line in the list of all tests.
@@ -78,6 +79,9 @@ pub struct TestReport {
     pub metrics: Vec<MetricReport>,
     /// All requirements of the space.
     pub requirements: Vec<VerdictReport>,
+    /// What its repetitions say, where it was run again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub confirmed: Option<ConfirmedTest>,
     /// What should be brought to the user's attention.
     pub warnings: Vec<String>,
     /// What the session in which it ran left about it, such as the last words of its worker.
@@ -204,11 +208,12 @@ pub fn show(repository: &Repository, name: &str) -> Result<TestReport, RecordErr
     let notes = repository.events()?.into_iter();
     let notes = notes.filter(|event| event.kind == EventKind::Session && event.test == Some(ran));
     report.notes = notes.map(|event| event.text).collect();
+    report.confirmed = confirmed_test(repository, record.number, front)?;
     report.trace = repository.trace(record.number, record.duplicate_of);
     Ok(report)
 }
 
-/// Everything on a test, from its record; notes and trace are not there.
+/// Everything on a test, from its record; repetitions, notes and trace are not there.
 pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, front: bool) -> TestReport {
     let observation = &record.observation;
     TestReport {
@@ -241,6 +246,7 @@ pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, front: bool) -
             })
             .collect(),
         requirements: verdicts(plan, record),
+        confirmed: None,
         warnings: observation.warnings.clone(),
         notes: Vec::new(),
         trace: None,

@@ -1,10 +1,11 @@
 //! What a campaign found, at a glance.
 
 use serde::Serialize;
-use sesame_plan::{Bound, CampaignPlan, Direction, MetricId, Requirement};
+use sesame_plan::{Bound, CampaignPlan, Confirmation, Direction, MetricId, Requirement};
 
 use crate::observation::Outcome;
 use crate::record::{EventKind, MetricValue, Origin, RecordError, Repository, TestRow, Verdict, verdict};
+use crate::report::confirmed::{ConfirmedTest, confirmed_tests};
 use crate::report::coverage::{CoverageSummary, coverage};
 use crate::report::number;
 use crate::report::repetition::{Repetition, repetition};
@@ -26,6 +27,12 @@ pub struct Summary {
     pub objectives: Vec<Objective>,
     /// The tests no other is better than: most dangerous first, see [`summary`].
     pub front: Vec<FrontTest>,
+    /// How the campaign confirms the tests of its front, if it does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub confirmation: Option<Confirmation>,
+    /// Tests that were run again, by number.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub confirmed: Vec<ConfirmedTest>,
     /// All requirements of the space, in its order.
     pub requirements: Vec<RequirementSummary>,
     /// Expectations of known tests, in the order of the tests.
@@ -80,7 +87,7 @@ pub struct FrontTest {
     pub test: String,
     /// Its number.
     pub number: u32,
-    /// A value per objective.
+    /// A value per objective: that by which it is on the front, of its repetitions where the campaign confirms.
     pub values: Vec<Option<f64>>,
     /// Its operations, as in `jitter_link0 ×2, lose_link0`.
     pub operations: String,
@@ -196,13 +203,14 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
             None => event.text,
         }
     });
+    let confirmed = confirmed_tests(repository, rows, members)?;
     Ok(Summary {
         space: plan.space.clone(),
         campaign: plan.campaign.name.clone(),
         seed: facts.seed,
         stop: facts.stop.clone(),
         counts: counts(plan, rows),
-        front: front(plan, &objectives, rows, members),
+        front: front(plan, &objectives, rows, members, &confirmed),
         requirements: plan
             .requirements
             .iter()
@@ -214,6 +222,8 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
         spreads: spreads(plan, rows),
         coverage: coverage(repository)?,
         warnings: warnings.collect(),
+        confirmation: plan.campaign.confirm,
+        confirmed,
         objectives,
     })
 }
@@ -237,13 +247,27 @@ fn counts(plan: &CampaignPlan, rows: &[TestRow]) -> Counts {
     counts
 }
 
-fn front(plan: &CampaignPlan, objectives: &[Objective], rows: &[TestRow], members: &[u32]) -> Vec<FrontTest> {
+fn front(
+    plan: &CampaignPlan,
+    objectives: &[Objective],
+    rows: &[TestRow],
+    members: &[u32],
+    confirmed: &[ConfirmedTest],
+) -> Vec<FrontTest> {
+    let repeated = |number: u32| confirmed.iter().find(|test| test.number == number);
+    let values = |row: &TestRow| -> Vec<Option<f64>> {
+        match repeated(row.number).and_then(|test| test.values.as_ref()) {
+            Some(values) => values.iter().copied().map(Some).collect(),
+            None => objectives.iter().map(|objective| row.value(objective.id).value).collect(),
+        }
+    };
     let bounded =
         |objective: &&Objective| plan.requirements.iter().any(|requirement| requirement.metric == objective.id);
-    let key = objectives.iter().find(bounded).or_else(|| objectives.first());
+    let key = objectives.iter().position(|objective| bounded(&objective)).unwrap_or(0);
     let danger = |row: &TestRow| -> f64 {
-        let value = key.and_then(|objective| row.value(objective.id).value).unwrap_or(f64::NAN);
-        if key.is_some_and(|objective| objective.direction == Some(Direction::Minimise)) { -value } else { value }
+        let value = values(row).get(key).copied().flatten().unwrap_or(f64::NAN);
+        let minimise = objectives.get(key).is_some_and(|it| it.direction == Some(Direction::Minimise));
+        if minimise { -value } else { value }
     };
     let mut sorted: Vec<&TestRow> = rows.iter().filter(|row| members.contains(&row.number)).collect();
     sorted.sort_by(|a, b| danger(b).total_cmp(&danger(a)).then(a.number.cmp(&b.number)));
@@ -252,7 +276,7 @@ fn front(plan: &CampaignPlan, objectives: &[Objective], rows: &[TestRow], member
         .map(|row| FrontTest {
             test: format!("T{}", row.number),
             number: row.number,
-            values: objectives.iter().map(|objective| row.value(objective.id).value).collect(),
+            values: values(row),
             operations: operations(plan, row),
             violates: violated(plan, row),
         })

@@ -7,6 +7,7 @@ use sesame_plan::Span;
 use crate::observation::Counters;
 use crate::record::MetricValue;
 use crate::record::Verdict;
+use crate::report::confirmed::{ConfirmedTest, confirmation_sentence, values_sentence};
 use crate::report::coverage::coverage_sentence;
 use crate::report::number::{self, fixed, join_words, plural, with_unit};
 use crate::report::repetition::{Repetition, ViolationRate};
@@ -66,6 +67,9 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     paragraph(&mut text, &headline(summary), options);
     if !summary.front.is_empty() {
         text.push_str(&front(summary).render(options));
+        if let Some(confirmation) = summary.confirmation {
+            paragraph(&mut text, &values_sentence(confirmation), options);
+        }
     }
     if summary.objectives.is_empty() && !summary.spreads.is_empty() {
         section(&mut text, "Values", &spreads(&summary.spreads), options);
@@ -105,6 +109,9 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
         paragraph(&mut text, &coverage_sentence(coverage), options);
     }
     paragraph(&mut text, &counts_sentence(summary), options);
+    if let Some(sentence) = confirmation_sentence(&summary.confirmed) {
+        paragraph(&mut text, &sentence, options);
+    }
     for warning in &summary.warnings {
         paragraph(&mut text, &format!("warning: {}", visible(warning)), options);
     }
@@ -152,16 +159,28 @@ fn section(text: &mut String, title: &str, table: &Table, options: TextOptions) 
 fn front(summary: &Summary) -> Table {
     let mut columns = vec![left("test")];
     columns.extend(summary.objectives.iter().map(|objective| right(&objective.metric)));
-    columns.extend([left("violates"), left("operations")]);
+    columns.push(left("violates"));
+    let again = confirmed_column(summary);
+    columns.extend(again.is_some().then(|| left("confirmed")));
+    columns.push(left("operations"));
     let mut table = Table::new(columns);
     let values = objective_columns(summary);
     for (row, test) in summary.front.iter().enumerate() {
         let mut cells = vec![test.test.clone()];
         cells.extend(values.iter().map(|column| column[row].clone()));
-        cells.extend([test.violates.join(" "), test.operations.clone()]);
+        cells.push(test.violates.join(" "));
+        cells.extend(again.as_ref().map(|column| column[row].clone()));
+        cells.push(test.operations.clone());
         table.row(cells);
     }
     table
+}
+
+/// How often what was found in the tests of the front came again; `None` where none of them was run again.
+pub(crate) fn confirmed_column(summary: &Summary) -> Option<Vec<String>> {
+    let of = |number: u32| summary.confirmed.iter().find(|test| test.number == number);
+    let any = summary.front.iter().any(|test| of(test.number).is_some());
+    any.then(|| summary.front.iter().map(|test| of(test.number).map_or("–".to_owned(), ConfirmedTest::words)).collect())
 }
 
 /// The front's values in words, a column per objective.
@@ -335,6 +354,9 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
         }
         section(&mut text, "Requirements", &table, options);
     }
+    if let Some(confirmed) = &test.confirmed {
+        section(&mut text, "Run again", &run_again(confirmed), options);
+    }
     for warning in &test.warnings {
         paragraph(&mut text, &format!("warning: {}", visible(warning)), options);
     }
@@ -345,6 +367,21 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
         paragraph(&mut text, &format!("trace {}", visible(&trace.display().to_string())), options);
     }
     text
+}
+
+/// What was found in a test, and how often it came again.
+fn run_again(confirmed: &ConfirmedTest) -> Table {
+    let mut table = Table::new([left("finding"), left("came again")]);
+    for finding in &confirmed.findings {
+        table.row([finding.finding.clone(), format!("{} of {}", finding.again, confirmed.repetitions)]);
+    }
+    let what = match confirmed.findings.len() {
+        0 => "nothing found",
+        1 => "the finding",
+        _ => "all of it",
+    };
+    table.row([what.to_owned(), confirmed.words()]);
+    table
 }
 
 /// How a test ended, in a sentence.
