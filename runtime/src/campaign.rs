@@ -12,6 +12,7 @@ mod pool;
 mod traced;
 mod worker;
 
+pub use again::{Further, confirm_further};
 pub use alone::{AloneSettings, run_alone};
 pub use conduct::{CampaignError, Conducted, Progress, Settings, conduct, patience};
 pub use pool::{Ended, Job, Pool, PoolError, PoolSettings};

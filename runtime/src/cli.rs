@@ -3,6 +3,7 @@
 //! Results go to standard output, progress and problems to standard error. Exit codes: 0 done, 1 failed, 2 wrong usage,
 //! 3 done, but something is not as required where that was asked for, 130 stopped by the user.
 
+mod confirm;
 mod export;
 mod known;
 mod progress;
@@ -58,6 +59,8 @@ enum Command {
     Known(known::Options),
     /// Run one test again and again, to see what of its result is chance
     Repeat(repeat::Options),
+    /// Run recorded tests again with fresh seeds of the simulator and say whether what was found comes again
+    Confirm(confirm::Options),
     /// Run a recorded test again just as it was and say whether it is the same, bit for bit
     Replay(replay::Options),
     /// Feed a recording to the campaign's metrics, without a simulator
@@ -155,6 +158,7 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
         Some(Command::Resume(options)) => run::resume(runner, &plan, &results, &options),
         Some(Command::Known(options)) => known::known(runner, &plan, &results, &options),
         Some(Command::Repeat(options)) => repeat::repeat(runner, &plan, &results, &options),
+        Some(Command::Confirm(options)) => confirm::confirm(runner, &plan, &results, &options),
         Some(Command::Replay(options)) => replay::replay(runner, &plan, &results, &options),
         Some(Command::ReplayRecording(options)) => replay_recording::replay_recording(runner, &plan, &options),
         Some(Command::Export(options)) => export::export(&results, &options),

@@ -42,7 +42,7 @@ pub use summary::{
 };
 pub use table::TextOptions;
 pub(crate) use table::text_table;
-pub use text::{headline, list_text, summary_text, test_text};
+pub use text::{confirmed_text, headline, list_text, summary_text, test_text};
 
 #[cfg(test)]
 mod tests;

@@ -3,6 +3,7 @@
 
 mod commands;
 mod conditions;
+mod confirm;
 mod coverage;
 mod custom;
 mod declarative;

@@ -1,15 +1,16 @@
 //! Running tests again to confirm what was found: the same disturbance, a fresh seed of the simulator.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
-use std::sync::atomic::Ordering;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use sesame_plan::Test;
 
-use super::conduct::{CampaignError, Desk};
-use super::pool::{Ended, Job};
-use crate::record::{Event, EventKind, Repetition, TestRecord};
+use super::conduct::{CampaignError, Desk, Settings, patience};
+use super::pool::{Ended, Job, Pool, PoolSettings};
+use crate::record::{Event, EventKind, Recorder, Repetition, TestRecord};
 use crate::rng::derive_seed;
 
 /// What is said when confirming showed that there was nothing to confirm.
@@ -20,6 +21,52 @@ pub(super) const LIKE_BEFORE: &str = "every run to confirm a test came out just 
 /// same ones whenever it is confirmed.
 pub(super) fn confirmation_seed(seed: u64, test: u32, repetition: u32) -> u64 {
     derive_seed(seed, "confirm", &[u64::from(test), u64::from(repetition)])
+}
+
+/// Tests of finished results that are to be run again.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Further {
+    /// Numbers of the tests; none of a duplicate.
+    pub tests: Vec<u32>,
+    /// How often each is run.
+    pub times: u32,
+}
+
+/// Runs tests of finished results again, and records that beside what is recorded already: the repetitions that a campaign
+/// of its own accord confirms by are never among them, so that its front stays what it is. `each` is told how many runs
+/// there are by now, and how many there will be. False if the user stopped it; what had ended by then is recorded.
+pub fn confirm_further(
+    recorder: &mut Recorder,
+    further: &Further,
+    settings: &Settings,
+    directory: &Path,
+    interrupted: &AtomicBool,
+    each: &mut dyn FnMut(u32, u32),
+) -> Result<bool, CampaignError> {
+    let repository = recorder.repository();
+    let repeated = repository.repetitions()?;
+    let own = repository.plan().campaign.confirm.map_or(0, |confirmation| confirmation.times);
+    let mut again = Again::default();
+    let mut longest: f64 = 0.0;
+    let mut wanted = Vec::with_capacity(further.tests.len());
+    for &number in &further.tests {
+        let record = repository.test(number)?;
+        longest = longest.max(record.observation.wall.run);
+        let shown = Repetition::of(number, 0, record.simulator_seed, &record.observation);
+        again.first.insert(number, (record.test, shown));
+        let last = repeated.get(&number).and_then(|runs| runs.last()).map_or(0, |run| run.position);
+        let first = last.max(own) + 1;
+        wanted.push((number, first..=first.saturating_add(further.times - 1)));
+    }
+    let pool = Pool::start(&PoolSettings {
+        workers: settings.workers,
+        program: settings.program.clone(),
+        directory: directory.to_path_buf(),
+        timeout: settings.timeout.unwrap_or_else(|| patience(longest)),
+    })?;
+    let total = further.times.saturating_mul(u32::try_from(further.tests.len()).unwrap_or(u32::MAX));
+    let mut desk = Desk { recorder, recorded: BTreeSet::new(), repeated, pool, traces: None, interrupted };
+    desk.repeat(&mut again, &wanted, settings.seed, &mut |runs| each(runs, total))
 }
 
 /// What repeating needs to know of tests, and what it has seen.
@@ -73,13 +120,13 @@ impl Desk<'_> {
     pub(super) fn repeat(
         &mut self,
         again: &mut Again,
-        tests: &[u32],
-        positions: RangeInclusive<u32>,
+        tests: &[(u32, RangeInclusive<u32>)],
         seed: u64,
         each: &mut dyn FnMut(u32),
     ) -> Result<bool, CampaignError> {
         let mut waiting = BTreeMap::new();
-        for &number in tests {
+        for (number, positions) in tests {
+            let number = *number;
             let Some((test, _)) = again.first.get(&number) else { unreachable!("tests are remembered before") };
             let test = test.clone();
             for position in positions.clone() {

@@ -231,10 +231,10 @@ pub fn conduct(
                 }
                 let coverage = tracking.as_ref().map(|it| &it.coverage);
                 let before = confirming.front();
-                let complete =
-                    desk.repeat(&mut again, &wanted, 1..=confirmation.times, settings.seed, &mut |repetitions| {
-                        progress(Progress { done, total, repetitions, latest: None, front: &before, coverage });
-                    })?;
+                let runs: Vec<_> = wanted.iter().map(|&number| (number, 1..=confirmation.times)).collect();
+                let complete = desk.repeat(&mut again, &runs, settings.seed, &mut |repetitions| {
+                    progress(Progress { done, total, repetitions, latest: None, front: &before, coverage });
+                })?;
                 if !complete {
                     return interrupt(recorder);
                 }
@@ -426,16 +426,16 @@ impl Earlier {
 pub(super) struct Desk<'a> {
     pub(super) recorder: &'a mut Recorder,
     /// Numbers of the tests already recorded when the campaign was taken up again.
-    recorded: BTreeSet<u32>,
+    pub(super) recorded: BTreeSet<u32>,
     /// What is recorded of repetitions, by test.
     pub(super) repeated: BTreeMap<u32, Vec<Repetition>>,
     pub(super) pool: Pool,
-    traces: Option<Traces>,
+    pub(super) traces: Option<Traces>,
     pub(super) interrupted: &'a AtomicBool,
 }
 
 /// Which traces are kept, and in which folder of results.
-struct Traces {
+pub(super) struct Traces {
     folder: PathBuf,
     keep: Recorded,
 }

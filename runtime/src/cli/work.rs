@@ -61,6 +61,16 @@ impl Work {
         u32::try_from(self.processes()).unwrap_or(u32::MAX)
     }
 
+    /// What a campaign is told of it.
+    pub(super) fn settings(&self, seed: u64, files: &Files) -> Result<Settings, Failure> {
+        // A file that is changed is changed for every simulator.
+        let workers = if files.may_change { 1 } else { self.processes() };
+        if self.workers.is_some_and(|asked| asked.get() > workers) {
+            eprintln!("note: tests run one at a time, since operations may change files");
+        }
+        Ok(Settings { seed, workers, timeout: self.timeout, program: std::env::current_exe()? })
+    }
+
     fn processes(&self) -> usize {
         let processors = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         self.workers.map_or_else(processors, NonZeroUsize::get)
@@ -166,12 +176,7 @@ pub(super) fn carry_out(
     ending: &Ending,
     files: Files,
 ) -> Result<ExitCode, Failure> {
-    // A file that is changed is changed for every simulator.
-    let workers = if files.may_change { 1 } else { work.processes() };
-    if work.workers.is_some_and(|asked| asked.get() > workers) {
-        eprintln!("note: tests run one at a time, since operations may change files");
-    }
-    let settings = Settings { seed, workers, timeout: work.timeout, program: std::env::current_exe()? };
+    let settings = work.settings(seed, &files)?;
     let interrupted = interruptible()?;
     let started = Instant::now();
     let mut display = Display::new(plan, seed);

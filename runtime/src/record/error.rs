@@ -32,6 +32,12 @@ pub enum RecordError {
         /// The database.
         path: PathBuf,
     },
+    /// The run has not ended, and what it still records would come out otherwise.
+    #[error("this run is unfinished: `resume` goes on with it: {}", path.display())]
+    Unfinished {
+        /// The database.
+        path: PathBuf,
+    },
     /// The file is not a results repository.
     #[error("not the results of a campaign ({found}); nothing was changed: {}", path.display())]
     Foreign {

@@ -56,6 +56,15 @@ impl Recorder {
 
     /// Goes on with the results of a run that was interrupted.
     pub fn resume(folder: &Path, workers: u32) -> Result<Recorder, RecordError> {
+        Recorder::open(folder, workers, false)
+    }
+
+    /// Opens the results of a run that is finished, to record [repetitions](Recorder::put_repetition) beside them.
+    pub fn reopen(folder: &Path, workers: u32) -> Result<Recorder, RecordError> {
+        Recorder::open(folder, workers, true)
+    }
+
+    fn open(folder: &Path, workers: u32, finished: bool) -> Result<Recorder, RecordError> {
         let path = folder.join(DATABASE);
         if !path.exists() {
             return Err(RecordError::Missing { path });
@@ -64,8 +73,10 @@ impl Recorder {
         let connection = schema::open(&path, true)?;
         schema::check_whole(&connection, &path)?;
         let repository = Repository::from_connection(connection, path)?;
-        if repository.campaign().stop.is_some() {
-            return Err(RecordError::Finished { path: repository.path });
+        match repository.campaign().stop {
+            Some(_) if !finished => return Err(RecordError::Finished { path: repository.path }),
+            None if finished => return Err(RecordError::Unfinished { path: repository.path }),
+            _ => {}
         }
         tune(&repository.connection).map_err(|e| RecordError::database("open the results", &repository.path, e))?;
         Recorder::begin_session(repository, lock, workers)

@@ -16,10 +16,10 @@ use crate::search::{self, Fitness};
 /// not confirm, or not all of its repetitions are there. Further ones, which a user asked for later, change nothing.
 pub fn confirmed_fitness(plan: &CampaignPlan, repetitions: &[Repetition]) -> Option<Fitness> {
     let confirmation = plan.campaign.confirm?;
-    let runs = repetitions.get(..confirmation.times as usize)?;
+    let runs = repetitions.iter().take_while(|run| run.position <= confirmation.times);
     let runs: Vec<Fitness> =
-        runs.iter().map(|run| search::fitness_of(plan, &run.outcome, |metric| run.value(metric).value)).collect();
-    Some(typical(&runs, confirmation.by))
+        runs.map(|run| search::fitness_of(plan, &run.outcome, |metric| run.value(metric).value)).collect();
+    (runs.len() == confirmation.times as usize).then(|| typical(&runs, confirmation.by))
 }
 
 impl Recorder {

@@ -369,6 +369,16 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     text
 }
 
+/// What was found in tests that were run again, and how often it came again: a line for each.
+pub fn confirmed_text(tests: &[ConfirmedTest], options: TextOptions) -> String {
+    let mut table = Table::new([left("test"), left("finding"), left("came again")]);
+    for test in tests {
+        let findings: Vec<&str> = test.findings.iter().map(|finding| finding.finding.as_str()).collect();
+        table.row([test.test.clone(), findings.join(" "), test.words()]);
+    }
+    table.render(options)
+}
+
 /// What was found in a test, and how often it came again.
 fn run_again(confirmed: &ConfirmedTest) -> Table {
     let mut table = Table::new([left("finding"), left("came again")]);

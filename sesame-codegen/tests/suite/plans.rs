@@ -101,6 +101,8 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 search: Search::Random { evaluations: 10 },
                 coverage: None,
                 exploration: None,
+                confirm: None,
+                neighbours: None,
                 stop: Vec::new(),
                 seed: 42,
                 end_after: 70.0,

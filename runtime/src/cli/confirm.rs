@@ -1,0 +1,105 @@
+//! `confirm`: tests of a finished run again, each with fresh seeds of the simulator, to see whether what was found in them
+//! comes again.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use sesame_plan::CampaignPlan;
+
+use super::recorded::{open, refuse_changed};
+use super::work::{Work, claim_files, interruptible, refuse_unfilled, shown};
+use super::{Failure, Format, STOPPED, print, print_json, text_options};
+use crate::campaign::{Further, confirm_further};
+use crate::record::Recorder;
+use crate::report;
+use crate::runner::Runner;
+
+/// How often a line is printed.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// Which tests are run again, and how.
+#[derive(Debug, Args)]
+pub(super) struct Options {
+    /// The tests, for example `T158 T17`; by default those of the front
+    #[arg(value_name = "TEST")]
+    tests: Vec<String>,
+    /// How often each is run again, beside the times it was before
+    #[arg(short = 'n', long, default_value_t = 5, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    times: u32,
+    /// Folder of the run, for example `results/42`; by default the latest
+    #[arg(long, value_name = "DIR")]
+    results: Option<PathBuf>,
+    /// How to show what came of it
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+    #[command(flatten)]
+    work: Work,
+}
+
+pub(super) fn confirm(
+    runner: &Runner,
+    plan: &CampaignPlan,
+    results: &Path,
+    options: &Options,
+) -> Result<ExitCode, Failure> {
+    let repository = open(results, options.results.as_deref())?;
+    let mut tests = match options.tests.as_slice() {
+        [] => repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members),
+        names => names.iter().map(|name| repository.find(name)).collect::<Result<_, _>>()?,
+    };
+    if tests.is_empty() {
+        return Err(Failure(format!(
+            "there is no front in {}: name the tests that are to be run again, for example `confirm T1`",
+            shown(repository.path())
+        )));
+    }
+    for test in &mut tests {
+        refuse_changed(&repository, plan, *test)?;
+        // A duplicate is what its original is.
+        *test = repository.row(*test)?.duplicate_of.unwrap_or(*test);
+    }
+    tests.sort_unstable();
+    tests.dedup();
+    let seed = repository.campaign().seed;
+    let stop = repository.campaign().stop.clone().unwrap_or_default();
+    let folder = repository.folder().to_owned();
+    drop(repository);
+
+    let mut recorder = Recorder::reopen(&folder, options.work.workers())?;
+    let files = claim_files(runner, plan)?;
+    refuse_unfilled(runner, plan, true)?;
+    let settings = options.work.settings(seed, &files)?;
+    let interrupted = interruptible()?;
+    let further = Further { tests, times: options.times };
+    let mut said = Instant::now();
+    let complete = confirm_further(
+        &mut recorder,
+        &further,
+        &settings,
+        &folder.join("workers"),
+        &interrupted,
+        &mut |runs, total| {
+            if said.elapsed() >= LINE_EVERY {
+                said = Instant::now();
+                eprintln!("{runs}/{total} runs");
+            }
+        },
+    );
+    files.finish()?;
+    // What is recorded stays, however it ended.
+    let repository = recorder.finish(&stop)?;
+    if !complete? {
+        eprintln!("stopped; the runs that had ended are kept");
+        return Ok(ExitCode::from(STOPPED));
+    }
+    let page = folder.join("report.html");
+    report::write_page(&repository, &page)?;
+    let summary = report::summary(&repository)?;
+    let confirmed: Vec<_> = summary.confirmed.into_iter().filter(|test| further.tests.contains(&test.number)).collect();
+    match options.format {
+        Format::Text => print(&report::confirmed_text(&confirmed, text_options())),
+        Format::Json => print_json(&confirmed),
+    }
+}

@@ -1,0 +1,193 @@
+//! Findings that are run again with fresh seeds of the simulator: what that shows, that it survives anything, and what it
+//! brings where a simulator is noisy.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use sesame_runtime::observation::Outcome;
+use sesame_runtime::record::{Repetition, Repository, Verdict, verdict};
+use sesame_tests::{Done, Project, Runner, command, done, sesamec, workspace};
+
+/// The runner of a campaign in gusts.
+fn gusty(name: &str, campaign: &str) -> Runner {
+    let space = fs::read_to_string(workspace().join("tests/simulators/gusty/space.sesame")).unwrap();
+    Project::new(name, &space.replace("NAME", name), "gusty").build(campaign)
+}
+
+fn results(runner: &Runner, results: &str) -> Repository {
+    Repository::open(&runner.folder.join(results).join("3")).unwrap()
+}
+
+fn json(text: &str) -> serde_json::Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+#[test]
+fn a_front_is_of_confirmed_tests_and_says_how_often_each_finding_came_again() {
+    let runner = gusty("confirming", "confirming");
+    let junit = runner.folder.join("junit.xml");
+    let said = runner.run(&["--results", "results", "--workers", "1", "--junit", junit.to_str().unwrap()]).expect(0);
+    let repository = results(&runner, "results");
+    let rows = repository.tests().unwrap();
+    assert_eq!(rows.len(), 62, "repetitions are no tests");
+    let repetitions = repository.repetitions().unwrap();
+    let mut seeds: BTreeSet<u64> = BTreeSet::from([repository.test(1).unwrap().simulator_seed]);
+    for (test, runs) in &repetitions {
+        assert_eq!(runs.iter().map(|run| run.position).collect::<Vec<_>>(), [1, 2, 3, 4], "T{test}");
+        assert!(runs.iter().all(|run| seeds.insert(run.simulator_seed)), "every run has a seed of its own");
+    }
+
+    // The disturbance is the same each time, so what varies is the gust.
+    let failed = |run: &Repetition| matches!(run.outcome, Outcome::Crash { .. });
+    assert!(repetitions.values().flatten().any(failed), "some gusts throw the robot over");
+    assert!(repetitions.values().any(|runs| runs.iter().any(|run| run.values != runs[0].values)));
+
+    // The front, as told by definition from what is recorded.
+    let plan = repository.plan();
+    let front = repository.latest_result_set().unwrap().unwrap().members;
+    assert!(!front.is_empty() && front.iter().all(|test| repetitions.contains_key(test)), "{front:?}");
+    let summary = json(&runner.run(&["report", "--format", "json", "--results", "results/3"]).expect(0).out);
+    let confirmed = summary["confirmed"].as_array().unwrap();
+    assert_eq!(confirmed.len(), repetitions.len());
+    let mut standings = BTreeMap::new();
+    for test in confirmed {
+        let number = u32::try_from(test["number"].as_u64().unwrap()).unwrap();
+        let row = &rows[number as usize];
+        let violates =
+            |outcome: &Outcome, value| verdict(plan.requirements[0].bound, outcome, value) == Verdict::Violated;
+        let metric = plan.requirements[0].metric;
+        if !violates(&row.outcome, row.value(metric)) {
+            assert_eq!(test["standing"], serde_json::Value::Null);
+            continue;
+        }
+        let again = repetitions[&number].iter().filter(|run| violates(&run.outcome, run.value(metric))).count();
+        assert_eq!(test["again"], again, "T{number}");
+        let standing = match again {
+            0 => "not_confirmed",
+            4 => "confirmed",
+            _ => "flaky",
+        };
+        assert_eq!(test["standing"], standing);
+        *standings.entry(standing).or_insert(0) += 1;
+    }
+    assert!(standings.contains_key("confirmed") && standings.len() > 1, "{standings:?}");
+
+    // What people and programs see of it.
+    assert!(said.out.contains("confirmed"), "{}", said.out);
+    assert!(said.out.contains("Values are means of 4 fresh runs of each test."), "{}", said.out);
+    assert!(said.out.contains("further runs of"), "{}", said.out);
+    let page = fs::read_to_string(runner.folder.join("results/3/report.html")).unwrap();
+    assert!(page.contains("<th scope=\"col\">Confirmed</th>") || page.contains(">Confirmed<"), "the page has a column");
+    assert!(fs::read_to_string(&junit).unwrap().contains("; came again: T"));
+    let shown = runner.run(&["show", &format!("T{}", front[0]), "--results", "results/3"]).expect(0).out;
+    assert!(shown.contains("Run again"), "{shown}");
+    let mut analysis = command(sesamec());
+    analysis.args(["results", "front", "--format", "csv"]).arg(repository.path());
+    let table = done(&mut analysis).expect(0).out;
+    let header = table.lines().next().unwrap();
+    assert_eq!(header, "test,fuzzing_time,worst,same_as,confirmed,repetitions,confirmed_low,confirmed_high,standing");
+    let listed: BTreeSet<&str> = table.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
+    assert!(front.iter().all(|test| listed.contains(format!("T{test}").as_str())), "{table}");
+
+    // Analyses count tests, not repetitions.
+    let mut analysis = command(sesamec());
+    let tests = done(analysis.args(["results", "tests", "--format", "csv"]).arg(repository.path())).expect(0).out;
+    assert_eq!(tests.lines().count(), 61);
+    let view = rusqlite::Connection::open(repository.path()).unwrap();
+    let (rows, again): (u32, u32) = view
+        .query_row("SELECT count(*), coalesce(sum(confirmed), 0) FROM confirmations", [], |row| {
+            Ok((row.get(0)?, row.get(1)?))
+        })
+        .unwrap();
+    assert_eq!(rows, standings.values().sum::<u32>());
+    let counted: u64 = confirmed.iter().map(|test| test["again"].as_u64().unwrap()).sum();
+    assert_eq!(u64::from(again), counted);
+}
+
+/// A campaign in the background.
+fn start(runner: &Runner, results: &str, runs: &Path) -> Child {
+    let mut command = runner.command(&["--results", results, "--workers", "2"]);
+    command.env("PAUSE_US", "300").env("RUNS", runs).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.spawn().unwrap()
+}
+
+fn counted(runs: &Path) -> usize {
+    fs::read_to_string(runs).map_or(0, |text| text.lines().count())
+}
+
+#[test]
+fn repetitions_survive_a_kill_and_come_out_the_same_with_any_number_of_workers() {
+    let runner = gusty("confirm_killed", "confirming");
+    let whole = runner.run(&["--results", "one", "--workers", "1"]).expect(0).digest();
+    assert_eq!(runner.run(&["--results", "three", "--workers", "3"]).expect(0).digest(), whole);
+    let repository = results(&runner, "one");
+    let repetitions: usize = repository.repetitions().unwrap().values().map(Vec::len).sum();
+    let needed = 62 + repetitions;
+    // Each kill is after so many repetitions were recorded, so that some are in the middle of a test's.
+    for (at, least) in [1, repetitions / 3, 2 * repetitions / 3].into_iter().enumerate() {
+        let name = format!("killed{at}");
+        let (folder, runs) = (runner.folder.join(&name).join("3"), runner.folder.join(format!("{name}.runs")));
+        let mut child = start(&runner, &name, &runs);
+        let patience = Instant::now();
+        let recorded = || {
+            Repository::open(&folder)
+                .and_then(|it| it.repetitions())
+                .map_or(0, |it| it.values().map(Vec::len).sum::<usize>())
+        };
+        while recorded() < least {
+            assert!(patience.elapsed() < Duration::from_secs(60), "no {least} repetitions after a minute");
+            assert!(child.try_wait().unwrap().is_none(), "it ended before it was killed");
+            sleep(Duration::from_millis(2));
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        assert!(recorded() < repetitions, "killed in the middle");
+        let mut resume = runner.command(&["resume", &format!("{name}/3"), "--workers", "2"]);
+        let resumed = Done::of(&resume.env("RUNS", &runs).output().unwrap()).expect(0);
+        assert_eq!(resumed.digest(), whole, "killed after {least} repetitions");
+        // Only what the two workers were at is run again, and each may have begun one more meanwhile.
+        let ran = counted(&runs);
+        assert!((needed..=needed + 4).contains(&ran), "{ran} runs for {needed}");
+    }
+}
+
+#[test]
+fn where_nothing_varies_confirming_says_so() {
+    let runner = gusty("confirm_still", "confirming");
+    let mut command = runner.command(&["--results", "still"]);
+    let said = Done::of(&command.env("STILL", "1").output().unwrap()).expect(0);
+    assert!(said.out.contains("the simulator does not vary with its seed"), "{}", said.out);
+    let noisy = runner.run(&["--results", "noisy"]).expect(0);
+    assert!(!noisy.out.contains("the simulator does not vary"), "{}", noisy.out);
+}
+
+#[test]
+fn tests_of_finished_results_are_confirmed_later_and_the_front_stays() {
+    let runner = gusty("confirm_later", "believing");
+    runner.run(&["--results", "results"]).expect(0);
+    let before = results(&runner, "results");
+    let front = before.latest_result_set().unwrap().unwrap().members;
+    let digest = before.digest().unwrap();
+    assert!(before.repetitions().unwrap().is_empty());
+    drop(before);
+
+    let said = runner.run(&["confirm", "-n", "3", "--results", "results/3", "--format", "json"]).expect(0);
+    let tests = json(&said.out);
+    let numbers: Vec<u64> = tests.as_array().unwrap().iter().map(|test| test["number"].as_u64().unwrap()).collect();
+    assert_eq!(numbers, front.iter().map(|&number| u64::from(number)).collect::<Vec<_>>());
+    let again = runner.run(&["confirm", &format!("T{}", front[0]), "-n", "2", "--results", "results/3"]).expect(0);
+    assert!(again.out.contains(&format!("T{}", front[0])), "{}", again.out);
+    let after = results(&runner, "results");
+    assert_eq!(after.latest_result_set().unwrap().unwrap().members, front);
+    let positions: Vec<u32> = after.repetitions().unwrap()[&front[0]].iter().map(|run| run.position).collect();
+    assert_eq!(positions, [1, 2, 3, 4, 5], "what was there is kept and not run again");
+    assert_ne!(after.digest().unwrap(), digest, "it is part of the content");
+
+    let unknown = runner.run(&["confirm", "T999", "--results", "results/3"]).expect(1);
+    assert!(unknown.err.contains("T999"), "{}", unknown.err);
+}
