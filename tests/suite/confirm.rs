@@ -2,7 +2,6 @@
 //! brings where a simulator is noisy.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Stdio};
@@ -11,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use sesame_runtime::observation::Outcome;
 use sesame_runtime::record::{Repetition, Repository, Verdict, verdict};
+use sesame_runtime::report::summary;
 use sesame_tests::{Done, Project, Runner, command, done, sesamec, workspace};
 
 /// The runner of a campaign in gusts.
@@ -190,4 +190,140 @@ fn tests_of_finished_results_are_confirmed_later_and_the_front_stays() {
 
     let unknown = runner.run(&["confirm", "T999", "--results", "results/3"]).expect(1);
     assert!(unknown.err.contains("T999"), "{}", unknown.err);
+}
+
+/// Fresh runs by which each campaign's findings are judged in the end, which neither its search nor its `confirm` saw.
+const JUDGES: usize = 10;
+
+/// The findings of fronts, by whether fresh runs show them again.
+#[derive(Default)]
+struct Believed {
+    runs: usize,
+    findings: usize,
+    /// Violated again in every one of the fresh runs.
+    always: usize,
+    never: usize,
+    /// Fresh runs that violate again, of all findings together.
+    again: usize,
+    /// The harm by which findings are on their fronts, and that of their fresh runs, in sum.
+    promised: f64,
+    kept: f64,
+}
+
+impl Believed {
+    /// Adds a run's front, of which only tests whose own repetitions `believes` is content with are findings: how many of
+    /// them there are, and how many violate again.
+    fn add(&mut self, repository: &Repository, believes: impl Fn(usize, usize) -> bool) {
+        let plan = repository.plan();
+        let rows = repository.tests().unwrap();
+        let repetitions = repository.repetitions().unwrap();
+        let front = summary(repository).unwrap().front;
+        let harm = plan.campaign.objectives[1];
+        self.runs += rows.len() + repetitions.values().map(Vec::len).sum::<usize>() - JUDGES * front.len();
+        for test in front {
+            let row = &rows[test.number as usize];
+            let violated: Vec<_> = plan
+                .requirements
+                .iter()
+                .filter(|it| verdict(it.bound, &row.outcome, row.value(it.metric)) == Verdict::Violated)
+                .collect();
+            let violates = |run: &&Repetition| {
+                violated.iter().all(|it| verdict(it.bound, &run.outcome, run.value(it.metric)) == Verdict::Violated)
+            };
+            let runs = &repetitions[&test.number];
+            let (own, judges) = runs.split_at(runs.len() - JUDGES);
+            if violated.is_empty() || !believes(own.len(), own.iter().filter(violates).count()) {
+                continue;
+            }
+            let again = judges.iter().filter(violates).count();
+            self.findings += 1;
+            self.again += again;
+            self.always += usize::from(again == JUDGES);
+            self.never += usize::from(again == 0);
+            let fresh: Vec<f64> = judges.iter().filter_map(|run| run.value(harm).value).collect();
+            if !fresh.is_empty() {
+                self.promised += test.values[1].unwrap();
+                self.kept += fresh.iter().sum::<f64>() / fresh.len() as f64;
+            }
+        }
+    }
+
+    /// The share of fresh runs that show a finding again.
+    fn share(&self) -> f64 {
+        self.again as f64 / (self.findings * JUDGES) as f64
+    }
+
+    fn row(&self, name: &str) -> String {
+        format!(
+            "| {name} | {} | {} | {} ({:.0} %) | {} | {:.1} % | {:+.1} % |\n",
+            self.runs,
+            self.findings,
+            self.always,
+            100.0 * self.always as f64 / self.findings.max(1) as f64,
+            self.never,
+            100.0 * self.share(),
+            100.0 * (self.kept / self.promised - 1.0)
+        )
+    }
+}
+
+/// Runs these campaigns with seeds from 1 on, runs the tests of their fronts again, and prints a table. Gives the share of
+/// fresh runs that show a finding again, by campaign, and for `sure` those of tests that all repetitions confirmed.
+fn judged(project: &Project, campaigns: &[&'static str], seeds: u32) -> BTreeMap<&'static str, f64> {
+    let mut table = String::from(
+        "| campaign | runs | findings | again in all 10 | in none | fresh runs that show it | harm against what the front says |\n\
+         |---|---:|---:|---:|---:|---:|---:|\n",
+    );
+    let mut shares = BTreeMap::new();
+    for &campaign in campaigns {
+        let runner = project.build(campaign);
+        let (mut all, mut sure) = (Believed::default(), Believed::default());
+        for seed in 1..=seeds {
+            let results = format!("{campaign}/{seed}");
+            runner.run(&["--results", campaign, "--seed", &seed.to_string()]).expect(0);
+            runner.run(&["confirm", "-n", &JUDGES.to_string(), "--results", &results]).expect(0);
+            let repository = Repository::open(&runner.folder.join(&results)).unwrap();
+            all.add(&repository, |_, _| true);
+            sure.add(&repository, |own, again| own > 0 && own == again);
+        }
+        table += &all.row(campaign);
+        shares.insert(campaign, all.share());
+        if sure.findings > 0 {
+            table += &sure.row(&format!("{campaign}, marked confirmed"));
+            shares.insert("sure", sure.share());
+        }
+    }
+    println!("{table}");
+    shares
+}
+
+#[test]
+#[ignore = "long: 40 campaigns of 210 tests, and fresh runs of their fronts"]
+fn findings_of_a_noisy_cell_hold_more_often_where_they_were_confirmed() {
+    let project = Project::kuka_cell_with(
+        "noisy_cell",
+        "campaign believing from coverage_experiment { }\n\
+         campaign confirming from coverage_experiment { confirm 5 times }\n\
+         campaign doubting from coverage_experiment { confirm 5 times { by quantile 100% } }\n\
+         campaign averaging from coverage_experiment {\n  \
+           search nsga2 { population 10  evaluations 210  seed 42  neighbours 3 }\n}\n",
+    );
+    let space = fs::read_to_string(&project.space).unwrap();
+    fs::write(&project.space, space.replace("kuka_cell_sim::Cell", "kuka_cell_sim::NoisyCell")).unwrap();
+    let shares = judged(&project, &["believing", "averaging", "confirming", "doubting"], 10);
+    assert!(shares["sure"] >= shares["believing"] && shares["doubting"] >= shares["believing"], "{shares:?}");
+}
+
+/// Gusts are far from what a real cell does: most of what is found there once was luck.
+#[test]
+#[ignore = "long: 100 campaigns of 60 to 150 tests, and fresh runs of their fronts"]
+fn findings_in_gusts_hold_where_they_were_confirmed() {
+    let space = fs::read_to_string(workspace().join("tests/simulators/gusty/space.sesame")).unwrap();
+    let more = "campaign doubting from believing { confirm 4 times { by quantile 100% } }\n\
+                campaign averaging from believing { search nsga2 { population 10  evaluations 60  seed 3  neighbours 3 } }\n\
+                campaign longer from believing { search nsga2 { population 10  evaluations 150  seed 3 } }\n";
+    let project = Project::new("gusts", &format!("{}\n{more}", space.replace("NAME", "gusts")), "gusty");
+    let shares = judged(&project, &["believing", "longer", "averaging", "confirming", "doubting"], 20);
+    let believed = shares["believing"].max(shares["longer"]);
+    assert!(shares["confirming"] > believed + 0.1 && shares["sure"] > believed + 0.2, "{shares:?}");
 }
