@@ -324,6 +324,7 @@ fn findings_in_gusts_hold_where_they_were_confirmed() {
                 campaign longer from believing { search nsga2 { population 10  evaluations 150  seed 3 } }\n";
     let project = Project::new("gusts", &format!("{}\n{more}", space.replace("NAME", "gusts")), "gusty");
     let shares = judged(&project, &["believing", "longer", "averaging", "confirming", "doubting"], 20);
-    let believed = shares["believing"].max(shares["longer"]);
-    assert!(shares["confirming"] > believed + 0.1 && shares["sure"] > believed + 0.2, "{shares:?}");
+    assert!(shares["confirming"] > shares["believing"] + 0.1, "{shares:?}");
+    let as_many_runs = shares["longer"];
+    assert!(shares["sure"] > as_many_runs && shares["doubting"] > as_many_runs, "{shares:?}");
 }

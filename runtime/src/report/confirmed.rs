@@ -1,6 +1,7 @@
 //! What running tests again says of what was found: how often each finding came again, and how sure that is.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 
 use serde::Serialize;
 use sesame_plan::{CampaignPlan, Confirmation, Direction, Typical};
@@ -132,7 +133,7 @@ fn confirmed(
                 .collect(),
             again: if anything { again } else { 0 },
             interval: wilson(again, runs.len()).filter(|_| anything),
-            standing: anything.then(|| match again {
+            standing: anything.then_some(match again {
                 0 => Standing::NotConfirmed,
                 again if again == runs.len() => Standing::Confirmed,
                 _ => Standing::Flaky,
@@ -185,9 +186,9 @@ impl ConfirmedTest {
 
 /// How many of these tests' findings are how much to be believed, as in `4 confirmed, 1 flaky`; nothing for tests without
 /// findings.
-pub(crate) fn standings<'a>(tests: impl Iterator<Item = &'a ConfirmedTest> + Clone) -> String {
+pub(crate) fn standings(tests: &[&ConfirmedTest]) -> String {
     let words = [Standing::Confirmed, Standing::Flaky, Standing::NotConfirmed].into_iter().filter_map(|standing| {
-        let count = tests.clone().filter(|test| test.standing == Some(standing)).count();
+        let count = tests.iter().filter(|test| test.standing == Some(standing)).count();
         (count > 0).then(|| format!("{count} {}", standing.words()))
     });
     join_words(&words.collect::<Vec<_>>())
@@ -201,14 +202,14 @@ pub(crate) fn confirmation_sentence(tests: &[ConfirmedTest]) -> Option<String> {
     }
     let mut sentence =
         format!("{} of {}", plural(runs, "further run", "further runs"), plural(tests.len(), "test", "tests"));
-    let front = standings(tests.iter().filter(|test| test.front));
-    let all = standings(tests.iter());
+    let front = standings(&tests.iter().filter(|test| test.front).collect::<Vec<_>>());
+    let all = standings(&tests.iter().collect::<Vec<_>>());
     if !all.is_empty() {
-        sentence.push_str(&format!(" to confirm them: {all}"));
+        let _ = write!(sentence, " to confirm them: {all}");
         if front.is_empty() {
             sentence.push_str("; none of these on the front");
         } else if front != all {
-            sentence.push_str(&format!("; on the front {front}"));
+            let _ = write!(sentence, "; on the front {front}");
         }
     }
     Some(sentence)

@@ -57,7 +57,7 @@ impl Neighbours {
             if let (Some(point), Fitness::Measured(values)) = (&result.point, &result.fitness)
                 && stands_for(result.number) == result.number
             {
-                self.tests.insert(result.number, (point.clone(), values.clone()));
+                self.tests.insert(result.number, (*point, values.clone()));
             }
         }
         for result in results {
