@@ -22,6 +22,9 @@ const LINEAR: Exploration = Exploration::Boost {
     tries: 10,
 };
 
+/// The search with so many tests.
+type Searched = fn(u32) -> Search;
+
 fn nsga2(evaluations: u32) -> Search {
     Search::Nsga2 { population: 10, evaluations }
 }
@@ -52,12 +55,11 @@ fn observe(plan: &CampaignPlan, number: u32, operations: &[sesame_plan::TestOper
     let effects = operations
         .iter()
         .map(|it| {
-            let interval = match it.activation {
-                Activation::Time { start, end } => Span { start, end },
-                _ => {
-                    let start = stream.uniform(0.0, 500.0);
-                    Span { start, end: start + stream.uniform(1.0, 400.0) }
-                }
+            let interval = if let Activation::Time { start, end } = it.activation {
+                Span { start, end }
+            } else {
+                let start = stream.uniform(0.0, 500.0);
+                Span { start, end: start + stream.uniform(1.0, 400.0) }
             };
             touched += interval.end - interval.start;
             OperationEffect {
@@ -135,7 +137,6 @@ fn main() {
     // Cargo tells whether it measures or only tries that this works.
     let measured = std::env::args().any(|word| word == "--bench");
     let counts: &[u32] = if measured { &[100, 1_000, 10_000] } else { &[100] };
-    type Searched = fn(u32) -> Search;
     let strategies: [(&str, Searched, Option<Exploration>); 8] = [
         ("`nsga2`", nsga2, None),
         ("`boost fixed`", nsga2, Some(FIXED)),
