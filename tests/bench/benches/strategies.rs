@@ -151,7 +151,7 @@ fn main() {
     println!("|---|{}", "---:|".repeat(counts.len()));
     for (name, search, exploration) in strategies {
         let row = counts.iter().map(|&count| {
-            let plan = plan(search(count), exploration.clone());
+            let plan = plan(search(count), exploration);
             // Of five, the quickest is the one least disturbed by whatever else the machine does.
             let times = if measured { 5 } else { 1 };
             let quickest = (0..times).map(|_| spent(&plan)).min().unwrap_or_default();
