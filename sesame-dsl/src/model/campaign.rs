@@ -2,7 +2,7 @@
 
 use super::condition::ConditionSpace;
 use super::{
-    CampaignId, Confirmation, Declaration, Exploration, MetricId, OperationId, Range, ReducedDimension, StopRule,
+    CampaignId, Confirmation, Declaration, Dimension, Exploration, MetricId, OperationId, Range, Recorded, StopRule,
     TestId,
 };
 
@@ -36,15 +36,6 @@ pub struct Campaign {
     pub end_after: f64,
     /// Of which tests the messages are recorded. Default none.
     pub record: Option<Recorded>,
-}
-
-/// Of which tests the messages and the activity of operations are recorded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Recorded {
-    /// Of those that violate a requirement, crash or time out, and of the undisturbed runs to compare them with.
-    Failing,
-    /// Of all.
-    All,
 }
 
 /// How the tests of a campaign are found.
@@ -127,7 +118,7 @@ pub struct Coverage {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CoverageAxis {
     /// Which.
-    pub dimension: ReducedDimension,
+    pub dimension: Dimension,
     /// From the beginning of the first cell to the end of the last, not empty.
     pub range: Range,
     /// How many cells: 1 or more.

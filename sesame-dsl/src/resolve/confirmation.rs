@@ -16,7 +16,9 @@ impl<'a> Resolver<'a> {
         let by = match self.single(&written.by, "by") {
             None | Some(ast::Typical::Mean) => Some(Typical::Mean),
             Some(ast::Typical::Median) => Some(Typical::Median),
-            Some(ast::Typical::Quantile(share)) => self.share(share, "the share of a quantile").map(Typical::Quantile),
+            Some(ast::Typical::Quantile(share)) => {
+                self.share(share, "the share of a quantile").map(|share| Typical::Quantile { share })
+            }
         };
         Some(Some(Confirmation { times: times?, by: by? }))
     }
