@@ -116,3 +116,123 @@ impl Repository {
         Ok(repetitions)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::{Confirmation, Typical};
+
+    use super::*;
+    use crate::record::{DATABASE, sample};
+
+    fn repetition(test: u32, position: u32, outcome: Outcome, collisions: Option<f64>) -> Repetition {
+        let value = |value: Option<f64>| MetricValue { value, set: value.is_some() };
+        let values = [collisions, Some(0.1 + f64::from(position)), Some(1.0), None, Some(-0.25)].map(value).to_vec();
+        let seed = u64::MAX - u64::from(position);
+        Repetition { test, position, simulator_seed: seed, outcome, end: 69.98, messages: 12, values }
+    }
+
+    /// The sample's results with these repetitions, finished again.
+    fn repeated(folder: &std::path::Path, plan: &CampaignPlan, repetitions: &[Repetition]) -> Repository {
+        drop(sample::campaign(folder, plan, 20));
+        let mut recorder = Recorder::reopen(folder, 1).unwrap();
+        for repetition in repetitions {
+            recorder.put_repetition(repetition, &[]).unwrap();
+        }
+        recorder.finish("all evaluations done").unwrap()
+    }
+
+    fn every_outcome() -> Vec<Repetition> {
+        let crash = Outcome::Crash { message: "the simulator panicked".to_owned() };
+        let mut empty = repetition(3, 2, crash, None);
+        empty.values.clear();
+        vec![
+            repetition(5, 1, Outcome::Void, Some(0.0)),
+            repetition(3, 1, Outcome::Completed, Some(1.0 / 3.0)),
+            empty,
+            repetition(3, 3, Outcome::Timeout { limit: 30.0 }, Some(2.0)),
+        ]
+    }
+
+    #[test]
+    fn repetitions_are_read_as_they_were_written_and_are_no_tests() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut written = every_outcome();
+        let repository = repeated(folder.path(), &sample::plan(), &written);
+        written.sort_by_key(|it| (it.test, it.position));
+        let read: Vec<Repetition> = repository.repetitions().unwrap().into_values().flatten().collect();
+        assert_eq!(read, written);
+        assert_eq!(repository.tests().unwrap().len(), 22);
+        assert_eq!(repository.campaign().stop.as_deref(), Some("all evaluations done"));
+    }
+
+    #[test]
+    fn the_digest_covers_repetitions_in_whatever_order_they_ended() {
+        let digest = |repetitions: &[Repetition]| {
+            let folder = tempfile::tempdir().unwrap();
+            repeated(folder.path(), &sample::plan(), repetitions).digest().unwrap()
+        };
+        let written = every_outcome();
+        let mut backwards = written.clone();
+        backwards.reverse();
+        let whole = digest(&written);
+        assert_eq!(digest(&backwards), whole);
+        let changes: [fn(&mut Repetition); 6] = [
+            |it| it.simulator_seed -= 9,
+            |it| it.outcome = Outcome::Completed,
+            |it| it.end = it.end.next_up(),
+            |it| it.messages += 1,
+            |it| it.values[1].value = it.values[1].value.map(f64::next_up),
+            |it| it.values[1].set = false,
+        ];
+        for (at, change) in changes.into_iter().enumerate() {
+            let mut changed = written.clone();
+            change(&mut changed[0]);
+            assert_ne!(digest(&changed), whole, "change {at}");
+        }
+        let mut slower = written.clone();
+        slower[3].outcome = Outcome::Timeout { limit: 31.0 };
+        assert_eq!(digest(&slower), whole, "the limit is wall time");
+    }
+
+    #[test]
+    fn what_cannot_be_recorded_is_refused_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = sample::plan();
+        drop(repeated(folder.path(), &plan, &[]));
+        let mut recorder = Recorder::reopen(folder.path(), 1).unwrap();
+        let refused = recorder.put_repetition(&repetition(3, 1, Outcome::Completed, Some(f64::INFINITY)), &[]);
+        assert!(refused.unwrap_err().to_string().contains("repetition 1 is inf"));
+        let first = repetition(3, 1, Outcome::Completed, Some(1.0));
+        recorder.put_repetition(&first, &["`top_speed` refused NaN".to_owned()]).unwrap();
+        assert!(recorder.put_repetition(&repetition(3, 1, Outcome::Void, None), &[]).is_err(), "it is there already");
+        let repository = recorder.finish("all evaluations done").unwrap();
+        assert_eq!(repository.repetitions().unwrap()[&3], [first]);
+        let warned = repository
+            .events()
+            .unwrap()
+            .into_iter()
+            .any(|event| event.test.is_none() && event.text == "repetition 1 of T3: `top_speed` refused NaN");
+        assert!(warned);
+    }
+
+    #[test]
+    fn only_finished_results_are_reopened() {
+        let folder = tempfile::tempdir().unwrap();
+        Recorder::create(folder.path(), &sample::plan(), 42, 1).unwrap().interrupt().unwrap();
+        let refused = Recorder::reopen(folder.path(), 1).unwrap_err();
+        assert!(matches!(&refused, RecordError::Unfinished { path } if path.ends_with(DATABASE)), "{refused}");
+    }
+
+    #[test]
+    fn a_campaign_goes_by_its_own_repetitions_and_not_by_later_ones() {
+        let mut plan = sample::plan();
+        let completed = |position, collisions| repetition(3, position, Outcome::Completed, Some(collisions));
+        let runs = [completed(1, 2.0), completed(2, 4.0), completed(3, 90.0)];
+        assert_eq!(confirmed_fitness(&plan, &runs), None, "it does not confirm");
+        plan.campaign.confirm = Some(Confirmation { times: 2, by: Typical::Mean });
+        // Fuzzing time is minimised, collisions are maximised.
+        let Some(Fitness::Measured(values)) = confirmed_fitness(&plan, &runs) else { panic!("both have values") };
+        assert_eq!(values, [f64::midpoint(1.1, 2.1), -3.0]);
+        assert_eq!(confirmed_fitness(&plan, &runs[1..]), None, "one of its own is missing");
+    }
+}

@@ -288,3 +288,80 @@ fn reports_serialise_with_names_and_units() {
     let json = serde_json::to_value(list(&repository).unwrap()).unwrap();
     assert_eq!(json["tests"][5]["outcome"], "void");
 }
+
+/// The sample's campaign, which confirms by three runs each: some findings come again always, some sometimes, some never.
+fn confirmed() -> (tempfile::TempDir, Repository) {
+    use crate::observation::Outcome;
+    use crate::record::{MetricValue, Recorder, Repetition};
+
+    let folder = tempfile::tempdir().unwrap();
+    let mut plan = sample::plan();
+    plan.campaign.confirm = Some(sesame_plan::Confirmation { times: 3, by: sesame_plan::Typical::Mean });
+    let first = sample::campaign(folder.path(), &plan, 60);
+    let members = first.latest_result_set().unwrap().unwrap().members;
+    let rows = first.tests().unwrap();
+    drop(first);
+    let mut recorder = Recorder::reopen(folder.path(), 1).unwrap();
+    let crash = members.len() - 1;
+    for (at, &test) in members.iter().enumerate() {
+        for position in 1..=3 {
+            let mut values = rows[test as usize].values.clone();
+            let mut outcome = Outcome::Completed;
+            match (at, position) {
+                (1, 2) => values.iter_mut().for_each(|it| *it = MetricValue::default()),
+                (2, _) => {
+                    values[0] = MetricValue { value: Some(0.0), set: false };
+                    values[2] = MetricValue { value: Some(1.0), set: true };
+                    values[3] = MetricValue { value: Some(60.0), set: true };
+                    values[4] = MetricValue { value: Some(200.0), set: true };
+                }
+                (at, 3) if at == crash => outcome = Outcome::Crash { message: "it fell over".to_owned() },
+                _ => {}
+            }
+            let seed = u64::from(position);
+            let run = Repetition { test, position, simulator_seed: seed, outcome, end: 70.0, messages: 1, values };
+            recorder.put_repetition(&run, &[]).unwrap();
+        }
+    }
+    let repository = recorder.finish("all evaluations done").unwrap();
+    (folder, repository)
+}
+
+#[test]
+fn findings_that_were_run_again_say_how_often_they_came_again() {
+    let (_folder, repository) = confirmed();
+    let summary = summary(&repository).unwrap();
+    insta::assert_snapshot!("confirmed_summary", summary_text(&summary, WIDE));
+    let first = summary.confirmed[0].clone();
+    insta::assert_snapshot!("confirmed_test", test_text(&show(&repository, &first.test).unwrap(), WIDE));
+    insta::assert_snapshot!("confirmed_tests", confirmed_text(&summary.confirmed, WIDE));
+    let standings: std::collections::BTreeSet<&str> =
+        summary.confirmed.iter().filter_map(|test| test.standing).map(Standing::words).collect();
+    assert_eq!(standings.into_iter().collect::<Vec<_>>(), ["confirmed", "flaky", "not confirmed"]);
+    let junit = junit(&summary);
+    assert!(junit.contains("; came again: T"), "{junit}");
+    let page = page(&repository).unwrap();
+    parsed(&page);
+    assert!(page.contains("Values are means of 3 fresh runs of each test.") && page.contains("not confirmed"));
+}
+
+#[test]
+fn the_view_of_confirmations_agrees_with_the_report() {
+    let (folder, repository) = confirmed();
+    let told: Vec<(u32, String, u32, u32)> = summary(&repository)
+        .unwrap()
+        .confirmed
+        .iter()
+        .flat_map(|test| {
+            let count = |count: usize| u32::try_from(count).unwrap();
+            test.findings
+                .iter()
+                .map(move |it| (test.number, it.finding.clone(), count(it.again), count(test.repetitions)))
+        })
+        .collect();
+    assert!(told.len() > 3);
+    let open = rusqlite::Connection::open(folder.path().join(crate::record::DATABASE)).unwrap();
+    let mut statement = open.prepare("SELECT test, requirement, confirmed, repetitions FROM confirmations").unwrap();
+    let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))).unwrap();
+    assert_eq!(rows.collect::<Result<Vec<(u32, String, u32, u32)>, _>>().unwrap(), told);
+}
