@@ -382,13 +382,15 @@ pub fn confirmed_text(tests: &[ConfirmedTest], options: TextOptions) -> String {
 /// What was found in a test, and how often it came again.
 fn run_again(confirmed: &ConfirmedTest) -> Table {
     let mut table = Table::new([left("finding"), left("came again")]);
-    for finding in &confirmed.findings {
-        table.row([finding.finding.clone(), format!("{} of {}", finding.again, confirmed.repetitions)]);
-    }
-    let what = match confirmed.findings.len() {
-        0 => "nothing found",
-        1 => "the finding",
-        _ => "all of it",
+    let what = match confirmed.findings.as_slice() {
+        [] => "nothing found",
+        [one] => &one.finding,
+        several => {
+            for finding in several {
+                table.row([finding.finding.clone(), format!("{} of {}", finding.again, confirmed.repetitions)]);
+            }
+            "all of it"
+        }
     };
     table.row([what.to_owned(), confirmed.words()]);
     table
