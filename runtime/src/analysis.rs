@@ -81,6 +81,7 @@ fn search_word(search: &Search) -> &'static str {
         Search::Random { .. } => "random",
         Search::Repeat { .. } => "repeat",
         Search::Known { .. } => "known tests",
+        Search::Shrink { .. } => "shrink",
     }
 }
 

@@ -158,6 +158,9 @@ fn header(body: &mut Markup, repository: &Repository, summary: &Summary) -> Resu
         Search::Random { evaluations } => format!("random, {evaluations} evaluations"),
         Search::Repeat { test, times } => format!("{} repeated {times} times", plan.test(*test).name),
         Search::Known { tests } => plural(tests.len(), "known test", "known tests"),
+        Search::Shrink { test, evaluations, .. } => {
+            format!("{} made smaller, {evaluations} evaluations at most", plan.test(*test).name)
+        }
     };
     let search = match plan.campaign.coverage.as_ref().and_then(|goal| goal.stop_at) {
         Some(share) => format!("{search} at most, until {} % of the cells are covered", number::number(100.0 * share)),
