@@ -17,6 +17,7 @@ mod repetition;
 mod replay;
 mod scatter;
 mod show;
+mod shrinking;
 mod summary;
 mod table;
 mod text;
@@ -34,6 +35,7 @@ pub use replay::{Replay, replay_text};
 pub use show::{
     ChoiceReport, ListedTest, MetricReport, OperationReport, TestList, TestReport, VerdictReport, list, show,
 };
+pub use shrinking::{ShrinkStep, Shrinking, TestSize};
 pub use summary::{
     Counts, ExpectationSummary, Failure, FrontTest, Objective, RequirementSummary, Spread, Summary, Worst, summary,
 };

@@ -12,6 +12,7 @@ use crate::report::markup::{Markup, coordinate, fill};
 use crate::report::number::{self, plural, with_unit};
 use crate::report::scatter::{Detail, Dimension, Kind, Point, scatter};
 use crate::report::show::{TestReport, report_on};
+use crate::report::shrinking::{self, Shrinking};
 use crate::report::summary::{Objective, RequirementSummary, Summary, summarise, value_text};
 use crate::report::text::{
     came_out, choices_text, counts_sentence, effect_text, expectation_value, headline, objective_columns,
@@ -58,6 +59,9 @@ fn page_in(repository: &Repository, folder: &Path) -> Result<String, RecordError
         cells::coverage(&mut body, coverage);
     }
     repetition(&mut body, &summary);
+    if let Some(shrinking) = &summary.shrinking {
+        shrinking::section(&mut body, shrinking, &drawn);
+    }
     expectations(&mut body, &summary, &drawn);
     failures(&mut body, &summary, &drawn);
     for group in groups.iter().filter(|group| !group.tests.is_empty()) {
@@ -114,7 +118,11 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
     } else {
         "Outlined: planned; filled: active. Red: outside the bound of a requirement.".to_owned()
     };
+    let shrunk = summary.shrinking.as_ref().map_or_else(Vec::new, Shrinking::ends);
+    more.retain(|number| !shrunk.contains(number));
+    let shrunk_caption = "The test that was made smaller, and what became of it.".to_owned();
     vec![
+        Group { title: "Before and after", caption: shrunk_caption, tests: shrunk },
         Group { title: "Undisturbed", caption: "The reference run, for comparison.".to_owned(), tests: reference },
         Group { title: "Tests on the front", caption: front_caption, tests: front },
         Group {
@@ -595,7 +603,7 @@ fn row(body: &mut Markup, name: &str, cells: &[String]) {
 }
 
 /// A heading per column; those of columns of numbers stand to the right, as the numbers do.
-fn heading_row(body: &mut Markup, titles: &[&str], numbers: std::ops::Range<usize>) {
+pub(super) fn heading_row(body: &mut Markup, titles: &[&str], numbers: std::ops::Range<usize>) {
     body.open("thead", &[]);
     body.open("tr", &[]);
     for (column, title) in titles.iter().enumerate() {
@@ -606,7 +614,7 @@ fn heading_row(body: &mut Markup, titles: &[&str], numbers: std::ops::Range<usiz
     body.close();
 }
 
-fn test_link(body: &mut Markup, test: &str, drawn: &[u32]) {
+pub(super) fn test_link(body: &mut Markup, test: &str, drawn: &[u32]) {
     if drawn.iter().any(|number| format!("T{number}") == test) {
         let link = format!("#{test}");
         body.element("a", &[("href", &link)], test);

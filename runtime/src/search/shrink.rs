@@ -23,9 +23,7 @@ use crate::search::{Candidate, Evaluated, Strategy};
 use space::Space;
 use walk::{Answers, Arrived, Asked, walk};
 
-pub use space::RESOLUTION;
-#[cfg(feature = "report")]
-pub(crate) use space::mild_end;
+pub use space::{RESOLUTION, strength};
 
 /// What a test is tried for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -136,10 +134,13 @@ impl Shrink {
         &self.tried
     }
 
-    /// Positions among those tried of the tests that were gone to, the smallest last. Empty as long as the search goes on,
-    /// and where the test that was given does not fail.
-    pub fn kept(&self) -> &[usize] {
-        self.arrived.as_ref().map_or(&[], |arrived| &arrived.kept)
+    /// Positions among those tried of the tests that were gone to so far, the smallest last. Empty where the test that was
+    /// given does not fail, and as long as that is not known.
+    pub fn kept(&self) -> Vec<usize> {
+        let arrived = self.arrived.clone();
+        // With nothing more to be run the walk goes as far as what is known leads.
+        let arrived = arrived.or_else(|| walk(&self.space, &self.test, self, true).ok());
+        arrived.map_or_else(Vec::new, |arrived| arrived.kept)
     }
 
     /// Whether nothing of the smallest test can be made smaller by one step alone: all of that was run.

@@ -2,7 +2,8 @@
 
 use sesame_plan::condition::{Condition, ConditionEnd, ConditionSpace};
 use sesame_plan::{
-    Activation, ActivationMode, CampaignPlan, OperationId, OperationKind, Shape, TestOperation, ValueMode,
+    Activation, ActivationMode, CampaignPlan, Choice, Domain, OperationId, OperationKind, Shape, Test, TestOperation,
+    ValueMode,
 };
 
 use crate::search::choice::PermittedChoice;
@@ -182,7 +183,7 @@ fn parts_left_out(condition: &Condition) -> Vec<Condition> {
 /// | duplicate | one copy |
 /// | custom | 0, as far as anybody can know |
 /// | random absolute, stuck at | none: of a sub-range only a narrower one is milder |
-pub(crate) fn mild_end(kind: &OperationKind, parameter: &str) -> Option<f64> {
+fn mild_end(kind: &OperationKind, parameter: &str) -> Option<f64> {
     match kind {
         OperationKind::RandomValue { mode: ValueMode::Absolute, .. }
         | OperationKind::StuckAt { .. }
@@ -205,4 +206,44 @@ pub(crate) fn mild_end(kind: &OperationKind, parameter: &str) -> Option<f64> {
         | OperationKind::Reorder { .. }
         | OperationKind::Custom { .. } => Some(0.0),
     }
+}
+
+/// How strong a test is: the sum over its operations, of which each counts from 0 to 1. An operation counts the mean, over
+/// its numbers, of how far each is from where it is mildest, as a share of how far it may be; of a sub-range the end counts
+/// that is farther away, and where no number is milder than another its width. One without such a number counts 1.
+pub fn strength(plan: &CampaignPlan, test: &Test) -> f64 {
+    test.operations.iter().map(|used| strength_of(plan, used)).sum()
+}
+
+fn strength_of(plan: &CampaignPlan, used: &TestOperation) -> f64 {
+    let operation = plan.operation(used.operation);
+    let mut shares = Vec::new();
+    for (parameter, choice) in operation.parameters.iter().zip(&used.parameters) {
+        let end = mild_end(&operation.kind, &parameter.name);
+        let mut add = |(low, high): (f64, f64), (from, to): (f64, f64), shape| {
+            let share = match end.map(|end| end.clamp(low, high)) {
+                Some(end) => (from - end).abs().max((to - end).abs()) / (high - end).max(end - low),
+                None if shape == Shape::Range => (to - from) / (high - low),
+                None => return,
+            };
+            if low < high {
+                shares.push(share);
+            }
+        };
+        match (&parameter.domain, choice) {
+            (&Domain::Number { low, high, shape, .. }, &Choice::Value { value }) => {
+                add((low, high), (value, value), shape);
+            }
+            (&Domain::Number { low, high, shape, .. }, &Choice::Range { low: from, high: to }) => {
+                add((low, high), (from, to), shape);
+            }
+            (Domain::Point { low, high }, Choice::Point { point }) => {
+                for axis in 0..3 {
+                    add((low[axis], high[axis]), (point[axis], point[axis]), Shape::Value);
+                }
+            }
+            _ => {}
+        }
+    }
+    if shares.is_empty() { 1.0 } else { shares.iter().sum::<f64>() / shares.len() as f64 }
 }

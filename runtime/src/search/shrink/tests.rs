@@ -150,6 +150,7 @@ proptest! {
             prop_assert_eq!(broken_rule(&plan, &with_all_times(tried.test.clone())), None);
         }
         prop_assert_eq!(grown(&original, found), None);
+        prop_assert!(strength(&plan, found) <= strength(&plan, &original) + 1e-9);
         prop_assert!(found.operations.len() <= original.operations.len());
     }
 
