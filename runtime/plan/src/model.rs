@@ -835,10 +835,10 @@ impl Search {
             Search::Nsga2 { evaluations, .. }
             | Search::MapElites { evaluations, .. }
             | Search::Random { evaluations }
-            | Search::LatinHypercube { evaluations } => *evaluations,
+            | Search::LatinHypercube { evaluations }
+            | Search::Shrink { evaluations, .. } => *evaluations,
             Search::Repeat { times, .. } => *times,
             Search::Known { tests } => u32::try_from(tests.len()).unwrap_or(u32::MAX),
-            Search::Shrink { evaluations, .. } => *evaluations,
         }
     }
 }

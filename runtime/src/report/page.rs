@@ -10,6 +10,7 @@ use crate::record::{MetricValue, Origin, RecordError, Repository, TestRow, Verdi
 use crate::report::cells;
 use crate::report::markup::{Markup, coordinate, fill};
 use crate::report::number::{self, plural, with_unit};
+use crate::report::regions;
 use crate::report::scatter::{Detail, Dimension, Kind, Point, scatter};
 use crate::report::show::{TestReport, report_on};
 use crate::report::shrinking::{self, Shrinking};
@@ -58,6 +59,7 @@ fn page_in(repository: &Repository, folder: &Path) -> Result<String, RecordError
     if let Some(coverage) = &summary.coverage {
         cells::coverage(&mut body, coverage);
     }
+    regions::section(&mut body, repository)?;
     repetition(&mut body, &summary);
     if let Some(shrinking) = &summary.shrinking {
         shrinking::section(&mut body, shrinking, &drawn);

@@ -321,7 +321,9 @@ pub(crate) fn text(text: &mut String, shrinking: &Shrinking, options: TextOption
         let words = ["", "test", "which"];
         let column = |title: &String| if words.contains(&title.as_str()) { left(title) } else { right(title) };
         let mut table = Table::new(titles.iter().map(column));
-        rows.into_iter().for_each(|row| table.row(row));
+        for row in rows {
+            table.row(row);
+        }
         text.push_str(&table.render(options));
     }
     paragraph(text, &format!("{}.", shrinking.sentence()), options);

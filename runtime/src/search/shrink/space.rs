@@ -156,10 +156,13 @@ impl Space {
     }
 }
 
+/// What makes one condition of two: `and` or `or`.
+type Join = fn(Box<Condition>, Box<Condition>) -> Condition;
+
 /// A condition with one `and` or `or` in it replaced by one of its sides, in each way; those that leave out most come
 /// first.
 fn parts_left_out(condition: &Condition) -> Vec<Condition> {
-    let (a, b, join): (_, _, fn(Box<Condition>, Box<Condition>) -> Condition) = match condition {
+    let (a, b, join): (_, _, Join) = match condition {
         Condition::Compare { .. } => return Vec::new(),
         Condition::And(a, b) => (a, b, Condition::And),
         Condition::Or(a, b) => (a, b, Condition::Or),

@@ -50,7 +50,7 @@ struct Walk<'a, A> {
 /// Walks as far as what is known leads.
 pub(super) fn walk<A: Answers>(space: &Space, original: &Test, answers: &A, exhausted: bool) -> Result<Arrived, Asked> {
     let mut walk = Walk { space, answers, exhausted, guessed: false, test: original.clone(), kept: Vec::new() };
-    let found = walk.failing(Phase::Original, &[original.clone()])?;
+    let found = walk.failing(Phase::Original, std::slice::from_ref(original))?;
     if let Some(index) = found[0] {
         walk.kept.push(index);
         walk.all_the_way()?;
