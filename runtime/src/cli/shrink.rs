@@ -145,3 +145,59 @@ fn shrinking(plan: &mut CampaignPlan, name: &str, record: &TestRecord, failing: 
     plan.campaign.objectives.clear();
     plan.campaign.coverage = None;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::recorded::same_model;
+    use super::*;
+    use crate::record::sample;
+
+    fn found(name: &str, wanted: &[&str]) -> Result<Failing, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let repository = sample::campaign(folder.path(), &sample::plan(), 60);
+        let record = repository.test(repository.find(name).unwrap()).unwrap();
+        let wanted: Vec<String> = wanted.iter().map(|&name| name.to_owned()).collect();
+        failing(&repository, &record, &wanted).map_err(|Failure(words)| words)
+    }
+
+    #[test]
+    fn a_test_is_kept_to_what_it_did_and_the_undisturbed_run_did_not() {
+        let violation = |requirements: &[u32]| {
+            Ok(Failing::Violation { requirements: requirements.iter().copied().map(RequirementId).collect() })
+        };
+        assert_eq!(found("T23", &[]), Ok(Failing::Crash));
+        assert_eq!(found("T31", &[]), Ok(Failing::Timeout));
+        assert_eq!(found("known_jitter", &[]), violation(&[0]));
+        assert_eq!(found("known_jitter", &["R1"]), violation(&[0]));
+        assert_eq!(found("known_jitter", &["R3"]), Err("T1 does not violate `R3`; it violates R1".to_owned()));
+        assert!(found("reference", &[]).unwrap_err().starts_with("T0 disturbs nothing"));
+        let folder = tempfile::tempdir().unwrap();
+        let mut plan = sample::plan();
+        plan.requirements[0].bound = sesame_plan::Bound::Below { value: 0.0 };
+        let repository = sample::campaign(folder.path(), &plan, 20);
+        let record = repository.test(1).unwrap();
+        let Err(Failure(words)) = failing(&repository, &record, &["R1".to_owned()]) else { panic!("it is refused") };
+        assert!(words.starts_with("the undisturbed run violates R1 too"), "{words}");
+    }
+
+    #[test]
+    fn what_is_made_smaller_leaves_the_model_as_it_is() {
+        let plan = sample::plan();
+        let record = sample::record(&plan, 9, Origin::Search, plan.tests[0].test.clone());
+        let options = Options {
+            test: "T9".to_owned(),
+            results: None,
+            into: None,
+            requirement: Vec::new(),
+            runs: 3,
+            evaluations: 50,
+            work: Work::default(),
+            ending: Ending::default(),
+        };
+        let mut changed = plan.clone();
+        shrinking(&mut changed, "T9", &record, Failing::Crash, &options);
+        assert!(same_model(&changed, &plan), "so that `resume` goes on with it");
+        assert_eq!(changed.campaign.search.evaluations(), 50);
+        assert_eq!(changed.tests[1].test, record.test);
+    }
+}

@@ -415,3 +415,91 @@ fn table(body: &mut Markup, titles: &[String], numbers: std::ops::Range<usize>, 
     body.close();
     body.close();
 }
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::{KnownTest, KnownTestId};
+
+    use super::*;
+    use crate::record::{Origin, Recorder, TestRecord, sample};
+    use crate::report::{page, summary, summary_text};
+
+    /// A test of the sample campaign made smaller, as far as so many runs.
+    fn recorded(most: usize) -> (tempfile::TempDir, Repository) {
+        let mut plan = sample::plan();
+        let found = sample::records(&plan, 60);
+        let fails_r1 = |record: &TestRecord| record.observation.metrics.first().and_then(|it| it.value) > Some(0.0);
+        let found = found.iter().find(|record| record.number > 20 && fails_r1(record)).unwrap();
+        assert!(found.test.operations.len() > 1);
+        let test = KnownTestId(u32::try_from(plan.tests.len()).unwrap());
+        let (name, doc) = (format!("T{}", found.number), String::new());
+        plan.tests.push(KnownTest { name, doc, test: found.test.clone(), expectations: Vec::new() });
+        let failing = Failing::Violation { requirements: vec![RequirementId(0)] };
+        plan.campaign.search =
+            Search::Shrink { test, failing: failing.clone(), simulator_seed: 9, runs: 1, evaluations: 200 };
+        plan.campaign.objectives.clear();
+        let folder = tempfile::tempdir().unwrap();
+        let mut recorder = Recorder::create(folder.path(), &plan, 42, 1).unwrap();
+        recorder.commit(&sample::record(&plan, 0, Origin::Reference, Test::default())).unwrap();
+        let mut search = Shrink::of(&plan).unwrap();
+        let mut number = 0;
+        loop {
+            let asked = search.ask();
+            let mut told = Vec::new();
+            for (place, candidate) in asked.iter().enumerate() {
+                number += 1;
+                let observation = sample::observe(&plan, &candidate.test, 9);
+                let record = sample::record(&plan, number, Origin::Search, candidate.test.clone());
+                let record = TestRecord { parents: candidate.parents.clone(), observation, ..record };
+                let value = |id: MetricId| {
+                    let shown = &record.observation.metrics[id.index()];
+                    MetricValue { value: shown.value, set: shown.set }
+                };
+                if fails(&plan, &failing, &record.observation.outcome, value) {
+                    search.note_failure(place);
+                }
+                recorder.commit(&record).unwrap();
+                let (test, fitness) = (candidate.test.clone(), Fitness::Measured(Vec::new()));
+                told.push(Evaluated { number, test, fitness, point: None, course: None });
+                if number as usize == most {
+                    return (folder, recorder.finish("stopped").unwrap());
+                }
+            }
+            if asked.is_empty() {
+                return (folder, recorder.finish(&search.ended().unwrap()).unwrap());
+            }
+            search.tell(&told);
+        }
+    }
+
+    #[test]
+    fn what_became_of_a_test_is_told_with_the_way_there() {
+        let (_folder, repository) = recorded(usize::MAX);
+        let summary = summary(&repository).unwrap();
+        let shrinking = summary.shrinking.as_ref().unwrap();
+        let (before, after) = (shrinking.before.as_ref().unwrap(), shrinking.after.as_ref().unwrap());
+        assert!(shrinking.minimal && after.operations < before.operations && after.active_time < before.active_time);
+        assert!(after.strength < before.strength && after.values[0].value > Some(0.0));
+        assert_eq!(shrinking.steps.iter().filter(|step| step.kept).last().unwrap().test, after.test);
+        insta::assert_snapshot!("shrinking", summary_text(&summary, TextOptions { width: Some(110), colour: false }));
+        let html = page(&repository).unwrap();
+        assert!(html.contains("made smaller") && html.contains("Every test that was tried"));
+        for end in shrinking.ends() {
+            assert!(html.contains(&format!("id=\"T{end}\"")), "T{end} has a timeline");
+        }
+    }
+
+    #[test]
+    fn an_unfinished_way_is_told_as_far_as_it_went() {
+        let (_folder, whole) = recorded(usize::MAX);
+        let whole = summary(&whole).unwrap().shrinking.unwrap();
+        for most in 1..=whole.steps.len() {
+            let (_folder, repository) = recorded(most);
+            let part = summary(&repository).unwrap().shrinking.unwrap();
+            let steps = part.steps.iter().map(|step| (&step.test, &step.change, step.failed));
+            let expected = whole.steps.iter().map(|step| (&step.test, &step.change, step.failed));
+            assert!(part.steps.len() <= most && steps.eq(expected.take(part.steps.len())));
+            assert!(part.after.is_none_or(|after| after.number as usize <= most));
+        }
+    }
+}
