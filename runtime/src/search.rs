@@ -70,7 +70,7 @@ pub use vary::TestVariation;
 /// How tests are found, by ask and tell.
 ///
 /// The caller alternates: it asks for a generation, evaluates all of it in whatever order, and tells the results in the
-/// order asked. The tests of all generations together are exactly [`Search::evaluations`].
+/// order asked. The tests of all generations together are exactly [`Search::evaluations`]; of [`Shrink`], at most.
 pub trait Strategy: Send {
     /// The next generation of tests; empty when the search is over.
     fn ask(&mut self) -> Vec<Candidate>;
