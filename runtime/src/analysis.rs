@@ -4,6 +4,7 @@
 //! once from beginning to end, and gives a [`Dataset`], which prints as a table, as CSV and as JSON.
 
 mod dataset;
+pub mod regions;
 #[cfg(test)]
 mod tests;
 
@@ -82,6 +83,7 @@ fn search_word(search: &Search) -> &'static str {
         Search::Random { .. } => "random",
         Search::Repeat { .. } => "repeat",
         Search::Known { .. } => "known tests",
+        Search::Shrink { .. } => "shrink",
     }
 }
 

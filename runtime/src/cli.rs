@@ -13,6 +13,7 @@ mod replay;
 mod replay_recording;
 mod report_anew;
 mod run;
+mod shrink;
 mod work;
 
 use std::io::Write as _;
@@ -63,6 +64,8 @@ enum Command {
     Confirm(confirm::Options),
     /// Run a recorded test again just as it was and say whether it is the same, bit for bit
     Replay(replay::Options),
+    /// Make a failing test smaller for as long as it fails as it did: fewer operations, shorter, milder
+    Shrink(shrink::Options),
     /// Feed a recording to the campaign's metrics, without a simulator
     ReplayRecording(replay_recording::Options),
     /// Print a recorded test as a `test` block for the `.sesame` file
@@ -160,6 +163,7 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
         Some(Command::Repeat(options)) => repeat::repeat(runner, &plan, &results, &options),
         Some(Command::Confirm(options)) => confirm::confirm(runner, &plan, &results, &options),
         Some(Command::Replay(options)) => replay::replay(runner, &plan, &results, &options),
+        Some(Command::Shrink(options)) => shrink::shrink(runner, &plan, &results, &options),
         Some(Command::ReplayRecording(options)) => replay_recording::replay_recording(runner, &plan, &options),
         Some(Command::Export(options)) => export::export(&results, &options),
         Some(Command::Report(options)) => report_anew::report_anew(&results, &options),

@@ -38,7 +38,7 @@ pub use scan::{ScannedOperation, ScannedTest};
 pub use schema::SCHEMA;
 #[cfg(feature = "report")]
 pub(crate) use verdict::ends;
-pub use verdict::{Verdict, verdict, violation_spans};
+pub use verdict::{Verdict, fails, verdict, violation_spans};
 
 /// One test with everything that is known of it.
 #[derive(Debug, Clone, PartialEq)]

@@ -11,13 +11,15 @@ mod coverage;
 mod export;
 mod junit;
 mod markup;
-mod number;
+pub(crate) mod number;
 mod page;
 mod recording;
+mod regions;
 mod repetition;
 mod replay;
 mod scatter;
 mod show;
+mod shrinking;
 mod summary;
 mod table;
 mod text;
@@ -30,13 +32,16 @@ pub use coverage::CoverageSummary;
 pub(crate) use export::is_name;
 pub use export::{ExportError, Exported, export};
 pub use junit::{junit, write_junit};
+pub(crate) use markup::{Markup, percent};
 pub use page::{page, write_page};
 pub use recording::{FedMetric, RecordingReplay, Sameness, recording_text};
+pub(crate) use repetition::wilson;
 pub use repetition::{Repetition, ViolationRate};
 pub use replay::{Replay, replay_text};
 pub use show::{
     ChoiceReport, ListedTest, MetricReport, OperationReport, TestList, TestReport, VerdictReport, list, show,
 };
+pub use shrinking::{ShrinkStep, Shrinking, TestSize};
 pub use summary::{
     Counts, ExpectationSummary, Failure, FrontTest, Objective, RequirementSummary, Spread, Summary, Worst, summary,
 };

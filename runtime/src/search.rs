@@ -36,6 +36,7 @@ mod map_elites;
 mod predict;
 mod random;
 mod repeat;
+pub mod shrink;
 
 #[cfg(test)]
 mod explored;
@@ -66,13 +67,14 @@ pub use permitted::{Permitted, SearchError};
 pub use predict::Course;
 pub use random::Random;
 pub use repeat::Repeat;
+pub use shrink::Shrink;
 pub use stop::StopRules;
 pub use vary::TestVariation;
 
 /// How tests are found, by ask and tell.
 ///
 /// The caller alternates: it asks for a generation, evaluates all of it in whatever order, and tells the results in the
-/// order asked. The tests of all generations together are exactly [`Search::evaluations`].
+/// order asked. The tests of all generations together are exactly [`Search::evaluations`]; of [`Shrink`], at most.
 pub trait Strategy: Send {
     /// The next generation of tests; empty when the search is over.
     fn ask(&mut self) -> Vec<Candidate>;
@@ -82,6 +84,20 @@ pub trait Strategy: Send {
 
     /// Takes how the condition variables went in the undisturbed run, before the first generation is asked.
     fn reference(&mut self, _: Course) {}
+
+    /// The simulator's seed for the candidate at this place of the generation asked last; `None` for the campaign's own.
+    fn simulator_seed(&self, _place: usize) -> Option<u64> {
+        None
+    }
+
+    /// Takes note that the candidate at this place of the generation asked last failed as
+    /// [`Search::Shrink`] has it; before the generation is told.
+    fn note_failure(&mut self, _place: usize) {}
+
+    /// Why the search is over, where there is more to say than that all tests were evaluated.
+    fn ended(&self) -> Option<String> {
+        None
+    }
 }
 
 /// A test to be evaluated.
@@ -171,6 +187,9 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
         &Search::Repeat { test, times } => Box::new(Repeat::new(plan.test(test).test.clone(), times)),
         Search::Known { tests } => {
             Box::new(Known::new(tests.iter().map(|&id| (id, plan.test(id).test.clone())).collect()))
+        }
+        &Search::Shrink { test, simulator_seed, runs, evaluations, failing: _ } => {
+            Box::new(Shrink::new(plan, plan.test(test).test.clone(), simulator_seed, runs, evaluations))
         }
     })
 }

@@ -146,7 +146,7 @@ impl Point {
 
 impl Intensity {
     /// The parameter as a share of what is permitted; `None` where nothing else is permitted.
-    fn normalised(&self, class: Class, convention: Convention) -> Option<f64> {
+    pub(crate) fn normalised(&self, class: Class, convention: Convention) -> Option<f64> {
         let ((low, high), (from, to)) = (self.permitted, self.chosen);
         let width = high - low;
         if width.is_nan() || width <= 0.0 {

@@ -64,7 +64,7 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
         }
         Search::Random { evaluations } => format!("random {{ evaluations {evaluations}  seed {seed} }}"),
         // Only a runner's command line makes one, and no `.sesame` text does.
-        Search::Known { .. } => return clauses,
+        Search::Known { .. } | Search::Shrink { .. } => return clauses,
         Search::Repeat { test, times } => {
             let test = &plan.tests[test.index()];
             // Only a campaign that observes has a test without operations.

@@ -18,6 +18,7 @@ mod optimisers;
 mod random_models;
 mod regeneration;
 mod search;
+mod shrink;
 mod stl;
 mod strategies;
 mod tampering;

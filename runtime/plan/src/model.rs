@@ -41,6 +41,10 @@ id!(
     /// A known test: position in [`CampaignPlan::tests`].
     KnownTestId
 );
+id!(
+    /// A requirement: position in [`CampaignPlan::requirements`].
+    RequirementId
+);
 
 /// Everything a runner knows of its campaign.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -91,6 +95,10 @@ impl CampaignPlan {
     /// The operation of an id.
     pub fn operation(&self, id: OperationId) -> &Operation {
         &self.operations[id.index()]
+    }
+    /// The requirement of an id.
+    pub fn requirement(&self, id: RequirementId) -> &Requirement {
+        &self.requirements[id.index()]
     }
     /// The known test of an id.
     pub fn test(&self, id: KnownTestId) -> &KnownTest {
@@ -609,6 +617,36 @@ pub enum Search {
         /// Which.
         tests: Vec<KnownTestId>,
     },
+    /// A test made smaller for as long as it fails as it did. No campaign of a `.sesame` file does this: the runner's
+    /// `shrink` puts it in the campaign's place.
+    Shrink {
+        /// Which.
+        test: KnownTestId,
+        /// How it fails.
+        failing: Failing,
+        /// The simulator's seed with which it failed.
+        simulator_seed: u64,
+        /// In how many runs a smaller test has to fail, from 1; the first has the simulator's seed of the test, the others
+        /// seeds of their own.
+        runs: u32,
+        /// Runs at most.
+        evaluations: u32,
+    },
+}
+
+/// How a test fails that is made smaller.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Failing {
+    /// It violates each of these requirements; at least one.
+    Violation {
+        /// Which.
+        requirements: Vec<RequirementId>,
+    },
+    /// Its run crashes.
+    Crash,
+    /// Its run times out.
+    Timeout,
 }
 
 impl Search {
@@ -618,7 +656,8 @@ impl Search {
             Search::Nsga2 { evaluations, .. }
             | Search::MapElites { evaluations, .. }
             | Search::Random { evaluations }
-            | Search::LatinHypercube { evaluations } => *evaluations,
+            | Search::LatinHypercube { evaluations }
+            | Search::Shrink { evaluations, .. } => *evaluations,
             Search::Repeat { times, .. } => *times,
             Search::Known { tests } => u32::try_from(tests.len()).unwrap_or(u32::MAX),
         }

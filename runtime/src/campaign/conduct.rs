@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use sesame_plan::{CampaignPlan, CoverageGoal, Recorded, Search, Test};
+use sesame_plan::{CampaignPlan, CoverageGoal, MetricId, Recorded, Search, Test};
 
 use super::again::{Again, LIKE_BEFORE};
 use super::pool::{Ended, Job, Pool, PoolError, PoolSettings};
@@ -163,6 +163,7 @@ pub fn conduct(
     }
     let total = plan.campaign.search.evaluations();
     let repeats = matches!(plan.campaign.search, Search::Repeat { .. });
+    let failing = if let Search::Shrink { failing, .. } = &plan.campaign.search { Some(failing) } else { None };
     let mut front = Front::default();
     let mut rules = StopRules::of(plan);
     let begun = Instant::now();
@@ -186,16 +187,20 @@ pub fn conduct(
         let candidates = strategy.ask();
         let Some(generation) = candidates.first().map(|candidate| candidate.generation) else { break };
         let mut planned = Vec::with_capacity(candidates.len());
-        for Candidate { test, parents, generation, known } in candidates {
+        let first = numbered + 1;
+        for (place, Candidate { test, parents, generation, known }) in candidates.into_iter().enumerate() {
             numbered += 1;
+            let own_seed = strategy.simulator_seed(place);
             planned.push(Planned {
                 number: numbered,
                 origin: known.map_or(Origin::Search, Origin::Known),
                 generation: known.is_none().then_some(generation),
                 parents,
-                duplicate_of: if repeats { None } else { earlier.same(&test, numbered) },
+                // Equal tests with seeds of their own are no duplicates.
+                duplicate_of: if repeats || own_seed.is_some() { None } else { earlier.same(&test, numbered) },
                 test,
-                simulator_seed: simulator_seed(settings.seed, if repeats { numbered } else { 0 }),
+                simulator_seed: own_seed
+                    .unwrap_or_else(|| simulator_seed(settings.seed, if repeats { numbered } else { 0 })),
             });
         }
         let mut told = Vec::with_capacity(planned.len());
@@ -207,6 +212,11 @@ pub fn conduct(
                 again.remember(record);
             }
             front.add(record.number, &fitness);
+            if let Some(failing) = failing
+                && record::fails(plan, failing, &record.observation.outcome, |id| value(&record.observation, id))
+            {
+                strategy.note_failure((record.number - first) as usize);
+            }
             let point = counted_point(plan, record);
             if let (Some(tracking), Some(point)) = (&mut tracking, &point) {
                 tracking.coverage.add(point);
@@ -277,6 +287,9 @@ pub fn conduct(
     if again.all_like_before() {
         let text = LIKE_BEFORE.to_owned();
         desk.recorder.put_event(&Event { kind: EventKind::Warning, test: None, text })?;
+    }
+    if let Some(why) = strategy.ended() {
+        stop = why;
     }
     let mut ended = None;
     let last = undisturbed(numbered + 1, settings.seed);
@@ -508,6 +521,12 @@ impl Desk<'_> {
         each(record);
         Ok(())
     }
+}
+
+/// The value of a metric in a run; unmeasured when the run reported none.
+fn value(observation: &Observation, id: MetricId) -> MetricValue {
+    let metric = observation.metrics.get(id.index());
+    metric.map_or_else(MetricValue::default, |metric| MetricValue { value: metric.value, set: metric.set })
 }
 
 /// What is wrong with a system before anything is fuzzed.

@@ -22,7 +22,7 @@ use crate::report::{self, Summary};
 use crate::runner::Runner;
 
 /// How tests are run.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub(super) struct Work {
     /// How many worker processes; by default one per processor
     #[arg(long, value_name = "N")]
@@ -33,7 +33,7 @@ pub(super) struct Work {
 }
 
 /// How a command says what was found.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub(super) struct Ending {
     /// How to show what was found; as JSON there is nothing else on standard output
     #[arg(long, value_enum, default_value_t)]

@@ -35,6 +35,8 @@ pub struct ScannedTest {
 pub struct ScannedOperation {
     /// Which.
     pub operation: OperationId,
+    /// When it was to be active; `None` where conditions switch it, and for one beside the run.
+    pub planned: Option<Span>,
     /// What was chosen for its parameters.
     pub choices: Vec<Choice>,
     /// When it was seen to be active.
@@ -103,6 +105,9 @@ impl<'s, T> Cursor<'s, T> {
     }
 }
 
+/// A row of `operations`: the operation's name, and when it was to be active.
+type PlannedRow = (String, Option<Span>);
+
 /// A row of `choices`: the position of its operation, and the choice; `None` where it is none.
 type ChoiceRow = (usize, Option<Choice>);
 
@@ -116,7 +121,7 @@ impl Repository {
         // One read transaction, so that a run writing meanwhile is seen at one point.
         let _transaction = self.connection.unchecked_transaction().map_err(failed)?;
 
-        let mut operations = prepare("SELECT test, operation FROM operations ORDER BY test, position")?;
+        let mut operations = prepare("SELECT test, operation, start_s, end_s FROM operations ORDER BY test, position")?;
         let mut choices = prepare(
             "SELECT test, operation, value, low, high, x, y, z, text FROM choices ORDER BY test, operation, position",
         )?;
@@ -128,7 +133,11 @@ impl Repository {
              FROM tests ORDER BY number",
         )?;
         let mut operations =
-            Cursor::over(operations.query([]).map_err(failed)?, |row| row.get::<_, String>(1)).map_err(failed)?;
+            Cursor::over(operations.query([]).map_err(failed)?, |row| -> rusqlite::Result<PlannedRow> {
+                let (start, end): (Option<f64>, Option<f64>) = (row.get(2)?, row.get(3)?);
+                Ok((row.get(1)?, start.zip(end).map(|(start, end)| Span { start, end })))
+            })
+            .map_err(failed)?;
         let mut choices = Cursor::over(choices.query([]).map_err(failed)?, |row| -> rusqlite::Result<ChoiceRow> {
             Ok((position(row, 1)?, choice(row, 2)?))
         })
@@ -164,11 +173,16 @@ impl Repository {
                 operations: Vec::new(),
                 values: values.of(number).map_err(failed)?,
             };
-            for name in operations.of(number).map_err(failed)? {
+            for (name, planned) in operations.of(number).map_err(failed)? {
                 let operation = *ids
                     .get(name.as_str())
                     .ok_or_else(|| damaged(format!("T{number} has an operation `{name}` that the plan lacks")))?;
-                test.operations.push(ScannedOperation { operation, choices: Vec::new(), intervals: Vec::new() });
+                test.operations.push(ScannedOperation {
+                    operation,
+                    planned,
+                    choices: Vec::new(),
+                    intervals: Vec::new(),
+                });
             }
             let stray = |what: &str| damaged(format!("T{number} has {what} without an operation"));
             for (at, choice) in choices.of(number).map_err(failed)? {
@@ -212,6 +226,10 @@ mod tests {
                 .enumerate()
                 .map(|(at, it)| ScannedOperation {
                     operation: it.operation,
+                    planned: match it.activation {
+                        sesame_plan::Activation::Time { start, end } => Some(Span { start, end }),
+                        _ => None,
+                    },
                     choices: it.parameters.clone(),
                     intervals: record.observation.operations.get(at).map_or(Vec::new(), |it| it.intervals.clone()),
                 })

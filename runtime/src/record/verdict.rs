@@ -1,7 +1,7 @@
 //! What a run says about a requirement: kept, violated, or unsaid.
 
 use serde::Serialize;
-use sesame_plan::{Bound, Span};
+use sesame_plan::{Bound, CampaignPlan, Failing, MetricId, Span};
 
 use crate::observation::Outcome;
 use crate::record::MetricValue;
@@ -40,6 +40,26 @@ pub fn verdict(bound: Bound, outcome: &Outcome, value: MetricValue) -> Verdict {
         Some(x) if bound.holds(x) && ended => Verdict::Kept,
         Some(x) if !bound.holds(x) && (ended || value.set) => Verdict::Violated,
         Some(_) | None => Verdict::Unsaid,
+    }
+}
+
+/// Whether a run failed in a given way. One in which nothing was disturbed did not, whatever it shows.
+pub fn fails(
+    plan: &CampaignPlan,
+    failing: &Failing,
+    outcome: &Outcome,
+    value: impl Fn(MetricId) -> MetricValue,
+) -> bool {
+    match failing {
+        Failing::Crash => matches!(outcome, Outcome::Crash { .. }),
+        Failing::Timeout => matches!(outcome, Outcome::Timeout { .. }),
+        Failing::Violation { requirements } => {
+            *outcome != Outcome::Void
+                && requirements.iter().all(|&id| {
+                    let requirement = plan.requirement(id);
+                    verdict(requirement.bound, outcome, value(requirement.metric)) == Verdict::Violated
+                })
+        }
     }
 }
 

@@ -46,13 +46,21 @@ pub fn export(repository: &Repository, test: &str, name: Option<&str>) -> Result
         return Err(ExportError::Undisturbed(record.number));
     }
     let plan = repository.plan();
-    let name = name.map_or_else(|| free_name(plan, record.number), str::to_owned);
-    let block = block(plan, repository.campaign().seed, &record, &name);
+    let name =
+        name.map_or_else(|| free_name(plan, &format!("{}_T{}", plan.campaign.name, record.number)), str::to_owned);
+    let doc = format!("T{} of `{}`, seed {}.", record.number, plan.campaign.name, repository.campaign().seed);
+    let block = block(plan, &doc, &record, &name);
     Ok(Exported { test: format!("T{}", record.number), name, block })
 }
 
-fn block(plan: &CampaignPlan, seed: u64, record: &TestRecord, name: &str) -> String {
-    let mut text = format!("/// T{} of `{}`, seed {seed}.\ntest {name} {{\n", record.number, plan.campaign.name);
+/// The block of a test that was made out of another one, `original`, in a campaign of this seed.
+pub(super) fn shrunk_block(plan: &CampaignPlan, seed: u64, record: &TestRecord, original: &str) -> String {
+    let name = free_name(plan, &format!("{}_{original}_shrunk", plan.campaign.name));
+    block(plan, &format!("{original} of `{}`, seed {seed}, made smaller.", plan.campaign.name), record, &name)
+}
+
+fn block(plan: &CampaignPlan, doc: &str, record: &TestRecord, name: &str) -> String {
+    let mut text = format!("/// {doc}\ntest {name} {{\n");
     for used in &record.test.operations {
         let operation = plan.operation(used.operation);
         let _ = write!(text, "  {}", operation.name);
@@ -134,8 +142,8 @@ fn value(record: &TestRecord, metric: MetricId) -> Option<f64> {
     record.observation.metrics.get(metric.index())?.value
 }
 
-/// A name for the block that nothing in the plan has.
-fn free_name(plan: &CampaignPlan, number: u32) -> String {
+/// A name for the block that nothing in the plan has: this one, or with a number behind it.
+fn free_name(plan: &CampaignPlan, name: &str) -> String {
     let names = [&plan.space, &plan.simulator.name, &plan.campaign.name];
     let mut taken: Vec<&str> = names.into_iter().map(String::as_str).collect();
     taken.extend(plan.messages.iter().map(|it| it.name.as_str()));
@@ -145,9 +153,9 @@ fn free_name(plan: &CampaignPlan, number: u32) -> String {
     taken.extend(plan.requirements.iter().map(|it| it.name.as_str()));
     taken.extend(plan.operations.iter().map(|it| it.name.as_str()));
     taken.extend(plan.tests.iter().map(|it| it.name.as_str()));
-    let name = format!("{}_T{number}", plan.campaign.name);
     let more = (2u32..).map(|n| format!("{name}_{n}"));
-    std::iter::once(name.clone()).chain(more).find(|name| !taken.contains(&name.as_str())).unwrap_or(name)
+    let names = std::iter::once(name.to_owned()).chain(more);
+    names.into_iter().find(|name| !taken.contains(&name.as_str())).unwrap_or_else(|| name.to_owned())
 }
 
 /// Whether a name can be that of a test; the words of the language are refused when the block is read.
@@ -182,7 +190,7 @@ mod tests {
     fn a_block_says_what_switches_an_operation() {
         let plan = sample::plan();
         let record = sample::record(&plan, 5, crate::record::Origin::Search, sample::conditional_test());
-        insta::assert_snapshot!(block(&plan, 42, &record, "by_condition"), @r"
+        insta::assert_snapshot!(block(&plan, "T5 of `coverage_experiment`, seed 42.", &record, "by_condition"), @r"
         /// T5 of `coverage_experiment`, seed 42.
         test by_condition {
           jitter_link0 offset [-0.1rad, 0.2rad] when arm_distance < 450mm and (1.5m/s < top_speed or arm_distance < 450mm) until 1.5m/s < top_speed seed 11
@@ -204,19 +212,19 @@ mod tests {
             draw_seed: 11,
         };
         let record = sample::record(&plan, 5, crate::record::Origin::Search, Test { operations: vec![used] });
-        let before = block(&plan, 42, &record, "spoilt");
+        let before = block(&plan, "T5 of `coverage_experiment`, seed 42.", &record, "spoilt");
         assert!(before.contains("\n  spoil way \"hot\" before start seed 11\n"), "{before}");
         plan.operations[4].kind = OperationKind::Custom { moment: Moment::AfterEnd };
-        let after = block(&plan, 42, &record, "spoilt");
+        let after = block(&plan, "T5 of `coverage_experiment`, seed 42.", &record, "spoilt");
         assert!(after.contains("\n  spoil way \"hot\" after end seed 11\n"), "{after}");
     }
 
     #[test]
     fn a_name_that_is_taken_is_not_given_again() {
         let mut plan = sample::plan();
-        assert_eq!(free_name(&plan, 9), "coverage_experiment_T9");
+        assert_eq!(free_name(&plan, "coverage_experiment_T9"), "coverage_experiment_T9");
         plan.tests[0].name = "coverage_experiment_T9".to_owned();
         plan.metrics[0].name = "coverage_experiment_T9_2".to_owned();
-        assert_eq!(free_name(&plan, 9), "coverage_experiment_T9_3");
+        assert_eq!(free_name(&plan, "coverage_experiment_T9"), "coverage_experiment_T9_3");
     }
 }

@@ -11,8 +11,10 @@ use crate::report::cells;
 use crate::report::confirmed::{confirmation_sentence, values_sentence};
 use crate::report::markup::{Markup, coordinate, fill};
 use crate::report::number::{self, plural, with_unit};
+use crate::report::regions;
 use crate::report::scatter::{Detail, Dimension, Kind, Point, scatter};
 use crate::report::show::{TestReport, report_on};
+use crate::report::shrinking::{self, Shrinking};
 use crate::report::summary::{Objective, RequirementSummary, Summary, summarise, value_text};
 use crate::report::text::{
     came_out, choices_text, confirmed_column, counts_sentence, effect_text, expectation_value, headline,
@@ -58,7 +60,11 @@ fn page_in(repository: &Repository, folder: &Path) -> Result<String, RecordError
     if let Some(coverage) = &summary.coverage {
         cells::coverage(&mut body, coverage);
     }
+    regions::section(&mut body, repository)?;
     repetition(&mut body, &summary);
+    if let Some(shrinking) = &summary.shrinking {
+        shrinking::section(&mut body, shrinking, &drawn);
+    }
     expectations(&mut body, &summary, &drawn);
     failures(&mut body, &summary, &drawn);
     for group in groups.iter().filter(|group| !group.tests.is_empty()) {
@@ -115,7 +121,11 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
     } else {
         "Outlined: planned; filled: active. Red: outside the bound of a requirement.".to_owned()
     };
+    let shrunk = summary.shrinking.as_ref().map_or_else(Vec::new, Shrinking::ends);
+    more.retain(|number| !shrunk.contains(number));
+    let shrunk_caption = "The test that was made smaller, and what became of it.".to_owned();
     vec![
+        Group { title: "Before and after", caption: shrunk_caption, tests: shrunk },
         Group { title: "Undisturbed", caption: "The reference run, for comparison.".to_owned(), tests: reference },
         Group { title: "Tests on the front", caption: front_caption, tests: front },
         Group {
@@ -159,6 +169,9 @@ fn header(body: &mut Markup, repository: &Repository, summary: &Summary) -> Resu
         Search::Random { evaluations } => format!("random, {evaluations} evaluations"),
         Search::Repeat { test, times } => format!("{} repeated {times} times", plan.test(*test).name),
         Search::Known { tests } => plural(tests.len(), "known test", "known tests"),
+        Search::Shrink { test, evaluations, .. } => {
+            format!("{} made smaller, {evaluations} evaluations at most", plan.test(*test).name)
+        }
     };
     let search = match plan.campaign.coverage.as_ref().and_then(|goal| goal.stop_at) {
         Some(share) => format!("{search} at most, until {} % of the cells are covered", number::number(100.0 * share)),
@@ -620,7 +633,7 @@ fn row(body: &mut Markup, name: &str, cells: &[String]) {
 }
 
 /// A heading per column; those of columns of numbers stand to the right, as the numbers do.
-fn heading_row(body: &mut Markup, titles: &[&str], numbers: std::ops::Range<usize>) {
+pub(super) fn heading_row(body: &mut Markup, titles: &[&str], numbers: std::ops::Range<usize>) {
     body.open("thead", &[]);
     body.open("tr", &[]);
     for (column, title) in titles.iter().enumerate() {
@@ -631,7 +644,7 @@ fn heading_row(body: &mut Markup, titles: &[&str], numbers: std::ops::Range<usiz
     body.close();
 }
 
-fn test_link(body: &mut Markup, test: &str, drawn: &[u32]) {
+pub(super) fn test_link(body: &mut Markup, test: &str, drawn: &[u32]) {
     if drawn.iter().any(|number| format!("T{number}") == test) {
         let link = format!("#{test}");
         body.element("a", &[("href", &link)], test);

@@ -9,6 +9,7 @@ use crate::report::confirmed::{ConfirmedTest, confirmed_tests};
 use crate::report::coverage::{CoverageSummary, coverage};
 use crate::report::number;
 use crate::report::repetition::{Repetition, repetition};
+use crate::report::shrinking::{Shrinking, shrinking};
 
 /// What a campaign found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -41,6 +42,9 @@ pub struct Summary {
     pub failures: Vec<Failure>,
     /// What repeating says, where the campaign repeats one test.
     pub repetition: Option<Repetition>,
+    /// How a test was made smaller, where the campaign does that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shrinking: Option<Shrinking>,
     /// How far each metric went, in the plan's order; what a campaign without objectives is about.
     pub spreads: Vec<Spread>,
     /// How much of the space was looked at, where the campaign counts it.
@@ -218,6 +222,7 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
             .collect(),
         expectations: expectations(plan, rows),
         repetition: repetition(plan, rows),
+        shrinking: shrinking(repository, rows)?,
         failures: rows.iter().filter_map(failure).collect(),
         spreads: spreads(plan, rows),
         coverage: coverage(repository)?,

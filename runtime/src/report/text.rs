@@ -12,14 +12,15 @@ use crate::report::coverage::coverage_sentence;
 use crate::report::number::{self, fixed, join_words, plural, with_unit};
 use crate::report::repetition::{Repetition, ViolationRate};
 use crate::report::show::{OperationReport, TestList, TestReport};
+use crate::report::shrinking;
 use crate::report::summary::{ExpectationSummary, Objective, Spread, Summary, value_text};
 use crate::report::table::{Align, Table, TextOptions, visible, wrap};
 
-fn left(title: &str) -> (String, Align) {
+pub(super) fn left(title: &str) -> (String, Align) {
     (title.to_owned(), Align::Left)
 }
 
-fn right(title: &str) -> (String, Align) {
+pub(super) fn right(title: &str) -> (String, Align) {
     (title.to_owned(), Align::Right)
 }
 
@@ -71,7 +72,10 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
             paragraph(&mut text, &values_sentence(confirmation), options);
         }
     }
-    if summary.objectives.is_empty() && !summary.spreads.is_empty() {
+    if let Some(shrinking) = &summary.shrinking {
+        shrinking::text(&mut text, shrinking, options);
+    }
+    if summary.objectives.is_empty() && !summary.spreads.is_empty() && summary.shrinking.is_none() {
         section(&mut text, "Values", &spreads(&summary.spreads), options);
     }
     if !summary.requirements.is_empty() {
@@ -142,14 +146,14 @@ pub(crate) fn counts_sentence(summary: &Summary) -> String {
     sentence
 }
 
-fn paragraph(text: &mut String, sentence: &str, options: TextOptions) {
+pub(super) fn paragraph(text: &mut String, sentence: &str, options: TextOptions) {
     for line in wrap(sentence, options.width.unwrap_or(usize::MAX)) {
         text.push_str(&line);
         text.push('\n');
     }
 }
 
-fn section(text: &mut String, title: &str, table: &Table, options: TextOptions) {
+pub(super) fn section(text: &mut String, title: &str, table: &Table, options: TextOptions) {
     text.push('\n');
     text.push_str(&options.heading(title));
     text.push('\n');

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use anyhow::{Context as _, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use sesame_plan::Dimension;
-use sesame_runtime::analysis::{self, Dataset, Selection};
+use sesame_runtime::analysis::{self, Dataset, Selection, regions};
 use sesame_runtime::coverage::Grid;
 use sesame_runtime::record::{DATABASE, Repository};
 use sesame_runtime::report::TextOptions;
@@ -50,6 +50,22 @@ pub(super) enum Results {
         /// Whose formulas: `original` for the original platform's numbers, `paper` for those of the paper's text.
         #[arg(long, value_enum, default_value_t)]
         compat: Compat,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// Where tests fail: rules over the reduced space and the operations, found by a small decision tree.
+    Regions {
+        #[command(flatten)]
+        input: Input,
+        /// Only this requirement, or `crash` or `timeout`; all in which tests fail if not said.
+        #[arg(long, value_name = "NAME")]
+        requirement: Option<String>,
+        /// How many questions a rule has at most.
+        #[arg(long, value_name = "N", default_value_t = regions::DEPTH, value_parser = clap::value_parser!(u32).range(1..=8))]
+        depth: u32,
+        /// Draw the tree of each into this folder, as `regions-NAME.svg`.
+        #[arg(long, value_name = "DIR")]
+        svg: Option<PathBuf>,
         #[command(flatten)]
         output: Output,
     },
@@ -159,6 +175,22 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
             let (repository, selection) = open(&input)?;
             let dimensions = if dims.is_empty() { Dimension::ALL.to_vec() } else { dims };
             print(&analysis::sspr(&repository, &selection, &dimensions, compat.convention())?, &output)
+        }
+        Results::Regions { input, requirement, depth, svg, output } => {
+            let (repository, selection) = open(&input)?;
+            let found = regions::regions(&repository, &selection, requirement.as_deref(), depth)?;
+            if found.is_empty() {
+                shell.warning("no test of these fails: it violates no requirement, crashes or times out");
+            }
+            if let Some(folder) = svg {
+                std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+                for of in &found {
+                    let file = folder.join(format!("regions-{}.svg", of.target));
+                    std::fs::write(&file, of.svg(repository.plan()))
+                        .with_context(|| format!("cannot write {}", file.display()))?;
+                }
+            }
+            print(&regions::table(&found), &output)
         }
         Results::Coverage { input, grid, dims, hits, cells, compat, output } => {
             let (repository, selection) = open(&input)?;

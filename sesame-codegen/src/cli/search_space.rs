@@ -31,6 +31,7 @@ pub(super) fn described(plan: &CampaignPlan) -> String {
         }
         Search::Repeat { times, .. } => u64::from(times),
         Search::Known { ref tests } => tests.len() as u64,
+        Search::Shrink { evaluations, .. } => u64::from(evaluations),
     };
     let runs = runs + REFERENCE_RUNS;
     let end = plan.campaign.end_after;

@@ -1,0 +1,203 @@
+//! `shrink`: a failing test made smaller, for as long as it fails as it did.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use sesame_plan::{CampaignPlan, Failing, KnownTest, KnownTestId, RequirementId, Search};
+
+use super::Failure;
+use super::recorded::{open, refuse_changed};
+use super::work::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled};
+use crate::observation::{Observation, Outcome};
+use crate::record::{MetricValue, Origin, Repository, TestRecord, Verdict, verdict};
+use crate::runner::Runner;
+
+/// Which test is made smaller, and how.
+#[derive(Debug, Args)]
+pub(super) struct Options {
+    /// The test, for example `T158`
+    test: String,
+    /// Folder of the run that recorded the test, for example `results/42`; by default the latest
+    #[arg(long, value_name = "DIR")]
+    results: Option<PathBuf>,
+    /// Folder in which the results get a folder of their own; by default beside the run that recorded the test
+    #[arg(long, value_name = "DIR")]
+    into: Option<PathBuf>,
+    /// Insist on this requirement only (may be given again); by default on each that the test violates, or that its run
+    /// crashes or times out if it did
+    #[arg(long, value_name = "NAME")]
+    requirement: Vec<String>,
+    /// In how many runs a smaller test has to fail: the first with the simulator's seed of the test, the others with
+    /// seeds of their own. More than one for a simulator that is noisy
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    runs: u32,
+    /// Runs of the simulator at most
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
+    evaluations: u32,
+    #[command(flatten)]
+    work: Work,
+    #[command(flatten)]
+    ending: Ending,
+}
+
+pub(super) fn shrink(
+    runner: &Runner,
+    plan: &CampaignPlan,
+    results: &Path,
+    options: &Options,
+) -> Result<ExitCode, Failure> {
+    if options.evaluations < options.runs {
+        return Err(Failure(format!(
+            "--evaluations {} is less than --runs {}: not even the test itself could be run that often",
+            options.evaluations, options.runs
+        )));
+    }
+    let repository = open(results, options.results.as_deref())?;
+    let record = repository.test(repository.find(&options.test)?)?;
+    let name = format!("T{}", record.number);
+    let failing = failing(&repository, &record, &options.requirement)?;
+    refuse_changed(&repository, plan, record.number)?;
+    let run = repository.path().parent().unwrap_or(results);
+    let into = options.into.as_deref().or(run.parent()).unwrap_or(run);
+    let seed = repository.campaign().seed;
+    let mut plan = repository.plan().clone();
+    shrinking(&mut plan, &name, &record, failing, options);
+    let files = claim_files(runner, &plan)?;
+    refuse_unfilled(runner, &plan, true)?;
+    let (recorder, folder) = begin(into, &format!("shrink-{name}"), &plan, seed, &options.work)?;
+    carry_out(&plan, recorder, &folder, seed, &options.work, &options.ending, files)
+}
+
+/// How a test failed, and with which requirements.
+fn failing(repository: &Repository, record: &TestRecord, wanted: &[String]) -> Result<Failing, Failure> {
+    let plan = repository.plan();
+    let test = format!("T{}", record.number);
+    if record.test.operations.is_empty() {
+        return Err(Failure(format!("{test} disturbs nothing, so there is nothing to make smaller")));
+    }
+    match record.observation.outcome {
+        Outcome::Crash { .. } if wanted.is_empty() => return Ok(Failing::Crash),
+        Outcome::Timeout { .. } if wanted.is_empty() => return Ok(Failing::Timeout),
+        _ => {}
+    }
+    let violated = violated(plan, &record.observation);
+    let named = |id: &RequirementId| plan.requirement(*id).name.as_str();
+    let names: Vec<&str> = violated.iter().map(named).collect();
+    if let Some(stranger) = wanted.iter().find(|wanted| !names.contains(&wanted.as_str())) {
+        return Err(Failure(format!(
+            "{test} does not violate `{stranger}`; it violates {}",
+            if names.is_empty() { "no requirement".to_owned() } else { names.join(", ") }
+        )));
+    }
+    if violated.is_empty() {
+        return Err(Failure(format!(
+            "{test} violates no requirement and its run came to its end, so there is nothing that a smaller test could \
+             keep; `list` shows which tests violate what"
+        )));
+    }
+    let chosen: Vec<RequirementId> =
+        violated.iter().copied().filter(|id| wanted.is_empty() || wanted.iter().any(|it| it == named(id))).collect();
+    // What needs no disturbance says nothing about one.
+    let undisturbed = match repository.tests()?.iter().find(|row| row.origin == Origin::Reference) {
+        Some(row) => self::violated(plan, &repository.test(row.number)?.observation),
+        None => Vec::new(),
+    };
+    let caused: Vec<RequirementId> = chosen.iter().copied().filter(|id| !undisturbed.contains(id)).collect();
+    if caused.is_empty() {
+        let names: Vec<&str> = chosen.iter().map(named).collect();
+        return Err(Failure(format!(
+            "the undisturbed run violates {} too, so {test} is not what makes it so",
+            names.join(", ")
+        )));
+    }
+    Ok(Failing::Violation { requirements: caused })
+}
+
+/// The requirements that a run violates.
+fn violated(plan: &CampaignPlan, observation: &Observation) -> Vec<RequirementId> {
+    let of = |requirement: &sesame_plan::Requirement| {
+        let value = observation.metrics.get(requirement.metric.index());
+        let value = value.map_or_else(MetricValue::default, |it| MetricValue { value: it.value, set: it.set });
+        verdict(requirement.bound, &observation.outcome, value)
+    };
+    let requirements = (0u32..).map(RequirementId).zip(&plan.requirements);
+    requirements.filter(|(_, requirement)| of(requirement) == Verdict::Violated).map(|(id, _)| id).collect()
+}
+
+/// Puts making a test smaller in the place of what the campaign does.
+fn shrinking(plan: &mut CampaignPlan, name: &str, record: &TestRecord, failing: Failing, options: &Options) {
+    plan.tests.push(KnownTest {
+        name: name.to_owned(),
+        doc: String::new(),
+        test: record.test.clone(),
+        expectations: Vec::new(),
+    });
+    let test = KnownTestId(u32::try_from(plan.tests.len() - 1).expect("a plan holds fewer than 2^32 tests"));
+    plan.campaign.search = Search::Shrink {
+        test,
+        failing,
+        simulator_seed: record.simulator_seed,
+        runs: options.runs,
+        evaluations: options.evaluations,
+    };
+    // Nothing is sought, so there is no front.
+    plan.campaign.objectives.clear();
+    plan.campaign.coverage = None;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::recorded::same_model;
+    use super::*;
+    use crate::record::sample;
+
+    fn found(name: &str, wanted: &[&str]) -> Result<Failing, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let repository = sample::campaign(folder.path(), &sample::plan(), 60);
+        let record = repository.test(repository.find(name).unwrap()).unwrap();
+        let wanted: Vec<String> = wanted.iter().map(|&name| name.to_owned()).collect();
+        failing(&repository, &record, &wanted).map_err(|Failure(words)| words)
+    }
+
+    #[test]
+    fn a_test_is_kept_to_what_it_did_and_the_undisturbed_run_did_not() {
+        let violation = |requirements: &[u32]| {
+            Ok(Failing::Violation { requirements: requirements.iter().copied().map(RequirementId).collect() })
+        };
+        assert_eq!(found("T23", &[]), Ok(Failing::Crash));
+        assert_eq!(found("T31", &[]), Ok(Failing::Timeout));
+        assert_eq!(found("known_jitter", &[]), violation(&[0]));
+        assert_eq!(found("known_jitter", &["R1"]), violation(&[0]));
+        assert_eq!(found("known_jitter", &["R3"]), Err("T1 does not violate `R3`; it violates R1".to_owned()));
+        assert!(found("reference", &[]).unwrap_err().starts_with("T0 disturbs nothing"));
+        let folder = tempfile::tempdir().unwrap();
+        let mut plan = sample::plan();
+        plan.requirements[0].bound = sesame_plan::Bound::Below { value: 0.0 };
+        let repository = sample::campaign(folder.path(), &plan, 20);
+        let record = repository.test(1).unwrap();
+        let Err(Failure(words)) = failing(&repository, &record, &["R1".to_owned()]) else { panic!("it is refused") };
+        assert!(words.starts_with("the undisturbed run violates R1 too"), "{words}");
+    }
+
+    #[test]
+    fn what_is_made_smaller_leaves_the_model_as_it_is() {
+        let plan = sample::plan();
+        let record = sample::record(&plan, 9, Origin::Search, plan.tests[0].test.clone());
+        let options = Options {
+            test: "T9".to_owned(),
+            results: None,
+            into: None,
+            requirement: Vec::new(),
+            runs: 3,
+            evaluations: 50,
+            work: Work::default(),
+            ending: Ending::default(),
+        };
+        let mut changed = plan.clone();
+        shrinking(&mut changed, "T9", &record, Failing::Crash, &options);
+        assert!(same_model(&changed, &plan), "so that `resume` goes on with it");
+        assert_eq!(changed.campaign.search.evaluations(), 50);
+        assert_eq!(changed.tests[1].test, record.test);
+    }
+}
