@@ -17,6 +17,7 @@ use crate::record::{
     ResultSet, Status, TestRecord, Verdict, differences, verdict,
 };
 use crate::rng::derive_seed;
+use crate::search::indicators::Indicators;
 use crate::search::{self, Candidate, Course, Evaluated, Front, SearchError, StopRules};
 use crate::sspr::{self, Point};
 
@@ -161,6 +162,7 @@ pub fn conduct(
     let repeats = matches!(plan.campaign.search, Search::Repeat { .. });
     let mut front = Front::default();
     let mut rules = StopRules::of(plan);
+    let mut indicators = Indicators::new(Some(&search::fitness(plan, &reference)));
     let begun = Instant::now();
     let mut earlier = Earlier::default();
     let mut numbered = 0;
@@ -188,6 +190,7 @@ pub fn conduct(
             let fitness = search::fitness(plan, &record.observation);
             done += 1;
             front.add(record.number, &fitness);
+            indicators.add(&record.observation.outcome, record.duplicate_of.is_some(), &fitness);
             let point = counted_point(plan, record);
             if let (Some(tracking), Some(point)) = (&mut tracking, &point) {
                 tracking.coverage.add(point);
@@ -211,6 +214,7 @@ pub fn conduct(
                 members: front.numbers(),
             })?;
         }
+        desk.recorder.put_indicators(&indicators.after(generation, &front), indicators.reference())?;
         if let Some(tracking) = &tracking {
             desk.recorder.put_coverage(&tracking.after(generation, done))?;
             if let Some(reached) = tracking.reached() {

@@ -9,6 +9,7 @@ use sesame_plan::*;
 use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
 use crate::record::{Event, EventKind, Origin, Recorder, Repository, ResultSet, Status, TestRecord};
 use crate::rng::Stream;
+use crate::search::{self, indicators::Indicators};
 
 fn metric(name: &str, unit: Option<&str>, direction: Direction, default: Option<f64>, source: MetricSource) -> Metric {
     Metric {
@@ -399,8 +400,18 @@ pub(crate) fn front(plan: &CampaignPlan, records: &[TestRecord]) -> Vec<u32> {
 pub(crate) fn campaign(folder: &Path, plan: &CampaignPlan, searched: u32) -> Repository {
     let mut recorder = Recorder::create(folder, plan, plan.campaign.seed, 2).unwrap();
     let records = records(plan, searched);
-    for record in &records {
+    let mut indicators = Indicators::new(Some(&search::fitness(plan, &records[0].observation)));
+    let mut front_so_far = search::Front::default();
+    recorder.commit(&records[0]).unwrap();
+    for (at, record) in records.iter().enumerate().skip(1) {
         recorder.commit(record).unwrap();
+        let fitness = search::fitness(plan, &record.observation);
+        indicators.add(&record.observation.outcome, record.duplicate_of.is_some(), &fitness);
+        front_so_far.add(record.number, &fitness);
+        let next = records.get(at + 1).map(|next| next.generation);
+        if let Some(generation) = record.generation.filter(|&it| next != Some(Some(it))) {
+            recorder.put_indicators(&indicators.after(generation, &front_so_far), indicators.reference()).unwrap();
+        }
     }
     let set =
         |name: &str, generation, status, members| ResultSet { name: String::from(name), generation, status, members };
