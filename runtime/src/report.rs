@@ -6,12 +6,15 @@
 
 mod axis;
 mod cells;
+mod chart;
 mod coverage;
 mod export;
+mod generations;
 mod junit;
 mod markup;
 mod number;
 mod page;
+mod published;
 mod recording;
 mod repetition;
 mod replay;

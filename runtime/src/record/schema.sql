@@ -174,7 +174,7 @@ CREATE TABLE indicators (
 ) STRICT;
 
 -- The point that hypervolumes are measured from: of each objective the worst value of the undisturbed run and of the tests
--- up to the first generation with a measured one, and a tenth of the range of these values beyond it. It never moves.
+-- up to the first generation with a measured one, and half of the range of these values beyond it. It never moves.
 CREATE TABLE reference_point (
     objective       INTEGER PRIMARY KEY, -- position among the campaign's objectives, from 0
     metric          INTEGER NOT NULL REFERENCES metrics,

@@ -1,5 +1,7 @@
 //! What a campaign found, at a glance.
 
+use std::collections::BTreeSet;
+
 use serde::Serialize;
 use sesame_plan::{Bound, CampaignPlan, Direction, MetricId, Requirement};
 
@@ -245,6 +247,7 @@ fn front(plan: &CampaignPlan, objectives: &[Objective], rows: &[TestRow], member
         let value = key.and_then(|objective| row.value(objective.id).value).unwrap_or(f64::NAN);
         if key.is_some_and(|objective| objective.direction == Some(Direction::Minimise)) { -value } else { value }
     };
+    let members: BTreeSet<u32> = members.iter().copied().collect();
     let mut sorted: Vec<&TestRow> = rows.iter().filter(|row| members.contains(&row.number)).collect();
     sorted.sort_by(|a, b| danger(b).total_cmp(&danger(a)).then(a.number.cmp(&b.number)));
     sorted

@@ -2,7 +2,7 @@
 //!
 //! While a campaign runs nobody knows how far its front will get, so hypervolumes are measured from a point that is fixed
 //! early and never moved: of each objective the worst value of the undisturbed run and of the tests up to and including
-//! the first generation with a measured one, and a tenth of the range of these values beyond it. Only finite values
+//! the first generation with a measured one, and half of the range of these values beyond it. Only finite values
 //! count. It follows from results alone, so a resumed campaign has the same one.
 
 use serde::Serialize;
@@ -11,9 +11,9 @@ use crate::observation::Outcome;
 use crate::search::hypervolume::hypervolume;
 use crate::search::{Fitness, Front};
 
-/// How far beyond the worst value the reference point lies, as a share of the range of values: enough that the ends of
-/// a front count.
-const MARGIN: f64 = 0.1;
+/// How far beyond the worst value the reference point lies, as a share of the range of values: far enough that a front
+/// counts which later spreads beyond the first tests, near enough that what is gained shows.
+const MARGIN: f64 = 0.5;
 
 /// What a search has come to after a generation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -111,7 +111,7 @@ pub fn volume(front: &Front, reference: &[f64]) -> Option<f64> {
     Some(hypervolume(&points, reference)).filter(|volume| volume.is_finite() && !reference.is_empty())
 }
 
-/// Of each objective the worst finite value, and a tenth of the range of all beyond it; `None` where an objective has no
+/// Of each objective the worst finite value, and half of the range of all beyond it; `None` where an objective has no
 /// finite value.
 pub fn reference_point<P: AsRef<[f64]>>(points: &[P]) -> Option<Vec<f64>> {
     let objectives = points.first()?.as_ref().len();
@@ -146,8 +146,8 @@ mod tests {
             }
         }
         let second = indicators.after(1, &front);
-        assert_eq!(indicators.reference(), Some(&[22.0, 0.5][..]));
-        assert_eq!((second.front, second.hypervolume), (2, Some(12.0 * 3.5 + 2.0 * 2.0)));
+        assert_eq!(indicators.reference(), Some(&[30.0, 2.5][..]));
+        assert_eq!((second.front, second.hypervolume), (2, Some(20.0 * 5.5 + 10.0 * 2.0)));
         // What is worse later moves nothing.
         indicators.add(&Outcome::Completed, true, &measured([100.0, 50.0]));
         let third = indicators.after(2, &front);

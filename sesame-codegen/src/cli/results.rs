@@ -258,7 +258,7 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
 fn measured_from(shell: Shell, reference: &[(String, f64)]) {
     if !reference.is_empty() {
         let point: Vec<String> = reference.iter().map(|(metric, value)| format!("{metric} {value}")).collect();
-        shell.note(&format!("hypervolumes are measured from {}", point.join(", ")));
+        shell.note(format!("hypervolumes are measured from {}", point.join(", ")));
     }
 }
 
