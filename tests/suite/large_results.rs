@@ -14,6 +14,7 @@ use sesame_plan::{Activation, CampaignPlan, Direction, Metric, MetricId, Span};
 use sesame_runtime::coverage::{Coverage, Grid};
 use sesame_runtime::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
 use sesame_runtime::record::{GenerationCoverage, Origin, Recorder, Repository, ResultSet, Status, TestRecord};
+use sesame_runtime::report;
 use sesame_runtime::rng::Stream;
 use sesame_runtime::search::indicators::Indicators;
 use sesame_runtime::search::initial::fresh_test;
@@ -119,13 +120,13 @@ fn record(plan: &CampaignPlan, permitted: &Permitted, number: u32) -> TestRecord
 }
 
 /// Records a campaign as a runner does, generation by generation.
-fn generate(folder: &Path, plan: &CampaignPlan) -> usize {
+fn generate(folder: &Path, plan: &CampaignPlan, tests: u32) -> usize {
     let permitted = Permitted::of(plan).unwrap();
     let goal = plan.campaign.coverage.as_ref().unwrap();
     let mut coverage = Coverage::new(Grid::new(goal.axes.clone()).unwrap(), goal.hits);
     let mut recorder = Recorder::create(folder, plan, 1, 1).unwrap();
     let (mut front, mut indicators) = (Front::default(), Indicators::new(None));
-    for number in 1..=TESTS {
+    for number in 1..=tests {
         let record = record(plan, &permitted, number);
         recorder.commit(&record).unwrap();
         let fitness = search::fitness(plan, &record.observation);
@@ -145,7 +146,7 @@ fn generate(folder: &Path, plan: &CampaignPlan) -> usize {
             let (covered, cells) = (coverage.covered(), coverage.grid().len());
             let after = GenerationCoverage { generation, evaluations: number, covered, cells, feasible: 96 };
             recorder.put_coverage(&after).unwrap();
-            if number == TESTS {
+            if number == tests {
                 recorder.put_result_set(&set("final".to_owned(), None, Status::Final)).unwrap();
             }
         }
@@ -202,7 +203,7 @@ fn each_analysis_of_100_000_tests_takes_less_than_five_seconds_and_500_mb() {
     for objectives in [2, 3] {
         let folder = root.join(objectives.to_string());
         let begun = Instant::now();
-        let front = generate(&folder, &plan(objectives));
+        let front = generate(&folder, &plan(objectives), TESTS);
         let file = fs::metadata(folder.join("results.sqlite")).unwrap().len() / 1_000_000;
         println!(
             "{objectives} objectives, {front} tests on the front: {file} MB, written in {:.0} s",
@@ -233,4 +234,19 @@ fn each_analysis_of_100_000_tests_takes_less_than_five_seconds_and_500_mb() {
         assert!(front > 200, "{front}: a small front would show little");
     }
     assert!(slow.is_empty(), "{slow:?}");
+}
+
+#[test]
+#[ignore = "long: 10,000 tests, twice"]
+fn the_page_of_10_000_tests_is_small() {
+    let root = fresh_folder("large_pages");
+    for objectives in [2, 3] {
+        let folder = root.join(objectives.to_string());
+        let front = generate(&folder, &plan(objectives), 10_000);
+        let begun = Instant::now();
+        let page = report::page(&Repository::open(&folder).unwrap()).unwrap();
+        let took = begun.elapsed().as_secs_f64();
+        println!("{objectives} objectives, {front} tests on the front: {} kB, in {took:.1} s", page.len() / 1000);
+        assert!(page.len() < 4_000_000, "{} bytes", page.len());
+    }
 }

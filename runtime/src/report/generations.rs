@@ -27,6 +27,8 @@ const FRONTS: usize = 100;
 const SHADES: usize = 5;
 /// Pairs of objectives for which fronts are drawn.
 const PAIRS: usize = 3;
+/// Dots drawn at most, over all pairs: of more evenly chosen ones.
+const DOTS: usize = 1500;
 
 /// Draws indicators and fronts by generation, of a search that has had two generations.
 pub(crate) fn generations(
@@ -212,7 +214,7 @@ fn fronts(
         if pairs.len() == 1 {
             lines(markup, &shown, &places, best, &across, &up);
         }
-        for (row, stay, (x, y)) in &places {
+        for (row, stay, (x, y)) in &evenly(&places, DOTS / pairs.len()) {
             let (cx, cy) = (percent(across.share(*x)), percent(1.0 - up.share(*y)));
             let class = format!("dot w{}", shade(stay.from, shown.len()));
             let (from, to) = (stay.from.to_string(), stay.to.to_string());
@@ -240,9 +242,9 @@ fn fronts(
         markup.close();
     }
     markup.close();
+    let some = if members.len() > DOTS / pairs.len() { "Some of the tests that were" } else { "Every test that was" };
     let chosen = if shown.len() == FRONTS { ", of evenly chosen generations" } else { "" };
-    let words =
-        format!("Every test that was on a front{chosen}: the bluer, the later it came. Click one to see it over time.");
+    let words = format!("{some} on a front{chosen}: the bluer, the later it came. Click one to see it over time.");
     markup.element("p", &[("class", "quiet")], &words);
     markup.close();
     Ok(())
