@@ -57,7 +57,7 @@ pub(crate) fn generations(
     markup.open("section", &[("id", "generations")]);
     markup.element("h2", &[], "By generation");
     fronts(markup, repository, summary, rows, drawn)?;
-    markup.open("div", &[("class", "charts")]);
+    markup.open("div", &[("class", "charts two")]);
     charts(markup, &analysis);
     markup.close();
     markup.element("p", &[("class", "quiet")], &caption(&analysis));
@@ -78,6 +78,8 @@ fn caption(analysis: &IndicatorAnalysis) -> String {
     text
 }
 
+const HYPERVOLUME: &str = "hypervolume";
+
 /// A line of a chart: its class, what it is called where there are several, and its value after each generation.
 type Line<'a> = (&'static str, &'static str, &'a dyn Fn(&Indicator) -> Option<f64>);
 
@@ -85,7 +87,7 @@ type Line<'a> = (&'static str, &'static str, &'a dyn Fn(&Indicator) -> Option<f6
 type DrawnLine = (&'static str, &'static str, Vec<(f64, f64)>);
 
 fn charts(markup: &mut Markup, analysis: &IndicatorAnalysis) {
-    chart(markup, analysis, "hypervolume", &[("line", "hypervolume", &|it| it.hypervolume)]);
+    chart(markup, analysis, HYPERVOLUME, &[("line", HYPERVOLUME, &|it| it.hypervolume)]);
     chart(markup, analysis, "IGD⁺ to the final front", &[("line", "IGD⁺", &|it| it.igd_plus)]);
     chart(markup, analysis, "tests on the front", &[("line", "on the front", &|it| Some(f64::from(it.front)))]);
     let share = |count: Option<u32>, it: &Indicator| {
@@ -118,8 +120,10 @@ fn chart(markup: &mut Markup, analysis: &IndicatorAnalysis, title: &str, lines: 
         return;
     }
     let across = Axis::exact(0.0, analysis.generations.last().map_or(1.0, place), 5);
+    // A hypervolume has no meaningful zero: it depends on where it is measured from.
+    let zero = (title != HYPERVOLUME).then_some(0.0);
     let heights = drawn.iter().flat_map(|(_, _, points)| points.iter().map(|point| point.1));
-    let up = Axis::round(heights.chain([0.0]), 4);
+    let up = Axis::round(heights.chain(zero), 4);
     markup.open("div", &[("class", "chart small")]);
     markup.open("p", &[("class", "axis-title")]);
     markup.text(title);
