@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// What an evolution does so that more cells are covered. It needs a campaign that counts its coverage.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Exploration {
     /// Coverage boosting (section 4.2.2 of the methodology's paper): some children are mutated again until they lie in a
