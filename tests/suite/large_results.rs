@@ -18,12 +18,12 @@ use sesame_runtime::report;
 use sesame_runtime::rng::Stream;
 use sesame_runtime::search::indicators::Indicators;
 use sesame_runtime::search::initial::fresh_test;
-use sesame_runtime::search::{self, Front, Permitted};
+use sesame_runtime::search::{self, Fitness, Front, Permitted};
 use sesame_runtime::sspr;
 use sesame_tests::{command, fresh_folder, optimised_sesamec};
 
 const TESTS: u32 = 100_000;
-const POPULATION: u32 = 100;
+const POPULATION: u32 = 250;
 /// What an analysis may take.
 const LONGEST: Duration = Duration::from_secs(5);
 const MOST_MEMORY_KB: u64 = 500_000;
@@ -46,7 +46,7 @@ operation lag    on command = latency [0ms, 500ms] uniform
 campaign all {
   objectives first
   operations jitter, lose, lag   1..5 per test
-  search     nsga2 { population 100  evaluations 100000  seed 1 }
+  search     nsga2 { population 250  evaluations 100000  seed 1 }
   coverage   { T1 [0, 1] cells 6   T2 [0, 0.5] cells 6   P1 [0, 1] cells 3   hits 1 }
   end        after 100s
 }
@@ -126,18 +126,23 @@ fn generate(folder: &Path, plan: &CampaignPlan, tests: u32) -> usize {
     let mut coverage = Coverage::new(Grid::new(goal.axes.clone()).unwrap(), goal.hits);
     let mut recorder = Recorder::create(folder, plan, 1, 1).unwrap();
     let (mut front, mut indicators) = (Front::default(), Indicators::new(None));
+    // Sorted out once for each generation, which is a hundred times as fast as test by test.
+    let mut standing: Vec<(u32, Fitness)> = Vec::new();
     for number in 1..=tests {
         let record = record(plan, &permitted, number);
         recorder.commit(&record).unwrap();
         let fitness = search::fitness(plan, &record.observation);
         indicators.add(&record.observation.outcome, false, &fitness);
-        front.add(number, &fitness);
+        standing.push((number, fitness));
         if let Some(point) = sspr::observed_point(plan, &record.test, &record.observation)
             && record.observation.outcome != Outcome::Void
         {
             coverage.add(&point);
         }
         if number % POPULATION == 0 {
+            front = Front::of(standing.iter().map(|(number, fitness)| (*number, fitness)));
+            let members = front.numbers();
+            standing.retain(|(number, _)| members.binary_search(number).is_ok());
             let generation = number / POPULATION - 1;
             let set = |name, generation, status| ResultSet { name, generation, status, members: front.numbers() };
             let name = format!("generation-{generation}");
@@ -223,7 +228,8 @@ fn each_analysis_of_100_000_tests_takes_less_than_five_seconds_and_500_mb() {
         for arguments in asked {
             let arguments = [arguments, &["--format", "csv"]].concat();
             let took = analysis(sesamec, &arguments);
-            let named = arguments[..arguments.len() - 3].join(" ");
+            let named: Vec<&str> = arguments.iter().copied().filter(|it| !it.contains('/')).collect();
+            let named = named[..named.len() - 2].join(" ");
             println!("{named:<28} {:>6.2} s {:>6} kB {:>7} lines", took.time.as_secs_f64(), took.memory, took.lines);
             assert!(took.lines > 1, "{named} said nothing");
             if took.time > LONGEST {
