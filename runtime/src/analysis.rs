@@ -3,7 +3,10 @@
 //! Any results file will do, whatever campaign wrote it and whether or not it is finished. Each analysis reads the file
 //! once from beginning to end, and gives a [`Dataset`], which prints as a table, as CSV and as JSON.
 
+mod compare;
 mod dataset;
+mod indicators;
+mod rank_sum;
 pub mod regions;
 #[cfg(test)]
 mod tests;
@@ -13,12 +16,17 @@ use std::collections::BTreeSet;
 use sesame_plan::{CampaignPlan, Dimension, GridAxis, MetricId, Search};
 
 use crate::coverage::{Coverage, CurvePoint, Feasible, Grid, curve};
-use crate::record::{Origin, RecordError, Repository, ScannedTest, confirmed_fitness};
+use crate::record::{Origin, RecordError, Repository, ScannedTest};
 use crate::report::confirmed_tests;
-use crate::search::{Front, fitness_of};
+use crate::search::dominance::lexicographic;
+use crate::search::front::FrontMember;
+use crate::search::{Front, in_unit};
 use crate::sspr::Convention;
 
+pub use compare::{CompareError, Comparison, Run, compare};
 pub use dataset::{Dataset, Datum};
+pub use indicators::{Indicator, IndicatorAnalysis, indicators};
+pub use rank_sum::{RankSum, rank_sum};
 
 /// Which tests are looked at.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -31,15 +39,15 @@ impl Selection {
     /// All tests, or those of the result set of this name.
     pub fn of(repository: &Repository, set: Option<&str>) -> Result<Selection, RecordError> {
         let Some(name) = set else { return Ok(Selection::default()) };
-        let sets = repository.result_sets()?;
-        match sets.iter().find(|set| set.name == name) {
-            Some(set) => Ok(Selection { tests: Some(set.members.iter().copied().collect()) }),
-            None => Err(RecordError::NoSuchSet {
-                name: name.to_owned(),
-                known: sets.into_iter().map(|set| set.name).collect(),
-                path: repository.path().to_owned(),
-            }),
+        let sets = repository.result_set_sizes()?;
+        if sets.iter().any(|(set, _)| set.name == name) {
+            return Ok(Selection { tests: Some(repository.members(name)?.into_iter().collect()) });
         }
+        Err(RecordError::NoSuchSet {
+            name: name.to_owned(),
+            known: sets.into_iter().map(|(set, _)| set.name).collect(),
+            path: repository.path().to_owned(),
+        })
     }
 
     fn holds(&self, number: u32) -> bool {
@@ -54,19 +62,17 @@ pub fn campaigns(repositories: &[Repository]) -> Result<Dataset, RecordError> {
     for repository in repositories {
         let facts = repository.campaign();
         let plan = &facts.plan;
-        let mut tests = 0;
-        repository.scan(&mut |test| tests += i64::from(test.origin != Origin::Reference))?;
-        let sets = repository.result_sets()?;
+        let sets = repository.result_set_sizes()?;
         let objectives: Vec<&str> = plan.campaign.objectives.iter().map(|&id| plan.metric(id).name.as_str()).collect();
-        let names: Vec<&str> = sets.iter().map(|set| set.name.as_str()).collect();
+        let names: Vec<&str> = sets.iter().map(|(set, _)| set.name.as_str()).collect();
         dataset.row([
             Datum::Text(repository.path().display().to_string()),
             Datum::Text(plan.space.clone()),
             Datum::Text(plan.campaign.name.clone()),
             Datum::Text(search_word(&plan.campaign.search).to_owned()),
             Datum::Text(facts.seed.to_string()),
-            Datum::Whole(tests),
-            sets.last().map_or(Datum::Missing, |set| Datum::count(set.members.len())),
+            Datum::count(repository.evaluated()?),
+            sets.last().map_or(Datum::Missing, |(_, size)| Datum::count(*size)),
             Datum::Text(objectives.join(" ")),
             Datum::Text(names.join(" ")),
             facts.stop.clone().map_or(Datum::Missing, Datum::Text),
@@ -136,26 +142,19 @@ fn operations(plan: &CampaignPlan, test: &ScannedTest) -> String {
 pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, RecordError> {
     let plan = repository.plan();
     let objectives = &plan.campaign.objectives;
-    let mut front = Front::default();
-    let mut measured = Vec::new();
-    let repetitions = repository.repetitions()?;
+    let judge = repository.judge()?;
+    let mut judged = Vec::new();
     repository.scan(&mut |test| {
-        if test.origin == Origin::Reference || !selection.holds(test.number) {
-            return;
-        }
-        // A duplicate is what its original is.
-        let runs = repetitions.get(&test.duplicate_of.unwrap_or(test.number));
-        let fitness = runs
-            .and_then(|runs| confirmed_fitness(plan, runs))
-            .unwrap_or_else(|| fitness_of(plan, &test.outcome, |id| test.value(id).value));
-        front.add(test.number, &fitness);
-        if let Some(values) = fitness.objectives() {
-            measured.push((test.number, values.to_vec()));
+        if test.origin != Origin::Reference && selection.holds(test.number) {
+            judged.push((test.number, judge.fitness(&test)));
         }
     })?;
     let names = objectives.iter().map(|&id| plan.metric(id).name.clone());
-    let confirmed =
-        if repetitions.is_empty() { Vec::new() } else { confirmed_tests(repository, &repository.tests()?, &[])? };
+    let confirmed = if judge.repetitions().is_empty() {
+        Vec::new()
+    } else {
+        confirmed_tests(repository, &repository.tests()?, &[])?
+    };
     let again: &[&str] = match confirmed.len() {
         0 => &[],
         _ => &["confirmed", "repetitions", "confirmed_low", "confirmed_high", "standing"],
@@ -166,14 +165,15 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, 
     if objectives.is_empty() {
         return Ok(dataset);
     }
-    for (number, oriented) in measured {
-        let Some(member) = front.members().iter().find(|member| member.objectives == oriented) else { continue };
-        let values = objectives.iter().zip(oriented).map(|(&id, value)| {
-            let sign = if plan.metric(id).direction == Some(sesame_plan::Direction::Maximise) { -1.0 } else { 1.0 };
-            Datum::real(Some(0.0 + sign * value))
-        });
-        let same = if member.number == number { Datum::Missing } else { name(member.number) };
-        let of = confirmed.iter().find(|test| test.number == number);
+    let front = Front::of(judged.iter().map(|(number, fitness)| (*number, fitness)));
+    let mut members: Vec<&FrontMember> = front.members().iter().collect();
+    members.sort_by(|a, b| lexicographic(&a.objectives, &b.objectives));
+    for (number, fitness) in &judged {
+        let Some(oriented) = fitness.objectives() else { continue };
+        let Ok(at) = members.binary_search_by(|member| lexicographic(&member.objectives, oriented)) else { continue };
+        let values = objectives.iter().zip(oriented).map(|(&id, &value)| Datum::real(Some(in_unit(plan, id, value))));
+        let same = if members[at].number == *number { Datum::Missing } else { name(members[at].number) };
+        let of = confirmed.iter().find(|test| test.number == *number);
         let ends = of.and_then(|test| test.interval);
         let came_again = [
             of.filter(|test| test.standing.is_some()).map_or(Datum::Missing, |test| Datum::count(test.again)),
@@ -183,7 +183,7 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, 
             of.and_then(|test| test.standing).map_or(Datum::Missing, |it| Datum::Text(it.words().to_owned())),
         ];
         let came_again = came_again.into_iter().take(again.len());
-        dataset.row([name(number)].into_iter().chain(values).chain([same]).chain(came_again));
+        dataset.row([name(*number)].into_iter().chain(values).chain([same]).chain(came_again));
     }
     Ok(dataset)
 }

@@ -54,7 +54,11 @@ impl Coverage {
     /// Counts a test. True if it has made a cell covered. A test without one of the grid's dimensions (intensity, where
     /// no operation has a parameter) lies in no cell.
     pub fn add(&mut self, point: &Point) -> bool {
-        let Some(cell) = self.grid.cell_of(point) else { return false };
+        self.grid.cell_of(point).is_some_and(|cell| self.hit(cell))
+    }
+
+    /// Counts a test that lies in a cell of the grid. True if it has made the cell covered.
+    pub fn hit(&mut self, cell: usize) -> bool {
         self.hits[cell] = self.hits[cell].saturating_add(1);
         let now = self.hits[cell] == self.needed;
         self.covered += usize::from(now);

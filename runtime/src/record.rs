@@ -32,7 +32,7 @@ pub use digest::digest;
 pub use error::RecordError;
 pub use folder::{Claim, DATABASE, LOCK, TRACES, claim_folder, latest_folder, trace_file};
 pub use recorder::Recorder;
-pub use repetitions::confirmed_fitness;
+pub use repetitions::{Judge, confirmed_fitness};
 pub use repository::{CampaignFacts, Repository};
 pub use scan::{ScannedOperation, ScannedTest};
 pub use schema::SCHEMA;

@@ -6,13 +6,16 @@
 
 mod axis;
 mod cells;
+mod chart;
 mod confirmed;
 mod coverage;
 mod export;
+mod generations;
 mod junit;
 mod markup;
 pub(crate) mod number;
 mod page;
+mod published;
 mod recording;
 mod regions;
 mod repetition;

@@ -13,6 +13,8 @@ pub mod crowding;
 pub mod dominance;
 pub mod front;
 pub mod hypervolume;
+pub mod igd;
+pub mod indicators;
 pub mod initial;
 pub mod neighbours;
 pub mod nsga2;
@@ -240,6 +242,11 @@ pub fn fitness_of(plan: &CampaignPlan, outcome: &Outcome, value: impl Fn(MetricI
         }
     });
     oriented.collect::<Option<Vec<f64>>>().map_or(Fitness::Unfit(Unfit::Unmeasured), Fitness::Measured)
+}
+
+/// An oriented value of an objective as the metric has it, in its unit. It undoes what [`fitness`] does.
+pub fn in_unit(plan: &CampaignPlan, objective: MetricId, oriented: f64) -> f64 {
+    if plan.metric(objective).direction == Some(Direction::Maximise) { 0.0 - oriented } else { 0.0 + oriented }
 }
 
 /// Variation of tests that is told what came of them.

@@ -34,19 +34,28 @@ pub fn target() -> PathBuf {
 /// The program `sesamec` of this workspace, built if it is not up to date.
 pub fn sesamec() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| {
-        let output = Command::new(env!("CARGO"))
-            .args(["build", "--quiet", "--package", "sesame-codegen", "--message-format=json-render-diagnostics"])
-            .current_dir(workspace())
-            .output()
-            .expect("cargo starts");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        let said = String::from_utf8_lossy(&output.stdout);
-        let mark = "\"executable\":\"";
-        let at = said.rfind(mark).expect("cargo names the program it built") + mark.len();
-        let rest = &said[at..];
-        PathBuf::from(&rest[..rest.find('"').expect("a name ends")])
-    })
+    PROGRAM.get_or_init(|| built(&[]))
+}
+
+/// The same, optimised: for what is to be measured.
+pub fn optimised_sesamec() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| built(&["--release"]))
+}
+
+fn built(arguments: &[&str]) -> PathBuf {
+    let output = Command::new(env!("CARGO"))
+        .args(["build", "--quiet", "--package", "sesame-codegen", "--message-format=json-render-diagnostics"])
+        .args(arguments)
+        .current_dir(workspace())
+        .output()
+        .expect("cargo starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said = String::from_utf8_lossy(&output.stdout);
+    let mark = "\"executable\":\"";
+    let at = said.rfind(mark).expect("cargo names the program it built") + mark.len();
+    let rest = &said[at..];
+    PathBuf::from(&rest[..rest.find('"').expect("a name ends")])
 }
 
 /// A command with the surroundings of these tests: one target folder, no colours, nothing of the cargo around it.

@@ -48,6 +48,22 @@ pub struct Sorted {
     pub crowding: Vec<Vec<f64>>,
 }
 
+/// Points whose distance to a front is asked for.
+#[derive(Debug, Clone, Serialize)]
+pub struct Distance {
+    /// The front, smaller being better; finite.
+    pub front: Vec<Vec<f64>>,
+    /// The points.
+    pub points: Vec<Vec<f64>>,
+}
+
+/// What pymoo made of a distance.
+#[derive(Debug, Clone, Copy, Deserialize)]
+pub struct Distant {
+    /// IGD⁺ of the points.
+    pub igd_plus: f64,
+}
+
 /// The answers to requests, in their order; `None` where nobody named a Python that has the packages. One that is named
 /// has to work.
 pub fn ask<Request: Serialize, Answer: for<'a> Deserialize<'a>>(requests: &[Request]) -> Option<Vec<Answer>> {

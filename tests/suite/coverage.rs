@@ -97,6 +97,15 @@ fn analyses_of_a_results_file_say_what_the_campaign_said() {
     let found: serde_json::Value = serde_json::from_str(&found).unwrap();
     assert_eq!((found[0]["campaign"].as_str(), found[0]["tests"].as_u64()), (Some("covering"), Some(30)));
 
+    let indicators = results(&["indicators", "--format", "json"], &folder);
+    assert!(indicators.err.contains("note: hypervolumes are measured from fuzzing_time "), "{}", indicators.err);
+    let indicators: serde_json::Value = serde_json::from_str(&indicators.out).unwrap();
+    let recorded = repository.indicators().unwrap();
+    assert_eq!(indicators.as_array().unwrap().len(), recorded.len());
+    let last = indicators.as_array().unwrap().last().unwrap();
+    assert_eq!((last["hypervolume"].as_f64(), last["igd_plus"].as_f64()), (recorded[0].hypervolume, Some(0.0)));
+    assert_eq!((last["covered"].as_u64(), last["evaluations"].as_u64()), (Some(counted.covered as u64), Some(30)));
+
     let refused = |arguments: &[&str]| {
         let mut asked = command(sesamec());
         done(asked.arg("results").args(arguments)).expect(1).err
@@ -105,6 +114,36 @@ fn analyses_of_a_results_file_say_what_the_campaign_said() {
     assert!(refused(&["sspr", "--set", "finale", shown]).contains("no set of results `finale`"));
     assert!(refused(&["tests", "no/such/file"]).contains("no results here"));
     assert!(refused(&["coverage", "--dims", "T3", shown]).contains("no dimension T3"));
+    assert!(refused(&["indicators", "--reference", "1,-2,3", shown]).contains("has 3 values for 2 objectives"));
+    assert!(refused(&["compare", shown]).contains("there is one run only"));
     let nothing = refused(&["campaigns", tempfile::tempdir().unwrap().path().to_str().unwrap()]);
     assert!(nothing.contains("no results in"), "{nothing}");
+}
+
+#[test]
+fn runs_are_compared_one_by_one_and_in_groups() {
+    let runner = build("compared");
+    for seed in ["1", "2", "3"] {
+        runner.run(&["--results", "short", "--evaluations", "10", "--seed", seed]).expect(0);
+        runner.run(&["--results", "long", "--evaluations", "40", "--seed", seed]).expect(0);
+    }
+    let ask = |arguments: &[&str]| {
+        let mut asked = command(sesamec());
+        done(asked.current_dir(&runner.folder).args(["results", "compare"]).args(arguments)).expect(0).out
+    };
+    let groups: serde_json::Value = serde_json::from_str(&ask(&["short", "long", "--format", "json"])).unwrap();
+    let long =
+        groups.as_array().unwrap().iter().find(|row| row["measure"] == "tests" && row["group"] == "long").unwrap();
+    assert_eq!(
+        (long["median"].as_f64(), long["a12"].as_f64(), long["runs"].as_u64()),
+        (Some(40.0), Some(1.0), Some(3))
+    );
+    assert_eq!((long["p"].as_f64(), long["p_is"].as_str()), (Some(0.1), Some("exact")));
+    let better =
+        groups.as_array().unwrap().iter().filter(|row| row["group"] == "long" && row["measure"] == "hypervolume");
+    assert!(better.map(|row| row["a12"].as_f64().unwrap()).all(|a12| a12 > 0.5));
+    let two = ask(&["short/1", "long/1", "--format", "csv"]);
+    assert!(two.starts_with("group,campaign,seed,tests,") && two.lines().count() == 3, "{two}");
+    assert_eq!(ask(&["short", "long", "--by-campaign", "--runs"]).lines().count(), 7);
+    assert_eq!(ask(&["short", "--pairs", "--format", "csv"]).lines().count(), 7);
 }

@@ -218,6 +218,26 @@ fn every_stored_front_is_computed_again_from_the_stored_values() {
 }
 
 #[test]
+fn an_imported_search_has_indicators_of_its_sets() {
+    let Some(out) = imported("kuka-coverage-ga.model", "imported_indicators") else { return };
+    let repository = results(&out, "coverageExperiment");
+    let analysis = analysis::indicators(&repository, None).unwrap();
+    let sets = repository.result_sets().unwrap();
+    assert_eq!(analysis.generations.len(), sets.len());
+    assert_eq!(analysis.reference.len(), 2);
+    for (row, set) in analysis.generations.iter().zip(&sets) {
+        assert_eq!(row.set.as_ref(), Some(&set.name));
+        let evaluations = row.evaluations.unwrap();
+        assert!(set.name.ends_with(&format!("-{evaluations}")) && evaluations % 10 == 0, "{}", set.name);
+        assert_eq!((row.void, row.unique), (None, None), "nobody counted");
+    }
+    let last = analysis.generations.last().unwrap();
+    assert_eq!((last.evaluations, last.igd_plus), (Some(220), Some(0.0)));
+    let volumes: Vec<f64> = analysis.generations.iter().map(|it| it.hypervolume.unwrap()).collect();
+    assert!(volumes.is_sorted() && volumes[0] < last.hypervolume.unwrap(), "{volumes:?}");
+}
+
+#[test]
 fn recorded_timings_are_observed_intervals_and_what_never_activated_has_no_point() {
     let Some(out) = imported("kuka-conditions-timed.model", "imported_timed") else { return };
     let folder = out.join("results/coverageExperiment_condbased");

@@ -14,6 +14,7 @@ mod first_front;
 mod import;
 mod interruption;
 mod kuka_cell;
+mod large_results;
 mod optimisers;
 mod random_models;
 mod regeneration;

@@ -1,4 +1,4 @@
-"""What other implementations of NSGA-II make of published problems, and pymoo of sorting and crowding.
+"""What other implementations of NSGA-II make of published problems, and pymoo of sorting, crowding and distances.
 
 Reads requests, one JSON object per line, and answers each with one line of JSON.
 """
@@ -53,9 +53,17 @@ def sort(points):
     return fronts, [[-1.0 if np.isinf(x) else float(x) for x in front] for front in crowding]
 
 
+def igd_plus(front, points):
+    from pymoo.indicators.igd_plus import IGDPlus
+
+    return float(IGDPlus(np.array(front, dtype=float))(np.array(points, dtype=float)))
+
+
 for line in sys.stdin:
     request = json.loads(line)
-    if "points" in request:
+    if "front" in request:
+        print(json.dumps({"igd_plus": igd_plus(request["front"], request["points"])}), flush=True)
+    elif "points" in request:
         fronts, crowding = sort(request["points"])
         print(json.dumps({"fronts": fronts, "crowding": crowding}), flush=True)
     else:

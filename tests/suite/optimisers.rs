@@ -6,9 +6,10 @@ use proptest::test_runner::TestRunner;
 use sesame_runtime::search::Fitness;
 use sesame_runtime::search::crowding::distances;
 use sesame_runtime::search::hypervolume::hypervolume;
+use sesame_runtime::search::igd::igd_plus;
 use sesame_runtime::search::problems::{Problem, approximate};
 use sesame_runtime::search::sorting::fronts;
-use sesame_tests::optimisers::{PYTHON, Ran, Run, Sort, Sorted, ask};
+use sesame_tests::optimisers::{Distance, Distant, PYTHON, Ran, Run, Sort, Sorted, ask};
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=5;
 
@@ -103,4 +104,29 @@ fn fronts_and_crowding_distances_are_those_of_pymoo_on_random_and_tied_points() 
     }
     println!("{compared} crowding distances are equal");
     assert!(compared > 5_000);
+}
+
+#[test]
+#[ignore = "long: needs Python's pymoo"]
+fn distances_to_fronts_are_those_of_pymoo() {
+    let any_sets = (1usize..=4).prop_flat_map(|objectives| {
+        let points = proptest::collection::vec(proptest::collection::vec(-3.0..5.0f64, objectives), 1..40);
+        (points.clone(), points)
+    });
+    let mut runner = TestRunner::deterministic();
+    let cases: Vec<Distance> = (0..300)
+        .map(|_| any_sets.new_tree(&mut runner).unwrap().current())
+        .map(|(front, points)| Distance { front, points })
+        .collect();
+    let Some(theirs) = ask::<Distance, Distant>(&cases) else {
+        println!("skipped: {PYTHON} names no Python with pymoo");
+        assert!(std::env::var_os("CI").is_none(), "CI has Python, so it has it");
+        return;
+    };
+    for (case, theirs) in cases.iter().zip(theirs) {
+        let front: Vec<&[f64]> = case.front.iter().map(Vec::as_slice).collect();
+        let points: Vec<&[f64]> = case.points.iter().map(Vec::as_slice).collect();
+        let ours = igd_plus(&points, &front).unwrap();
+        assert!((ours - theirs.igd_plus).abs() <= 1e-12 * ours.max(1.0), "{ours} {}: {case:?}", theirs.igd_plus);
+    }
 }

@@ -138,3 +138,144 @@ fn what_is_printed_for_programs_reads_back() {
     assert_eq!(Dataset::new(["a".to_owned()]).json(), "[]\n");
     assert_eq!(Datum::real(Some(f64::NAN)), Datum::Missing);
 }
+
+/// Numbers of a column, by its name.
+fn numbers(dataset: &Dataset, column: &str) -> Vec<Option<f64>> {
+    let at = dataset.columns().iter().position(|name| name == column).unwrap();
+    let number = |row: &Vec<Datum>| match row[at] {
+        Datum::Missing => None,
+        Datum::Real(number) => Some(number),
+        Datum::Whole(number) => Some(number as f64),
+        ref other => panic!("{other:?} is no number"),
+    };
+    dataset.rows().iter().map(number).collect()
+}
+
+#[test]
+fn indicators_are_those_recorded_and_end_on_the_front() {
+    let (_folder, repository) = repository();
+    let analysis = indicators(&repository, None).unwrap();
+    let dataset = analysis.dataset();
+    let recorded = repository.indicators().unwrap();
+    assert_eq!(recorded.len(), 7);
+    let volumes: Vec<Option<f64>> = recorded.iter().map(|it| it.hypervolume).collect();
+    assert_eq!(numbers(&dataset, "hypervolume"), volumes);
+    assert!(volumes.is_sorted() && volumes[0] < volumes[6], "{volumes:?}");
+    let distances = numbers(&dataset, "igd_plus");
+    assert!(distances.iter().rev().is_sorted() && distances[0] > Some(0.0), "{distances:?}");
+    assert_eq!(distances[6], Some(0.0), "the last front is the front");
+    let reported = crate::report::summary(&repository).unwrap();
+    let last = &analysis.generations[6];
+    assert_eq!(last.covered, Some(reported.coverage.as_ref().unwrap().covered));
+    let counts = reported.counts;
+    assert_eq!((last.evaluations, last.unique), (Some(61), Some(60)));
+    assert_eq!(last.void, u32::try_from(counts.void).ok());
+    assert_eq!((last.crashes, last.timeouts), (Some(2), Some(1)));
+    assert_eq!(last.front as usize, reported.front.len());
+    insta::assert_snapshot!("indicators", dataset.text(TextOptions { width: None, colour: false }));
+}
+
+#[test]
+fn hypervolumes_are_measured_anew_from_the_point_given() {
+    let (_folder, repository) = repository();
+    let own = indicators(&repository, None).unwrap();
+    let point: Vec<f64> = own.reference.iter().map(|(_, value)| *value).collect();
+    let same = indicators(&repository, Some(&point)).unwrap();
+    assert_eq!((&same.generations, &same.reference), (&own.generations, &own.reference));
+    let farther = indicators(&repository, Some(&[point[0] + 10.0, point[1] - 1.0])).unwrap();
+    assert!(farther.generations[6].hypervolume > own.generations[6].hypervolume);
+}
+
+/// Runs of one campaign, so many tests long.
+fn runs(folder: &std::path::Path, groups: &[(&str, &[u32])]) -> Vec<Run> {
+    let mut plan = sample::plan();
+    let axis = GridAxis { dimension: Dimension::T1, low: 0.0, high: 1.0, cells: 6 };
+    plan.campaign.coverage = Some(CoverageGoal { axes: vec![axis], hits: 1, stop_at: None });
+    let mut runs = Vec::new();
+    for (group, lengths) in groups {
+        for &length in *lengths {
+            let folder = folder.join(format!("{group}-{length}"));
+            let repository = sample::campaign(&folder, &plan, length);
+            runs.push(Run { group: (*group).to_owned(), repository });
+        }
+    }
+    runs
+}
+
+#[test]
+fn runs_are_measured_from_one_point_to_one_front() {
+    let folder = tempfile::tempdir().unwrap();
+    let runs = runs(folder.path(), &[("short", &[30]), ("long", &[90])]);
+    let comparison = compare(&runs, None, None).unwrap();
+    assert!(!comparison.has_groups() && comparison.covers);
+    let table = comparison.runs();
+    let column = |name: &str| numbers(&table, name);
+    assert_eq!(column("tests"), [Some(31.0), Some(91.0)]);
+    // The longer run holds all tests of the shorter one, so its front is the joint one.
+    assert_eq!((column("igd_plus")[1], column("joint_share")[1]), (Some(0.0), Some(1.0)));
+    assert!(column("igd_plus")[0] > Some(0.0) && column("joint_share")[0] < Some(1.0));
+    assert!(column("hypervolume")[0] < column("hypervolume")[1]);
+    assert!(column("coverage")[0] <= column("coverage")[1]);
+    assert_eq!(numbers(&comparison.pairs(), "c")[1], Some(1.0), "the longer run's front covers the shorter one's");
+    // Brute force: the area below a staircase, by counting squares.
+    let point: Vec<f64> = comparison.reference.iter().map(|(_, value)| *value).collect();
+    let listed = front(&runs[0].repository, &all()).unwrap();
+    let members: Vec<(f64, f64)> = numbers(&listed, "fuzzing_time")
+        .into_iter()
+        .zip(numbers(&listed, "collision_occurrence"))
+        .map(|(x, y)| (x.unwrap(), y.unwrap()))
+        .collect();
+    let (mut area, steps) = (0.0, 20_000u32);
+    for step in 0..steps {
+        let x = point[0] * (f64::from(step) + 0.5) / f64::from(steps);
+        let best = members.iter().filter(|member| member.0 <= x).map(|member| member.1).fold(point[1], f64::max);
+        area += (best - point[1]) * point[0] / f64::from(steps);
+    }
+    let volume = column("hypervolume")[0].unwrap();
+    assert!((volume - area).abs() < 1e-3 * area, "{volume} {area}");
+}
+
+#[test]
+fn groups_are_compared_by_medians_and_ranks() {
+    let folder = tempfile::tempdir().unwrap();
+    let groups: [(&str, &[u32]); 2] = [("short", &[20, 24, 28, 32, 36]), ("long", &[120, 130, 140, 150, 160])];
+    let comparison =
+        compare(&runs(folder.path(), &groups), Some(&[200.0, 0.0]), Grid::parse("T2:0:0.5:4").ok()).unwrap();
+    assert!(comparison.has_groups());
+    assert_eq!(comparison.reference, [("fuzzing_time".to_owned(), 200.0), ("collision_occurrence".to_owned(), 0.0)]);
+    let table = comparison.groups();
+    insta::assert_snapshot!("compared_groups", table.text(TextOptions { width: None, colour: false }));
+    assert_eq!(numbers(&table, "median")[8..10], [Some(29.0), Some(141.0)], "tests, the known one included");
+    let p = numbers(&table, "p");
+    assert!((p[9].unwrap() - 2.0 / 252.0).abs() < 1e-12);
+    assert_eq!(comparison.runs().rows().len(), 10);
+}
+
+#[test]
+fn what_has_no_common_measure_is_refused_or_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut both = runs(folder.path(), &[("a", &[20])]);
+    let mut plan = sample::plan();
+    plan.campaign.objectives.reverse();
+    let repository = sample::campaign(&folder.path().join("other"), &plan, 20);
+    both.push(Run { group: "b".to_owned(), repository });
+    let error = compare(&both, None, None).unwrap_err().to_string();
+    let theirs = "has fuzzing_time [s] minimised, collision_occurrence maximised, ";
+    assert!(
+        error.starts_with("runs with different objectives cannot be compared: ") && error.contains(theirs),
+        "{error}"
+    );
+    let error = compare(&both[..1], Some(&[1.0]), None).unwrap_err().to_string();
+    assert!(error.starts_with("the reference point has 1 values for 2 objectives"), "{error}");
+
+    plan.campaign.objectives.clear();
+    let without = |name: &str| {
+        let repository = sample::campaign(&folder.path().join(name), &plan, 20);
+        Run { group: name.to_owned(), repository }
+    };
+    let table = compare(&[without("c"), without("d")], None, None).unwrap();
+    assert!(!table.covers && table.reference.is_empty());
+    for measure in ["hypervolume", "igd_plus", "joint_share", "coverage"] {
+        assert_eq!(numbers(&table.runs(), measure), [None, None], "{measure}");
+    }
+}

@@ -18,6 +18,7 @@ use crate::record::{
     Repository, ResultSet, Status, TestRecord, Verdict, differences, verdict,
 };
 use crate::rng::derive_seed;
+use crate::search::indicators::Indicators;
 use crate::search::{self, Candidate, Confirming, Course, Evaluated, Front, Neighbours, SearchError, StopRules};
 use crate::sspr::{self, Point};
 
@@ -166,6 +167,7 @@ pub fn conduct(
     let failing = if let Search::Shrink { failing, .. } = &plan.campaign.search { Some(failing) } else { None };
     let mut front = Front::default();
     let mut rules = StopRules::of(plan);
+    let mut indicators = Indicators::new(Some(&search::fitness(plan, &reference)));
     let begun = Instant::now();
     let mut earlier = Earlier::default();
     let mut confirming = plan.campaign.confirm.map(|confirmation| (confirmation, Confirming::default()));
@@ -217,6 +219,7 @@ pub fn conduct(
             {
                 strategy.note_failure((record.number - first) as usize);
             }
+            indicators.add(&record.observation.outcome, record.duplicate_of.is_some(), &fitness);
             let point = counted_point(plan, record);
             if let (Some(tracking), Some(point)) = (&mut tracking, &point) {
                 tracking.coverage.add(point);
@@ -271,6 +274,7 @@ pub fn conduct(
                 members: front.numbers(),
             })?;
         }
+        desk.recorder.put_indicators(&indicators.after(generation, &front), indicators.reference())?;
         if let Some(tracking) = &tracking {
             desk.recorder.put_coverage(&tracking.after(generation, done))?;
             if let Some(reached) = tracking.reached() {

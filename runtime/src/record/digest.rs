@@ -57,6 +57,12 @@ const CONTENT: &[(&str, &str)] = &[
     ("result_sets", "SELECT name, generation, status FROM result_sets ORDER BY name"),
     ("result_set_members", "SELECT result_set, position, test FROM result_set_members ORDER BY result_set, position"),
     ("coverage", "SELECT generation, evaluations, covered, cells, feasible FROM coverage ORDER BY generation"),
+    (
+        "indicators",
+        "SELECT generation, evaluations, unique_tests, void, crashes, timeouts, front, hypervolume FROM indicators \
+         ORDER BY generation",
+    ),
+    ("reference_point", "SELECT objective, metric, value FROM reference_point ORDER BY objective"),
     // Warnings of the campaign itself may come in another order with other workers, so their order is their text's.
     ("events", "SELECT test, text FROM events WHERE kind = 'warning' ORDER BY test, text"),
 ];

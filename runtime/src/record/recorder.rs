@@ -12,6 +12,8 @@ use crate::observation::{Observation, Outcome};
 use crate::record::folder::{BEGUN, DATABASE, Lock};
 use crate::record::schema::{self, index};
 use crate::record::{Event, EventKind, GenerationCoverage, Origin, RecordError, Repository, ResultSet, TestRecord};
+use crate::search;
+use crate::search::indicators::GenerationIndicators;
 
 /// Writes the results of one campaign run. There is one per folder: it holds the folder's lock.
 ///
@@ -168,6 +170,36 @@ impl Recorder {
             )
             .map(drop)
             .map_err(|e| RecordError::database("record the coverage", &self.repository.path, e))
+    }
+
+    /// Records the indicators after a generation, and the point that hypervolumes are measured from, oriented as a fitness
+    /// is, once there is one; what was recorded for the generation before is replaced.
+    pub fn put_indicators(
+        &mut self,
+        indicators: &GenerationIndicators,
+        reference: Option<&[f64]>,
+    ) -> Result<(), RecordError> {
+        let plan = &self.repository.facts.plan;
+        let GenerationIndicators { generation, evaluations, unique, void, crashes, timeouts, front, hypervolume } =
+            *indicators;
+        let written = self.repository.connection.transaction().and_then(|transaction| {
+            transaction
+                .prepare_cached(
+                    "INSERT OR REPLACE INTO indicators (generation, evaluations, unique_tests, void, crashes, timeouts, \
+                     front, hypervolume) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+                )?
+                .execute(params![generation, evaluations, unique, void, crashes, timeouts, front, hypervolume])?;
+            let objectives = plan.campaign.objectives.iter().zip(reference.unwrap_or_default()).enumerate();
+            for (position, (&metric, &value)) in objectives {
+                transaction
+                    .prepare_cached(
+                        "INSERT OR REPLACE INTO reference_point (objective, metric, value) VALUES (?1, ?2, ?3)",
+                    )?
+                    .execute(params![index(position), metric.0, search::in_unit(plan, metric, value)])?;
+            }
+            transaction.commit()
+        });
+        written.map_err(|e| RecordError::database("record the indicators", &self.repository.path, e))
     }
 
     /// Records an event. A warning said before is kept once, so that a resumed run may say it again.

@@ -8,7 +8,7 @@ use sesame_plan::CampaignPlan;
 use crate::observation::Outcome;
 use crate::record::recorder::write_event;
 use crate::record::schema::index;
-use crate::record::{Event, EventKind, MetricValue, RecordError, Recorder, Repetition, Repository};
+use crate::record::{Event, EventKind, MetricValue, RecordError, Recorder, Repetition, Repository, ScannedTest};
 use crate::search::confirming::typical;
 use crate::search::{self, Fitness};
 
@@ -20,6 +20,28 @@ pub fn confirmed_fitness(plan: &CampaignPlan, repetitions: &[Repetition]) -> Opt
     let runs: Vec<Fitness> =
         runs.map(|run| search::fitness_of(plan, &run.outcome, |metric| run.value(metric).value)).collect();
     (runs.len() == confirmation.times as usize).then(|| typical(&runs, confirmation.by))
+}
+
+/// By what the tests of a campaign are judged.
+#[derive(Debug)]
+pub struct Judge<'a> {
+    plan: &'a CampaignPlan,
+    repetitions: BTreeMap<u32, Vec<Repetition>>,
+}
+
+impl Judge<'_> {
+    /// The fitness of a test: that of its repetitions where the campaign confirmed it, else by its recorded values. A
+    /// duplicate is what its original is.
+    pub fn fitness(&self, test: &ScannedTest) -> Fitness {
+        let runs = self.repetitions.get(&test.duplicate_of.unwrap_or(test.number));
+        runs.and_then(|runs| confirmed_fitness(self.plan, runs))
+            .unwrap_or_else(|| search::fitness_of(self.plan, &test.outcome, |metric| test.value(metric).value))
+    }
+
+    /// All repetitions, by the numbers of their tests.
+    pub fn repetitions(&self) -> &BTreeMap<u32, Vec<Repetition>> {
+        &self.repetitions
+    }
 }
 
 impl Recorder {
@@ -76,6 +98,11 @@ impl Recorder {
 }
 
 impl Repository {
+    /// By what its tests are judged.
+    pub fn judge(&self) -> Result<Judge<'_>, RecordError> {
+        Ok(Judge { plan: self.plan(), repetitions: self.repetitions()? })
+    }
+
     /// All repetitions of all tests: by test, and of each in their order.
     pub fn repetitions(&self) -> Result<BTreeMap<u32, Vec<Repetition>>, RecordError> {
         let values = self.read(

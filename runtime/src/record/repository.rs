@@ -14,6 +14,7 @@ use crate::record::{
     Event, EventKind, GenerationCoverage, MetricValue, Origin, RecordError, ResultSet, Session, Status, TestRecord,
     TestRow, digest, schema,
 };
+use crate::search::indicators::GenerationIndicators;
 
 /// The results of one campaign run, to be read.
 #[derive(Debug)]
@@ -104,6 +105,12 @@ impl Repository {
     /// Hash of the canonical content, see [`digest()`].
     pub fn digest(&self) -> Result<String, RecordError> {
         digest::of_connection(&self.connection).map_err(|e| RecordError::database("read the results", &self.path, e))
+    }
+
+    /// How many tests there are, the undisturbed runs left aside.
+    pub fn evaluated(&self) -> Result<usize, RecordError> {
+        let count = self.read("SELECT count(*) FROM tests WHERE origin <> 'reference'", [], |row| position(row, 0))?;
+        Ok(count.into_iter().sum())
     }
 
     /// All tests, by number.
@@ -199,28 +206,42 @@ impl Repository {
 
     /// The sets of results, by generation, the final one last.
     pub fn result_sets(&self) -> Result<Vec<ResultSet>, RecordError> {
-        let mut sets = self.read(
-            "SELECT name, generation, status FROM result_sets ORDER BY status = 'final', generation, name",
-            [],
-            |row| {
-                let last = row.get::<_, String>(2)? == Status::Final.word();
-                let status = if last { Status::Final } else { Status::Intermediate };
-                Ok(ResultSet { name: row.get(0)?, generation: row.get(1)?, status, members: Vec::new() })
-            },
-        )?;
-        for set in &mut sets {
-            set.members = self.read(
-                "SELECT test FROM result_set_members WHERE result_set = ?1 ORDER BY position",
-                params![set.name],
-                |row| row.get(0),
-            )?;
+        let mut sets = Vec::new();
+        for (mut set, _) in self.result_set_sizes()? {
+            set.members = self.members(&set.name)?;
+            sets.push(set);
         }
         Ok(sets)
     }
 
+    /// The sets of results in the same order, without their members but with how many there are: the fronts of thousands
+    /// of generations may have millions.
+    pub fn result_set_sizes(&self) -> Result<Vec<(ResultSet, usize)>, RecordError> {
+        self.read(
+            "SELECT name, generation, status, coalesce((SELECT max(position) + 1 FROM result_set_members WHERE result_set = name), 0) \
+             FROM result_sets ORDER BY status = 'final', generation, name",
+            [],
+            |row| {
+                let last = row.get::<_, String>(2)? == Status::Final.word();
+                let status = if last { Status::Final } else { Status::Intermediate };
+                let set = ResultSet { name: row.get(0)?, generation: row.get(1)?, status, members: Vec::new() };
+                Ok((set, position(row, 3)?))
+            },
+        )
+    }
+
+    /// The numbers of the tests of a set of results, in its order; empty where there is no such set.
+    pub fn members(&self, set: &str) -> Result<Vec<u32>, RecordError> {
+        self.read("SELECT test FROM result_set_members WHERE result_set = ?1 ORDER BY position", params![set], |row| {
+            row.get(0)
+        })
+    }
+
     /// The final set of results, or the latest one while there is no final one.
     pub fn latest_result_set(&self) -> Result<Option<ResultSet>, RecordError> {
-        Ok(self.result_sets()?.pop())
+        let Some((mut set, _)) = self.result_set_sizes()?.pop() else { return Ok(None) };
+        set.members = self.members(&set.name)?;
+        Ok(Some(set))
     }
 
     /// How much was covered after each generation; empty for a campaign that does not count it.
@@ -238,6 +259,34 @@ impl Repository {
                 })
             },
         )
+    }
+
+    /// The indicators after each generation; none of an imported campaign, whose tests are of no generation.
+    pub fn indicators(&self) -> Result<Vec<GenerationIndicators>, RecordError> {
+        self.read(
+            "SELECT generation, evaluations, unique_tests, void, crashes, timeouts, front, hypervolume FROM indicators \
+             ORDER BY generation",
+            [],
+            |row| {
+                Ok(GenerationIndicators {
+                    generation: row.get(0)?,
+                    evaluations: row.get(1)?,
+                    unique: row.get(2)?,
+                    void: row.get(3)?,
+                    crashes: row.get(4)?,
+                    timeouts: row.get(5)?,
+                    front: row.get(6)?,
+                    hypervolume: row.get(7)?,
+                })
+            },
+        )
+    }
+
+    /// The point that the hypervolumes of [`Repository::indicators`] are measured from, a value per objective in its unit;
+    /// `None` where there is none.
+    pub fn reference_point(&self) -> Result<Option<Vec<f64>>, RecordError> {
+        let point = self.read("SELECT value FROM reference_point ORDER BY objective", [], |row| row.get(0))?;
+        Ok(Some(point).filter(|point| !point.is_empty()))
     }
 
     /// Everything that happened that a user should know, warnings of tests included: first those of the campaign, then

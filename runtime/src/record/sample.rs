@@ -9,6 +9,7 @@ use sesame_plan::*;
 use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
 use crate::record::{Event, EventKind, Origin, Recorder, Repository, ResultSet, Status, TestRecord};
 use crate::rng::Stream;
+use crate::search::{self, indicators::Indicators};
 
 fn metric(name: &str, unit: Option<&str>, direction: Direction, default: Option<f64>, source: MetricSource) -> Metric {
     Metric {
@@ -397,12 +398,36 @@ pub(crate) fn front(plan: &CampaignPlan, records: &[TestRecord]) -> Vec<u32> {
     points.iter().filter(|(_, point)| !points.iter().any(|(_, other)| better(other, point))).map(|(n, _)| *n).collect()
 }
 
-/// Records a campaign as a runner does, and finishes it.
+/// Records a campaign as a runner does, but for the fronts of most generations, and finishes it.
 pub(crate) fn campaign(folder: &Path, plan: &CampaignPlan, searched: u32) -> Repository {
+    recorded(folder, plan, searched, false)
+}
+
+/// Records a campaign with the fronts of all generations, and finishes it.
+pub(crate) fn campaign_with_fronts(folder: &Path, plan: &CampaignPlan, searched: u32) -> Repository {
+    recorded(folder, plan, searched, true)
+}
+
+fn recorded(folder: &Path, plan: &CampaignPlan, searched: u32, fronts: bool) -> Repository {
     let mut recorder = Recorder::create(folder, plan, plan.campaign.seed, 2).unwrap();
     let records = records(plan, searched);
-    for record in &records {
+    let mut indicators = Indicators::new(Some(&search::fitness(plan, &records[0].observation)));
+    let mut front_so_far = search::Front::default();
+    recorder.commit(&records[0]).unwrap();
+    for (at, record) in records.iter().enumerate().skip(1) {
         recorder.commit(record).unwrap();
+        let fitness = search::fitness(plan, &record.observation);
+        indicators.add(&record.observation.outcome, record.duplicate_of.is_some(), &fitness);
+        front_so_far.add(record.number, &fitness);
+        let next = records.get(at + 1).map(|next| next.generation);
+        if let Some(generation) = record.generation.filter(|&it| next != Some(Some(it))) {
+            recorder.put_indicators(&indicators.after(generation, &front_so_far), indicators.reference()).unwrap();
+            if fronts {
+                let (name, members) = (format!("generation-{generation}"), front_so_far.numbers());
+                let status = Status::Intermediate;
+                recorder.put_result_set(&ResultSet { name, generation: Some(generation), status, members }).unwrap();
+            }
+        }
     }
     let set =
         |name: &str, generation, status, members| ResultSet { name: String::from(name), generation, status, members };

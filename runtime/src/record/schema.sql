@@ -183,6 +183,27 @@ CREATE TABLE coverage (
     feasible        INTEGER NOT NULL  -- cells that a test can reach, as far as known, or has hit
 ) STRICT;
 
+-- How good the front was after each generation, and what the tests came to by then.
+CREATE TABLE indicators (
+    generation      INTEGER PRIMARY KEY,
+    evaluations     INTEGER NOT NULL, -- tests evaluated by then
+    unique_tests    INTEGER NOT NULL, -- of these, no exact duplicates of an earlier one
+    void            INTEGER NOT NULL, -- of these, without effect
+    crashes         INTEGER NOT NULL,
+    timeouts        INTEGER NOT NULL,
+    front           INTEGER NOT NULL, -- tests on the front
+    hypervolume     REAL            -- of the front up to the reference point; NULL without objectives, before anything was
+                                    -- measured, and where the front has no end
+) STRICT;
+
+-- The point that hypervolumes are measured from: of each objective the worst value of the undisturbed run and of the tests
+-- up to the first generation with a measured one, and half of the range of these values beyond it. It never moves.
+CREATE TABLE reference_point (
+    objective       INTEGER PRIMARY KEY, -- position among the campaign's objectives, from 0
+    metric          INTEGER NOT NULL REFERENCES metrics,
+    value           REAL NOT NULL   -- in the metric's unit
+) STRICT;
+
 -- What happened that a user should know. A warning belongs to the content; a session note (interrupted, resumed, a
 -- worker restarted) to one way of getting there.
 CREATE TABLE events (

@@ -251,10 +251,11 @@ fn what_is_no_repository_of_this_release_is_refused_with_what_to_do() {
     let open = Connection::open(&path).unwrap();
     open.pragma_update(None, "user_version", SCHEMA + 1).unwrap();
     drop(open);
-    assert!(matches!(refused("schema 5, this release reads 4"), RecordError::Newer { found: 5, known: 4, .. }));
+    let later = refused(&format!("schema {}, this release reads {SCHEMA}", SCHEMA + 1));
+    assert!(matches!(later, RecordError::Newer { known: SCHEMA, .. }));
     Connection::open(&path).unwrap().pragma_update(None, "user_version", 1).unwrap();
-    let earlier = refused("schema 1, this release reads 4; read them with the release that wrote them");
-    assert!(matches!(earlier, RecordError::Older { found: 1, known: 4, .. }));
+    let told = format!("schema 1, this release reads {SCHEMA}; read them with the release that wrote them");
+    assert!(matches!(refused(&told), RecordError::Older { found: 1, known: SCHEMA, .. }));
     for length in [whole.len() / 2, 4096, 700] {
         std::fs::write(&path, &whole[..length]).unwrap();
         assert!(matches!(refused("restore the file"), RecordError::Damaged { .. }), "cut to {length} bytes");

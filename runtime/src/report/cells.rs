@@ -2,56 +2,60 @@
 
 use std::fmt::Write as _;
 
-use sesame_plan::GridAxis;
+use serde_json::{Value, json};
+use sesame_plan::{CampaignPlan, Direction, GridAxis};
 
 use crate::report::axis::Axis;
+use crate::report::chart;
 use crate::report::coverage::{CoverageSummary, coverage_sentence};
 use crate::report::markup::{Markup, coordinate, percent};
 use crate::report::number;
+use crate::report::published::{BOOSTING, CELLS, TRACKING, is_published_grid};
 
 /// Cells that a map draws at most; of larger ones none is drawn.
 const MOST_DRAWN: usize = 10_000;
 
-/// Draws the coverage over evaluations and the map of its first two dimensions.
-pub(crate) fn coverage(markup: &mut Markup, coverage: &CoverageSummary) {
+/// Draws the coverage over evaluations and the map of its cells.
+pub(crate) fn coverage(markup: &mut Markup, plan: &CampaignPlan, coverage: &CoverageSummary, drawn: &[u32]) {
+    let published = is_published_grid(coverage);
     markup.open("section", &[("id", "coverage")]);
     markup.element("h2", &[], "Coverage");
     markup.element("p", &[], &format!("{}.", coverage_sentence(coverage)));
     markup.open("div", &[("class", "charts")]);
-    over_evaluations(markup, coverage);
-    map(markup, coverage);
+    over_evaluations(markup, coverage, published);
+    map(markup, plan, coverage, drawn);
     markup.close();
-    let others: Vec<String> = coverage.axes.iter().skip(2).map(|axis| axis.dimension.name().to_owned()).collect();
-    let over = if others.is_empty() {
-        String::new()
-    } else {
-        format!(" A square stands for its cells of every {}.", number::join_words(&others))
-    };
-    let caption = format!("Map: the bluer, the more tests; white: none yet; grey: no test can get there.{over}");
+    let mut caption = String::new();
+    if published {
+        caption.push_str(
+            "Grey, for comparison: the methodology's paper on these cells, counted only (line), and where boosting \
+             reached half of them (ring). ",
+        );
+    }
+    caption.push_str(
+        "Map: the bluer, the more tests; white: none yet; grey: no test can get there. A square stands for its cells of \
+         every dimension that is not shown.",
+    );
     markup.element("p", &[("class", "quiet")], &caption);
     markup.close();
 }
 
 /// The share of covered cells after each test, as steps.
-fn over_evaluations(markup: &mut Markup, coverage: &CoverageSummary) {
-    let last = coverage.curve.last().map_or(0.0, |point| f64::from(point.evaluations));
+fn over_evaluations(markup: &mut Markup, coverage: &CoverageSummary, published: bool) {
+    let mut last = coverage.curve.last().map_or(0.0, |point| f64::from(point.evaluations));
+    let mut highest = coverage.stop_at.unwrap_or(0.0).max(coverage.coverage).max(0.01);
+    let percent_of = |cells: f64| 100.0 * cells / CELLS;
+    if published {
+        last = last.max(TRACKING[TRACKING.len() - 1].0);
+        highest = highest.max(percent_of(BOOSTING.1) / 100.0);
+    }
     let across = Axis::exact(0.0, last.max(1.0), 5);
-    let highest = coverage.stop_at.unwrap_or(0.0).max(coverage.coverage).max(0.01);
     let up = Axis::round([0.0, 100.0 * highest], 5);
     markup.open("div", &[("class", "chart small")]);
     markup.element("p", &[("class", "axis-title")], "coverage of all cells [%]");
     let label = format!("coverage over evaluations, {} % at the end", number::number(100.0 * coverage.coverage));
     markup.open("svg", &[("class", "scatter"), ("role", "img"), ("aria-label", &label)]);
-    for (tick, text) in up.ticks.iter().zip(up.labels()) {
-        let y = percent(1.0 - up.share(*tick));
-        markup.leaf("line", &[("class", "grid"), ("x1", "0"), ("x2", "100%"), ("y1", &y), ("y2", &y)]);
-        markup.element("text", &[("class", "tick end"), ("x", "-8"), ("y", &y), ("dy", "4")], &text);
-    }
-    for (tick, text) in across.ticks.iter().zip(across.labels()) {
-        let x = percent(across.share(*tick));
-        markup.leaf("line", &[("class", "grid"), ("x1", &x), ("x2", &x), ("y1", "0"), ("y2", "100%")]);
-        markup.element("text", &[("class", "tick middle"), ("x", &x), ("y", "100%"), ("dy", "18")], &text);
-    }
+    chart::ticks(markup, &across, &up);
     if let Some(share) = coverage.stop_at {
         let y = percent(1.0 - up.share(100.0 * share));
         markup.open("g", &[]);
@@ -59,15 +63,22 @@ fn over_evaluations(markup: &mut Markup, coverage: &CoverageSummary) {
         markup.leaf("line", &[("class", "bound"), ("x1", "0"), ("x2", "100%"), ("y1", &y), ("y2", &y)]);
         markup.close();
     }
-    let mut path = String::from("M0 100");
-    for point in &coverage.curve {
-        let x = coordinate(100.0 * across.share(f64::from(point.evaluations)));
-        let y = coordinate(100.0 * (1.0 - up.share(100.0 * point.coverage)));
-        let _ = write!(path, " H{x} V{y}");
+    let begin = std::iter::once((0.0, 0.0));
+    let own: Vec<(f64, f64)> =
+        begin.chain(coverage.curve.iter().map(|it| (f64::from(it.evaluations), 100.0 * it.coverage))).collect();
+    let tracking = TRACKING.map(|(evaluations, cells)| (evaluations, percent_of(cells)));
+    let lines: [(&str, &[(f64, f64)]); 2] = [("line published", &tracking), ("line", &own)];
+    chart::steps(markup, &across, &up, if published { &lines } else { &lines[1..] });
+    if published {
+        let (x, y) = (percent(across.share(BOOSTING.0)), percent(1.0 - up.share(percent_of(BOOSTING.1))));
+        markup.open("circle", &[("class", "ring published"), ("cx", &x), ("cy", &y), ("r", "5")]);
+        markup.element("title", &[], "the paper, with boosting: half of the cells at 110 evaluations");
+        markup.close();
+        let (x, y) = (percent(across.share(210.0)), percent(1.0 - up.share(50.0)));
+        markup.open("circle", &[("class", "dot"), ("cx", &x), ("cy", &y), ("r", "4")]);
+        markup.element("title", &[], "the paper, counted only: half of the cells at 210 evaluations");
+        markup.close();
     }
-    markup.open("svg", &[("viewBox", "0 0 100 100"), ("preserveAspectRatio", "none"), ("aria-hidden", "true")]);
-    markup.leaf("path", &[("class", "line"), ("d", &path)]);
-    markup.close();
     markup.close();
     markup.element("p", &[("class", "axis-title below")], "evaluations");
     markup.close();
@@ -82,8 +93,9 @@ struct Place {
     hits: u64,
 }
 
-/// The map of the first two dimensions; a grid of one dimension is a row.
-fn map(markup: &mut Markup, coverage: &CoverageSummary) {
+/// The map of the first two dimensions; a grid of one dimension is a row. What it needs to show others instead lies beside
+/// it, for the page's script.
+fn map(markup: &mut Markup, plan: &CampaignPlan, coverage: &CoverageSummary, drawn: &[u32]) {
     let axes = &coverage.axes;
     let [x, y] = [axes.first(), axes.get(1)];
     let Some(x) = x else { return };
@@ -93,6 +105,8 @@ fn map(markup: &mut Markup, coverage: &CoverageSummary) {
     }
     let places = places(coverage, columns, rows);
     let most = places.iter().map(|place| place.hits).max().unwrap_or(0).max(1) as f64;
+    let data = map_data(plan, coverage, drawn);
+    markup.open("div", &[("class", "map"), ("data-cells", &data)]);
     markup.open("div", &[("class", "chart small")]);
     let vertical = y.map_or_else(|| "all".to_owned(), |y| y.dimension.name().to_owned());
     markup.element("p", &[("class", "axis-title")], &vertical);
@@ -131,6 +145,64 @@ fn map(markup: &mut Markup, coverage: &CoverageSummary) {
     markup.close();
     markup.element("p", &[("class", "axis-title below")], x.dimension.name());
     markup.close();
+    markup.close();
+}
+
+/// All that the map can show, as JSON: axes; per metric that is of interest one way its name, unit and that way; which
+/// cells can be reached, as lengths of runs that begin with those that cannot; and per cell that was hit its number, its
+/// hits, and per metric the worst value with its test. The tests that have a timeline on the page are `drawn`.
+fn map_data(plan: &CampaignPlan, coverage: &CoverageSummary, drawn: &[u32]) -> String {
+    let axes: Vec<Value> = coverage
+        .axes
+        .iter()
+        .map(|axis| json!({"name": axis.dimension.name(), "low": axis.low, "high": axis.high, "cells": axis.cells}))
+        .collect();
+    let metrics: Vec<Value> = coverage
+        .worst
+        .metrics
+        .iter()
+        .map(|&id| {
+            let metric = plan.metric(id);
+            json!({"name": metric.name, "unit": metric.unit, "most": metric.direction == Some(Direction::Maximise)})
+        })
+        .collect();
+    let mut reach = Vec::new();
+    let (mut now, mut length) = (false, 0u32);
+    for (cell, &hits) in coverage.counted.hits().iter().enumerate() {
+        if (coverage.reachable.reaches(cell) || hits > 0) != now {
+            reach.push(length);
+            (now, length) = (!now, 0);
+        }
+        length += 1;
+    }
+    reach.push(length);
+    let hit: Vec<Value> = coverage
+        .counted
+        .hits()
+        .iter()
+        .enumerate()
+        .filter(|(_, hits)| **hits > 0)
+        .map(|(cell, hits)| {
+            let mut row = vec![json!(cell), json!(hits)];
+            for worst in coverage.worst.of(cell) {
+                match worst {
+                    Some((value, test)) => row.extend([json!(rounded(*value)), json!(test)]),
+                    None => row.extend([Value::Null, Value::Null]),
+                }
+            }
+            Value::Array(row)
+        })
+        .collect();
+    json!({
+        "axes": axes, "metrics": metrics, "needed": coverage.hits, "reach": reach, "hit": hit,
+        "drawn": drawn,
+    })
+    .to_string()
+}
+
+/// Four digits: what a colour and a hint can tell.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 fn places(coverage: &CoverageSummary, columns: usize, rows: usize) -> Vec<Place> {

@@ -1,10 +1,12 @@
 //! How much of the space a campaign has looked at.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
-use sesame_plan::GridAxis;
+use sesame_plan::{CampaignPlan, Direction, GridAxis, MetricId};
 
 use crate::coverage::{Coverage, CurvePoint, Feasible, Grid, curve};
-use crate::record::{Origin, RecordError, Repository};
+use crate::record::{Origin, RecordError, Repository, ScannedTest};
 use crate::report::number::fixed;
 use crate::sspr::Convention;
 
@@ -35,6 +37,46 @@ pub struct CoverageSummary {
     pub(crate) counted: Coverage,
     #[serde(skip)]
     pub(crate) reachable: Feasible,
+    #[serde(skip)]
+    pub(crate) worst: WorstOfCells,
+}
+
+/// The worst value of some metrics in each cell.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct WorstOfCells {
+    /// The metrics: objectives and those that a requirement bounds, where it is known which way is of interest.
+    pub(crate) metrics: Vec<MetricId>,
+    /// Per cell and metric the value and the number of its test, of cells that were hit.
+    values: BTreeMap<usize, Vec<Option<(f64, u32)>>>,
+}
+
+impl WorstOfCells {
+    fn new(plan: &CampaignPlan) -> WorstOfCells {
+        let mut metrics = Vec::new();
+        let bounded = plan.requirements.iter().map(|requirement| requirement.metric);
+        for id in plan.campaign.objectives.iter().copied().chain(bounded) {
+            if plan.metric(id).direction.is_some() && !metrics.contains(&id) {
+                metrics.push(id);
+            }
+        }
+        WorstOfCells { metrics, values: BTreeMap::new() }
+    }
+
+    fn add(&mut self, plan: &CampaignPlan, cell: usize, test: &ScannedTest) {
+        let worst = self.values.entry(cell).or_insert_with(|| vec![None; self.metrics.len()]);
+        for (&id, worst) in self.metrics.iter().zip(worst) {
+            let Some(value) = test.value(id).value.filter(|value| value.is_finite()) else { continue };
+            let more = plan.metric(id).direction == Some(Direction::Maximise);
+            if worst.is_none_or(|(known, _)| if more { value > known } else { value < known }) {
+                *worst = Some((value, test.number));
+            }
+        }
+    }
+
+    /// Of each metric the worst value in a cell with its test; nothing where no test was.
+    pub(crate) fn of(&self, cell: usize) -> &[Option<(f64, u32)>] {
+        self.values.get(&cell).map_or(&[], Vec::as_slice)
+    }
 }
 
 /// The coverage of a campaign that counts it; `None` for any other.
@@ -44,9 +86,14 @@ pub(crate) fn coverage(repository: &Repository) -> Result<Option<CoverageSummary
     let grid = Grid::new(goal.axes.clone())
         .map_err(|error| RecordError::damaged(repository.path(), format!("its coverage is no grid: {error}")))?;
     let mut points = Vec::new();
+    let mut worst = WorstOfCells::new(plan);
     repository.scan(&mut |test| {
         if test.origin != Origin::Reference {
-            points.push(test.covering_point(plan, Convention::Ours));
+            let point = test.covering_point(plan, Convention::Ours);
+            if let Some(cell) = point.as_ref().and_then(|point| grid.cell_of(point)) {
+                worst.add(plan, cell, &test);
+            }
+            points.push(point);
         }
     })?;
     let reachable = Feasible::of(plan, &grid);
@@ -65,6 +112,7 @@ pub(crate) fn coverage(repository: &Repository) -> Result<Option<CoverageSummary
         curve,
         counted,
         reachable,
+        worst,
     }))
 }
 

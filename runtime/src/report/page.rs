@@ -1,21 +1,24 @@
 //! The page with pictures: one file that needs nothing but itself.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use sesame_plan::Search;
+use sesame_plan::{CampaignPlan, Search};
 
 use crate::observation::Outcome;
 use crate::record::{MetricValue, Origin, RecordError, Repository, TestRow, Verdict, trace_file};
 use crate::report::cells;
+use crate::report::chart::evenly;
 use crate::report::confirmed::{confirmation_sentence, values_sentence};
+use crate::report::generations::generations;
 use crate::report::markup::{Markup, coordinate, fill};
 use crate::report::number::{self, plural, with_unit};
 use crate::report::regions;
-use crate::report::scatter::{Detail, Dimension, Kind, Point, scatter};
+use crate::report::scatter::{Detail, Dimension, Kind, Point, dimension, scatter};
 use crate::report::show::{TestReport, report_on};
 use crate::report::shrinking::{self, Shrinking};
-use crate::report::summary::{Objective, RequirementSummary, Summary, summarise, value_text};
+use crate::report::summary::{RequirementSummary, Summary, operations, summarise, value_text};
 use crate::report::text::{
     came_out, choices_text, confirmed_column, counts_sentence, effect_text, expectation_value, headline,
     objective_columns, outcome_sentence, planned_text, rate_text, spans_text,
@@ -57,8 +60,9 @@ fn page_in(repository: &Repository, folder: &Path) -> Result<String, RecordError
     body.open("main", &[]);
     requirements(&mut body, &summary, &drawn);
     front(&mut body, repository, &summary, &rows, &drawn);
+    generations(&mut body, repository, &summary, &rows, &drawn)?;
     if let Some(coverage) = &summary.coverage {
-        cells::coverage(&mut body, coverage);
+        cells::coverage(&mut body, repository.plan(), coverage, &drawn);
     }
     regions::section(&mut body, repository)?;
     repetition(&mut body, &summary);
@@ -134,14 +138,6 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
             tests: more,
         },
     ]
-}
-
-/// At most so many, evenly chosen, first and last among them.
-fn evenly(all: &[u32], limit: usize) -> Vec<u32> {
-    if all.len() <= limit {
-        return all.to_vec();
-    }
-    (0..limit).map(|at| all[at * (all.len() - 1) / (limit - 1)]).collect()
 }
 
 fn header(body: &mut Markup, repository: &Repository, summary: &Summary) -> Result<(), RecordError> {
@@ -276,18 +272,20 @@ fn front(body: &mut Markup, repository: &Repository, summary: &Summary, rows: &[
         return;
     }
     body.element("h2", &[], "Front");
+    let plan = repository.plan();
     let objectives = &summary.objectives;
     let pairs: Vec<(usize, usize)> = (0..objectives.len()).flat_map(|y| (0..y).map(move |x| (x, y))).take(10).collect();
     if objectives.len() == 1 {
         let x = Dimension { title: "test".to_owned(), direction: None };
-        let points = points(summary, rows, drawn, |row| Some((f64::from(row.number), shown_value(summary, row, 0)?)));
+        let points =
+            points(plan, summary, rows, drawn, |row| Some((f64::from(row.number), shown_value(summary, row, 0)?)));
         scatter(body, &x, &dimension(&objectives[0]), &points, Detail { named: true, points: 2500 });
     }
     let detail = Detail { named: pairs.len() == 1, points: 2500 / pairs.len().max(1) };
     body.open("div", &[("class", if pairs.len() > 1 { "charts" } else { "charts one" })]);
     for (x, y) in pairs {
         let value = |row: &TestRow, at: usize| shown_value(summary, row, at);
-        let points = points(summary, rows, drawn, |row| Some((value(row, x)?, value(row, y)?)));
+        let points = points(plan, summary, rows, drawn, |row| Some((value(row, x)?, value(row, y)?)));
         scatter(body, &dimension(&objectives[x]), &dimension(&objectives[y]), &points, detail);
     }
     body.close();
@@ -296,16 +294,8 @@ fn front(body: &mut Markup, repository: &Repository, summary: &Summary, rows: &[
     body.close();
 }
 
-fn dimension(objective: &Objective) -> Dimension {
-    let title = match &objective.unit {
-        Some(unit) => format!("{} [{unit}]", objective.metric),
-        None => objective.metric.clone(),
-    };
-    Dimension { title, direction: objective.direction }
-}
-
 /// The value of an objective by which a test is judged: that of its repetitions where the campaign confirmed it.
-fn shown_value(summary: &Summary, row: &TestRow, objective: usize) -> Option<f64> {
+pub(crate) fn shown_value(summary: &Summary, row: &TestRow, objective: usize) -> Option<f64> {
     let repeated = summary.confirmed.iter().find(|test| test.number == row.number);
     match repeated.and_then(|test| test.values.as_ref()) {
         Some(values) => values.get(objective).copied(),
@@ -314,44 +304,49 @@ fn shown_value(summary: &Summary, row: &TestRow, objective: usize) -> Option<f64
 }
 
 fn points(
+    plan: &CampaignPlan,
     summary: &Summary,
     rows: &[TestRow],
     drawn: &[u32],
     place: impl Fn(&TestRow) -> Option<(f64, f64)>,
 ) -> Vec<Point> {
+    let front: BTreeSet<u32> = summary.front.iter().map(|test| test.number).collect();
     let measured =
         |row: &&TestRow| matches!(row.outcome, Outcome::Completed | Outcome::Unknown) && row.duplicate_of.is_none();
     rows.iter()
         .filter(measured)
         .filter_map(|row| {
             let (x, y) = place(row)?;
-            let kind = if summary.front.iter().any(|test| test.number == row.number) {
+            let kind = if front.contains(&row.number) {
                 Kind::Front
             } else if row.origin == Origin::Reference {
                 Kind::Reference
             } else {
                 Kind::Plain
             };
-            let values: Vec<String> = summary
-                .objectives
-                .iter()
-                .enumerate()
-                .map(|(at, objective)| {
-                    let value = shown_value(summary, row, at).map_or("–".to_owned(), number::number);
-                    format!("{} {}", objective.metric, with_unit(value, objective.unit.as_deref()))
-                })
-                .collect();
-            let name = if kind == Kind::Reference { "undisturbed".to_owned() } else { format!("T{}", row.number) };
             Some(Point {
                 x,
                 y,
                 kind,
                 test: format!("T{}", row.number),
-                title: format!("{name}: {}", values.join(", ")),
+                title: dot_title(plan, summary, row),
                 linked: drawn.contains(&row.number),
             })
         })
         .collect()
+}
+
+/// What a dot says when it is pointed at: the test, what it disturbs, and the values of its objectives.
+pub(crate) fn dot_title(plan: &CampaignPlan, summary: &Summary, row: &TestRow) -> String {
+    let values = summary.objectives.iter().enumerate().map(|(at, objective)| {
+        let value = shown_value(summary, row, at).map_or("–".to_owned(), number::number);
+        format!("{} {}", objective.metric, with_unit(value, objective.unit.as_deref()))
+    });
+    let values = values.collect::<Vec<String>>().join(", ");
+    match row.origin {
+        Origin::Reference => format!("undisturbed: {values}"),
+        Origin::Known(_) | Origin::Search => format!("T{} ({}): {values}", row.number, operations(plan, row)),
+    }
 }
 
 fn caption(summary: &Summary, repository: &Repository) -> String {
@@ -370,7 +365,8 @@ fn caption(summary: &Summary, repository: &Repository) -> String {
     }
     let mut caption =
         "Each dot is a test; emphasised: no other test is better in one objective without being worse in another. \
-         The ring is the undisturbed run. Point at a dot to see its values, click it to see it over time."
+         The ring is the undisturbed run. Point at a dot to see its operations and values. Click one to see it over time, where this page has room for \
+         that; `show` tells the others."
             .to_owned();
     if let Some(confirmation) = summary.confirmation {
         let _ = write!(

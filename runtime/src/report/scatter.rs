@@ -8,7 +8,9 @@ use std::fmt::Write as _;
 use sesame_plan::Direction;
 
 use crate::report::axis::Axis;
+use crate::report::chart;
 use crate::report::markup::{Markup, coordinate, percent};
+use crate::report::summary::Objective;
 
 /// One axis of a chart.
 #[derive(Debug, Clone)]
@@ -59,19 +61,10 @@ pub(crate) fn scatter(markup: &mut Markup, x: &Dimension, y: &Dimension, points:
     let vertical = Axis::round(points.iter().map(|point| point.y), 5);
     let place = |point: &Point| (horizontal.share(point.x), 1.0 - vertical.share(point.y));
     markup.open("div", &[("class", if detail.named { "chart" } else { "chart small" })]);
-    markup.element("p", &[("class", "axis-title")], &axis_title(y));
+    markup.element("p", &[("class", "axis-title")], &y.axis_title());
     let label = format!("{} against {}, {} tests", y.title, x.title, points.len());
     markup.open("svg", &[("class", "scatter"), ("role", "img"), ("aria-label", &label)]);
-    for (tick, text) in vertical.ticks.iter().zip(vertical.labels()) {
-        let y = percent(1.0 - vertical.share(*tick));
-        markup.leaf("line", &[("class", "grid"), ("x1", "0"), ("x2", "100%"), ("y1", &y), ("y2", &y)]);
-        markup.element("text", &[("class", "tick end"), ("x", "-8"), ("y", &y), ("dy", "4")], &text);
-    }
-    for (tick, text) in horizontal.ticks.iter().zip(horizontal.labels()) {
-        let x = percent(horizontal.share(*tick));
-        markup.leaf("line", &[("class", "grid"), ("x1", &x), ("x2", &x), ("y1", "0"), ("y2", "100%")]);
-        markup.element("text", &[("class", "tick middle"), ("x", &x), ("y", "100%"), ("dy", "18")], &text);
-    }
+    chart::ticks(markup, &horizontal, &vertical);
     let plain: Vec<&Point> = points.iter().filter(|point| point.kind == Kind::Plain).collect();
     for point in thin(&plain, detail.points, place) {
         dot(markup, point, place(point), "3", "dot");
@@ -92,15 +85,27 @@ pub(crate) fn scatter(markup: &mut Markup, x: &Dimension, y: &Dimension, points:
         names(markup, &front, &occupied, Screen { width: 300.0, height: 280.0, class: "name narrow" });
     }
     markup.close();
-    markup.element("p", &[("class", "axis-title below")], &axis_title(x));
+    markup.element("p", &[("class", "axis-title below")], &x.axis_title());
     markup.close();
 }
 
-fn axis_title(dimension: &Dimension) -> String {
-    match dimension.direction {
-        Some(Direction::Maximise) => format!("{}, maximised", dimension.title),
-        Some(Direction::Minimise) => format!("{}, minimised", dimension.title),
-        None => dimension.title.clone(),
+/// The axis of an objective.
+pub(crate) fn dimension(objective: &Objective) -> Dimension {
+    let title = match &objective.unit {
+        Some(unit) => format!("{} [{unit}]", objective.metric),
+        None => objective.metric.clone(),
+    };
+    Dimension { title, direction: objective.direction }
+}
+
+impl Dimension {
+    /// The title, and which way is of interest.
+    pub(crate) fn axis_title(&self) -> String {
+        match self.direction {
+            Some(Direction::Maximise) => format!("{}, maximised", self.title),
+            Some(Direction::Minimise) => format!("{}, minimised", self.title),
+            None => self.title.clone(),
+        }
     }
 }
 
@@ -245,7 +250,7 @@ mod tests {
         Point { x, y, kind, test: test.to_owned(), title: format!("{test}: {x}, {y}"), linked: kind == Kind::Front }
     }
 
-    fn dimension(title: &str, direction: Direction) -> Dimension {
+    fn along(title: &str, direction: Direction) -> Dimension {
         Dimension { title: title.to_owned(), direction: Some(direction) }
     }
 
@@ -260,7 +265,7 @@ mod tests {
         ];
         let mut markup = Markup::default();
         let detail = Detail { named: true, points: 100 };
-        let (x, y) = (dimension("fuzzing_time [s]", Direction::Minimise), dimension("hits", Direction::Maximise));
+        let (x, y) = (along("fuzzing_time [s]", Direction::Minimise), along("hits", Direction::Maximise));
         scatter(&mut markup, &x, &y, &points, detail);
         insta::assert_snapshot!("scatter", markup.finish().replace("><", ">\n<"));
     }
@@ -271,7 +276,7 @@ mod tests {
             (0..10_000u32).map(|n| point(f64::from(n % 100), f64::from(n / 100), Kind::Plain, "T9")).collect();
         points.extend((0..50).map(|n| point(f64::from(n), f64::from(n), Kind::Front, "T1")));
         let mut markup = Markup::default();
-        let (x, y) = (dimension("x", Direction::Minimise), dimension("y", Direction::Maximise));
+        let (x, y) = (along("x", Direction::Minimise), along("y", Direction::Maximise));
         scatter(&mut markup, &x, &y, &points, Detail { named: true, points: 800 });
         let text = markup.finish();
         assert_eq!(text.matches("\"dot front\"").count(), 50);

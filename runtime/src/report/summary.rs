@@ -1,5 +1,7 @@
 //! What a campaign found, at a glance.
 
+use std::collections::BTreeSet;
+
 use serde::Serialize;
 use sesame_plan::{Bound, CampaignPlan, Confirmation, Direction, MetricId, Requirement};
 
@@ -274,6 +276,7 @@ fn front(
         let minimise = objectives.get(key).is_some_and(|it| it.direction == Some(Direction::Minimise));
         if minimise { -value } else { value }
     };
+    let members: BTreeSet<u32> = members.iter().copied().collect();
     let mut sorted: Vec<&TestRow> = rows.iter().filter(|row| members.contains(&row.number)).collect();
     sorted.sort_by(|a, b| danger(b).total_cmp(&danger(a)).then(a.number.cmp(&b.number)));
     sorted

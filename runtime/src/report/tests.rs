@@ -118,10 +118,97 @@ fn campaigns_with_any_number_of_objectives_have_a_page() {
         let repository = sample::campaign(folder.path(), &plan, 30);
         let html = page(&repository).unwrap();
         let document = parsed(&html);
-        let charts = document.descendants().filter(|node| node.attribute("class") == Some("scatter")).count();
+        let front = document.descendants().find(|node| node.attribute("id") == Some("front")).unwrap();
+        let charts = front.descendants().filter(|node| node.attribute("class") == Some("scatter")).count();
         assert_eq!(charts, [0, 1, 1, 3, 6][objectives as usize]);
         assert_eq!(summary_text(&summary(&repository).unwrap(), WIDE).contains("median"), objectives == 0);
     }
+}
+
+/// The sample plan with the grid of the paper's Table 3.
+fn plan_on_the_published_grid() -> sesame_plan::CampaignPlan {
+    let mut plan = sample::plan();
+    let grid = crate::coverage::Grid::parse("T1:0:1:6,T2:0:0.5:6,P1:0:1:3").unwrap();
+    plan.campaign.coverage = Some(sesame_plan::CoverageGoal { axes: grid.axes().to_vec(), hits: 1, stop_at: None });
+    plan
+}
+
+#[test]
+fn the_page_shows_fronts_and_indicators_by_generation() {
+    let folder = tempfile::tempdir().unwrap();
+    let repository = sample::campaign_with_fronts(folder.path(), &sample::plan(), 60);
+    let html = page(&repository).unwrap();
+    let document = parsed(&html);
+    let section = document.descendants().find(|node| node.attribute("id") == Some("generations")).unwrap();
+    let titles: Vec<&str> = section
+        .descendants()
+        .filter(|node| node.attribute("class") == Some("axis-title"))
+        .map(|node| node.text().unwrap())
+        .collect();
+    let indicators = ["hypervolume", "IGD⁺ to the final front", "tests on the front", "share of all tests so far [%]"];
+    assert_eq!(titles, [&["collision_occurrence, maximised"][..], &indicators].concat());
+    // Every front is there to be moved to, and each dot says when it was on one.
+    let sets = repository.result_sets().unwrap();
+    let fronts: Vec<_> = sets.iter().filter(|set| set.generation.is_some()).collect();
+    let told = section.descendants().find_map(|node| node.attribute("data-fronts")).unwrap();
+    let told: Vec<(u32, usize)> = serde_json::from_str(told).unwrap();
+    assert_eq!(told, fronts.iter().map(|set| (set.generation.unwrap(), set.members.len())).collect::<Vec<_>>());
+    for (at, set) in fronts.iter().enumerate() {
+        let stays = |node: &roxmltree::Node<'_, '_>| -> Option<bool> {
+            let bound = |name: &str| node.attribute(name)?.parse::<usize>().ok();
+            Some((bound("data-from")?..=bound("data-to")?).contains(&at))
+        };
+        let on = section.descendants().filter(|node| stays(node) == Some(true));
+        let mut named: Vec<u32> = on
+            .filter_map(|dot| dot.first_element_child()?.text()?.strip_prefix('T')?.split(' ').next()?.parse().ok())
+            .collect();
+        named.sort_unstable();
+        assert_eq!(named, set.members, "{}", set.name);
+    }
+}
+
+#[test]
+fn the_map_of_cells_has_all_that_its_script_shows() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = plan_on_the_published_grid();
+    let repository = sample::campaign(folder.path(), &plan, 60);
+    let html = page(&repository).unwrap();
+    let document = parsed(&html);
+    let data = document.descendants().find_map(|node| node.attribute("data-cells")).unwrap();
+    let data: serde_json::Value = serde_json::from_str(data).unwrap();
+    let summary = summary(&repository).unwrap().coverage.unwrap();
+    let hits: u64 = data["hit"].as_array().unwrap().iter().map(|row| row[1].as_u64().unwrap()).sum();
+    assert_eq!(data["hit"].as_array().unwrap().len(), summary.covered);
+    let reach: Vec<u64> = data["reach"].as_array().unwrap().iter().map(|it| it.as_u64().unwrap()).collect();
+    assert_eq!(reach.iter().sum::<u64>(), 108);
+    assert_eq!(reach.iter().skip(1).step_by(2).sum::<u64>(), summary.feasible as u64);
+    // The worst values are those that a look at every test finds.
+    let grid = crate::coverage::Grid::new(plan.campaign.coverage.as_ref().unwrap().axes.clone()).unwrap();
+    let collisions = data["metrics"].as_array().unwrap().iter().position(|it| it["name"] == "collision_occurrence");
+    let column = 2 + 2 * collisions.unwrap();
+    let mut counted = 0;
+    repository
+        .scan(&mut |test| {
+            let point = test.covering_point(&plan, crate::sspr::Convention::Ours);
+            let Some(cell) = point.and_then(|point| grid.cell_of(&point)) else { return };
+            if test.origin == crate::record::Origin::Reference {
+                return;
+            }
+            counted += 1;
+            let row = data["hit"].as_array().unwrap().iter().find(|row| row[0] == cell).unwrap();
+            let value = test.value(sesame_plan::MetricId(0)).value;
+            assert!(value.is_none_or(|value| value <= row[column].as_f64().unwrap()), "T{}", test.number);
+            if row[column + 1] == test.number {
+                assert_eq!(value, row[column].as_f64());
+            }
+        })
+        .unwrap();
+    assert_eq!(hits, counted);
+    assert!(html.contains("the paper, with boosting: half of the cells at 110 evaluations"));
+    let mut other = plan;
+    other.campaign.coverage.as_mut().unwrap().hits = 2;
+    let folder = tempfile::tempdir().unwrap();
+    assert!(!page(&sample::campaign(folder.path(), &other, 20)).unwrap().contains("boosting: half"), "other cells");
 }
 
 #[test]

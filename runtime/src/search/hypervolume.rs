@@ -1,10 +1,11 @@
 //! Hypervolume: the volume that a set of points dominates up to a reference point, all objectives minimised.
 //!
-//! Exact: a sweep for two objectives, WFG's recursion over exclusive volumes (While et al. 2012) for any other number.
+//! Exact: sweeps for two and three objectives (the latter after Beume et al. 2009), WFG's recursion over exclusive volumes
+//! (While et al. 2012) for any other number.
 
 use std::cmp::Ordering;
 
-use crate::search::dominance::{dominates_in_all, lexicographic};
+use crate::search::dominance::{ascending, dominates_in_all, lexicographic};
 
 /// The volume dominated by the points and bounded by the reference. A point counts only where it is below the reference
 /// in every objective. The reference must be finite, the points free of NaN and as long as it; with no objectives at
@@ -51,6 +52,9 @@ fn volume(points: Vec<Vec<f64>>, reference: &[f64]) -> f64 {
         }
         return area;
     }
+    if let [x, y, z] = *reference {
+        return swept(points, [x, y, z]);
+    }
     let mut total = 0.0;
     let mut rest = points.into_iter();
     while let Some(point) = rest.next() {
@@ -60,6 +64,50 @@ fn volume(points: Vec<Vec<f64>>, reference: &[f64]) -> f64 {
         total += own - volume(non_dominated(limited.collect()), reference);
     }
     total
+}
+
+/// As [`volume`], of three objectives: a plane moves up the third one, and the area dominated below it only grows.
+fn swept(mut points: Vec<Vec<f64>>, [right, top, end]: [f64; 3]) -> f64 {
+    points.sort_by(|a, b| ascending(a[2], b[2]));
+    let mut stairs = Stairs { steps: Vec::new(), right, top };
+    let (mut total, mut area) = (0.0, 0.0);
+    let mut height = points.first().map_or(end, |lowest| lowest[2]);
+    for point in &points {
+        total += area * (point[2] - height);
+        height = point[2];
+        area += stairs.add(point[0], point[1]);
+    }
+    total + area * (end - height)
+}
+
+/// The area that points in the plane dominate up to a corner.
+struct Stairs {
+    /// The points that no other dominates: the first coordinate ascends, the second descends.
+    steps: Vec<(f64, f64)>,
+    right: f64,
+    top: f64,
+}
+
+impl Stairs {
+    /// Adds a point, and tells by how much the area has grown.
+    fn add(&mut self, x: f64, y: f64) -> f64 {
+        let beyond = self.steps.partition_point(|step| step.0 <= x);
+        let mut ceiling = beyond.checked_sub(1).map_or(self.top, |before| self.steps[before].1);
+        if ceiling <= y {
+            return 0.0;
+        }
+        let first = self.steps.partition_point(|step| step.0 < x);
+        let (mut left, mut grown, mut last) = (x, 0.0, first);
+        while let Some(&(step, height)) = self.steps.get(last).filter(|step| step.1 >= y) {
+            grown += (step - left) * (ceiling - y);
+            (left, ceiling) = (step, height);
+            last += 1;
+        }
+        let end = self.steps.get(last).map_or(self.right, |step| step.0);
+        grown += (end - left) * (ceiling - y);
+        self.steps.splice(first..last, [(x, y)]);
+        grown
+    }
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use anyhow::{Context as _, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use sesame_plan::Dimension;
-use sesame_runtime::analysis::{self, Dataset, Selection, regions};
+use sesame_runtime::analysis::{self, Dataset, Run, Selection, regions};
 use sesame_runtime::coverage::Grid;
 use sesame_runtime::record::{DATABASE, Repository};
 use sesame_runtime::report::TextOptions;
@@ -91,6 +91,45 @@ pub(super) enum Results {
         #[command(flatten)]
         output: Output,
     },
+    /// Hypervolume, distance to the final front, coverage and counts of tests after each generation.
+    Indicators {
+        /// A results file, or the folder of a run.
+        file: PathBuf,
+        /// Measure hypervolumes from this point, a value per objective in its unit, for example `325,0`; from the one
+        /// fixed while the campaign ran if not said.
+        #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "VALUES")]
+        reference: Vec<f64>,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// Runs, or groups of runs that differ in their seeds, beside each other.
+    ///
+    /// Each FILE is a group: a results file, the folder of a run, or a folder with several runs below. With groups of
+    /// several runs medians, quartiles and how each group compares with the first are shown, else the runs.
+    Compare {
+        /// Results files, folders of runs, or folders with such folders below.
+        #[arg(required = true, value_name = "FILE")]
+        files: Vec<PathBuf>,
+        /// Group all runs by the names of their campaigns instead.
+        #[arg(long)]
+        by_campaign: bool,
+        /// Measure hypervolumes from this point, a value per objective in its unit, for example `325,0`; from the worst
+        /// values in any test of any run if not said.
+        #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "VALUES")]
+        reference: Vec<f64>,
+        /// The cells coverage is counted in, for example `T1:0:1:6,T2:0:0.5:6,P1:0:1:3`; those of the campaigns, if they
+        /// are the same in all, if not said.
+        #[arg(long, value_name = "GRID", value_parser = Grid::parse)]
+        grid: Option<Grid>,
+        /// Show each run, also where there are groups.
+        #[arg(long, conflicts_with = "pairs")]
+        runs: bool,
+        /// Show of each two runs which share of the second one's front the first one's covers (the C-metric).
+        #[arg(long)]
+        pairs: bool,
+        #[command(flatten)]
+        output: Output,
+    },
 }
 
 /// Which tests.
@@ -151,11 +190,7 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
         Results::Campaigns { files, output } => {
             let mut found = Vec::new();
             for file in &files {
-                let before = found.len();
-                gather(file, &mut found)?;
-                if found.len() == before {
-                    bail!("no results in {}: name a results file, or a folder with such files below", file.display());
-                }
+                found.extend(gathered(file)?);
             }
             let repositories = found.iter().map(|file| Repository::open(file)).collect::<Result<Vec<_>, _>>()?;
             print(&analysis::campaigns(&repositories)?, &output)
@@ -217,7 +252,72 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
             }
             print(&if cells { analysis.cells() } else { analysis.curve() }, &output)
         }
+        Results::Indicators { file, reference, output } => {
+            let repository = Repository::open(&file)?;
+            let needed = repository.plan().campaign.objectives.len();
+            if !reference.is_empty() && reference.len() != needed {
+                let given = reference.len();
+                bail!("the reference point has {given} values for {needed} objectives; give one for each, in its unit");
+            }
+            let given = Some(reference.as_slice()).filter(|point| !point.is_empty());
+            let analysis = analysis::indicators(&repository, given)?;
+            measured_from(shell, &analysis.reference);
+            print(&analysis.dataset(), &output)
+        }
+        Results::Compare { files, by_campaign, reference, grid, runs, pairs, output } => {
+            let compared = to_compare(&files, by_campaign)?;
+            let given = Some(reference.as_slice()).filter(|point| !point.is_empty());
+            let comparison = analysis::compare(&compared, given, grid)?;
+            measured_from(shell, &comparison.reference);
+            if !comparison.covers && !pairs {
+                shell.note(
+                    "the campaigns do not count the same cells; `--grid` gives cells to compare their coverage in",
+                );
+            }
+            let shown = if pairs {
+                comparison.pairs()
+            } else if runs || !comparison.has_groups() {
+                comparison.runs()
+            } else {
+                comparison.groups()
+            };
+            print(&shown, &output)
+        }
     }
+}
+
+/// Says where hypervolumes begin, aside, so that tables stay tables.
+fn measured_from(shell: Shell, reference: &[(String, f64)]) {
+    if !reference.is_empty() {
+        let point: Vec<String> = reference.iter().map(|(metric, value)| format!("{metric} {value}")).collect();
+        shell.note(format!("hypervolumes are measured from {}", point.join(", ")));
+    }
+}
+
+/// The runs at and below paths, each in the group of its path or of its campaign.
+fn to_compare(files: &[PathBuf], by_campaign: bool) -> anyhow::Result<Vec<Run>> {
+    let mut runs: Vec<Run> = Vec::new();
+    for file in files {
+        for found in gathered(file)? {
+            let repository = Repository::open(&found)?;
+            let group = if by_campaign { repository.plan().campaign.name.clone() } else { file.display().to_string() };
+            runs.push(Run { group, repository });
+        }
+    }
+    if runs.len() < 2 {
+        bail!("there is one run only, and nothing to compare it with: name two or more");
+    }
+    Ok(runs)
+}
+
+/// The results files at and below a path; at least one.
+fn gathered(path: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    gather(path, &mut found)?;
+    if found.is_empty() {
+        bail!("no results in {}: name a results file, or a folder with such files below", path.display());
+    }
+    Ok(found)
 }
 
 fn open(input: &Input) -> anyhow::Result<(Repository, Selection)> {
