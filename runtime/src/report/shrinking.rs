@@ -350,8 +350,14 @@ pub(crate) fn section(body: &mut Markup, shrinking: &Shrinking, drawn: &[u32]) {
     body.open("section", &[("id", "shrinking")]);
     body.element("h2", &[], &format!("{} made smaller", shrinking.test));
     body.element("p", &[], &format!("{}.", shrinking.sentence()));
-    let (titles, rows) = sizes(shrinking);
+    let (mut titles, rows) = sizes(shrinking);
     let last = titles.len() - 1;
+    // Headings of columns begin with capitals here; names of metrics stay as they are.
+    for (at, title) in titles.iter_mut().enumerate() {
+        if let Some(first) = title.get_mut(..1).filter(|_| at < 6 || at == last) {
+            first.make_ascii_uppercase();
+        }
+    }
     table(body, &titles, 2..last, |body| {
         for row in rows {
             body.open("tr", &[]);
@@ -480,7 +486,7 @@ mod tests {
         let (before, after) = (shrinking.before.as_ref().unwrap(), shrinking.after.as_ref().unwrap());
         assert!(shrinking.minimal && after.operations < before.operations && after.active_time < before.active_time);
         assert!(after.strength < before.strength && after.values[0].value > Some(0.0));
-        assert_eq!(shrinking.steps.iter().filter(|step| step.kept).last().unwrap().test, after.test);
+        assert_eq!(shrinking.steps.iter().rfind(|step| step.kept).unwrap().test, after.test);
         insta::assert_snapshot!("shrinking", summary_text(&summary, TextOptions { width: Some(110), colour: false }));
         let html = page(&repository).unwrap();
         assert!(html.contains("made smaller") && html.contains("Every test that was tried"));
