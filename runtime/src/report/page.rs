@@ -58,6 +58,9 @@ fn page_in(repository: &Repository, folder: &Path) -> Result<String, RecordError
     let mut body = Markup::default();
     header(&mut body, repository, &summary)?;
     body.open("main", &[]);
+    if let Some(shrinking) = &summary.shrinking {
+        shrinking::section(&mut body, shrinking, &drawn);
+    }
     requirements(&mut body, &summary, &drawn);
     front(&mut body, repository, &summary, &rows, &drawn);
     generations(&mut body, repository, &summary, &rows, &drawn)?;
@@ -66,9 +69,6 @@ fn page_in(repository: &Repository, folder: &Path) -> Result<String, RecordError
     }
     regions::section(&mut body, repository)?;
     repetition(&mut body, &summary);
-    if let Some(shrinking) = &summary.shrinking {
-        shrinking::section(&mut body, shrinking, &drawn);
-    }
     expectations(&mut body, &summary, &drawn);
     failures(&mut body, &summary, &drawn);
     for group in groups.iter().filter(|group| !group.tests.is_empty()) {
@@ -264,6 +264,10 @@ fn verdict_bar(body: &mut Markup, requirement: &RequirementSummary) {
 }
 
 fn front(body: &mut Markup, repository: &Repository, summary: &Summary, rows: &[TestRow], drawn: &[u32]) {
+    // Of tests that differ in a step or two from each other, how far metrics went says nothing.
+    if summary.shrinking.is_some() {
+        return;
+    }
     body.open("section", &[("id", "front")]);
     if summary.objectives.is_empty() {
         body.element("h2", &[], "Values");

@@ -350,8 +350,14 @@ pub(crate) fn section(body: &mut Markup, shrinking: &Shrinking, drawn: &[u32]) {
     body.open("section", &[("id", "shrinking")]);
     body.element("h2", &[], &format!("{} made smaller", shrinking.test));
     body.element("p", &[], &format!("{}.", shrinking.sentence()));
-    let (titles, rows) = sizes(shrinking);
+    let (mut titles, rows) = sizes(shrinking);
     let last = titles.len() - 1;
+    // Headings of columns begin with capitals here; names of metrics stay as they are.
+    for (at, title) in titles.iter_mut().enumerate() {
+        if let Some(first) = title.get_mut(..1).filter(|_| at < 6 || at == last) {
+            first.make_ascii_uppercase();
+        }
+    }
     table(body, &titles, 2..last, |body| {
         for row in rows {
             body.open("tr", &[]);
