@@ -21,7 +21,7 @@ pub(crate) fn coverage(markup: &mut Markup, plan: &CampaignPlan, coverage: &Cove
     markup.open("section", &[("id", "coverage")]);
     markup.element("h2", &[], "Coverage");
     markup.element("p", &[], &format!("{}.", coverage_sentence(coverage)));
-    markup.open("div", &[("class", "charts")]);
+    markup.open("div", &[("class", "charts two")]);
     over_evaluations(markup, coverage, published);
     map(markup, plan, coverage, drawn);
     markup.close();

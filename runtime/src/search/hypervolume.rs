@@ -24,7 +24,7 @@ pub fn hypervolume(points: &[&[f64]], reference: &[f64]) -> f64 {
     } else if points.iter().flatten().any(|x| x.is_infinite()) {
         f64::INFINITY
     } else {
-        volume(non_dominated(points), reference)
+        volume(points, reference)
     }
 }
 
@@ -41,14 +41,17 @@ fn non_dominated(mut points: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     kept
 }
 
-/// The volume of mutually non-dominated points in lexicographic order, all inside the reference.
-fn volume(points: Vec<Vec<f64>>, reference: &[f64]) -> f64 {
+/// The volume that points dominate, all inside the reference and finite.
+fn volume(mut points: Vec<Vec<f64>>, reference: &[f64]) -> f64 {
     if let [x, y] = *reference {
+        points.sort_by(|a, b| lexicographic(a, b));
         let mut top = y;
         let mut area = 0.0;
         for point in &points {
-            area += (x - point[0]) * (top - point[1]);
-            top = point[1];
+            if point[1] < top {
+                area += (x - point[0]) * (top - point[1]);
+                top = point[1];
+            }
         }
         return area;
     }
@@ -56,19 +59,19 @@ fn volume(points: Vec<Vec<f64>>, reference: &[f64]) -> f64 {
         return swept(points, [x, y, z]);
     }
     let mut total = 0.0;
-    let mut rest = points.into_iter();
+    let mut rest = non_dominated(points).into_iter();
     while let Some(point) = rest.next() {
         let own: f64 = point.iter().zip(reference).map(|(x, bound)| bound - x).product();
         // What the remaining points dominate of this point's box: their corners moved into it.
         let limited = rest.as_slice().iter().map(|other| other.iter().zip(&point).map(|(a, b)| a.max(*b)).collect());
-        total += own - volume(non_dominated(limited.collect()), reference);
+        total += own - volume(limited.collect(), reference);
     }
     total
 }
 
 /// As [`volume`], of three objectives: a plane moves up the third one, and the area dominated below it only grows.
 fn swept(mut points: Vec<Vec<f64>>, [right, top, end]: [f64; 3]) -> f64 {
-    points.sort_by(|a, b| ascending(a[2], b[2]));
+    points.sort_by(|a, b| ascending(a[2], b[2]).then_with(|| lexicographic(a, b)));
     let mut stairs = Stairs { steps: Vec::new(), right, top };
     let (mut total, mut area) = (0.0, 0.0);
     let mut height = points.first().map_or(end, |lowest| lowest[2]);
