@@ -16,6 +16,7 @@ pub mod initial;
 pub mod nsga2;
 pub mod permitted;
 pub mod problems;
+pub mod published;
 pub mod range;
 pub mod real;
 pub mod selection;
