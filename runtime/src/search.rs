@@ -20,6 +20,7 @@ pub mod published;
 pub mod range;
 pub mod real;
 pub mod selection;
+pub mod sobol_points;
 pub mod sorting;
 pub mod stop;
 pub mod vary;
@@ -28,6 +29,7 @@ mod boost;
 mod cells;
 mod construct;
 mod constructing;
+mod decoded;
 mod in_turn;
 mod known;
 mod latin_hypercube;
@@ -35,6 +37,7 @@ mod map_elites;
 mod predict;
 mod random;
 mod repeat;
+mod sobol;
 
 #[cfg(test)]
 mod explored;
@@ -63,6 +66,7 @@ pub use permitted::{Permitted, SearchError};
 pub use predict::Course;
 pub use random::Random;
 pub use repeat::Repeat;
+pub use sobol::Sobol;
 pub use stop::StopRules;
 pub use vary::TestVariation;
 
