@@ -74,6 +74,9 @@ const BEST: usize = 3;
 /// How much of the doubt counts in favour of a place, in turn.
 const DOUBTS: [f64; 3] = [0.0, 1.0, 2.0];
 
+/// Margins so many times further above the median than the least one is below are outliers.
+const STRAIGHT: f64 = 4.0;
+
 /// A focused falsification by ask and tell.
 #[derive(Debug, Clone)]
 pub struct Falsifier<G: Ground> {
@@ -261,8 +264,8 @@ fn reach(least: f64, most: f64, stream: &mut Stream) -> f64 {
     least * libm::pow(most / least, stream.unit())
 }
 
-/// Margins with those above the median drawn together: how far away the far ones are does not matter. What is not known counts
-/// as the worst.
+/// Margins with outliers above drawn together: a default of 999 s must not hide the differences of those below. What is not
+/// known counts as the worst.
 fn flattened(margins: &[Option<f64>]) -> Vec<f64> {
     let mut known: Vec<f64> = margins.iter().flatten().copied().filter(|margin| margin.is_finite()).collect();
     known.sort_by(f64::total_cmp);
@@ -274,7 +277,7 @@ fn flattened(margins: &[Option<f64>]) -> Vec<f64> {
         .map(|margin| {
             let margin = margin.unwrap_or(f64::INFINITY).clamp(least, most);
             let above = (margin - median).max(0.0) / scale;
-            (margin.min(median) - least) / scale + libm::log1p(above)
+            (margin.min(median) - least) / scale + above.min(STRAIGHT) + libm::log1p((above - STRAIGHT).max(0.0))
         })
         .collect()
 }
