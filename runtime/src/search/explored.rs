@@ -1,12 +1,10 @@
 //! Strategies that go for cells, on robots that cost nothing to evaluate.
 
-use std::time::{Duration, Instant};
-
 use sesame_plan::{BoostedChildren, CampaignPlan, CoverageGoal, Exploration, Search, Test};
 
 use crate::coverage::{Coverage, Grid};
 use crate::search::landscape::{LANDSCAPES, Landscape};
-use crate::search::{Candidate, Evaluated, SearchError, Strategy, strategy};
+use crate::search::{SearchError, strategy};
 
 const NSGA2: Search = Search::Nsga2 { population: 10, evaluations: 210 };
 const FIXED: Exploration =
@@ -146,55 +144,4 @@ fn strategies_without_what_they_work_on_are_refused() {
     assert_eq!(refusal(&conditional), Some(SearchError::NotByTime { campaign: campaign.clone() }));
     let predicting = plan(landscape, NSGA2, Some(Exploration::Predict { candidates: 5 }));
     assert_eq!(refusal(&predicting), Some(SearchError::NotByCondition { campaign }));
-}
-
-/// Prints seconds spent in `ask` and `tell` of whole campaigns; how many depends on the machine, so nothing is asserted of
-/// them. `./test --long` shows them.
-#[test]
-#[ignore = "long: campaigns of up to 10,000 tests"]
-fn what_strategies_cost_beside_their_simulations() {
-    type Searched = fn(u32) -> Search;
-    let nsga2: Searched = |evaluations| Search::Nsga2 { population: 10, evaluations };
-    let strategies: [(&str, Searched, Option<Exploration>); 7] = [
-        ("nsga2", nsga2, None),
-        ("boost fixed", nsga2, Some(FIXED)),
-        ("boost linear", nsga2, Some(LINEAR)),
-        ("construct", nsga2, Some(Exploration::Construct { share: 0.5, until: None })),
-        ("map_elites", |evaluations| Search::MapElites { population: 10, evaluations }, None),
-        ("random", |evaluations| Search::Random { evaluations }, None),
-        ("latin_hypercube", |evaluations| Search::LatinHypercube { evaluations }, None),
-    ];
-    println!("| strategy | 100 tests | 1,000 tests | 10,000 tests |\n|---|---:|---:|---:|");
-    for (name, search, exploration) in strategies {
-        let seconds = [100, 1_000, 10_000].map(|evaluations| {
-            let landscape = &LANDSCAPES[0];
-            let plan = plan(landscape, search(evaluations), exploration.clone());
-            let mut timed = Timed { strategy: strategy(&plan, 1).unwrap(), spent: Duration::ZERO };
-            let run = landscape.campaign(&mut timed);
-            assert_eq!(run.tests.len(), evaluations as usize);
-            format!("{:.4} s", timed.spent.as_secs_f64())
-        });
-        println!("| {name} | {} |", seconds.join(" | "));
-    }
-}
-
-/// A strategy, and how long it took.
-struct Timed {
-    strategy: Box<dyn Strategy>,
-    spent: Duration,
-}
-
-impl Strategy for Timed {
-    fn ask(&mut self) -> Vec<Candidate> {
-        let begun = Instant::now();
-        let asked = self.strategy.ask();
-        self.spent += begun.elapsed();
-        asked
-    }
-
-    fn tell(&mut self, results: &[Evaluated]) {
-        let begun = Instant::now();
-        self.strategy.tell(results);
-        self.spent += begun.elapsed();
-    }
 }
