@@ -76,6 +76,8 @@ impl Selection {
             model::Search::Nsga2 { content, .. }
             | model::Search::MapElites { content, .. }
             | model::Search::LatinHypercube { content, .. }
+            | model::Search::Sobol { content, .. }
+            | model::Search::Falsification { content, .. }
             | model::Search::Random { content, .. } => content.operations.clone(),
             model::Search::Repeat { test, .. } => {
                 space.tests[*test].operations.iter().map(|operation| operation.operation).collect()
@@ -175,6 +177,13 @@ impl Selection {
             model::Search::LatinHypercube { content, evaluations } => {
                 (plan::Search::LatinHypercube { evaluations: limit(*evaluations) }, held(content))
             }
+            model::Search::Sobol { content, evaluations } => {
+                (plan::Search::Sobol { evaluations: limit(*evaluations) }, held(content))
+            }
+            model::Search::Falsification { content, population, evaluations } => (
+                plan::Search::Falsification { population: *population, evaluations: limit(*evaluations) },
+                held(content),
+            ),
             model::Search::Repeat { test, times } => {
                 let held = space.tests[*test].operations.len();
                 let held = u32::try_from(held).expect("a file holds fewer than 2^32 operations");
@@ -201,7 +210,7 @@ impl Selection {
             },
             search,
             coverage: campaign.coverage.as_ref().map(coverage),
-            exploration: campaign.exploration.map(exploration),
+            exploration: campaign.exploration.as_ref().map(exploration),
             stop: campaign.stop.iter().copied().map(stop_rule).collect(),
             seed: campaign.seed,
             end_after: campaign.end_after,
@@ -399,8 +408,8 @@ fn coverage(coverage: &model::Coverage) -> plan::CoverageGoal {
     plan::CoverageGoal { axes: axes.collect(), hits: coverage.hits, stop_at: coverage.stop_at }
 }
 
-fn exploration(exploration: model::Exploration) -> plan::Exploration {
-    match exploration {
+fn exploration(exploration: &model::Exploration) -> plan::Exploration {
+    match *exploration {
         model::Exploration::Boost { every_generations, children, tries } => {
             let children = match children {
                 model::BoostedChildren::Every { iterations } => plan::BoostedChildren::Every { iterations },
@@ -412,6 +421,9 @@ fn exploration(exploration: model::Exploration) -> plan::Exploration {
         }
         model::Exploration::Construct { share, until } => plan::Exploration::Construct { share, until },
         model::Exploration::Predict { candidates } => plan::Exploration::Predict { candidates },
+        model::Exploration::Novelty { neighbours, ref over } => {
+            plan::Exploration::Novelty { neighbours, over: over.iter().copied().map(dimension).collect() }
+        }
     }
 }
 

@@ -57,6 +57,8 @@ pub(super) fn run(
             Search::Nsga2 { evaluations, .. }
             | Search::MapElites { evaluations, .. }
             | Search::Random { evaluations }
+            | Search::Sobol { evaluations }
+            | Search::Falsification { evaluations, .. }
             | Search::LatinHypercube { evaluations } => *evaluations = wanted,
             Search::Repeat { times, .. } => *times = wanted,
             Search::Known { tests } => tests.truncate(usize::try_from(wanted).unwrap_or(usize::MAX)),

@@ -12,18 +12,10 @@ mod box_ground;
 mod field;
 
 use crate::rng::Stream;
+use crate::search::margin::Margin;
 use bandit::Bandit;
 pub use box_ground::UnitBox;
 use field::{Field, Separations};
-
-/// How far a requirement is from its violation in one test.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Margin {
-    /// The margin, never NaN, smaller where the requirement is nearer to its violation; `None` where the run says nothing.
-    pub value: Option<f64>,
-    /// Whether it is violated.
-    pub violated: bool,
-}
 
 /// What can be tried: places, and what is known of how far they are from each other.
 pub trait Ground {

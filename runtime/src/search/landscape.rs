@@ -263,7 +263,14 @@ impl Landscape {
                     let fitness =
                         if time < 0.05 { Fitness::Unfit(Unfit::Void) } else { Fitness::Measured(vec![time, -hits]) };
                     let point = if time < 0.05 { None } else { Self::point(plan, &candidate.test) };
-                    Evaluated { number, test: candidate.test, fitness, point, course: course.clone() }
+                    Evaluated {
+                        number,
+                        test: candidate.test,
+                        fitness,
+                        point,
+                        course: course.clone(),
+                        margins: Vec::new(),
+                    }
                 })
                 .collect();
             for result in &results {
@@ -385,6 +392,7 @@ mod tests {
                     fitness: Fitness::Unfit(Unfit::Unmeasured),
                     point: None,
                     course: None,
+                    margins: Vec::new(),
                 })
                 .collect();
             strategy.tell(&results);

@@ -1,8 +1,10 @@
 //! How a search is made to look where it has not been, and when it has looked for long enough.
 
+use super::ReducedDimension;
+
 /// What NSGA-II does besides evolving so that more cells are covered; only in campaigns that count coverage, by time unless
 /// it says otherwise.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Exploration {
     /// Some children are mutated again until they are planned to lie in a cell that wants tests.
     Boost {
@@ -25,6 +27,14 @@ pub enum Exploration {
     Predict {
         /// How many candidates: 1 or more. Default 20.
         candidates: u32,
+    },
+    /// How far tests are from others counts as one objective more when survivors are chosen. By time and by condition, with
+    /// or without cells.
+    Novelty {
+        /// How many of the nearest tests count: 1 or more. Default 10.
+        neighbours: u32,
+        /// The dimensions of distances: at least one, none twice. Default all.
+        over: Vec<ReducedDimension>,
     },
 }
 

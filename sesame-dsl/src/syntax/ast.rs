@@ -683,6 +683,8 @@ pub(crate) enum Strategy {
     Random,
     MapElites,
     LatinHypercube,
+    Sobol,
+    Falsification,
 }
 
 #[derive(Debug, Clone)]
@@ -702,7 +704,8 @@ pub(crate) struct CoverageAxis {
     pub(crate) cells: Count,
 }
 
-/// `boost fixed { … }`, `boost linear { … }`, `construct { … }` or `predict { … }`, with the settings as written.
+/// `boost fixed { … }`, `boost linear { … }`, `construct { … }`, `predict { … }` or `novelty { … }`, with the settings as
+/// written.
 #[derive(Debug, Clone)]
 pub(crate) struct Exploration {
     pub(crate) span: Span,
@@ -716,6 +719,9 @@ pub(crate) struct Exploration {
     pub(crate) shares: Vec<(Span, Quantity)>,
     pub(crate) untils: Vec<(Span, Quantity)>,
     pub(crate) candidates: Vec<(Span, Count)>,
+    pub(crate) neighbours: Vec<(Span, Count)>,
+    /// Dimensions.
+    pub(crate) overs: Vec<(Span, Vec<Name>)>,
     pub(crate) damaged: bool,
 }
 
@@ -736,6 +742,7 @@ pub(crate) enum ExplorationKind {
     BoostLinear,
     Construct,
     Predict,
+    Novelty,
 }
 
 #[derive(Debug, Clone)]

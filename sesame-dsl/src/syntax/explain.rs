@@ -34,6 +34,7 @@ pub(super) enum Place {
     Boost,
     Construct,
     Predict,
+    Novelty,
     Stop,
     Repeat,
     Launch,
@@ -62,6 +63,7 @@ impl Place {
             Place::Boost => Rule::error_boost_setting,
             Place::Construct => Rule::error_construct_setting,
             Place::Predict => Rule::error_predict_setting,
+            Place::Novelty => Rule::error_novelty_setting,
             Place::Stop => Rule::error_stop_rule,
             Place::Repeat => Rule::error_repeat_setting,
             Place::Launch => Rule::error_launch_setting,
@@ -112,6 +114,7 @@ impl Place {
                 Rule::boost,
                 Rule::construct,
                 Rule::predict,
+                Rule::novelty,
                 Rule::stop,
                 Rule::end,
                 Rule::repeat,
@@ -132,6 +135,7 @@ impl Place {
             ],
             Place::Construct => &[Rule::construct_share, Rule::construct_until],
             Place::Predict => &[Rule::predict_candidates],
+            Place::Novelty => &[Rule::novelty_neighbours, Rule::novelty_over],
             Place::Stop => &[Rule::stop_time, Rule::stop_stagnation, Rule::stop_discovery, Rule::stop_completeness],
             Place::Repeat => &[Rule::setting_seed],
             Place::Launch => &[Rule::ready],
@@ -171,6 +175,7 @@ impl Place {
             Place::Boost => Rule::one_boost_setting,
             Place::Construct => Rule::one_construct_setting,
             Place::Predict => Rule::one_predict_setting,
+            Place::Novelty => Rule::one_novelty_setting,
             Place::Stop => Rule::one_stop_rule,
             Place::Repeat => Rule::one_repeat_setting,
             Place::Launch => Rule::one_launch_setting,
@@ -198,7 +203,7 @@ impl Place {
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
             Place::Campaign => {
                 "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `boost`, `construct`, `predict`, \
-                 `stop`, `repeat`, `passive`, `record` or `end after`"
+                 `novelty`, `stop`, `repeat`, `passive`, `record` or `end after`"
             }
             Place::Condition => "`depth` or `integers`",
             Place::Search => "`population`, `evaluations` or `seed`",
@@ -206,6 +211,7 @@ impl Place {
             Place::Boost => "`every N generations`, `every N iterations`, `from N to N`, `drop N` or `tries N`",
             Place::Construct => "`share` or `until`",
             Place::Predict => "`candidates`",
+            Place::Novelty => "`neighbours` or `over`",
             Place::Stop => "`time`, `stagnation`, `discovery` or `completeness`",
             Place::Repeat => "`seed`",
             Place::Launch => "`ready when topic`",
@@ -250,6 +256,7 @@ impl Place {
                 "boost",
                 "construct",
                 "predict",
+                "novelty",
                 "stop",
                 "repeat",
                 "passive",
@@ -262,6 +269,7 @@ impl Place {
             Place::Boost => &["every", "from", "drop", "tries"],
             Place::Construct => &["share", "until"],
             Place::Predict => &["candidates"],
+            Place::Novelty => &["neighbours", "over"],
             Place::Stop => &["time", "stagnation", "discovery", "completeness"],
             Place::Repeat => &["seed"],
             Place::Launch => &["ready"],

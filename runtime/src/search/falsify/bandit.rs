@@ -5,6 +5,8 @@
 //! are chosen by what their latest tests earned, with a bonus for those seldom gone for (UCB1 of Auer, Cesa-Bianchi and
 //! Fischer 2002, over a window).
 
+use crate::search::margin::Margin;
+
 /// Earnings that count: older ones say little of what is near.
 const WINDOW: usize = 6;
 /// Weight of the bonus.
@@ -44,11 +46,8 @@ impl Bandit {
             if arm.violated && open {
                 continue;
             }
-            let earned = if arm.earned.is_empty() {
-                1.0
-            } else {
-                arm.earned.iter().sum::<f64>() / arm.earned.len() as f64
-            };
+            let earned =
+                if arm.earned.is_empty() { 1.0 } else { arm.earned.iter().sum::<f64>() / arm.earned.len() as f64 };
             let often = f64::from(pulls(at)) + 1.0;
             let promise = earned + CURIOSITY * libm::sqrt(libm::log(f64::from(total) + 1.0) / often);
             if best.is_none_or(|(_, most)| promise > most) {
@@ -77,8 +76,6 @@ impl Bandit {
         self.arms[requirement].pulls
     }
 }
-
-use super::Margin;
 
 impl Arm {
     /// What a margin earns.
