@@ -31,6 +31,12 @@ pub trait Ground {
     /// A place near another; `reach` is roughly the share of the ground that is moved, in `0..1`.
     fn near(&self, place: &Self::Place, reach: f64, stream: &mut Stream) -> Self::Place;
 
+    /// A place found otherwise than by what is to be expected of it, for every second test; `best` are the best places so far,
+    /// the best first, at least one. `None` on grounds that are smooth enough to go by expectations alone.
+    fn otherwise(&self, _turn: u32, _best: &[&Self::Place], _stream: &mut Stream) -> Option<Self::Place> {
+        None
+    }
+
     /// How many components separations have, at least one.
     fn components(&self) -> usize;
 
@@ -63,6 +69,8 @@ const ROUNDS: u64 = 3;
 const PER_ROUND: u64 = 30;
 /// How many of the best places are gone out from.
 const BEST: usize = 3;
+/// How many of the best are offered to what is found otherwise.
+const PARENTS: usize = 6;
 /// How much of the doubt counts in favour of a place, in turn.
 const DOUBTS: [f64; 3] = [0.0, 1.0, 2.0];
 
@@ -143,16 +151,23 @@ impl<G: Ground> Falsifier<G> {
         let mut places: Vec<G::Place> = Vec::new();
         for at in 0..batch {
             let requirement = self.bandit.choice(&coming);
+            let turn = self.bandit.pulls(requirement) + coming[requirement];
+            let mut stream = Stream::derive(self.settings.seed, "falsify", &[u64::from(self.asked + at)]);
+            coming[requirement] += 1;
+            self.awaited.push(Some(requirement));
+            if turn % 2 == 1 {
+                let best = self.memories[requirement].best();
+                if let Some(place) = self.ground.otherwise(turn / 2, &best, &mut stream) {
+                    places.push(place);
+                    continue;
+                }
+            }
             let mut fitted = match expected[requirement].take() {
                 Some(fitted) => fitted,
                 None => Fitted::of(&self.ground, &self.memories[requirement]),
             };
-            let turn = self.bandit.pulls(requirement) + coming[requirement];
             let doubt = DOUBTS[turn as usize % DOUBTS.len()];
-            let mut stream = Stream::derive(self.settings.seed, "falsify", &[u64::from(self.asked + at)]);
             let place = fitted.most_promising(&self.ground, doubt, &mut stream);
-            coming[requirement] += 1;
-            self.awaited.push(Some(requirement));
             places.push(place.clone());
             if at + 1 < batch {
                 fitted.expect(&self.ground, place);
@@ -164,6 +179,14 @@ impl<G: Ground> Falsifier<G> {
 }
 
 impl<P> Memory<P> {
+    /// The best places, of equals the earliest first.
+    fn best(&self) -> Vec<&P> {
+        let margin = |at: &usize| self.places[*at].1.unwrap_or(f64::INFINITY);
+        let mut order: Vec<usize> = (0..self.places.len()).collect();
+        order.sort_by(|a, b| margin(a).total_cmp(&margin(b)));
+        order.into_iter().take(PARENTS).map(|at| &self.places[at].0).collect()
+    }
+
     fn add(&mut self, place: P, margin: Option<f64>) {
         self.places.push((place, margin));
         if self.places.len() > MEMORY {

@@ -13,6 +13,13 @@ pub struct Margin {
     pub violated: bool,
 }
 
+impl Margin {
+    /// That of a bound of which a metric has this value, which is not NaN.
+    pub fn of(bound: Bound, value: f64) -> Self {
+        Margin { value: Some(to_bound(bound, value)), violated: !bound.holds(value) }
+    }
+}
+
 /// The margin of each requirement of the plan, in its order.
 ///
 /// A margin is in the unit of the requirement's metric: how far the metric may still move before it breaks the bound, and
@@ -28,8 +35,8 @@ pub fn margins(plan: &CampaignPlan, observation: &Observation) -> Vec<Margin> {
         let Some(value) = value.filter(|value| !value.is_nan()) else {
             return Margin { value: None, violated: false };
         };
-        let violated = !requirement.bound.holds(value);
-        Margin { value: (whole || violated).then(|| to_bound(requirement.bound, value)), violated }
+        let margin = Margin::of(requirement.bound, value);
+        if whole || margin.violated { margin } else { Margin { value: None, ..margin } }
     };
     plan.requirements.iter().map(margin).collect()
 }

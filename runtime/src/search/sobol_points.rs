@@ -184,7 +184,9 @@ mod tests {
         assert_eq!([1, 2, 3].map(|index| at(1, index)), [0.5, 0.75, 0.25]);
         assert_eq!([1, 2, 3].map(|index| at(2, index)), [0.5, 0.75, 0.25]);
         assert_eq!([4, 5].map(|index| at(1, index)), [0.625, 0.125]);
-        assert_eq!([4, 5].map(|index| at(2, index)), [0.125, 0.625]);
+        assert_eq!([4, 5].map(|index| at(2, index)), [0.375, 0.875]);
+        // The fifth point in the usual order.
+        assert_eq!([0, 1, 2].map(|dimension| at(dimension, 6)), [0.375, 0.375, 0.625]);
     }
 
     proptest! {
