@@ -13,7 +13,7 @@ pub enum FalsificationProblem {
     /// Peltomäki and Porres 2022, "Falsification of Multiple Requirements for Cyber-Physical Systems Using Online
     /// Generative Adversarial Networks and Multi-Armed Bandits".
     Mo3d,
-    /// Requirements AT6a, AT6b and AT6c of the automatic transmission of ARCH-COMP (Hoxha, Abbas and Fainekos 2014; Ernst
+    /// Requirements `AT6a`, `AT6b` and `AT6c` of the automatic transmission of ARCH-COMP (Hoxha, Abbas and Fainekos 2014; Ernst
     /// et al. 2021), each of which may be violated: throttle and brake are constant for 5 s each, twelve numbers for 30 s.
     /// The published Simulink model is written anew as differential equations; see [`FalsificationProblem::margins`].
     Transmission,

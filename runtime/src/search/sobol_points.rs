@@ -70,8 +70,8 @@ impl SobolPoints {
                 *number = u32::from(known);
             }
         }
-        for bit in 0..degree.min(BITS) {
-            numbers[bit] <<= BITS - 1 - bit;
+        for (bit, number) in numbers.iter_mut().enumerate().take(degree) {
+            *number <<= BITS - 1 - bit;
         }
         for bit in degree..BITS {
             let oldest = numbers[bit - degree];
@@ -89,7 +89,7 @@ fn degree(polynomial: u32) -> usize {
 
 /// The next polynomial over the field of two elements, coefficients as bits, that is primitive.
 fn next_primitive(polynomial: u32) -> u32 {
-    (polynomial + 1..).find(|&next| is_primitive(next)).expect("there is one of every degree")
+    (polynomial + 1..u32::MAX).find(|&next| is_primitive(next)).expect("there is one of every degree")
 }
 
 /// Whether the powers of x run through all polynomials of a lesser degree.

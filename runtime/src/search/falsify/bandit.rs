@@ -96,3 +96,59 @@ impl Arm {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn margins(values: [f64; 3]) -> Vec<Margin> {
+        values.map(|value| Margin { value: Some(value), violated: value <= 0.0 }).to_vec()
+    }
+
+    /// How often each requirement is gone for when these are their margins after so many tests that went for them.
+    fn pulls(margin: impl Fn(usize, u32) -> f64, tests: u32) -> [u32; 3] {
+        let mut bandit = Bandit::new(3);
+        let mut pulls = [0; 3];
+        bandit.learn(&margins([0, 1, 2].map(|at| margin(at, 0))), None);
+        for _ in 0..tests {
+            let choice = bandit.choice(&[0; 3]);
+            pulls[choice] += 1;
+            bandit.learn(&margins([0, 1, 2].map(|at| margin(at, pulls[at]))), Some(choice));
+        }
+        assert_eq!(pulls, [0, 1, 2].map(|at| bandit.pulls(at)));
+        pulls
+    }
+
+    #[test]
+    fn most_tests_go_for_the_requirement_that_comes_nearer_and_some_for_the_others() {
+        let [stuck, nearer, far] = pulls(
+            |at, tests| match at {
+                0 => 5.0,
+                1 => 1e6 * libm::pow(0.8, f64::from(tests)),
+                _ => 1e9,
+            },
+            40,
+        );
+        assert!(nearer > 20 && stuck >= 3 && far >= 3, "{stuck}, {nearer} and {far}");
+    }
+
+    #[test]
+    fn what_is_violated_is_left_alone_until_all_are() {
+        let [first, second, third] =
+            pulls(|at, tests| if tests >= [2, 4, 6][at] { -1.0 } else { 10.0 - f64::from(tests) }, 12);
+        assert_eq!([first, second, third], [2, 4, 6]);
+        let [first, second, third] = pulls(|at, tests| if tests >= [2, 4, 6][at] { -1.0 } else { 10.0 }, 40);
+        assert!(first > 2 && second > 4 && third > 6, "then all are gone for again");
+    }
+
+    #[test]
+    fn a_run_that_says_nothing_earns_nothing() {
+        let mut bandit = Bandit::new(1);
+        bandit.learn(&[Margin { value: None, violated: false }], Some(0));
+        bandit.learn(&[Margin { value: Some(4.0), violated: false }], Some(0));
+        bandit.learn(&[Margin { value: Some(1.0), violated: false }], Some(0));
+        bandit.learn(&[Margin { value: Some(3.0), violated: false }], Some(0));
+        assert_eq!(bandit.arms[0].earned, [0.0, 0.0, 0.75, 0.0]);
+        assert_eq!(bandit.arms[0].least, Some(1.0));
+    }
+}

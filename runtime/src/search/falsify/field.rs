@@ -206,3 +206,92 @@ impl Factor {
         (0..self.size).map(|row| libm::log(self.row(row)[row])).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn separations(places: &[Vec<f64>]) -> Separations {
+        let mut separations = Separations::new(places[0].len());
+        for (at, place) in places.iter().enumerate() {
+            separations.add(&to_each(place, &places[..at]));
+        }
+        separations
+    }
+
+    fn to_each(place: &[f64], others: &[Vec<f64>]) -> Vec<f64> {
+        others.iter().flat_map(|other| place.iter().zip(other).map(|(a, b)| (a - b) * (a - b))).collect()
+    }
+
+    /// Gaussian elimination with pivoting.
+    fn naive(mut matrix: Vec<Vec<f64>>, mut right: Vec<f64>) -> Vec<f64> {
+        let n = right.len();
+        for column in 0..n {
+            let by_size = |a: &usize, b: &usize| matrix[*a][column].abs().total_cmp(&matrix[*b][column].abs());
+            let pivot = (column..n).max_by(by_size).unwrap();
+            matrix.swap(column, pivot);
+            right.swap(column, pivot);
+            let head = matrix[column].clone();
+            for row in (0..n).filter(|&row| row != column) {
+                let factor = matrix[row][column] / head[column];
+                matrix[row].iter_mut().zip(&head).for_each(|(x, h)| *x -= factor * h);
+                right[row] -= factor * right[column];
+            }
+        }
+        (0..n).map(|row| right[row] / matrix[row][row]).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn expectations_are_those_of_kriging_solved_naively(
+            places in prop::collection::vec(prop::collection::vec(0.0..1.0f64, 2), 2..8),
+            values in prop::collection::vec(-5.0..5.0f64, 8),
+            at in prop::collection::vec(0.0..1.0f64, 2),
+        ) {
+            let values = &values[..places.len()];
+            let separations = separations(&places);
+            let field = Field::of(&separations, values, vec![2.0, 0.5], 0.01);
+            let (mean, deviation) = field.at(&to_each(&at, &places));
+
+            // The best linear unbiased prediction: correlations bordered by ones for the unknown mean.
+            let n = places.len();
+            let near = |a: &[f64], b: &Vec<f64>| correlation(&[2.0, 0.5], &to_each(a, std::slice::from_ref(b)));
+            let mut matrix: Vec<Vec<f64>> = (0..n)
+                .map(|i| {
+                    let row = (0..n).map(|j| near(&places[i], &places[j]) + if i == j { 0.01 } else { 0.0 });
+                    row.chain([1.0]).collect()
+                })
+                .collect();
+            matrix.push([vec![1.0; n], vec![0.0]].concat());
+            let right: Vec<f64> = places.iter().map(|place| near(&at, place)).chain([1.0]).collect();
+            let weights = naive(matrix, right.clone());
+            let expected: f64 = weights.iter().zip(values).map(|(w, v)| w * v).sum();
+            prop_assert!((mean - expected).abs() < 1e-5, "{} and {}", mean, expected);
+            let share = 1.0 - weights.iter().zip(&right).map(|(w, r)| w * r).sum::<f64>();
+            prop_assert!((deviation * deviation - field.variance * share).abs() < 1e-4 * (1.0 + field.variance));
+        }
+    }
+
+    #[test]
+    fn a_fit_finds_the_variable_that_matters_and_is_sure_only_where_it_knows() {
+        let mut stream = crate::rng::Stream::derive(1, "test", &[]);
+        let places: Vec<Vec<f64>> = (0..30).map(|_| (0..3).map(|_| stream.unit()).collect()).collect();
+        let values: Vec<f64> = places.iter().map(|place| libm::sin(6.0 * place[1])).collect();
+        let field = Field::fitted(&separations(&places), &values);
+        assert!(field.weights[1] > 3.0 * field.weights[0] && field.weights[1] > 3.0 * field.weights[2]);
+        for at in [0.2, 0.5, 0.8] {
+            let (mean, deviation) = field.at(&to_each(&[0.5, at, 0.5], &places));
+            assert!((mean - libm::sin(6.0 * at)).abs() < 0.1, "{mean} at {at}");
+            assert!(deviation < field.at(&to_each(&[0.5, at + 3.0, 0.5], &places)).1);
+        }
+    }
+
+    #[test]
+    fn values_all_alike_leave_no_doubt_and_no_place_better() {
+        let places = vec![vec![0.1], vec![0.6], vec![0.9]];
+        let field = Field::fitted(&separations(&places), &[4.0; 3]);
+        assert_eq!(field.at(&to_each(&[0.3], &places)), (4.0, 0.0));
+    }
+}
