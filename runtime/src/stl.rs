@@ -88,7 +88,8 @@ pub enum FormulaError {
 /// The robustness of one formula on one trace, computed as samples come.
 ///
 /// ```
-/// use sesame_plan::stl::{Comparison, Formula, Interval};
+/// use sesame_plan::Comparison;
+/// use sesame_plan::stl::{Formula, Interval};
 /// use sesame_runtime::{stl::Monitor, time::SimTime};
 ///
 /// let clear = Formula::Predicate { signal: 0, comparison: Comparison::Above, constant: 0.5 };

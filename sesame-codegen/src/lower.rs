@@ -10,7 +10,6 @@
 //!   conditions and expectations of these tests.
 
 mod condition;
-mod disturbance;
 mod formula;
 mod robustness;
 
@@ -210,14 +209,11 @@ impl Selection {
             },
             search,
             coverage: campaign.coverage.as_ref().map(coverage),
-            exploration: campaign.exploration.as_ref().map(exploration),
-            stop: campaign.stop.iter().copied().map(stop_rule).collect(),
+            exploration: campaign.exploration.clone(),
+            stop: campaign.stop.clone(),
             seed: campaign.seed,
             end_after: campaign.end_after,
-            record: campaign.record.map(|record| match record {
-                model::Recorded::Failing => plan::Recorded::Failing,
-                model::Recorded::All => plan::Recorded::All,
-            }),
+            record: campaign.record,
         }
     }
 }
@@ -262,7 +258,7 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
             metric: metric.declaration.name.clone(),
             doc: metric.declaration.doc.clone(),
             unit: unit(metric.unit.as_ref()),
-            direction: metric.direction.map(direction),
+            direction: metric.direction,
             source: space.file_of(&metric.declaration).to_owned(),
             line: metric.declaration.line,
             inputs: topics.iter().map(|&id| topic_id(id)).collect(),
@@ -283,7 +279,7 @@ fn custom_operations(space: &Space) -> Vec<OperationPlan> {
             source: space.file_of(&operation.declaration).to_owned(),
             line: operation.declaration.line,
             topic: operation.topic().map(topic_id),
-            moment: disturbance::moment(*when),
+            moment: *when,
             parameters: operation.parameters.iter().map(|it| (parameter(it), it.doc.clone())).collect(),
         }),
         _ => None,
@@ -296,15 +292,9 @@ fn parameter(parameter: &model::Parameter) -> plan::Parameter {
         name: parameter.name.clone(),
         unit: unit(parameter.unit.as_ref()),
         domain: match &parameter.domain {
-            model::Domain::Number { range, shape, integer } => plan::Domain::Number {
-                low: range.low,
-                high: range.high,
-                shape: match shape {
-                    model::Shape::Value => plan::Shape::Value,
-                    model::Shape::Range => plan::Shape::Range,
-                },
-                integer: *integer,
-            },
+            model::Domain::Number { range, shape, integer } => {
+                plan::Domain::Number { low: range.low, high: range.high, shape: *shape, integer: *integer }
+            }
             model::Domain::Point { low, high } => plan::Domain::Point { low: *low, high: *high },
             model::Domain::Texts(texts) => plan::Domain::Texts { texts: texts.clone() },
             model::Domain::Files(files) => plan::Domain::Files { files: files.clone() },
@@ -360,7 +350,7 @@ fn metric(metric: &model::Metric) -> plan::Metric {
         name: metric.declaration.name.clone(),
         doc: metric.declaration.doc.clone(),
         unit: unit(metric.unit.as_ref()),
-        direction: metric.direction.map(direction),
+        direction: metric.direction,
         default: metric.default,
         initial: metric.initial,
         source: match &metric.source {
@@ -387,8 +377,8 @@ fn operation(
         name: operation.declaration.name.clone(),
         doc: operation.declaration.doc.clone(),
         topic: operation.topic().map(topic_id),
-        places: operation.target.iter().flat_map(|target| &target.places).map(|place| steps(place)).collect(),
-        kind: disturbance::kind(&operation.kind),
+        places: operation.target.iter().flat_map(|target| &target.places).cloned().collect(),
+        kind: operation.kind.clone(),
         parameters: operation.parameters.iter().map(parameter).collect(),
         within: within(operation, end_after),
         priority: operation.priority,
@@ -400,63 +390,12 @@ fn operation(
 
 fn coverage(coverage: &model::Coverage) -> plan::CoverageGoal {
     let axes = coverage.axes.iter().map(|axis| plan::GridAxis {
-        dimension: dimension(axis.dimension),
+        dimension: axis.dimension,
         low: axis.range.low,
         high: axis.range.high,
         cells: axis.cells,
     });
     plan::CoverageGoal { axes: axes.collect(), hits: coverage.hits, stop_at: coverage.stop_at }
-}
-
-fn exploration(exploration: &model::Exploration) -> plan::Exploration {
-    match *exploration {
-        model::Exploration::Boost { every_generations, children, tries } => {
-            let children = match children {
-                model::BoostedChildren::Every { iterations } => plan::BoostedChildren::Every { iterations },
-                model::BoostedChildren::Falling { first, last, drop } => {
-                    plan::BoostedChildren::Falling { first, last, drop }
-                }
-            };
-            plan::Exploration::Boost { every_generations, children, tries }
-        }
-        model::Exploration::Construct { share, until } => plan::Exploration::Construct { share, until },
-        model::Exploration::Predict { candidates } => plan::Exploration::Predict { candidates },
-        model::Exploration::Novelty { neighbours, ref over } => {
-            plan::Exploration::Novelty { neighbours, over: over.iter().copied().map(dimension).collect() }
-        }
-    }
-}
-
-fn stop_rule(rule: model::StopRule) -> plan::StopRule {
-    match rule {
-        model::StopRule::WallTime { seconds } => plan::StopRule::WallTime { seconds },
-        model::StopRule::Stagnation { generations, below } => plan::StopRule::Stagnation { generations, below },
-        model::StopRule::Discovery { below } => plan::StopRule::Discovery { below },
-        model::StopRule::Completeness { share } => plan::StopRule::Completeness { share },
-    }
-}
-
-fn dimension(dimension: model::ReducedDimension) -> plan::Dimension {
-    match dimension {
-        model::ReducedDimension::T1 => plan::Dimension::T1,
-        model::ReducedDimension::T2 => plan::Dimension::T2,
-        model::ReducedDimension::T3 => plan::Dimension::T3,
-        model::ReducedDimension::P1 => plan::Dimension::P1,
-        model::ReducedDimension::P2 => plan::Dimension::P2,
-        model::ReducedDimension::O0 => plan::Dimension::O0,
-        model::ReducedDimension::O1 => plan::Dimension::O1,
-        model::ReducedDimension::O2 => plan::Dimension::O2,
-        model::ReducedDimension::O3 => plan::Dimension::O3,
-    }
-}
-
-fn steps(place: &[model::Step]) -> plan::Place {
-    let step = |step: &model::Step| match step {
-        model::Step::Field(name) => plan::Step::Field(name.clone()),
-        model::Step::Element(at) => plan::Step::Element(*at),
-        model::Step::Each => plan::Step::Each,
-    };
-    place.iter().map(step).collect()
 }
 
 /// The window of an operation; one without `within` may be active during the whole test.
@@ -484,13 +423,6 @@ fn bound(bound: model::Bound) -> plan::Bound {
         model::Bound::Above(value) => plan::Bound::Above { value },
         model::Bound::Equal(value) => plan::Bound::Equal { value },
         model::Bound::Within(range) => plan::Bound::Within { low: range.low, high: range.high },
-    }
-}
-
-fn direction(direction: model::Direction) -> plan::Direction {
-    match direction {
-        model::Direction::Maximise => plan::Direction::Maximise,
-        model::Direction::Minimise => plan::Direction::Minimise,
     }
 }
 

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use nix::sys::signal::Signal;
+use sesame_runtime::record::Repository;
 use sesame_runtime::rng::{Stream, keyed_unit};
 use sesame_runtime::search::falsify::{Falsifier, Settings as FalsifierSettings, UnitBox};
 use sesame_runtime::search::nsga2::{Nsga2, Settings, Survival, Told};
@@ -9,10 +11,39 @@ use sesame_runtime::search::published::FalsificationProblem;
 use sesame_runtime::search::real::RealVariation;
 use sesame_runtime::search::sobol_points::SobolPoints;
 use sesame_runtime::search::{Fitness, Margin};
+use sesame_tests::Project;
+
+use crate::interruption::Running;
 
 const BUDGET: u32 = 80;
 /// The seeds that are reported. What is tuned, is tuned on mo3d with seeds from 1000 on.
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=50;
+
+/// A space with requirements, and a campaign per search that this room is about.
+const SPACE: &str = r#"
+space falsified
+system {
+  simulator faulty = in_process "faulty_sim::Faulty" { crate "simulator"  step 10ms }
+  topic level  = "faulty/level"         : real[m]
+}
+
+metric fuzzing_time minimise = fuzzing_time()
+metric highest maximise default 0m = max(level) outbound
+
+requirement R1 "The level stays low" = highest <= 5.5m
+
+operation lift on level = random offset [0m, 3m] within [0s, 1s]
+operation cut on level = packet loss [0%, 100%] within [0s, 1s]
+
+campaign falsifying {
+  objectives fuzzing_time, highest
+  operations lift, cut   1..3 per test
+  search     falsification { evaluations 24  population 2  seed 3 }
+  end        after 1s
+}
+campaign even      from falsifying { search sobol { evaluations 24  seed 3 } }
+campaign wandering from falsifying { search nsga2 { population 6  evaluations 24  seed 3 }  novelty { over T1, T2, O0 } }
+"#;
 
 type Attempt = fn(FalsificationProblem, u64) -> Option<usize>;
 
@@ -134,6 +165,27 @@ fn table(problem: FalsificationProblem, strategies: &[(&str, Attempt)]) -> (Stri
     );
     let found = strategies.iter().map(|(name, attempt)| row(&mut table, problem, name, *attempt)).collect();
     (table, found)
+}
+
+#[test]
+fn runners_search_so_with_any_number_of_workers_and_after_an_interruption() {
+    for campaign in ["falsifying", "even", "wandering"] {
+        let runner = Project::new(&format!("searched_{campaign}"), SPACE, "faulty").build(campaign);
+        let whole = runner.run(&["--results", "whole", "--workers", "2"]).expect(0);
+        let repository = Repository::open(&runner.folder.join("whole/3")).unwrap();
+        // The search, and an undisturbed run before and after it.
+        assert_eq!(repository.tests().unwrap().len(), 26, "{campaign}");
+        assert_eq!(runner.run(&["--results", "alone", "--workers", "1"]).expect(0).digest(), whole.digest());
+        let mut running = Running::start(&runner, "stopped", "2");
+        running.until_recorded(14);
+        running.signal(Signal::SIGKILL);
+        running.ended();
+        assert_eq!(runner.run(&["resume", "stopped/3"]).expect(0).digest(), whole.digest(), "{campaign}");
+        if campaign == "falsifying" {
+            let bred = |number| !repository.test(number).unwrap().parents.is_empty();
+            assert!((1..=24).any(bred), "some tests come from others");
+        }
+    }
 }
 
 #[test]

@@ -97,13 +97,21 @@ pub struct Variable {
     pub high: Option<f64>,
 }
 
-/// Whole numbers from `lowest` to `highest`, both included.
+/// Whole numbers from `lowest` to `highest`, both included; neither is beyond 2^53. `lowest <= highest`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Integers {
     /// The least.
     pub lowest: i64,
     /// The greatest.
     pub highest: i64,
+}
+
+impl Integers {
+    /// The numbers that are in both, if any is.
+    pub fn shared(self, other: Integers) -> Option<Integers> {
+        let shared = Integers { lowest: self.lowest.max(other.lowest), highest: self.highest.min(other.highest) };
+        (shared.lowest <= shared.highest).then_some(shared)
+    }
 }
 
 /// How activations by condition end.

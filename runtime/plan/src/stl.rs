@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Expression, Input, Side};
+use crate::{Comparison, Expression, Input, Side};
 
 /// By how much a run keeps a formula (positive) or breaks it (negative).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -83,24 +83,6 @@ pub enum Formula {
         /// What then holds.
         right: Box<Formula>,
     },
-}
-
-/// How a signal compares with a constant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Comparison {
-    /// `<`
-    Below,
-    /// `<=`
-    AtMost,
-    /// `>`
-    Above,
-    /// `>=`
-    AtLeast,
-    /// `==`
-    Equal,
-    /// `!=`
-    NotEqual,
 }
 
 /// A stretch of time counted from the time at which a formula is evaluated, in seconds; both ends belong to it.

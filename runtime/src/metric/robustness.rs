@@ -93,7 +93,8 @@ impl<'p> RobustnessState<'p> {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use sesame_plan::stl::{Comparison, Formula, Interval};
+    use sesame_plan::Comparison;
+    use sesame_plan::stl::{Formula, Interval};
     use sesame_plan::{Expression, FieldRef, Input, MetricSource, Side};
 
     use super::*;

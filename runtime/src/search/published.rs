@@ -9,7 +9,7 @@ use transmission::Transmission;
 /// less.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FalsificationProblem {
-    /// Three requirements over three variables, of which one alone can be violated, by 0.08 % of the box. Figures:
+    /// Three requirements over three variables, of which one alone can be violated, by 0.07 % of the box. Figures:
     /// Peltomäki and Porres 2022, "Falsification of Multiple Requirements for Cyber-Physical Systems Using Online
     /// Generative Adversarial Networks and Multi-Armed Bandits".
     Mo3d,

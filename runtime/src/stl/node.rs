@@ -4,7 +4,8 @@
 
 use std::collections::VecDeque;
 
-use sesame_plan::stl::{Comparison, Formula, Interval};
+use sesame_plan::Comparison;
+use sesame_plan::stl::{Formula, Interval};
 
 use super::FormulaError;
 use super::minimum::SlidingMinimum;

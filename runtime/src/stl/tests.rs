@@ -1,5 +1,6 @@
 use proptest::prelude::*;
-use sesame_plan::stl::{Comparison, Formula, Interval};
+use sesame_plan::Comparison;
+use sesame_plan::stl::{Formula, Interval};
 
 use super::*;
 

@@ -153,7 +153,7 @@ fn campaign_text(
         lines.push(format!("observes {}", observed.join(", ")));
     }
     lines.push(format!("end      after {}s", number(end)));
-    let name = writer.names.take(&campaign.name, "campaign");
+    let name = writer.name("campaign", &campaign.name);
     text.push('\n');
     if name != campaign.name {
         let _ = writeln!(text, "/// In the original: `{shown}`.");
@@ -297,7 +297,7 @@ pub(super) fn compared_by(operation: &Operation) -> Vec<Reference> {
 
 /// A test that is repeated, as a known test of these lines; its name.
 fn known_test(writer: &mut Writer<'_>, test: &Test, lines: &str, text: &mut String) -> String {
-    let name = writer.names.take(&test.name, "test");
+    let name = writer.name("test", &test.name);
     text.push('\n');
     if name != *test.name {
         let _ = writeln!(text, "/// In the original: `{}`.", printable(&test.name));

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 /// What became of something.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
-    /// It is called something else in newer files.
+    /// It is called something else in newer files, or here.
     Renamed,
     /// It is said in another way.
     Mapped,

@@ -103,6 +103,15 @@ fn dialect(original: &Original, notes: &mut Notes) {
 }
 
 impl Writer<'_> {
+    /// A name for something of a kind, like the one it had; that it is another one is told.
+    pub(super) fn name(&mut self, kind: &str, original: &str) -> String {
+        let name = self.names.take(original, kind);
+        if !original.is_empty() && name != original {
+            self.notes.say(Kind::Renamed, format!("{kind} `{}` is `{name}` here", printable(original)));
+        }
+        name
+    }
+
     /// The topic that a reference to a variable became.
     fn topic(&self, variable: Reference) -> Option<&(String, Type)> {
         self.topics[self.original.variable(variable)?].as_ref()
@@ -188,7 +197,7 @@ impl Writer<'_> {
             if clauses.is_empty() {
                 continue;
             }
-            let name = self.names.take(&node.name, "node");
+            let name = self.name("node", &node.name);
             let blank = if std::mem::take(&mut first) { "\n" } else { "" };
             let _ = writeln!(text, "{blank}  node {name} {{ {} }}", clauses.join("   "));
         }
@@ -207,7 +216,7 @@ impl Writer<'_> {
                 self.mapped.metrics.push(None);
                 continue;
             }
-            let name = self.names.take(&metric.name, "metric");
+            let name = self.name("metric", &metric.name);
             let direction = if metric.highest { "maximise" } else { "minimise" };
             if name == metric.name {
                 text.push('\n');
@@ -427,7 +436,7 @@ impl Writer<'_> {
 
     /// The name of an operation, and above its line what it was called.
     fn declared_name(&mut self, wanted: &str, operation: &Operation, text: &mut String) -> String {
-        let name = self.names.take(wanted, "operation");
+        let name = self.name("operation", wanted);
         if !operation.name.is_empty() && name != *operation.name {
             let _ = writeln!(text, "/// In the original: `{}`.", printable(&operation.name));
         }

@@ -34,15 +34,9 @@ impl Selection {
             (Box::new(self.condition(left)), Box::new(self.condition(right)))
         };
         match condition {
-            from::Condition::Compare { left, by, right } => to::Condition::Compare {
-                left: self.operand(left),
-                by: match by {
-                    from::Comparison::Below => to::Comparison::Below,
-                    from::Comparison::Above => to::Comparison::Above,
-                    from::Comparison::Equal => to::Comparison::Equal,
-                },
-                right: self.operand(right),
-            },
+            from::Condition::Compare { left, by, right } => {
+                to::Condition::Compare { left: self.operand(left), by: *by, right: self.operand(right) }
+            }
             from::Condition::And(left, right) => {
                 let (left, right) = both(left, right);
                 to::Condition::And(left, right)
@@ -82,7 +76,7 @@ impl Selection {
             space: to::ConditionSpace {
                 variables: variables.collect(),
                 depth: space.depth,
-                integers: integers(space.integers),
+                integers: space.integers,
                 end: match space.lengths {
                     None => to::ConditionEnd::Condition,
                     Some(range) => to::ConditionEnd::Length { low: range.low, high: range.high },
@@ -95,11 +89,7 @@ impl Selection {
     pub(super) fn constraint(&self, constraint: &from::Constraint) -> to::Constraint {
         match *constraint {
             from::Constraint::Variable(metric) => to::Constraint::Variable { metric: self.metric(metric) },
-            from::Constraint::Integer(bounds) => to::Constraint::Integer { bounds: integers(bounds) },
+            from::Constraint::Integer(bounds) => to::Constraint::Integer { bounds },
         }
     }
-}
-
-fn integers(integers: from::Integers) -> to::Integers {
-    to::Integers { lowest: integers.lowest, highest: integers.highest }
 }

@@ -28,15 +28,7 @@ pub(super) fn formula(formula: &model::Formula) -> plan::Formula {
 }
 
 pub(super) fn inputs(inputs: &[model::Input]) -> Vec<plan::Input> {
-    let inputs = inputs.iter().map(|input| plan::Input {
-        field: field(&input.field),
-        members: match input.members {
-            model::Members::Min => plan::Members::Min,
-            model::Members::Max => plan::Members::Max,
-            model::Members::Sum => plan::Members::Sum,
-            model::Members::Each => plan::Members::Each,
-        },
-    });
+    let inputs = inputs.iter().map(|input| plan::Input { field: field(&input.field), members: input.members });
     inputs.collect()
 }
 
@@ -67,18 +59,9 @@ fn condition(of: &model::Condition) -> plan::Condition {
     match of {
         model::Condition::Constant(value) => plan::Condition::Constant(*value),
         model::Condition::Input(at) => plan::Condition::Input(raw(*at)),
-        model::Condition::Compare(left, by, right) => plan::Condition::Compare {
-            left: expression(left),
-            by: match by {
-                model::Comparison::AtMost => plan::Comparison::AtMost,
-                model::Comparison::Below => plan::Comparison::Below,
-                model::Comparison::AtLeast => plan::Comparison::AtLeast,
-                model::Comparison::Above => plan::Comparison::Above,
-                model::Comparison::Equal => plan::Comparison::Equal,
-                model::Comparison::NotEqual => plan::Comparison::NotEqual,
-            },
-            right: expression(right),
-        },
+        model::Condition::Compare(left, by, right) => {
+            plan::Condition::Compare { left: expression(left), by: *by, right: expression(right) }
+        }
         model::Condition::Same(left, right) => {
             plan::Condition::Same { left: Box::new(condition(left)), right: Box::new(condition(right)) }
         }

@@ -1,7 +1,7 @@
 //! Temporal formulas of metrics, from the model to the plan.
 
 use sesame_dsl::model::{self, Temporal};
-use sesame_plan::stl::{Comparison, Formula, Interval, Robustness};
+use sesame_plan::stl::{Formula, Robustness};
 
 use super::formula::{expression, inputs, side};
 use super::raw;
@@ -19,16 +19,16 @@ fn formula(of: &Temporal) -> Formula {
     let boxed = |of: &Temporal| Box::new(formula(of));
     match of {
         Temporal::Predicate(signal, by, constant) => {
-            Formula::Predicate { signal: raw(*signal), comparison: comparison(*by), constant: *constant }
+            Formula::Predicate { signal: raw(*signal), comparison: *by, constant: *constant }
         }
         Temporal::Not(of) => Formula::Not { of: boxed(of) },
         Temporal::All(of) => joined(of, |left, right| Formula::And { left, right }),
         Temporal::Any(of) => joined(of, |left, right| Formula::Or { left, right }),
         Temporal::Implies(left, right) => Formula::Implies { left: boxed(left), right: boxed(right) },
-        Temporal::Always(when, of) => Formula::Always { interval: interval(*when), of: boxed(of) },
-        Temporal::Eventually(when, of) => Formula::Eventually { interval: interval(*when), of: boxed(of) },
+        Temporal::Always(when, of) => Formula::Always { interval: *when, of: boxed(of) },
+        Temporal::Eventually(when, of) => Formula::Eventually { interval: *when, of: boxed(of) },
         Temporal::Until(when, left, right) => {
-            Formula::Until { interval: interval(*when), left: boxed(left), right: boxed(right) }
+            Formula::Until { interval: *when, left: boxed(left), right: boxed(right) }
         }
     }
 }
@@ -40,21 +40,6 @@ fn joined(of: &[Temporal], join: fn(Box<Formula>, Box<Formula>) -> Formula) -> F
     }
     let (left, right) = of.split_at(of.len() / 2);
     join(Box::new(joined(left, join)), Box::new(joined(right, join)))
-}
-
-fn comparison(by: model::Comparison) -> Comparison {
-    match by {
-        model::Comparison::AtMost => Comparison::AtMost,
-        model::Comparison::Below => Comparison::Below,
-        model::Comparison::AtLeast => Comparison::AtLeast,
-        model::Comparison::Above => Comparison::Above,
-        model::Comparison::Equal => Comparison::Equal,
-        model::Comparison::NotEqual => Comparison::NotEqual,
-    }
-}
-
-fn interval(interval: model::Interval) -> Interval {
-    Interval { from: interval.from, to: interval.to }
 }
 
 #[cfg(test)]
@@ -91,8 +76,9 @@ mod tests {
         let when = model::Interval { from: 1.0, to: Some(2.5) };
         let until = Temporal::Until(when, Box::new(predicate(0)), Box::new(predicate(1)));
         let found = formula(&Temporal::Implies(Box::new(Temporal::Not(Box::new(predicate(2)))), Box::new(until)));
-        let expected = |signal| Box::new(Formula::Predicate { signal, comparison: Comparison::AtLeast, constant: 2.0 });
-        let interval = Interval { from: 1.0, to: Some(2.5) };
+        let expected =
+            |signal| Box::new(Formula::Predicate { signal, comparison: model::Comparison::AtLeast, constant: 2.0 });
+        let interval = model::Interval { from: 1.0, to: Some(2.5) };
         let right = Box::new(Formula::Until { interval, left: expected(0), right: expected(1) });
         assert_eq!(found, Formula::Implies { left: Box::new(Formula::Not { of: expected(2) }), right });
     }

@@ -1,7 +1,9 @@
 //! Campaigns: how tests are found and run.
 
 use super::condition::ConditionSpace;
-use super::{CampaignId, Declaration, Exploration, MetricId, OperationId, Range, ReducedDimension, StopRule, TestId};
+use super::{
+    CampaignId, Declaration, Dimension, Exploration, MetricId, OperationId, Range, Recorded, StopRule, TestId,
+};
 
 /// A campaign.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,15 +30,6 @@ pub struct Campaign {
     pub end_after: f64,
     /// Of which tests the messages are recorded. Default none.
     pub record: Option<Recorded>,
-}
-
-/// Of which tests the messages and the activity of operations are recorded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Recorded {
-    /// Of those that violate a requirement, crash or time out, and of the undisturbed runs to compare them with.
-    Failing,
-    /// Of all.
-    All,
 }
 
 /// How the tests of a campaign are found.
@@ -137,7 +130,7 @@ pub struct Coverage {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CoverageAxis {
     /// Which.
-    pub dimension: ReducedDimension,
+    pub dimension: Dimension,
     /// From the beginning of the first cell to the end of the last, not empty.
     pub range: Range,
     /// How many cells: 1 or more.

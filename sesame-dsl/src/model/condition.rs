@@ -1,5 +1,7 @@
 //! Conditions that switch operations on and off (paper §3.9.2, Table 1), and what a campaign grows them from.
 
+pub use sesame_plan::condition::{Comparison, Integers};
+
 use super::MetricId;
 
 /// A condition over metrics, at most [`Condition::MAX_DEPTH`] levels deep.
@@ -57,17 +59,6 @@ pub enum Operand {
     Variable(MetricId),
     /// A number in the unit of the variable it is compared with; finite.
     Number(f64),
-}
-
-/// How the sides of a comparison are compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Comparison {
-    /// `<`
-    Below,
-    /// `>`
-    Above,
-    /// `==`
-    Equal,
 }
 
 /// Between what a number is known to lie, both ends included; infinite where nothing is known. `low <= high`.
@@ -141,23 +132,6 @@ pub struct Variable {
     pub metric: MetricId,
     /// Between what it lies, in the metric's unit.
     pub known: Known,
-}
-
-/// Whole numbers from `lowest` to `highest`, both included; neither is beyond 2^53. `lowest <= highest`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Integers {
-    /// The least.
-    pub lowest: i64,
-    /// The greatest.
-    pub highest: i64,
-}
-
-impl Integers {
-    /// The numbers that are in both, if any is.
-    pub fn shared(self, other: Integers) -> Option<Integers> {
-        let shared = Integers { lowest: self.lowest.max(other.lowest), highest: self.highest.min(other.highest) };
-        (shared.lowest <= shared.highest).then_some(shared)
-    }
 }
 
 /// What the start condition of an operation has to contain wherever a search grows it.

@@ -3,7 +3,7 @@
 //! Numbers are in the units of the wire or of a conversion that is part of the expression; so whoever evaluates one needs
 //! no units.
 
-use super::FieldPath;
+use super::{Comparison, FieldPath, Members};
 
 /// A metric computed from messages without any code of the user.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,19 +29,6 @@ pub struct Input {
     pub field: FieldPath,
     /// What is made of a group's members.
     pub members: Members,
-}
-
-/// What is made of the values of a group's members.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Members {
-    /// The least of the last values.
-    Min,
-    /// The greatest of the last values.
-    Max,
-    /// The sum of the last values.
-    Sum,
-    /// The last value of any of them.
-    Each,
 }
 
 /// How a formula's values become the metric's.
@@ -131,21 +118,4 @@ impl Condition {
             Condition::All(of) | Condition::Any(of) => of.iter().map(Condition::depth).max().unwrap_or(0),
         }
     }
-}
-
-/// How two numbers are compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Comparison {
-    /// `<=`
-    AtMost,
-    /// `<`
-    Below,
-    /// `>=`
-    AtLeast,
-    /// `>`
-    Above,
-    /// `==`
-    Equal,
-    /// `!=`
-    NotEqual,
 }

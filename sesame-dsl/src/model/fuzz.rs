@@ -1,7 +1,7 @@
 //! Fuzzing operations and the known tests that apply them.
 
 use super::condition::{Condition, Constraint};
-use super::{Bound, Declaration, MetricId, OperationId, Range, TopicId};
+use super::{Bound, Declaration, MetricId, Moment, OperationId, OperationKind, Range, Shape, Step, TopicId};
 use crate::units::Unit;
 
 /// A fuzzing operation with its permitted ranges.
@@ -49,146 +49,6 @@ pub struct Target {
     pub places: Vec<Vec<Step>>,
 }
 
-/// One step into a message.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Step {
-    /// The field of this name.
-    Field(String),
-    /// The element of a list at this position, from 0.
-    Element(u32),
-    /// Each element of a list.
-    Each,
-}
-
-/// What an operation does to the messages of its topic. What its parameters are, the plan's
-/// kinds of the same names say.
-#[derive(Debug, Clone, PartialEq)]
-pub enum OperationKind {
-    /// Replaces or shifts numbers and points by fresh uniform draws per message.
-    RandomValue {
-        /// Whether the draw replaces the value or is added to it.
-        mode: ValueMode,
-        /// Whether the values are whole numbers; the ends of the range then are whole as well.
-        integer: bool,
-    },
-    /// Replaces texts by a fresh draw per message.
-    RandomText {
-        /// What is drawn from: at least one, none twice.
-        texts: Vec<String>,
-    },
-    /// Replaces values by one and the same.
-    StuckAt {
-        /// The truth value, where that is what is replaced.
-        truth: Option<bool>,
-    },
-    /// Adds one and the same.
-    Bias,
-    /// Adds what grows with the time since the operation went on.
-    Drift,
-    /// Adds a fresh normal draw per message.
-    Noise,
-    /// Multiplies.
-    Scale,
-    /// Replaces reals by what is no finite number.
-    NotFinite {
-        /// By what.
-        number: NotFinite,
-    },
-    /// Repeats the values that were there last before the operation went on.
-    Freeze,
-    /// Replaces values by those that were there some time ago.
-    Stale,
-    /// Adds to time stamps.
-    ClockSkew,
-    /// Drops each message independently.
-    PacketLoss,
-    /// Drops messages in bursts.
-    BurstLoss,
-    /// Drops what comes sooner than a rate permits.
-    RateLimit,
-    /// Delays each message, order kept.
-    Latency {
-        /// How each message's delay is drawn.
-        distribution: Distribution,
-        /// What becomes of held messages when the window ends.
-        drain: Drain,
-    },
-    /// Delays each message by a time of its own, order not kept.
-    Reorder {
-        /// What becomes of held messages when the window ends.
-        drain: Drain,
-    },
-    /// Sends copies after each message.
-    Duplicate,
-    /// Drops every message.
-    Blackhole,
-    /// Calls the user's code.
-    Custom {
-        /// When.
-        moment: Moment,
-    },
-}
-
-impl OperationKind {
-    /// Whether its parameters are probabilities: percentages in the language, fractions in the model.
-    pub fn has_probabilities(&self) -> bool {
-        matches!(self, OperationKind::PacketLoss | OperationKind::BurstLoss)
-    }
-}
-
-/// What is no finite number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NotFinite {
-    /// Not a number.
-    Nan,
-    /// Larger than every number.
-    Infinity,
-    /// Smaller than every number.
-    MinusInfinity,
-}
-
-/// When the code of a custom operation is called.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Moment {
-    /// With each message while the operation is active.
-    OnMessage,
-    /// Before the simulator starts.
-    BeforeStart,
-    /// After the run has come to its end.
-    AfterEnd,
-}
-
-/// Whether a random value replaces or shifts the original.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ValueMode {
-    /// The draw replaces the value.
-    Absolute,
-    /// The draw is added to the value.
-    Offset,
-}
-
-/// How the delay of each message is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Distribution {
-    /// The same for every message.
-    Fixed,
-    /// Uniform over the test's sub-range, drawn anew per message.
-    Uniform,
-    /// Normal inside the test's sub-range, drawn anew per message.
-    Normal,
-}
-
-/// What becomes of held messages when an operation's window ends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Drain {
-    /// Held ones go out on time, later ones queue behind them. The default.
-    Finish,
-    /// Held ones go out at once.
-    Flush,
-    /// Held ones are lost.
-    Drop,
-}
-
 /// A parameter of an operation: what is permitted, and what a test makes of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
@@ -225,15 +85,6 @@ pub enum Domain {
     Texts(Vec<String>),
     /// One of these files, at least one, none twice: paths relative to the folder of the `.sesame` file.
     Files(Vec<String>),
-}
-
-/// What a test chooses of a permitted range.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Shape {
-    /// One value of it.
-    Value,
-    /// A sub-range of it.
-    Range,
 }
 
 /// A known test: fixed operations, and what is expected of them.

@@ -1,6 +1,6 @@
 //! What is measured, and what must hold of it.
 
-use super::{Declaration, FieldPath, Formula, MetricId, Robustness, TopicId};
+use super::{Declaration, Direction, FieldPath, Formula, MetricId, Robustness, TopicId};
 use crate::units::Unit;
 
 /// A number computed from the messages of a test.
@@ -18,15 +18,6 @@ pub struct Metric {
     pub initial: Option<f64>,
     /// Where its value comes from.
     pub source: MetricSource,
-}
-
-/// Which end of a metric is of interest to a tester.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Direction {
-    /// Larger is more dangerous.
-    Maximise,
-    /// Smaller is more dangerous (or cheaper).
-    Minimise,
 }
 
 /// Where a metric's value comes from.

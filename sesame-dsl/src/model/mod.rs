@@ -7,27 +7,30 @@
 mod campaign;
 pub mod condition;
 pub mod eddi;
-mod exploration;
 mod formula;
 mod fuzz;
 mod ids;
 mod measure;
 pub mod physical;
-mod reduced;
 mod system;
 mod temporal;
 
 pub use campaign::*;
-pub use exploration::*;
 pub use formula::*;
 pub use fuzz::*;
 pub use ids::*;
 pub use measure::*;
-pub use reduced::*;
 pub use system::*;
 pub use temporal::*;
 
 use std::collections::BTreeMap;
+
+// What holds no names and no units is the same here and in a plan.
+pub use sesame_plan::stl::Interval;
+pub use sesame_plan::{
+    BoostedChildren, Comparison, Dimension, Direction, Distribution, Drain, Exploration, Members, Moment, NotFinite,
+    OperationKind, Recorded, Shape, Step, StopRule, ValueMode,
+};
 
 use crate::span::{FileId, Span};
 

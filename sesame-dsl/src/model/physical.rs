@@ -1,6 +1,6 @@
 //! Physical labs: how tests are chosen for one, run in it, and compared with simulation.
 
-use super::{Bound, Declaration, MetricId, Range, ReducedDimension};
+use super::{Bound, Declaration, Dimension, MetricId, Range};
 
 /// A lab.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,7 +81,7 @@ pub struct Budget {
     /// The weight of difference against interest, in `0..=1`.
     pub lambda: f64,
     /// What tests differ in; at least one, each once.
-    pub over: Vec<ReducedDimension>,
+    pub over: Vec<Dimension>,
 }
 
 /// A body.

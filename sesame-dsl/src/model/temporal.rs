@@ -1,6 +1,6 @@
 //! Metrics that are the robustness of a formula of signal temporal logic, with units resolved.
 
-use super::{Comparison, Expression, Input};
+use super::{Comparison, Expression, Input, Interval};
 
 /// By how much a test keeps a temporal formula (positive) or breaks it (negative), in the unit of its comparisons.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,13 +47,4 @@ impl Temporal {
             Temporal::Implies(left, right) | Temporal::Until(_, left, right) => left.depth().max(right.depth()),
         }
     }
-}
-
-/// A stretch of time from now on, in seconds; `0 <= from <= to`, both included.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
-    /// Where it begins.
-    pub from: f64,
-    /// Where it ends; `None` for one that goes on to the end of the test.
-    pub to: Option<f64>,
 }

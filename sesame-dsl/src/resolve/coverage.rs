@@ -3,7 +3,7 @@
 use super::Resolver;
 use super::quantity::percent;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, CoverageAxis, ReducedDimension};
+use crate::model::{self, CoverageAxis, Dimension};
 use crate::similar::most_similar;
 use crate::syntax::ast;
 
@@ -75,13 +75,13 @@ impl<'a> Resolver<'a> {
 
     fn axis(&mut self, axis: &ast::CoverageAxis) -> Option<CoverageAxis> {
         let name = &axis.dimension;
-        let known = ReducedDimension::named(&name.text);
+        let known = Dimension::named(&name.text);
         if known.is_none() {
             let mut diagnostic =
                 Diagnostic::new(Code::UNKNOWN_NAME, name.span, format!("no dimension named `{}`", name.text))
                     .label("not a dimension of tests")
                     .note("there are T1, T2, T3 (timing), P1, P2 (parameters), O0, O1, O2 and O3 (operations)");
-            if let Some(similar) = most_similar(&name.text, ReducedDimension::NAMES) {
+            if let Some(similar) = most_similar(&name.text, Dimension::ALL.map(Dimension::name)) {
                 diagnostic = diagnostic.suggest(format!("`{similar}` is"), name.span, similar);
             }
             self.report(diagnostic);

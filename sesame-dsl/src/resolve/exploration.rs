@@ -3,7 +3,7 @@
 use super::Resolver;
 use super::quantity::percent;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{ActivationMode, BoostedChildren, Exploration, ReducedDimension, Search};
+use crate::model::{ActivationMode, BoostedChildren, Dimension, Exploration, Search};
 use crate::span::Span;
 use crate::syntax::ast::{self, ExplorationKind, Strategy};
 
@@ -129,7 +129,7 @@ impl<'a> Resolver<'a> {
                 let over: Vec<_> = names.iter().map(|name| self.dimension(name)).collect();
                 over.into_iter().collect::<Option<Vec<_>>>()
             }
-            None => Some(ReducedDimension::NAMES.iter().filter_map(|name| ReducedDimension::named(name)).collect()),
+            None => Some(Dimension::ALL.to_vec()),
         };
         Some(Exploration::Novelty { neighbours: neighbours?, over: over? })
     }

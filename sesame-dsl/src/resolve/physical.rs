@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::physical::{Budget, Cost, Fit, Form, LabSetting, LabSimulator, Order, Physical, Place, Shape};
-use crate::model::{Id as _, MetricId, ReducedDimension};
+use crate::model::{Dimension, Id as _, MetricId};
 use crate::similar::most_similar;
 use crate::span::Span;
 use crate::syntax::ast::{self, Name, Quantity};
@@ -260,12 +260,12 @@ impl<'a> Resolver<'a> {
         Some(Budget { limit: limit?, lambda: lambda?, over: over.into_iter().collect::<Option<_>>()? })
     }
 
-    pub(super) fn dimension(&mut self, name: &Name) -> Option<ReducedDimension> {
-        let found = ReducedDimension::named(&name.text);
+    pub(super) fn dimension(&mut self, name: &Name) -> Option<Dimension> {
+        let found = Dimension::named(&name.text);
         if found.is_none() {
             let title = format!("no dimension of the search space is named `{}`", name.text);
             let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("no such dimension");
-            self.report(diagnostic.note(format!("there are {}", super::list(&ReducedDimension::NAMES))));
+            self.report(diagnostic.note(format!("there are {}", super::list(&Dimension::ALL.map(Dimension::name)))));
         }
         found
     }

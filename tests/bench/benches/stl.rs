@@ -5,7 +5,8 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use sesame_plan::stl::{Comparison, Formula, Interval};
+use sesame_plan::Comparison;
+use sesame_plan::stl::{Formula, Interval};
 use sesame_runtime::rng::Stream;
 use sesame_runtime::stl::Monitor;
 use sesame_runtime::time::SimTime;

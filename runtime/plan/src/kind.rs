@@ -1,0 +1,189 @@
+//! What operations do to messages.
+
+use serde::{Deserialize, Serialize};
+
+/// What an operation does to the messages of its topic, with the parameters that a test chooses for it.
+///
+/// Of the values at an operation's places, only numbers, points, texts and truth values are changed as the kind says; the
+/// generator makes sure that they are of a type that the kind is for. Numbers are in the unit of their field. Results of
+/// whole numbers are rounded to the nearest whole number, halves away from zero, and held inside 64 bits.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum OperationKind {
+    /// Replaces or shifts numbers and points by fresh uniform draws per message. Of numbers one parameter, a sub-range
+    /// ([`crate::Shape::Range`]) in the field's unit: `value` or `offset`. Of points three of them: `x`, `y`, `z`.
+    RandomValue {
+        /// Whether the draw replaces the value or is added to it.
+        mode: ValueMode,
+        /// Whether the values are whole numbers; the draw is then uniform over the whole numbers of the range.
+        integer: bool,
+    },
+    /// Replaces texts by a fresh draw per message. No parameters.
+    RandomText {
+        /// What is drawn from, each alike: at least one, none twice.
+        texts: Vec<String>,
+    },
+    /// Replaces values by one and the same. One parameter `value`: a number, a point or a text; of truth values none.
+    StuckAt {
+        /// The truth value, where that is what is replaced.
+        truth: Option<bool>,
+    },
+    /// Adds one and the same. One parameter `bias`: a number, or a point.
+    Bias,
+    /// Adds what grows with the time since the operation went on. One parameter `rate`: a number or a point, in the
+    /// field's unit per second.
+    Drift,
+    /// Adds a fresh normal draw per message and number, of mean zero. One parameter `sigma`, not negative: its standard
+    /// deviation, on each axis of a point.
+    Noise,
+    /// Multiplies. One parameter `factor`: a number.
+    Scale,
+    /// Replaces reals, and all coordinates of points, by what is no finite number. No parameters.
+    NotFinite {
+        /// By what.
+        number: NotFinite,
+    },
+    /// Repeats, on each wire, the values that were there last before the operation went on; if none were, the first ones
+    /// after that. With no places: the whole message. No parameters.
+    Freeze,
+    /// Replaces values by those that were there some time ago. With no places: the whole message. One parameter `age` in
+    /// seconds, not negative.
+    Stale,
+    /// Adds to time stamps. One parameter `skew`, in the field's unit.
+    ClockSkew,
+    /// Drops each message independently. One parameter `loss`: the probability to drop, a value in `0..=1`.
+    PacketLoss,
+    /// Drops messages in bursts (Gilbert 1960, Elliott 1963). Parameters, values in `0..=1`: `enter` and `leave`, the
+    /// probabilities per message that a burst begins and ends, and where it is not 1, `loss`, the probability to drop a
+    /// message of a burst.
+    BurstLoss,
+    /// Drops what comes sooner after the last message that passed on the wire than the period of a rate. One parameter
+    /// `rate` in hertz; positive.
+    RateLimit,
+    /// Delays each message, order kept. One parameter `delay` in seconds: a value if fixed, else a sub-range.
+    Latency {
+        /// How each message's delay is drawn.
+        distribution: Distribution,
+        /// What becomes of held messages when the window ends.
+        drain: Drain,
+    },
+    /// Delays each message by a fresh uniform draw from zero to a parameter `window` in seconds; order is not kept.
+    Reorder {
+        /// What becomes of held messages when the window ends.
+        drain: Drain,
+    },
+    /// Sends copies right after each message. One parameter `copies`: how many, a whole number from 1.
+    Duplicate,
+    /// Drops every message. No parameters.
+    Blackhole,
+    /// The user's Rust code, with parameters as declared.
+    Custom {
+        /// When it is called.
+        moment: Moment,
+    },
+}
+
+/// What is no finite number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NotFinite {
+    /// Not a number.
+    Nan,
+    /// Larger than every number.
+    Infinity,
+    /// Smaller than every number.
+    MinusInfinity,
+}
+
+/// When the code of a custom operation is called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Moment {
+    /// With each message of its topic while the operation is active.
+    OnMessage,
+    /// Once, before the simulator starts afresh for the test.
+    BeforeStart,
+    /// Once, after a run that came to its end.
+    AfterEnd,
+}
+
+impl OperationKind {
+    /// Whether it acts beside the run, before its start or after its end: its activation in a test is then
+    /// [`crate::Activation::Offline`], and it has no observed intervals.
+    pub fn is_offline(&self) -> bool {
+        matches!(self, OperationKind::Custom { moment: Moment::BeforeStart | Moment::AfterEnd })
+    }
+
+    /// Whether its parameters are probabilities: fractions here, percentages in the `.sesame` file.
+    pub fn has_probabilities(&self) -> bool {
+        matches!(self, OperationKind::PacketLoss | OperationKind::BurstLoss)
+    }
+
+    /// The kind in words, as the `.sesame` file has it.
+    pub fn words(&self) -> &'static str {
+        match self {
+            OperationKind::RandomValue { mode: ValueMode::Absolute, .. } => "random absolute",
+            OperationKind::RandomValue { mode: ValueMode::Offset, .. } => "random offset",
+            OperationKind::RandomText { .. } => "random one of",
+            OperationKind::StuckAt { truth: None } => "stuck at",
+            OperationKind::StuckAt { truth: Some(true) } => "stuck at true",
+            OperationKind::StuckAt { truth: Some(false) } => "stuck at false",
+            OperationKind::Bias => "bias",
+            OperationKind::Drift => "drift",
+            OperationKind::Noise => "noise",
+            OperationKind::Scale => "scale",
+            OperationKind::NotFinite { number: NotFinite::Nan } => "nan",
+            OperationKind::NotFinite { number: NotFinite::Infinity } => "infinity",
+            OperationKind::NotFinite { number: NotFinite::MinusInfinity } => "-infinity",
+            OperationKind::Freeze => "freeze",
+            OperationKind::Stale => "stale",
+            OperationKind::ClockSkew => "clock skew",
+            OperationKind::PacketLoss => "packet loss",
+            OperationKind::BurstLoss => "burst loss",
+            OperationKind::RateLimit => "rate limit",
+            OperationKind::Latency { .. } => "latency",
+            OperationKind::Reorder { .. } => "reorder",
+            OperationKind::Duplicate => "duplicate",
+            OperationKind::Blackhole => "blackhole",
+            OperationKind::Custom { moment: Moment::OnMessage } => "custom",
+            OperationKind::Custom { moment: Moment::BeforeStart } => "custom before start",
+            OperationKind::Custom { moment: Moment::AfterEnd } => "custom after end",
+        }
+    }
+}
+
+/// Whether a random value replaces or shifts the original.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ValueMode {
+    /// The draw replaces the value.
+    Absolute,
+    /// The draw is added to the value.
+    Offset,
+}
+
+/// How the delay of each message is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Distribution {
+    /// The same for every message.
+    Fixed,
+    /// Uniform over the test's sub-range, drawn anew per message.
+    Uniform,
+    /// Normal around the middle of the test's sub-range with a quarter of its width as standard deviation, drawn anew per
+    /// message, and drawn again where it would leave the sub-range.
+    Normal,
+}
+
+/// What becomes of held messages when an operation's window ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Drain {
+    /// Held ones go out on time, later ones queue behind them.
+    #[default]
+    Finish,
+    /// Held ones go out at once.
+    Flush,
+    /// Held ones are lost.
+    Drop,
+}
