@@ -86,6 +86,8 @@ fn search_word(search: &Search) -> &'static str {
         Search::Nsga2 { .. } => "nsga2",
         Search::MapElites { .. } => "map_elites",
         Search::LatinHypercube { .. } => "latin_hypercube",
+        Search::Sobol { .. } => "sobol",
+        Search::Falsification { .. } => "falsification",
         Search::Random { .. } => "random",
         Search::Repeat { .. } => "repeat",
         Search::Known { .. } => "known tests",

@@ -11,18 +11,22 @@ pub mod condition;
 pub mod confirming;
 pub mod crowding;
 pub mod dominance;
+pub mod falsify;
 pub mod front;
 pub mod hypervolume;
 pub mod igd;
 pub mod indicators;
 pub mod initial;
+pub mod margin;
 pub mod neighbours;
 pub mod nsga2;
 pub mod permitted;
 pub mod problems;
+pub mod published;
 pub mod range;
 pub mod real;
 pub mod selection;
+pub mod sobol_points;
 pub mod sorting;
 pub mod stop;
 pub mod vary;
@@ -31,14 +35,18 @@ mod boost;
 mod cells;
 mod construct;
 mod constructing;
+mod decoded;
+mod falsification;
 mod in_turn;
 mod known;
 mod latin_hypercube;
 mod map_elites;
+mod novelty;
 mod predict;
 mod random;
 mod repeat;
 pub mod shrink;
+mod sobol;
 
 #[cfg(test)]
 mod explored;
@@ -54,15 +62,18 @@ use boost::{Boosted, Boosting};
 use cells::Cells;
 use construct::Constructor;
 use constructing::{Constructing, Construction};
+use novelty::{Measure, Novel};
 use nsga2::{Survival, Variation};
 use predict::Predicting;
 
 pub use confirming::Confirming;
 pub use dominance::{Fitness, Unfit};
+pub use falsification::Falsification;
 pub use front::Front;
 pub use known::Known;
 pub use latin_hypercube::LatinHypercube;
 pub use map_elites::MapElites;
+pub use margin::{Margin, margins};
 pub use neighbours::Neighbours;
 pub use nsga2::Nsga2;
 pub use permitted::{Permitted, SearchError};
@@ -70,6 +81,7 @@ pub use predict::Course;
 pub use random::Random;
 pub use repeat::Repeat;
 pub use shrink::Shrink;
+pub use sobol::Sobol;
 pub use stop::StopRules;
 pub use vary::TestVariation;
 
@@ -128,6 +140,14 @@ pub struct Evaluated {
     pub point: Option<Point>,
     /// How the condition variables went in its run, where the campaign [predicts](needs_courses).
     pub course: Option<Course>,
+    /// How far each requirement of the plan is from its violation, from [`margins`], where the campaign
+    /// [asks for them](needs_margins); else empty.
+    pub margins: Vec<Margin>,
+}
+
+/// Whether the strategy of a plan asks for the margins of requirements.
+pub fn needs_margins(plan: &CampaignPlan) -> bool {
+    matches!(plan.campaign.search, Search::Falsification { .. })
 }
 
 /// Whether the strategy of a plan asks for the courses of runs.
@@ -138,7 +158,9 @@ pub fn needs_courses(plan: &CampaignPlan) -> bool {
 /// The strategy that a plan names. `seed` is the campaign's, or what `run --seed` put in its place.
 pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, SearchError> {
     Ok(match &plan.campaign.search {
-        Search::Nsga2 { population: 0, .. } | Search::MapElites { population: 0, .. } => {
+        Search::Nsga2 { population: 0, .. }
+        | Search::MapElites { population: 0, .. }
+        | Search::Falsification { population: 0, .. } => {
             return Err(SearchError::NoPopulation { campaign: plan.campaign.name.clone() });
         }
         &Search::Nsga2 { population, evaluations } => {
@@ -158,6 +180,14 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
                     Box::new(Nsga2::new(settings, predicting))
                 }
                 None => Box::new(Nsga2::new(settings, tests)),
+                Some(Exploration::Novelty { neighbours, over }) => {
+                    let measure = Measure {
+                        neighbours: *neighbours as usize,
+                        over: over.clone(),
+                        largest_count: permitted.most() as f64,
+                    };
+                    Box::new(Novel::new(Nsga2::new(settings, tests), measure))
+                }
                 &Some(Exploration::Boost { every_generations, children, tries }) => {
                     let boosting = Boosting { every_generations, children, tries };
                     Box::new(Nsga2::new(settings, Boosted::new(tests, cells(plan)?, boosting, seed)))
@@ -180,10 +210,21 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
             Box::new(MapElites::new(settings, variation(plan, Permitted::of(plan)?, seed), grid))
         }
         &Search::LatinHypercube { evaluations } => {
-            if plan.campaign.activation != ActivationMode::Time {
-                return Err(SearchError::NotByTime { campaign: plan.campaign.name.clone() });
-            }
+            by_time(plan)?;
             Box::new(LatinHypercube::new(Permitted::of(plan)?, evaluations, seed))
+        }
+        &Search::Sobol { evaluations } => {
+            by_time(plan)?;
+            Box::new(Sobol::new(Permitted::of(plan)?, evaluations, seed))
+        }
+        &Search::Falsification { population, evaluations } => {
+            by_time(plan)?;
+            let requirements = plan.requirements.len();
+            if requirements == 0 {
+                return Err(SearchError::NoRequirement { campaign: plan.campaign.name.clone() });
+            }
+            let settings = falsify::Settings { requirements, evaluations, batch: population, seed };
+            Box::new(Falsification::new(Permitted::of(plan)?, settings))
         }
         &Search::Random { evaluations } => Box::new(Random::new(Permitted::of(plan)?, evaluations, seed)),
         &Search::Repeat { test, times } => Box::new(Repeat::new(plan.test(test).test.clone(), times)),
@@ -194,6 +235,14 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
             Box::new(Shrink::new(plan, plan.test(test).test.clone(), simulator_seed, runs, evaluations))
         }
     })
+}
+
+/// Refuses a campaign in which conditions switch operations.
+fn by_time(plan: &CampaignPlan) -> Result<(), SearchError> {
+    match plan.campaign.activation {
+        ActivationMode::Time => Ok(()),
+        ActivationMode::Condition { .. } => Err(SearchError::NotByTime { campaign: plan.campaign.name.clone() }),
+    }
 }
 
 fn variation(plan: &CampaignPlan, permitted: Permitted, seed: u64) -> TestVariation {

@@ -62,6 +62,10 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
         Search::LatinHypercube { evaluations } => {
             format!("latin_hypercube {{ evaluations {evaluations}  seed {seed} }}")
         }
+        Search::Sobol { evaluations } => format!("sobol {{ evaluations {evaluations}  seed {seed} }}"),
+        Search::Falsification { population, evaluations } => {
+            format!("falsification {{ population {population}  evaluations {evaluations}  seed {seed} }}")
+        }
         Search::Random { evaluations } => format!("random {{ evaluations {evaluations}  seed {seed} }}"),
         // Only a runner's command line makes one, and no `.sesame` text does.
         Search::Known { .. } | Search::Shrink { .. } => return clauses,
@@ -131,6 +135,10 @@ fn explored(exploration: &Exploration) -> (&'static str, String) {
         Exploration::Construct { share, until } => {
             let until = until.map_or(String::new(), |until| format!("  until {}%", percent(until)));
             ("construct", format!("{{ share {}%{until} }}", percent(*share)))
+        }
+        Exploration::Novelty { neighbours, over } => {
+            let over: Vec<&str> = over.iter().map(|dimension| dimension.name()).collect();
+            ("novelty", format!("{{ neighbours {neighbours}  over {} }}", over.join(", ")))
         }
         Exploration::Predict { candidates } => ("predict", format!("{{ candidates {candidates} }}")),
     }
@@ -448,6 +456,15 @@ mod tests {
     const LATIN: &str = "
         campaign latin { objectives time  operations cut, swing 1..3 per test
           search latin_hypercube { evaluations 8 }  end after 70s }";
+    const SOBOL: &str = "
+        campaign even { objectives time  operations cut, swing 1..3 per test
+          search sobol { evaluations 8 }  end after 70s }";
+    const FALSIFIED: &str = "
+        campaign falsified { objectives time  operations cut, swing 1..3 per test
+          search falsification { evaluations 8  population 2 }  end after 70s }";
+    const NOVEL: &str = "
+        campaign novel { objectives time  operations cut, swing 1..3 per test
+          search nsga2 { population 4  evaluations 8 }  novelty { over T1, O2 }  end after 70s }";
     const AGAIN: &str = "campaign again { repeat still 3 times  end after 70s  record mcap failing }";
     const WATCH: &str = "campaign watch { passive 3 times { seed 4 }  observes near  end after 70s  record mcap all }";
 
@@ -462,7 +479,22 @@ mod tests {
 
     #[test]
     fn what_is_explained_has_the_same_plan() {
-        for text in [EVERYTHING, DEFAULTS, BY_TIME, BOOSTED, CONSTRUCTED, PREDICTED, ELITES, LATIN, AGAIN, WATCH] {
+        let texts = [
+            EVERYTHING,
+            DEFAULTS,
+            BY_TIME,
+            BOOSTED,
+            CONSTRUCTED,
+            PREDICTED,
+            ELITES,
+            LATIN,
+            SOBOL,
+            FALSIFIED,
+            NOVEL,
+            AGAIN,
+            WATCH,
+        ];
+        for text in texts {
             // Operations that a campaign leaves out are still needed by the known test.
             let original = plan(&format!("{OPERATIONS}{text}"));
             let explained = campaign(&original);
@@ -486,9 +518,10 @@ mod tests {
 
     #[test]
     fn explorations_with_their_defaults() {
-        let explained = [BOOSTED, CONSTRUCTED, PREDICTED].map(|text| campaign(&plan(&format!("{OPERATIONS}{text}"))));
+        let explained =
+            [BOOSTED, CONSTRUCTED, PREDICTED, NOVEL].map(|text| campaign(&plan(&format!("{OPERATIONS}{text}"))));
         let clauses = explained.iter().flat_map(|text| text.lines()).map(str::trim).filter(|line| {
-            ["coverage", "boost", "construct", "predict", "confirm", "stop"]
+            ["coverage", "boost", "construct", "predict", "novelty", "confirm", "stop"]
                 .iter()
                 .any(|word| line.starts_with(&format!("{word} ")))
         });
@@ -502,6 +535,7 @@ confirm    10 times { by quantile 90% }
 stop       { time 5400s  stagnation 5 generations below 2%  discovery below 3%  completeness 90% }
 coverage   { T1 [0, 1] cells 6   hits 1 }
 predict    { candidates 20 }
+novelty    { neighbours 10  over T1, O2 }
         ");
     }
 

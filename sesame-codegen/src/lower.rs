@@ -75,6 +75,8 @@ impl Selection {
             model::Search::Nsga2 { content, .. }
             | model::Search::MapElites { content, .. }
             | model::Search::LatinHypercube { content, .. }
+            | model::Search::Sobol { content, .. }
+            | model::Search::Falsification { content, .. }
             | model::Search::Random { content, .. } => content.operations.clone(),
             model::Search::Repeat { test, .. } => {
                 space.tests[*test].operations.iter().map(|operation| operation.operation).collect()
@@ -174,6 +176,13 @@ impl Selection {
             model::Search::LatinHypercube { content, evaluations } => {
                 (plan::Search::LatinHypercube { evaluations: limit(*evaluations) }, held(content))
             }
+            model::Search::Sobol { content, evaluations } => {
+                (plan::Search::Sobol { evaluations: limit(*evaluations) }, held(content))
+            }
+            model::Search::Falsification { content, population, evaluations } => (
+                plan::Search::Falsification { population: *population, evaluations: limit(*evaluations) },
+                held(content),
+            ),
             model::Search::Repeat { test, times } => {
                 let held = space.tests[*test].operations.len();
                 let held = u32::try_from(held).expect("a file holds fewer than 2^32 operations");
@@ -200,7 +209,7 @@ impl Selection {
             },
             search,
             coverage: campaign.coverage.as_ref().map(coverage),
-            exploration: campaign.exploration,
+            exploration: campaign.exploration.clone(),
             confirm: campaign.confirm,
             neighbours: campaign.neighbours,
             stop: campaign.stop.clone(),

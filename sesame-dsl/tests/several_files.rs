@@ -180,6 +180,7 @@ fn explorations_are_inherited_where_they_can_work_and_reasons_to_stop_by_every_s
             Exploration::Boost { .. } => "boost",
             Exploration::Construct { .. } => "construct",
             Exploration::Predict { .. } => "predict",
+            Exploration::Novelty { .. } => "novelty",
         });
         assert_eq!(
             campaign.confirm.is_some(),

@@ -9,6 +9,7 @@ mod custom;
 mod declarative;
 mod disk;
 mod exported;
+mod falsification;
 mod faults;
 mod first_front;
 mod import;

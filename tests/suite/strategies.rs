@@ -17,7 +17,7 @@ const HALF: u32 = 54;
 const REFERENCE: [f64; 2] = [325.0, 0.0];
 
 /// Campaigns on the cell, each with its search and exploration.
-const STRATEGIES: [(&str, &str, &str); 7] = [
+const STRATEGIES: [(&str, &str, &str); 10] = [
     ("tracking", "nsga2 { population 10  evaluations 210 }", ""),
     ("boost_fixed", "nsga2 { population 10  evaluations 210 }", "boost fixed { }"),
     ("boost_linear", "nsga2 { population 10  evaluations 210 }", "boost linear { from 10 to 1 }"),
@@ -25,6 +25,9 @@ const STRATEGIES: [(&str, &str, &str); 7] = [
     ("elites", "map_elites { population 10  evaluations 210 }", ""),
     ("random_tests", "random { evaluations 210 }", ""),
     ("latin", "latin_hypercube { evaluations 210 }", ""),
+    ("even", "sobol { evaluations 210 }", ""),
+    ("novelties", "nsga2 { population 10  evaluations 210 }", "novelty { over T1, T2, P1 }"),
+    ("falsified", "falsification { evaluations 210 }", ""),
 ];
 
 /// What a run came to.
@@ -86,7 +89,7 @@ fn compared(runs: &[Ran], others: &[Ran]) -> String {
 }
 
 #[test]
-#[ignore = "long: 140 campaigns of 210 tests"]
+#[ignore = "long: 200 campaigns of 210 tests"]
 fn construction_reaches_half_of_the_cells_almost_at_once_and_does_not_lose_the_front() {
     let mut campaigns = String::new();
     for (name, search, exploration) in STRATEGIES {
@@ -118,7 +121,7 @@ fn construction_reaches_half_of_the_cells_almost_at_once_and_does_not_lose_the_f
         ran.push(runs);
     }
     println!("{table}");
-    let [tracking, fixed, _, construction, ..] = &ran[..] else { panic!("seven strategies") };
+    let [tracking, fixed, _, construction, ..] = &ran[..] else { panic!("ten strategies") };
     assert!(median(construction, |ran| ran.half) <= 60.0, "{table}");
     let [tracking, fixed, construction] = [tracking, fixed, construction].map(|runs| median(runs, |ran| ran.covered));
     assert!(fixed > tracking && construction > fixed, "{table}");

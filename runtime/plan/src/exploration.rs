@@ -2,8 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What an evolution does so that more cells are covered. It needs a campaign that counts its coverage.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+use crate::Dimension;
+
+/// What an evolution does so that more cells are covered. It needs a campaign that counts its coverage, unless it
+/// says otherwise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Exploration {
     /// Coverage boosting (section 4.2.2 of the methodology's paper): some children are mutated again until they lie in a
@@ -23,6 +26,13 @@ pub enum Exploration {
         share: f64,
         /// The share of all cells, in `0..=1`, from which on none is constructed any more; `None` for all feasible ones.
         until: Option<f64>,
+    },
+    /// Novelty: how far a test is from others counts as one objective more when survivors are chosen. It needs no coverage.
+    Novelty {
+        /// How many of the nearest tests count; at least 1.
+        neighbours: u32,
+        /// The dimensions of distances; at least one.
+        over: Vec<Dimension>,
     },
     /// Prediction: of several candidates for each test the one that would probably fall into a cell that wants tests. For
     /// campaigns by condition.

@@ -604,6 +604,19 @@ pub enum Search {
         /// Tests in total.
         evaluations: u32,
     },
+    /// Sobol' sampling: tests spread evenly over their choices, every beginning of them too.
+    Sobol {
+        /// Tests in total.
+        evaluations: u32,
+    },
+    /// Focused falsification: the tests that most probably violate a requirement. For campaigns by time of spaces with
+    /// requirements.
+    Falsification {
+        /// Tests at a time, after the first ones; at least 1.
+        population: u32,
+        /// Tests in total.
+        evaluations: u32,
+    },
     /// One known test again and again.
     Repeat {
         /// Which.
@@ -656,6 +669,8 @@ impl Search {
             Search::Nsga2 { evaluations, .. }
             | Search::MapElites { evaluations, .. }
             | Search::Random { evaluations }
+            | Search::Sobol { evaluations }
+            | Search::Falsification { evaluations, .. }
             | Search::LatinHypercube { evaluations }
             | Search::Shrink { evaluations, .. } => *evaluations,
             Search::Repeat { times, .. } => *times,

@@ -158,7 +158,7 @@ pub fn conduct(
         desk.recorder.put_event(&Event { kind: EventKind::Warning, test: None, text })?;
     }
 
-    let courses = search::needs_courses(plan);
+    let (courses, margins) = (search::needs_courses(plan), search::needs_margins(plan));
     if let Some(course) = Course::of(plan, &reference).filter(|_| courses) {
         strategy.reference(course);
     }
@@ -225,7 +225,8 @@ pub fn conduct(
                 tracking.coverage.add(point);
             }
             let course = if courses { Course::of(plan, &record.observation) } else { None };
-            told.push(Evaluated { number: record.number, test: record.test.clone(), fitness, point, course });
+            let margins = if margins { search::margins(plan, &record.observation) } else { Vec::new() };
+            told.push(Evaluated { number: record.number, test: record.test.clone(), fitness, point, course, margins });
             let coverage = tracking.as_ref().map(|it| &it.coverage);
             let repetitions = again.runs();
             progress(Progress { done, total, repetitions, latest: Some(record), front: &front, coverage });

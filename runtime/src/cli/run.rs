@@ -57,6 +57,8 @@ pub(super) fn run(
             Search::Nsga2 { evaluations, .. }
             | Search::MapElites { evaluations, .. }
             | Search::Random { evaluations }
+            | Search::Sobol { evaluations }
+            | Search::Falsification { evaluations, .. }
             | Search::LatinHypercube { evaluations }
             | Search::Shrink { evaluations, .. } => *evaluations = wanted,
             Search::Repeat { times, .. } => *times = wanted,

@@ -162,6 +162,11 @@ fn header(body: &mut Markup, repository: &Repository, summary: &Summary) -> Resu
             format!("MAP-Elites, {population} tests per generation, {evaluations} evaluations")
         }
         Search::LatinHypercube { evaluations } => format!("Latin hypercube, {evaluations} evaluations"),
+        Search::Sobol { evaluations } => format!("Sobol points, {evaluations} evaluations"),
+        Search::Falsification { population: 1, evaluations } => format!("falsification, {evaluations} evaluations"),
+        Search::Falsification { population, evaluations } => {
+            format!("falsification, {population} tests at a time, {evaluations} evaluations")
+        }
         Search::Random { evaluations } => format!("random, {evaluations} evaluations"),
         Search::Repeat { test, times } => format!("{} repeated {times} times", plan.test(*test).name),
         Search::Known { tests } => plural(tests.len(), "known test", "known tests"),

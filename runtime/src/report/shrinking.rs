@@ -139,7 +139,7 @@ pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Opt
                 search.note_failure(place);
             }
             let (test, fitness) = (candidate.test.clone(), Fitness::Measured(Vec::new()));
-            told.push(Evaluated { number, test, fitness, point: None, course: None });
+            told.push(Evaluated { number, test, fitness, point: None, course: None, margins: Vec::new() });
         }
         // A run that is unfinished is told as far as its last whole generation.
         if asked.is_empty() || told.len() < asked.len() {
@@ -466,7 +466,7 @@ mod tests {
                 }
                 recorder.commit(&record).unwrap();
                 let (test, fitness) = (candidate.test.clone(), Fitness::Measured(Vec::new()));
-                told.push(Evaluated { number, test, fitness, point: None, course: None });
+                told.push(Evaluated { number, test, fitness, point: None, course: None, margins: Vec::new() });
                 if number as usize == most {
                     return (folder, recorder.finish("stopped").unwrap());
                 }

@@ -99,6 +99,8 @@ fn the_seed_decides_and_results_told_again_bring_a_search_back_to_where_it_was()
         (NSGA2, Some(CONSTRUCT)),
         (Search::MapElites { population: 10, evaluations: 210 }, None),
         (Search::LatinHypercube { evaluations: 210 }, None),
+        (Search::Sobol { evaluations: 210 }, None),
+        (NSGA2, Some(Exploration::Novelty { neighbours: 10, over: sesame_plan::Dimension::ALL.to_vec() })),
     ];
     for (search, exploration) in strategies {
         let landscape = &LANDSCAPES[1];

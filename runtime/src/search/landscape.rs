@@ -6,15 +6,15 @@
 
 use sesame_plan::condition::{ConditionEnd, ConditionSpace, Integers, Variable};
 use sesame_plan::{
-    Activation, ActivationMode, Campaign, CampaignPlan, Choice, Count, Direction, Domain, Metric, MetricId,
-    MetricSource, Operation, OperationId, OperationKind, Parameter, SCHEMA, Search, Shape, Simulator, Span, Test,
-    TestOperation, TopicId, Transport, ValueMode,
+    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Count, Direction, Domain, Metric, MetricId,
+    MetricSource, Operation, OperationId, OperationKind, Parameter, Requirement, SCHEMA, Search, Shape, Simulator,
+    Span, Test, TestOperation, TopicId, Transport, ValueMode,
 };
 
 use crate::activation::Activity;
 use crate::observation::{MetricObservation, Observation, Outcome, WallTime};
 use crate::search::hypervolume::hypervolume;
-use crate::search::{Course, Evaluated, Fitness, Front, Strategy, Unfit, needs_courses};
+use crate::search::{Course, Evaluated, Fitness, Front, Margin, Strategy, Unfit, needs_courses};
 use crate::sspr::{self, Convention, Point};
 use crate::time::SimTime;
 
@@ -138,6 +138,12 @@ impl Landscape {
                 record: None,
             },
         }
+    }
+
+    /// A requirement on the hits of a test.
+    pub(crate) fn fewer_hits_than(value: f64) -> Requirement {
+        let bound = Bound::Below { value };
+        Requirement { name: "R1".to_owned(), text: String::new(), metric: MetricId(1), bound }
     }
 
     /// The same campaign with operations switched by conditions over where the robot is in its cycle: how far each of two
@@ -265,7 +271,11 @@ impl Landscape {
                     let fitness =
                         if time < 0.05 { Fitness::Unfit(Unfit::Void) } else { Fitness::Measured(vec![time, -hits]) };
                     let point = if time < 0.05 { None } else { Self::point(plan, &candidate.test) };
-                    Evaluated { number, test: candidate.test, fitness, point, course: course.clone() }
+                    let margins = plan.requirements.iter().map(|requirement| {
+                        Margin::of(requirement.bound, if requirement.metric.0 == 0 { time } else { hits })
+                    });
+                    let margins = margins.collect();
+                    Evaluated { number, test: candidate.test, fitness, point, course: course.clone(), margins }
                 })
                 .collect();
             for result in &results {
@@ -387,6 +397,7 @@ mod tests {
                     fitness: Fitness::Unfit(Unfit::Unmeasured),
                     point: None,
                     course: None,
+                    margins: Vec::new(),
                 })
                 .collect();
             strategy.tell(&results);

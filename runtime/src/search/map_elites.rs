@@ -145,7 +145,7 @@ mod tests {
                 }
                 let point = Point::of(&planned(&plan, &test).unwrap(), Convention::Ours);
                 let fitness = Fitness::Measured(vec![f64::from(a), f64::from(b)]);
-                let result = Evaluated { number, test, fitness, point, course: None };
+                let result = Evaluated { number, test, fitness, point, course: None, margins: Vec::new() };
                 search.keep(&result);
                 all.push((early, result));
             }

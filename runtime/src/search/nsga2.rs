@@ -129,6 +129,14 @@ impl<V: Variation> Nsga2<V> {
         &self.population
     }
 
+    /// Judges the surviving genomes anew, for fitness that depends on what else was found. They are ranked again when the
+    /// next generation is told.
+    pub fn reappraise(&mut self, mut fitness: impl FnMut(&Told<V::Genome>) -> Fitness) {
+        for member in &mut self.population {
+            member.fitness = fitness(member);
+        }
+    }
+
     /// The next generation; empty when all evaluations are used up.
     pub fn ask(&mut self) -> Vec<Asked<V::Genome>> {
         assert!(self.awaited == 0, "a generation is told before the next is asked");

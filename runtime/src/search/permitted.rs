@@ -78,6 +78,12 @@ pub enum SearchError {
         /// Why not.
         reason: GridError,
     },
+    /// A falsification without anything to falsify.
+    #[error("campaign `{campaign}` has no requirement to violate; add a `requirement` to its space")]
+    NoRequirement {
+        /// The campaign.
+        campaign: String,
+    },
     /// A population of nobody.
     #[error("campaign `{campaign}` has a population of 0; give it at least 1")]
     NoPopulation {

@@ -22,6 +22,8 @@ pub(super) fn described(plan: &CampaignPlan) -> String {
         Search::Nsga2 { evaluations, .. }
         | Search::MapElites { evaluations, .. }
         | Search::Random { evaluations }
+        | Search::Sobol { evaluations }
+        | Search::Falsification { evaluations, .. }
         | Search::LatinHypercube { evaluations } => {
             match Permitted::of(plan) {
                 Ok(permitted) => space(plan, &permitted, &mut lines),

@@ -73,6 +73,22 @@ pub enum Search {
         /// Tests in total: at least 1.
         evaluations: u32,
     },
+    /// Sobol' sampling of tests by time.
+    Sobol {
+        /// What a test holds.
+        content: Content,
+        /// Tests in total: at least 1.
+        evaluations: u32,
+    },
+    /// Focused falsification of the space's requirements, of which there is one at least, by tests by time.
+    Falsification {
+        /// What a test holds.
+        content: Content,
+        /// Tests at a time: at least 1. Default 1.
+        population: u32,
+        /// Tests in total: at least 1.
+        evaluations: u32,
+    },
     /// One known test again and again.
     Repeat {
         /// Which.
@@ -94,7 +110,9 @@ impl Search {
             Search::Nsga2 { content, .. }
             | Search::Random { content, .. }
             | Search::MapElites { content, .. }
-            | Search::LatinHypercube { content, .. } => Some(content),
+            | Search::LatinHypercube { content, .. }
+            | Search::Sobol { content, .. }
+            | Search::Falsification { content, .. } => Some(content),
             Search::Repeat { .. } | Search::Passive { .. } => None,
         }
     }

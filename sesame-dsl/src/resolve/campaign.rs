@@ -237,9 +237,13 @@ impl<'a> Resolver<'a> {
         }
         let found = evaluations.and_then(|count| self.count(count, 1, "a search evaluates"));
         match strategy {
-            Strategy::Random | Strategy::LatinHypercube => {
+            Strategy::Random | Strategy::LatinHypercube | Strategy::Sobol => {
                 if let Some((span, _)) = search.population.first() {
-                    let what = if strategy == Strategy::Random { "random search" } else { "Latin hypercube" };
+                    let what = match strategy {
+                        Strategy::Random => "random search",
+                        Strategy::Sobol => "Sobol search",
+                        _ => "Latin hypercube",
+                    };
                     let title = format!("a {what} has no setting `population`");
                     let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, *span, title)
                         .label("leave it out")
@@ -250,8 +254,17 @@ impl<'a> Resolver<'a> {
                 let (content, evaluations) = (content?, found?);
                 Some(match strategy {
                     Strategy::Random => Search::Random { content, evaluations },
+                    Strategy::Sobol => Search::Sobol { content, evaluations },
                     _ => Search::LatinHypercube { content, evaluations },
                 })
+            }
+            Strategy::Falsification => {
+                let population = match population {
+                    Some(count) => self.count(count, 1, "a falsification tries at a time"),
+                    None => Some(1),
+                };
+                let (content, population, evaluations) = (content?, population?, found?);
+                Some(Search::Falsification { content, population, evaluations })
             }
             Strategy::Nsga2 | Strategy::MapElites => {
                 let Some(count) = population else {
@@ -398,6 +411,7 @@ fn exploring(campaign: &ast::Campaign) -> &'static str {
     match campaign.explorations.first().map(|exploration| exploration.kind) {
         Some(ast::ExplorationKind::Construct) => "construct",
         Some(ast::ExplorationKind::Predict) => "predict",
+        Some(ast::ExplorationKind::Novelty) => "novelty",
         _ => "boost",
     }
 }

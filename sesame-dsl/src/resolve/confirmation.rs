@@ -27,17 +27,22 @@ impl<'a> Resolver<'a> {
     #[expect(clippy::option_option, reason = "the outer says whether it was in order, the inner is the model's")]
     pub(super) fn neighbours(&mut self, search: &'a ast::Search) -> Option<Option<u32>> {
         let Some(&count) = self.single(&search.neighbours, "neighbours") else { return Some(None) };
-        let learns_nothing = match search.strategy? {
-            Strategy::Random => "random search",
-            Strategy::LatinHypercube => "Latin hypercube",
+        let learns_nothing = "what came of its tests changes nothing that it does";
+        let (strategy, note) = match search.strategy? {
+            Strategy::Random => ("random search", learns_nothing),
+            Strategy::LatinHypercube => ("Latin hypercube", learns_nothing),
+            Strategy::Sobol => ("Sobol search", learns_nothing),
+            Strategy::Falsification => (
+                "falsification",
+                "it goes by how far requirements are from their violation, and tells noise from that itself",
+            ),
             Strategy::Nsga2 | Strategy::MapElites => {
                 return self.count(count, 1, "a search averages over").map(Some);
             }
         };
-        let title = format!("a {learns_nothing} has no setting `neighbours`");
-        let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, search.neighbours[0].0, title)
-            .label("leave it out")
-            .note("what came of its tests changes nothing that it does");
+        let title = format!("a {strategy} has no setting `neighbours`");
+        let diagnostic =
+            Diagnostic::new(Code::UNKNOWN_NAME, search.neighbours[0].0, title).label("leave it out").note(note);
         self.report(diagnostic);
         None
     }

@@ -3,7 +3,7 @@
 use super::Resolver;
 use super::quantity::percent;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{ActivationMode, BoostedChildren, Exploration, Search};
+use crate::model::{ActivationMode, BoostedChildren, Dimension, Exploration, Search};
 use crate::span::Span;
 use crate::syntax::ast::{self, ExplorationKind, Strategy};
 
@@ -15,6 +15,8 @@ const DROP: u32 = 1;
 const CANDIDATES: u32 = 20;
 /// The share of a generation that is constructed unless it is said.
 const SHARE: f64 = 0.5;
+/// Nearest tests that make up novelty unless it is said.
+const NEIGHBOURS: u32 = 10;
 
 impl<'a> Resolver<'a> {
     /// The campaign's exploration. The outer `None` says that it is not in order.
@@ -30,6 +32,7 @@ impl<'a> Resolver<'a> {
         let of = match written.kind {
             ExplorationKind::BoostFixed | ExplorationKind::BoostLinear => self.boost(written),
             ExplorationKind::Construct => self.construct(written),
+            ExplorationKind::Novelty => self.novelty(written),
             ExplorationKind::Predict => match self.single(&written.candidates, "candidates") {
                 Some(&count) => self.count(count, 1, "a prediction compares"),
                 None => Some(CANDIDATES),
@@ -115,6 +118,22 @@ impl<'a> Resolver<'a> {
         Some(Exploration::Construct { share: share?, until: until? })
     }
 
+    fn novelty(&mut self, written: &'a ast::Exploration) -> Option<Exploration> {
+        let neighbours = match self.single(&written.neighbours, "neighbours") {
+            Some(&count) => self.count(count, 1, "novelty looks at"),
+            None => Some(NEIGHBOURS),
+        };
+        let over = match self.single(&written.overs, "over") {
+            Some(names) => {
+                self.once(names.iter());
+                let over: Vec<_> = names.iter().map(|name| self.dimension(name)).collect();
+                over.into_iter().collect::<Option<Vec<_>>>()
+            }
+            None => Some(Dimension::ALL.to_vec()),
+        };
+        Some(Exploration::Novelty { neighbours: neighbours?, over: over? })
+    }
+
     /// A share above 0 and at most 1.
     pub(super) fn share(&mut self, quantity: &ast::Quantity, what: &str) -> Option<f64> {
         let value = self.value(quantity, Some(&percent()), what)?;
@@ -140,20 +159,25 @@ impl<'a> Resolver<'a> {
         };
         let written = campaign.searches.first();
         let strategy = written.and_then(|search| Some((search.span, search.strategy?)));
+        let without_requirements = self.file.requirements.is_empty() && !campaign.unread;
         let without_cells = campaign.coverages.is_empty() && !campaign.unread;
         match strategy {
             Some((span, Strategy::MapElites)) if without_cells => {
                 refuse(self, span, "MAP-Elites", "has no cells to keep tests in", "add a `coverage`");
             }
-            Some((span, Strategy::LatinHypercube)) if by_condition => {
+            Some((span, by_windows @ (Strategy::LatinHypercube | Strategy::Sobol | Strategy::Falsification)))
+                if by_condition =>
+            {
+                let what = match by_windows {
+                    Strategy::Sobol => "a Sobol search",
+                    Strategy::Falsification => "a falsification",
+                    _ => "a Latin hypercube",
+                };
                 let lacks = "has no windows of time to choose";
-                refuse(
-                    self,
-                    span,
-                    "a Latin hypercube",
-                    lacks,
-                    "leave `activate by condition` out, or search otherwise",
-                );
+                refuse(self, span, what, lacks, "leave `activate by condition` out, or search otherwise");
+            }
+            Some((span, Strategy::Falsification)) if without_requirements => {
+                refuse(self, span, "a falsification", "has no requirement to violate", "add a `requirement`");
             }
             _ => {}
         }
@@ -162,10 +186,14 @@ impl<'a> Resolver<'a> {
                 ExplorationKind::BoostFixed | ExplorationKind::BoostLinear => "a boost",
                 ExplorationKind::Construct => "construction",
                 ExplorationKind::Predict => "a prediction",
+                ExplorationKind::Novelty => "novelty",
             };
+            let novel = exploration.kind == ExplorationKind::Novelty;
             let predicts = exploration.kind == ExplorationKind::Predict;
             if strategy.is_some_and(|(_, strategy)| strategy != Strategy::Nsga2) {
                 refuse(self, exploration.span, what, "changes an evolution", "search by `nsga2` to have one");
+            } else if novel {
+                // Distances are between points: neither cells nor windows are needed.
             } else if without_cells {
                 refuse(self, exploration.span, what, "has no cells to go for", "add a `coverage`");
             } else if predicts && !by_condition {

@@ -120,9 +120,10 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
 }
 
 /// Whether a campaign can explore like its base: a search that is no evolution has nothing to be changed, and of windows
-/// of time and conditions each is explored in its own way. Where the base itself is like that, it is said of the base.
+/// of time and conditions each is explored in its own way, but for novelty. Where the base itself is like that, it is said of the base.
 fn suits(exploration: &Exploration, child: &Campaign) -> bool {
     let evolves = child.searches.iter().all(|search| search.strategy.is_none_or(|it| it == Strategy::Nsga2));
     let by_condition = child.activates.iter().any(|(_, mode)| matches!(mode, ActivationMode::Condition(_)));
-    evolves && by_condition == (exploration.kind == ExplorationKind::Predict)
+    let novel = exploration.kind == ExplorationKind::Novelty;
+    evolves && (novel || by_condition == (exploration.kind == ExplorationKind::Predict))
 }

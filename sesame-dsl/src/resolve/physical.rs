@@ -232,7 +232,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// Reports metrics that stand twice.
-    fn once(&mut self, names: impl Iterator<Item = &'a Name>) {
+    pub(super) fn once(&mut self, names: impl Iterator<Item = &'a Name>) {
         let mut first: BTreeMap<&str, Span> = BTreeMap::new();
         for name in names {
             if let Some(&before) = first.get(name.text.as_str()) {
@@ -260,7 +260,7 @@ impl<'a> Resolver<'a> {
         Some(Budget { limit: limit?, lambda: lambda?, over: over.into_iter().collect::<Option<_>>()? })
     }
 
-    fn dimension(&mut self, name: &Name) -> Option<Dimension> {
+    pub(super) fn dimension(&mut self, name: &Name) -> Option<Dimension> {
         let found = Dimension::named(&name.text);
         if found.is_none() {
             let title = format!("no dimension of the search space is named `{}`", name.text);

@@ -685,6 +685,8 @@ pub(crate) enum Strategy {
     Random,
     MapElites,
     LatinHypercube,
+    Sobol,
+    Falsification,
 }
 
 #[derive(Debug, Clone)]
@@ -704,7 +706,8 @@ pub(crate) struct CoverageAxis {
     pub(crate) cells: Count,
 }
 
-/// `boost fixed { … }`, `boost linear { … }`, `construct { … }` or `predict { … }`, with the settings as written.
+/// `boost fixed { … }`, `boost linear { … }`, `construct { … }`, `predict { … }` or `novelty { … }`, with the settings as
+/// written.
 #[derive(Debug, Clone)]
 pub(crate) struct Exploration {
     pub(crate) span: Span,
@@ -718,6 +721,9 @@ pub(crate) struct Exploration {
     pub(crate) shares: Vec<(Span, Quantity)>,
     pub(crate) untils: Vec<(Span, Quantity)>,
     pub(crate) candidates: Vec<(Span, Count)>,
+    pub(crate) neighbours: Vec<(Span, Count)>,
+    /// Dimensions.
+    pub(crate) overs: Vec<(Span, Vec<Name>)>,
     pub(crate) damaged: bool,
 }
 
@@ -754,6 +760,7 @@ pub(crate) enum ExplorationKind {
     BoostLinear,
     Construct,
     Predict,
+    Novelty,
 }
 
 #[derive(Debug, Clone)]

@@ -34,6 +34,7 @@ pub(super) enum Place {
     Boost,
     Construct,
     Predict,
+    Novelty,
     Confirm,
     Stop,
     Repeat,
@@ -63,6 +64,7 @@ impl Place {
             Place::Boost => Rule::error_boost_setting,
             Place::Construct => Rule::error_construct_setting,
             Place::Predict => Rule::error_predict_setting,
+            Place::Novelty => Rule::error_novelty_setting,
             Place::Confirm => Rule::error_confirm_setting,
             Place::Stop => Rule::error_stop_rule,
             Place::Repeat => Rule::error_repeat_setting,
@@ -114,6 +116,7 @@ impl Place {
                 Rule::boost,
                 Rule::construct,
                 Rule::predict,
+                Rule::novelty,
                 Rule::confirm,
                 Rule::stop,
                 Rule::end,
@@ -137,6 +140,7 @@ impl Place {
             ],
             Place::Construct => &[Rule::construct_share, Rule::construct_until],
             Place::Predict => &[Rule::predict_candidates],
+            Place::Novelty => &[Rule::novelty_neighbours, Rule::novelty_over],
             Place::Confirm => &[Rule::confirm_by],
             Place::Stop => &[Rule::stop_time, Rule::stop_stagnation, Rule::stop_discovery, Rule::stop_completeness],
             Place::Repeat => &[Rule::setting_seed],
@@ -177,6 +181,7 @@ impl Place {
             Place::Boost => Rule::one_boost_setting,
             Place::Construct => Rule::one_construct_setting,
             Place::Predict => Rule::one_predict_setting,
+            Place::Novelty => Rule::one_novelty_setting,
             Place::Confirm => Rule::one_confirm_setting,
             Place::Stop => Rule::one_stop_rule,
             Place::Repeat => Rule::one_repeat_setting,
@@ -205,7 +210,7 @@ impl Place {
             Place::Test => "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`, or `expect`",
             Place::Campaign => {
                 "`objectives`, `operations`, `observes`, `activate`, `search`, `coverage`, `boost`, `construct`, `predict`, \
-                 `confirm`, `stop`, `repeat`, `passive`, `record` or `end after`"
+                 `novelty`, `confirm`, `stop`, `repeat`, `passive`, `record` or `end after`"
             }
             Place::Condition => "`depth` or `integers`",
             Place::Search => "`population`, `evaluations`, `seed` or `neighbours`",
@@ -213,6 +218,7 @@ impl Place {
             Place::Boost => "`every N generations`, `every N iterations`, `from N to N`, `drop N` or `tries N`",
             Place::Construct => "`share` or `until`",
             Place::Predict => "`candidates`",
+            Place::Novelty => "`neighbours` or `over`",
             Place::Confirm => "`by mean`, `by median` or `by quantile` and a share",
             Place::Stop => "`time`, `stagnation`, `discovery` or `completeness`",
             Place::Repeat => "`seed`",
@@ -258,6 +264,7 @@ impl Place {
                 "boost",
                 "construct",
                 "predict",
+                "novelty",
                 "confirm",
                 "stop",
                 "repeat",
@@ -271,6 +278,7 @@ impl Place {
             Place::Boost => &["every", "from", "drop", "tries"],
             Place::Construct => &["share", "until"],
             Place::Predict => &["candidates"],
+            Place::Novelty => &["neighbours", "over"],
             Place::Confirm => &["by"],
             Place::Stop => &["time", "stagnation", "discovery", "completeness"],
             Place::Repeat => &["seed"],

@@ -68,6 +68,19 @@ impl Reader<'_> {
         confirm
     }
 
+    pub(super) fn novelty(&mut self, pair: &Pair<'_>, span: Span) -> Exploration {
+        let mut novelty = empty(span, ExplorationKind::Novelty);
+        novelty.damaged =
+            self.members(&expect_child(pair, Rule::novelty_settings), Place::Novelty, |reader, setting| {
+                let span = reader.keyword_span(&setting);
+                match setting.as_rule() {
+                    Rule::novelty_over => novelty.overs.push((span, reader.names(&setting))),
+                    _ => novelty.neighbours.push((span, reader.count(&expect_child(&setting, Rule::number)))),
+                }
+            });
+        novelty
+    }
+
     pub(super) fn stop(&mut self, pair: &Pair<'_>, span: Span) -> Stop {
         let mut stop = Stop {
             span,
@@ -106,6 +119,8 @@ fn empty(span: Span, kind: ExplorationKind) -> Exploration {
         shares: vec![],
         untils: vec![],
         candidates: vec![],
+        neighbours: vec![],
+        overs: vec![],
         damaged: false,
     }
 }

@@ -602,6 +602,7 @@ impl Reader<'_> {
                 Rule::coverage => campaign.coverages.push(reader.coverage(&member, span)),
                 Rule::boost => campaign.explorations.push(reader.boost(&member, span)),
                 Rule::predict => campaign.explorations.push(reader.predict(&member, span)),
+                Rule::novelty => campaign.explorations.push(reader.novelty(&member, span)),
                 Rule::confirm => campaign.confirms.push(reader.confirm(&member, span)),
                 Rule::stop => campaign.stops.push(reader.stop(&member, span)),
                 Rule::construct => campaign.explorations.push(reader.construct(&member, span)),
@@ -687,6 +688,8 @@ impl Reader<'_> {
             (Rule::k_nsga2, Strategy::Nsga2),
             (Rule::k_map_elites, Strategy::MapElites),
             (Rule::k_latin_hypercube, Strategy::LatinHypercube),
+            (Rule::k_sobol, Strategy::Sobol),
+            (Rule::k_falsification, Strategy::Falsification),
             (Rule::k_random, Strategy::Random),
         ];
         search.strategy = strategies.into_iter().find(|(rule, _)| child(pair, *rule).is_some()).map(|(_, it)| it);

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use sesame_plan::condition::{ConditionEnd, ConditionSpace, Integers, Variable};
 use sesame_plan::{
-    Activation, ActivationMode, BoostedChildren, CampaignPlan, CoverageGoal, Exploration, MetricId, Search, Span,
-    StopRule,
+    Activation, ActivationMode, BoostedChildren, Bound, CampaignPlan, CoverageGoal, Dimension, Exploration, MetricId,
+    Requirement, Search, Span, StopRule,
 };
 use sesame_runtime::coverage::{Coverage, Grid};
 use sesame_runtime::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
@@ -42,6 +42,9 @@ fn plan(search: Search, exploration: Option<Exploration>) -> CampaignPlan {
         let space = ConditionSpace { variables: vec![variable], depth: 4, integers, end, times: 3 };
         plan.campaign.activation = ActivationMode::Condition { space };
     }
+    // Of no interest but to falsification, and hard to violate.
+    let bound = Bound::AtLeast { value: -1e9 };
+    plan.requirements.push(Requirement { name: "R1".to_owned(), text: String::new(), metric: MetricId(1), bound });
     plan.campaign.exploration = exploration;
     plan.campaign.stop =
         vec![StopRule::Discovery { below: 0.0 }, StopRule::Stagnation { generations: 1_000_000, below: 0.01 }];
@@ -91,7 +94,7 @@ fn spent(plan: &CampaignPlan) -> Duration {
     let mut spent = Duration::ZERO;
     let begun = Instant::now();
     let mut strategy = search::strategy(plan, 1).expect("the campaign can be searched");
-    let courses = search::needs_courses(plan);
+    let (courses, margins) = (search::needs_courses(plan), search::needs_margins(plan));
     if let Some(course) = Course::of(plan, &observe(plan, 0, &[])).filter(|_| courses) {
         strategy.reference(course);
     }
@@ -120,7 +123,8 @@ fn spent(plan: &CampaignPlan) -> Duration {
                 coverage.add(point);
             }
             let course = if courses { Course::of(plan, &observation) } else { None };
-            told.push(Evaluated { number, test, fitness, point, course });
+            let margins = if margins { search::margins(plan, &observation) } else { Vec::new() };
+            told.push(Evaluated { number, test, fitness, point, course, margins });
             spent += begun.elapsed();
         }
         let begun = Instant::now();
@@ -137,7 +141,7 @@ fn main() {
     // Cargo tells whether it measures or only tries that this works.
     let measured = std::env::args().any(|word| word == "--bench");
     let counts: &[u32] = if measured { &[100, 1_000, 10_000] } else { &[100] };
-    let strategies: [(&str, Searched, Option<Exploration>); 8] = [
+    let strategies: [(&str, Searched, Option<Exploration>); 11] = [
         ("`nsga2`", nsga2, None),
         ("`boost fixed`", nsga2, Some(FIXED)),
         ("`boost linear`", nsga2, Some(LINEAR)),
@@ -146,12 +150,15 @@ fn main() {
         ("`map_elites`", |evaluations| Search::MapElites { population: 10, evaluations }, None),
         ("`random`", |evaluations| Search::Random { evaluations }, None),
         ("`latin_hypercube`", |evaluations| Search::LatinHypercube { evaluations }, None),
+        ("`sobol`", |evaluations| Search::Sobol { evaluations }, None),
+        ("`novelty`", nsga2, Some(Exploration::Novelty { neighbours: 10, over: Dimension::ALL.to_vec() })),
+        ("`falsification`", |evaluations| Search::Falsification { population: 1, evaluations }, None),
     ];
     println!("| strategy | {} |", counts.iter().map(u32::to_string).collect::<Vec<_>>().join(" | "));
     println!("|---|{}", "---:|".repeat(counts.len()));
     for (name, search, exploration) in strategies {
         let row = counts.iter().map(|&count| {
-            let plan = plan(search(count), exploration);
+            let plan = plan(search(count), exploration.clone());
             // Of five, the quickest is the one least disturbed by whatever else the machine does.
             let times = if measured { 5 } else { 1 };
             let quickest = (0..times).map(|_| spent(&plan)).min().unwrap_or_default();

@@ -35,6 +35,7 @@ fn shrunk(mut shrink: Shrink, mut fails: impl FnMut(&Test, u64) -> bool) -> Shri
                 fitness: Fitness::Measured(Vec::new()),
                 point: None,
                 course: None,
+                margins: Vec::new(),
             });
         }
         shrink.tell(&told);
