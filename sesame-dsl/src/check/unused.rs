@@ -4,16 +4,14 @@ use std::collections::BTreeSet;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::eddi::Gate;
-use crate::model::{ActivationMode, MetricId, MetricSource, Operation, OperationId, Search, Space, TopicId};
+use crate::model::{ActivationMode, MetricId, MetricSource, Operation, OperationId, Space, TopicId};
 use crate::span::FileId;
 
 /// Operations of the file itself that no campaign and no known test uses.
 pub(super) fn operations(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnostic>) {
     let mut used: BTreeSet<OperationId> = BTreeSet::new();
     for campaign in space.campaigns.values() {
-        if let Search::Nsga2 { content, .. } | Search::Random { content, .. } = &campaign.search {
-            used.extend(&content.operations);
-        }
+        used.extend(campaign.search.content().iter().flat_map(|content| &content.operations));
     }
     used.extend(space.tests.values().flat_map(|test| &test.operations).map(|operation| operation.operation));
     for (id, operation) in space.operations.iter() {
@@ -47,9 +45,7 @@ fn used_metrics(space: &Space) -> BTreeSet<MetricId> {
     for campaign in space.campaigns.values() {
         used.extend(&campaign.objectives);
         used.extend(&campaign.observed);
-        if let Search::Nsga2 { content, .. } | Search::Random { content, .. } = &campaign.search
-            && let ActivationMode::Condition(grown) = &content.activation
-        {
+        if let Some(ActivationMode::Condition(grown)) = campaign.search.content().map(|content| &content.activation) {
             used.extend(grown.variables.iter().map(|variable| variable.metric));
         }
     }
