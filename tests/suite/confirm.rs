@@ -337,3 +337,25 @@ fn findings_in_gusts_hold_where_they_were_confirmed() {
     let as_many_runs = held["longer"].runs;
     assert!(held["sure"].runs > as_many_runs && held["doubting"].runs > as_many_runs, "{held:?}");
 }
+
+#[test]
+fn a_search_told_of_neighbours_asks_for_other_tests_and_the_same_ones_with_any_number_of_workers() {
+    let space = fs::read_to_string(workspace().join("tests/simulators/gusty/space.sesame")).unwrap();
+    let search = "search nsga2 { population 10  evaluations 60  seed 3  neighbours 3 }";
+    let more = format!("campaign averaging from believing {{ {search} }}\n");
+    let space = format!("{}\n{more}", space.replace("NAME", "neighbours"));
+    let project = Project::new("neighbours", &space, "gusty");
+    let averaging = project.build("averaging");
+    let digest = averaging.run(&["--results", "one", "--workers", "1"]).expect(0).digest();
+    assert_eq!(averaging.run(&["--results", "three", "--workers", "3"]).expect(0).digest(), digest);
+    project.build("believing").run(&["--results", "believing"]).expect(0);
+    let tests = |folder: &str| -> Vec<_> {
+        results(&averaging, folder).tests().unwrap().into_iter().map(|row| (row.generation, row.test)).collect()
+    };
+    let (averaged, believed) = (tests("one"), tests("believing"));
+    let first = |tests: &[(Option<u32>, _)]| tests.iter().take_while(|(generation, _)| *generation != Some(1)).count();
+    let bred = first(&averaged);
+    assert_eq!((bred, first(&believed)), (11, 11));
+    assert_eq!(averaged[..bred], believed[..bred], "nothing was told before the first generation");
+    assert_ne!(averaged[bred..], believed[bred..]);
+}
