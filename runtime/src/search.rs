@@ -99,15 +99,6 @@ pub trait Strategy: Send {
     /// Takes how the condition variables went in the undisturbed run, before the first generation is asked.
     fn reference(&mut self, _: Course) {}
 
-    /// The simulator's seed for the candidate at this place of the generation asked last; `None` for the campaign's own.
-    fn simulator_seed(&self, _place: usize) -> Option<u64> {
-        None
-    }
-
-    /// Takes note that the candidate at this place of the generation asked last failed as
-    /// [`Search::Shrink`] has it; before the generation is told.
-    fn note_failure(&mut self, _place: usize) {}
-
     /// Why the search is over, where there is more to say than that all tests were evaluated.
     fn ended(&self) -> Option<String> {
         None
@@ -125,6 +116,8 @@ pub struct Candidate {
     pub generation: u32,
     /// The known test it is, where a search runs known tests for their own sake.
     pub known: Option<KnownTestId>,
+    /// The simulator's seed in its run; `None` for the campaign's own. Equal tests with seeds of their own are run each.
+    pub simulator_seed: Option<u64>,
 }
 
 /// A test with its result.
@@ -143,6 +136,8 @@ pub struct Evaluated {
     /// How far each requirement of the plan is from its violation, from [`margins`], where the campaign
     /// [asks for them](needs_margins); else empty.
     pub margins: Vec<Margin>,
+    /// Whether it failed as a campaign that [makes a test smaller](Search::Shrink) has it; else false.
+    pub failing: bool,
 }
 
 /// Whether the strategy of a plan asks for the margins of requirements.
@@ -227,7 +222,7 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
             Box::new(Falsification::new(Permitted::of(plan)?, settings))
         }
         &Search::Random { evaluations } => Box::new(Random::new(Permitted::of(plan)?, evaluations, seed)),
-        &Search::Repeat { test, times } => Box::new(Repeat::new(plan.test(test).test.clone(), times)),
+        &Search::Repeat { test, times } => Box::new(Repeat::new(plan.test(test).test.clone(), times, seed)),
         Search::Known { tests } => {
             Box::new(Known::new(tests.iter().map(|&id| (id, plan.test(id).test.clone())).collect()))
         }
@@ -316,7 +311,10 @@ impl<V: Learning + Send> Strategy for Nsga2<V> {
     fn ask(&mut self) -> Vec<Candidate> {
         let generation = self.generation();
         let asked = Nsga2::ask(self);
-        asked.into_iter().map(|a| Candidate { test: a.genome, parents: a.parents, generation, known: None }).collect()
+        asked
+            .into_iter()
+            .map(|a| Candidate { test: a.genome, parents: a.parents, generation, known: None, simulator_seed: None })
+            .collect()
     }
 
     fn reference(&mut self, course: Course) {

@@ -163,7 +163,6 @@ pub fn conduct(
         strategy.reference(course);
     }
     let total = plan.campaign.search.evaluations();
-    let repeats = matches!(plan.campaign.search, Search::Repeat { .. });
     let failing = if let Search::Shrink { failing, .. } = &plan.campaign.search { Some(failing) } else { None };
     let mut front = Front::default();
     let mut rules = StopRules::of(plan);
@@ -189,20 +188,16 @@ pub fn conduct(
         let candidates = strategy.ask();
         let Some(generation) = candidates.first().map(|candidate| candidate.generation) else { break };
         let mut planned = Vec::with_capacity(candidates.len());
-        let first = numbered + 1;
-        for (place, Candidate { test, parents, generation, known }) in candidates.into_iter().enumerate() {
+        for Candidate { test, parents, generation, known, simulator_seed: own_seed } in candidates {
             numbered += 1;
-            let own_seed = strategy.simulator_seed(place);
             planned.push(Planned {
                 number: numbered,
                 origin: known.map_or(Origin::Search, Origin::Known),
                 generation: known.is_none().then_some(generation),
                 parents,
-                // Equal tests with seeds of their own are no duplicates.
-                duplicate_of: if repeats || own_seed.is_some() { None } else { earlier.same(&test, numbered) },
+                duplicate_of: if own_seed.is_some() { None } else { earlier.same(&test, numbered) },
                 test,
-                simulator_seed: own_seed
-                    .unwrap_or_else(|| simulator_seed(settings.seed, if repeats { numbered } else { 0 })),
+                simulator_seed: own_seed.unwrap_or_else(|| simulator_seed(settings.seed)),
             });
         }
         let mut told = Vec::with_capacity(planned.len());
@@ -214,11 +209,9 @@ pub fn conduct(
                 again.remember(record);
             }
             front.add(record.number, &fitness);
-            if let Some(failing) = failing
-                && record::fails(plan, failing, &record.observation.outcome, |id| value(&record.observation, id))
-            {
-                strategy.note_failure((record.number - first) as usize);
-            }
+            let failing = failing.is_some_and(|failing| {
+                record::fails(plan, failing, &record.observation.outcome, |id| value(&record.observation, id))
+            });
             indicators.add(&record.observation.outcome, record.duplicate_of.is_some(), &fitness);
             let point = counted_point(plan, record);
             if let (Some(tracking), Some(point)) = (&mut tracking, &point) {
@@ -226,7 +219,15 @@ pub fn conduct(
             }
             let course = if courses { Course::of(plan, &record.observation) } else { None };
             let margins = if margins { search::margins(plan, &record.observation) } else { Vec::new() };
-            told.push(Evaluated { number: record.number, test: record.test.clone(), fitness, point, course, margins });
+            told.push(Evaluated {
+                number: record.number,
+                test: record.test.clone(),
+                fitness,
+                point,
+                course,
+                margins,
+                failing,
+            });
             let coverage = tracking.as_ref().map(|it| &it.coverage);
             let repetitions = again.runs();
             progress(Progress { done, total, repetitions, latest: Some(record), front: &front, coverage });
@@ -326,9 +327,9 @@ fn interrupt(recorder: Recorder) -> Result<Conducted, CampaignError> {
     Ok(Conducted::Interrupted)
 }
 
-/// The simulator's seed: one for the whole campaign, and one for each run where a test is repeated.
-fn simulator_seed(seed: u64, repetition: u32) -> u64 {
-    derive_seed(seed, "simulator", &[u64::from(repetition)])
+/// The simulator's seed, one for the whole campaign; searches that run a test several times bring their own.
+fn simulator_seed(seed: u64) -> u64 {
+    derive_seed(seed, "simulator", &[0])
 }
 
 /// Counting cells while a campaign runs. Hits add up in any order, so that what is covered after a generation does not
@@ -402,7 +403,7 @@ fn undisturbed(number: u32, seed: u64) -> Planned {
         generation: None,
         parents: Vec::new(),
         test: Test::default(),
-        simulator_seed: simulator_seed(seed, 0),
+        simulator_seed: simulator_seed(seed),
         duplicate_of: None,
     }
 }

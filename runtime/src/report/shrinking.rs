@@ -132,14 +132,12 @@ pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Opt
     loop {
         let mut told = Vec::new();
         let asked = search.ask();
-        for (place, candidate) in asked.iter().enumerate() {
+        for candidate in &asked {
             number += 1;
             let Some(row) = rows.get(&number).filter(|row| row.test == candidate.test) else { break };
-            if fails(plan, failing, &row.outcome, |id| row.value(id)) {
-                search.note_failure(place);
-            }
+            let failing = fails(plan, failing, &row.outcome, |id| row.value(id));
             let (test, fitness) = (candidate.test.clone(), Fitness::Measured(Vec::new()));
-            told.push(Evaluated { number, test, fitness, point: None, course: None, margins: Vec::new() });
+            told.push(Evaluated { number, test, fitness, point: None, course: None, margins: Vec::new(), failing });
         }
         // A run that is unfinished is told as far as its last whole generation.
         if asked.is_empty() || told.len() < asked.len() {
@@ -452,7 +450,7 @@ mod tests {
         loop {
             let asked = search.ask();
             let mut told = Vec::new();
-            for (place, candidate) in asked.iter().enumerate() {
+            for candidate in &asked {
                 number += 1;
                 let observation = sample::observe(&plan, &candidate.test, 9);
                 let record = sample::record(&plan, number, Origin::Search, candidate.test.clone());
@@ -461,12 +459,10 @@ mod tests {
                     let shown = &record.observation.metrics[id.index()];
                     MetricValue { value: shown.value, set: shown.set }
                 };
-                if fails(&plan, &failing, &record.observation.outcome, value) {
-                    search.note_failure(place);
-                }
+                let failing = fails(&plan, &failing, &record.observation.outcome, value);
                 recorder.commit(&record).unwrap();
                 let (test, fitness) = (candidate.test.clone(), Fitness::Measured(Vec::new()));
-                told.push(Evaluated { number, test, fitness, point: None, course: None, margins: Vec::new() });
+                told.push(Evaluated { number, test, fitness, point: None, course: None, margins: Vec::new(), failing });
                 if number as usize == most {
                     return (folder, recorder.finish("stopped").unwrap());
                 }

@@ -54,6 +54,7 @@ impl Strategy for Falsification {
             parents: placed.parents.clone(),
             generation,
             known: None,
+            simulator_seed: None,
         };
         self.asked.iter().map(candidate).collect()
     }

@@ -26,8 +26,9 @@ impl InTurn {
         let generation = self.asked / GENERATION;
         let end = self.evaluations.min(self.asked + GENERATION);
         let tests = (self.asked..end).map(test);
-        let batch: Vec<Candidate> =
-            tests.map(|test| Candidate { test, parents: Vec::new(), generation, known: None }).collect();
+        let batch: Vec<Candidate> = tests
+            .map(|test| Candidate { test, parents: Vec::new(), generation, known: None, simulator_seed: None })
+            .collect();
         self.asked = end;
         self.awaited = batch.len();
         batch

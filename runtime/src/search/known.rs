@@ -25,7 +25,8 @@ impl Strategy for Known {
             return Vec::new();
         }
         self.awaited = Some(self.tests.len());
-        let candidate = |(id, test)| Candidate { test, parents: Vec::new(), generation: 0, known: Some(id) };
+        let candidate =
+            |(id, test)| Candidate { test, parents: Vec::new(), generation: 0, known: Some(id), simulator_seed: None };
         std::mem::take(&mut self.tests).into_iter().map(candidate).collect()
     }
 

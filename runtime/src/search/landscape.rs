@@ -275,7 +275,15 @@ impl Landscape {
                         Margin::of(requirement.bound, if requirement.metric.0 == 0 { time } else { hits })
                     });
                     let margins = margins.collect();
-                    Evaluated { number, test: candidate.test, fitness, point, course: course.clone(), margins }
+                    Evaluated {
+                        number,
+                        test: candidate.test,
+                        fitness,
+                        point,
+                        course: course.clone(),
+                        margins,
+                        failing: false,
+                    }
                 })
                 .collect();
             for result in &results {
@@ -398,6 +406,7 @@ mod tests {
                     point: None,
                     course: None,
                     margins: Vec::new(),
+                    failing: false,
                 })
                 .collect();
             strategy.tell(&results);

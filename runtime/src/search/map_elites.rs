@@ -50,6 +50,7 @@ impl MapElites {
             parents: Vec::new(),
             generation,
             known: None,
+            simulator_seed: None,
         };
         (0..size).map(fresh).collect()
     }
@@ -67,7 +68,7 @@ impl MapElites {
                     Heritage::Both if first.number == second.number => vec![first.number],
                     Heritage::Both => vec![first.number, second.number],
                 };
-                batch.push(Candidate { test: child.genome, parents, generation, known: None });
+                batch.push(Candidate { test: child.genome, parents, generation, known: None, simulator_seed: None });
             }
         }
         batch.truncate(size as usize);
@@ -145,7 +146,7 @@ mod tests {
                 }
                 let point = Point::of(&planned(&plan, &test).unwrap(), Convention::Ours);
                 let fitness = Fitness::Measured(vec![f64::from(a), f64::from(b)]);
-                let result = Evaluated { number, test, fitness, point, course: None, margins: Vec::new() };
+                let result = Evaluated { number, test, fitness, point, course: None, margins: Vec::new(), failing: false };
                 search.keep(&result);
                 all.push((early, result));
             }

@@ -2,20 +2,22 @@
 
 use sesame_plan::Test;
 
+use crate::rng::derive_seed;
 use crate::search::{Candidate, Evaluated, Strategy};
 
-/// The same test so many times, draw seeds included, in one generation.
+/// The same test so many times, draw seeds included, in one generation; each run has a seed of the simulator of its own.
 #[derive(Debug, Clone)]
 pub struct Repeat {
     test: Test,
     times: u32,
+    seed: u64,
     awaited: Option<usize>,
 }
 
 impl Repeat {
-    /// So many repetitions of a test.
-    pub fn new(test: Test, times: u32) -> Self {
-        Repeat { test, times, awaited: None }
+    /// So many repetitions of a test; `seed` is the campaign's.
+    pub fn new(test: Test, times: u32, seed: u64) -> Self {
+        Repeat { test, times, seed, awaited: None }
     }
 }
 
@@ -26,8 +28,14 @@ impl Strategy for Repeat {
             return Vec::new();
         }
         self.awaited = Some(self.times as usize);
-        let repetition = || Candidate { test: self.test.clone(), parents: Vec::new(), generation: 0, known: None };
-        std::iter::repeat_with(repetition).take(self.times as usize).collect()
+        let repetition = |repetition: u32| Candidate {
+            test: self.test.clone(),
+            parents: Vec::new(),
+            generation: 0,
+            known: None,
+            simulator_seed: Some(derive_seed(self.seed, "simulator", &[u64::from(repetition)])),
+        };
+        (1..=self.times).map(repetition).collect()
     }
 
     fn tell(&mut self, results: &[Evaluated]) {

@@ -71,8 +71,7 @@ pub struct Tried {
     pub number: u32,
 }
 
-/// Makes a test smaller, by ask and tell. The caller runs each candidate with the simulator's seed that
-/// [`Strategy::simulator_seed`] gives it, and says with [`Strategy::note_failure`] which of them failed.
+/// Makes a test smaller, by ask and tell of which candidates [fail](Evaluated::failing).
 #[derive(Debug, Clone)]
 pub struct Shrink {
     space: Space,
@@ -87,8 +86,8 @@ pub struct Shrink {
     /// Position of the first test of the generation asked last.
     asked: usize,
     generation: u32,
-    /// Runs of that generation which failed, by their place in it.
-    failures: Vec<bool>,
+    /// How many runs of that generation are to be told.
+    awaited: usize,
     arrived: Option<Arrived>,
 }
 
@@ -124,7 +123,7 @@ impl Shrink {
             known: BTreeMap::new(),
             asked: 0,
             generation: 0,
-            failures: Vec::new(),
+            awaited: 0,
             arrived: None,
         }
     }
@@ -168,7 +167,7 @@ fn content(test: &Test) -> String {
 
 impl Strategy for Shrink {
     fn ask(&mut self) -> Vec<Candidate> {
-        assert!(self.failures.is_empty(), "a generation is told before the next is asked");
+        assert!(self.awaited == 0, "a generation is told before the next is asked");
         if self.arrived.is_some() {
             return Vec::new();
         }
@@ -181,40 +180,37 @@ impl Strategy for Shrink {
         };
         tests.truncate(self.left as usize);
         self.asked = self.tried.len();
-        self.failures = vec![false; tests.len() * self.runs as usize];
         let parents: Vec<u32> = base.map(|base| self.tried[base].number).into_iter().collect();
-        let mut candidates = Vec::with_capacity(self.failures.len());
+        let mut candidates = Vec::with_capacity(tests.len() * self.runs as usize);
         for test in tests {
             self.left -= 1;
             self.known.insert(content(&test), self.tried.len());
             let number = u32::try_from(self.tried.len()).unwrap_or(u32::MAX).saturating_mul(self.runs) + 1;
             self.tried.push(Tried { test: test.clone(), phase, base, failed: None, number });
-            let run = Candidate { test, parents: parents.clone(), generation: self.generation, known: None };
-            candidates.extend(std::iter::repeat_n(run, self.runs as usize));
+            candidates.extend((0..self.runs).map(|run| Candidate {
+                test: test.clone(),
+                parents: parents.clone(),
+                generation: self.generation,
+                known: None,
+                simulator_seed: Some(match run {
+                    0 => self.simulator_seed,
+                    run => derive_seed(self.simulator_seed, "shrink", &[u64::from(run)]),
+                }),
+            }));
         }
+        self.awaited = candidates.len();
         candidates
     }
 
     fn tell(&mut self, results: &[Evaluated]) {
-        assert!(results.len() == self.failures.len(), "exactly the generation asked last is told");
-        let failures = std::mem::take(&mut self.failures);
-        let runs = self.runs as usize;
-        for ((tried, failed), first) in
-            self.tried[self.asked..].iter_mut().zip(failures.chunks(runs)).zip(results.iter().step_by(runs))
-        {
-            tried.failed = Some(u32::try_from(failed.iter().filter(|&&failed| failed).count()).unwrap_or(u32::MAX));
-            tried.number = first.number;
+        assert!(results.len() == self.awaited, "exactly the generation asked last is told");
+        self.awaited = 0;
+        for (tried, runs) in self.tried[self.asked..].iter_mut().zip(results.chunks(self.runs as usize)) {
+            let failed = runs.iter().filter(|run| run.failing).count();
+            tried.failed = Some(u32::try_from(failed).unwrap_or(u32::MAX));
+            tried.number = runs[0].number;
         }
         self.generation += 1;
-    }
-
-    fn note_failure(&mut self, place: usize) {
-        self.failures[place] = true;
-    }
-
-    fn simulator_seed(&self, place: usize) -> Option<u64> {
-        let run = place as u64 % u64::from(self.runs);
-        Some(if run == 0 { self.simulator_seed } else { derive_seed(self.simulator_seed, "shrink", &[run]) })
     }
 
     fn ended(&self) -> Option<String> {

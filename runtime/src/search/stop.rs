@@ -264,7 +264,7 @@ mod tests {
             let mut all: Vec<Evaluated> = Vec::new();
             for number in 0..6u32 {
                 let fitness = Fitness::Measured(vec![stream.unit(), stream.unit()]);
-                let result = Evaluated { number, test: sesame_plan::Test::default(), fitness, point: None, course: None, margins: Vec::new() };
+                let result = Evaluated { number, test: sesame_plan::Test::default(), fitness, point: None, course: None, margins: Vec::new(), failing: false };
                 rules.tell(std::slice::from_ref(&result));
                 all.push(result);
             }

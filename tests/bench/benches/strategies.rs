@@ -124,7 +124,7 @@ fn spent(plan: &CampaignPlan) -> Duration {
             }
             let course = if courses { Course::of(plan, &observation) } else { None };
             let margins = if margins { search::margins(plan, &observation) } else { Vec::new() };
-            told.push(Evaluated { number, test, fitness, point, course, margins });
+            told.push(Evaluated { number, test, fitness, point, course, margins, failing: false });
             spent += begun.elapsed();
         }
         let begun = Instant::now();

@@ -24,11 +24,9 @@ fn shrunk(mut shrink: Shrink, mut fails: impl FnMut(&Test, u64) -> bool) -> Shri
             return shrink;
         }
         let mut told = Vec::new();
-        for (place, candidate) in asked.into_iter().enumerate() {
+        for candidate in asked {
             number += 1;
-            if fails(&candidate.test, shrink.simulator_seed(place).unwrap()) {
-                shrink.note_failure(place);
-            }
+            let failing = fails(&candidate.test, candidate.simulator_seed.unwrap());
             told.push(Evaluated {
                 number,
                 test: candidate.test,
@@ -36,6 +34,7 @@ fn shrunk(mut shrink: Shrink, mut fails: impl FnMut(&Test, u64) -> bool) -> Shri
                 point: None,
                 course: None,
                 margins: Vec::new(),
+                failing,
             });
         }
         shrink.tell(&told);
