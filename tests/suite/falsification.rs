@@ -169,8 +169,9 @@ fn table(problem: FalsificationProblem, strategies: &[(&str, Attempt)]) -> (Stri
 
 #[test]
 fn runners_search_so_with_any_number_of_workers_and_after_an_interruption() {
+    let project = Project::new("falsified", SPACE, "faulty");
     for campaign in ["falsifying", "even", "wandering"] {
-        let runner = Project::new(&format!("searched_{campaign}"), SPACE, "faulty").build(campaign);
+        let runner = project.build(campaign);
         let whole = runner.run(&["--results", "whole", "--workers", "2"]).expect(0);
         let repository = Repository::open(&runner.folder.join("whole/3")).unwrap();
         // The search, and an undisturbed run before and after it.
