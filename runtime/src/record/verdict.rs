@@ -95,6 +95,7 @@ pub(crate) fn ends(bound: Bound) -> (Option<f64>, bool, Option<f64>, bool) {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
+    use sesame_plan::RequirementId;
 
     use super::*;
 
@@ -117,6 +118,25 @@ mod tests {
         assert_eq!(verdict(at_most_zero, &crash, value(Some(3.0), true)), Verdict::Violated);
         assert_eq!(verdict(at_most_zero, &crash, value(Some(999.0), false)), Verdict::Unsaid);
         assert_eq!(verdict(at_most_zero, &crash, value(Some(0.0), true)), Verdict::Unsaid);
+    }
+
+    #[test]
+    fn a_run_fails_alike_if_it_violates_all_of_it_and_was_disturbed() {
+        let plan = crate::record::sample::plan();
+        let violation =
+            |ids: &[u32]| Failing::Violation { requirements: ids.iter().copied().map(RequirementId).collect() };
+        // R1: at most 0 of metric 0; R4: at most 70 of metric 3.
+        let with = |outcome: &Outcome, failing: &Failing, collisions: f64, cycle: f64| {
+            fails(&plan, failing, outcome, |id| value(Some(if id.0 == 3 { cycle } else { collisions }), true))
+        };
+        let both = violation(&[0, 3]);
+        assert!(with(&Outcome::Completed, &both, 1.0, 71.0));
+        assert!(!with(&Outcome::Completed, &both, 1.0, 69.0) && with(&Outcome::Completed, &violation(&[0]), 1.0, 69.0));
+        assert!(!with(&Outcome::Void, &both, 1.0, 71.0), "nothing was disturbed");
+        let crash = Outcome::Crash { message: "gone".to_owned() };
+        assert!(with(&crash, &both, 1.0, 71.0), "a violation seen before a crash stands");
+        assert!(with(&crash, &Failing::Crash, 0.0, 0.0) && !with(&crash, &Failing::Timeout, 0.0, 0.0));
+        assert!(with(&Outcome::Timeout { limit: 1.0 }, &Failing::Timeout, 0.0, 0.0));
     }
 
     proptest! {
