@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::eddi::Gate;
-use crate::model::{ActivationMode, MetricId, MetricSource, Operation, OperationId, Search, Space, TopicId};
+use crate::model::{ActivationMode, MetricId, MetricSource, Operation, OperationId, Space, TopicId};
 use crate::span::FileId;
 
 /// Operations of the file itself that no campaign and no known test uses.
 pub(super) fn operations(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnostic>) {
     let mut used: BTreeSet<OperationId> = BTreeSet::new();
     for campaign in space.campaigns.values() {
-        if let Search::Nsga2 { content, .. } | Search::Random { content, .. } = &campaign.search {
+        if let Some(content) = campaign.search.content() {
             used.extend(&content.operations);
         }
     }
@@ -47,7 +47,7 @@ fn used_metrics(space: &Space) -> BTreeSet<MetricId> {
     for campaign in space.campaigns.values() {
         used.extend(&campaign.objectives);
         used.extend(&campaign.observed);
-        if let Search::Nsga2 { content, .. } | Search::Random { content, .. } = &campaign.search
+        if let Some(content) = campaign.search.content()
             && let ActivationMode::Condition(grown) = &content.activation
         {
             used.extend(grown.variables.iter().map(|variable| variable.metric));
