@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use nix::sys::signal::Signal;
 use sesame_runtime::record::Repository;
 use sesame_runtime::rng::{Stream, keyed_unit};
 use sesame_runtime::search::falsify::{Falsifier, Settings as FalsifierSettings, UnitBox};
@@ -12,8 +11,6 @@ use sesame_runtime::search::real::RealVariation;
 use sesame_runtime::search::sobol_points::SobolPoints;
 use sesame_runtime::search::{Fitness, Margin};
 use sesame_tests::Project;
-
-use crate::interruption::Running;
 
 const BUDGET: u32 = 80;
 /// The seeds that are reported. What is tuned, is tuned on mo3d with seeds from 1000 on.
@@ -168,7 +165,7 @@ fn table(problem: FalsificationProblem, strategies: &[(&str, Attempt)]) -> (Stri
 }
 
 #[test]
-fn runners_search_so_with_any_number_of_workers_and_after_an_interruption() {
+fn runners_search_so_with_any_number_of_workers() {
     let project = Project::new("falsified", SPACE, "faulty");
     for campaign in ["falsifying", "even", "wandering"] {
         let runner = project.build(campaign);
@@ -177,11 +174,6 @@ fn runners_search_so_with_any_number_of_workers_and_after_an_interruption() {
         // The search, and an undisturbed run before and after it.
         assert_eq!(repository.tests().unwrap().len(), 26, "{campaign}");
         assert_eq!(runner.run(&["--results", "alone", "--workers", "1"]).expect(0).digest(), whole.digest());
-        let mut running = Running::start(&runner, "stopped", "2");
-        running.until_recorded(14);
-        running.signal(Signal::SIGKILL);
-        running.ended();
-        assert_eq!(runner.run(&["resume", "stopped/3"]).expect(0).digest(), whole.digest(), "{campaign}");
         if campaign == "falsifying" {
             let bred = |number| !repository.test(number).unwrap().parents.is_empty();
             assert!((1..=24).any(bred), "some tests come from others");

@@ -11,7 +11,9 @@ use crate::span::FileId;
 pub(super) fn operations(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnostic>) {
     let mut used: BTreeSet<OperationId> = BTreeSet::new();
     for campaign in space.campaigns.values() {
-        used.extend(campaign.search.content().iter().flat_map(|content| &content.operations));
+        if let Some(content) = campaign.search.content() {
+            used.extend(&content.operations);
+        }
     }
     used.extend(space.tests.values().flat_map(|test| &test.operations).map(|operation| operation.operation));
     for (id, operation) in space.operations.iter() {
@@ -45,7 +47,9 @@ fn used_metrics(space: &Space) -> BTreeSet<MetricId> {
     for campaign in space.campaigns.values() {
         used.extend(&campaign.objectives);
         used.extend(&campaign.observed);
-        if let Some(ActivationMode::Condition(grown)) = campaign.search.content().map(|content| &content.activation) {
+        if let Some(content) = campaign.search.content()
+            && let ActivationMode::Condition(grown) = &content.activation
+        {
             used.extend(grown.variables.iter().map(|variable| variable.metric));
         }
     }
