@@ -70,6 +70,7 @@ pub use confirming::Confirming;
 pub use dominance::{Fitness, Unfit};
 pub use falsification::Falsification;
 pub use front::Front;
+pub use in_turn::{InTurn, Sampling};
 pub use known::Known;
 pub use latin_hypercube::LatinHypercube;
 pub use map_elites::MapElites;
@@ -206,11 +207,11 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
         }
         &Search::LatinHypercube { evaluations } => {
             by_time(plan)?;
-            Box::new(LatinHypercube::new(Permitted::of(plan)?, evaluations, seed))
+            Box::new(InTurn::new(LatinHypercube::new(Permitted::of(plan)?, evaluations, seed), evaluations))
         }
         &Search::Sobol { evaluations } => {
             by_time(plan)?;
-            Box::new(Sobol::new(Permitted::of(plan)?, evaluations, seed))
+            Box::new(InTurn::new(Sobol::new(Permitted::of(plan)?, seed), evaluations))
         }
         &Search::Falsification { population, evaluations } => {
             by_time(plan)?;
@@ -221,7 +222,7 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
             let settings = falsify::Settings { requirements, evaluations, batch: population, seed };
             Box::new(Falsification::new(Permitted::of(plan)?, settings))
         }
-        &Search::Random { evaluations } => Box::new(Random::new(Permitted::of(plan)?, evaluations, seed)),
+        &Search::Random { evaluations } => Box::new(InTurn::new(Random::new(Permitted::of(plan)?, seed), evaluations)),
         &Search::Repeat { test, times } => Box::new(Repeat::new(plan.test(test).test.clone(), times, seed)),
         Search::Known { tests } => {
             Box::new(Known::new(tests.iter().map(|&id| (id, plan.test(id).test.clone())).collect()))

@@ -11,6 +11,7 @@ use sesame_plan::{Activation, Choice, Test};
 use crate::rng::Stream;
 use crate::search::choice::PermittedChoice;
 use crate::search::falsify::{Falsifier, Ground, Settings};
+use crate::search::in_turn::Sampling;
 use crate::search::initial::fresh_test;
 use crate::search::permitted::PermittedActivation;
 use crate::search::range::{Range, StepSizes};
@@ -35,7 +36,7 @@ impl Falsification {
     /// A search before its first test. `settings` say how many requirements there are: what
     /// [`margins`](crate::search::margins) are told of.
     pub fn new(permitted: Permitted, settings: Settings) -> Self {
-        let spread = Sobol::new(permitted.clone(), settings.evaluations, settings.seed);
+        let spread = Sobol::new(permitted.clone(), settings.seed);
         Falsification {
             search: Falsifier::new(Tests { permitted, spread }, settings),
             generation: 0,
@@ -238,7 +239,7 @@ mod tests {
         #[test]
         fn tests_are_permitted_and_separations_are_squared_distances(plan in any_timed_plan(), seed: u64) {
             let permitted = Permitted::of(&plan).unwrap();
-            let mut ground = Tests { spread: Sobol::new(permitted.clone(), 20, seed), permitted };
+            let mut ground = Tests { spread: Sobol::new(permitted.clone(), seed), permitted };
             let mut stream = Stream::derive(seed, "test", &[]);
             let mut places = vec![ground.spread(0), ground.spread(1), ground.anywhere(&mut stream)];
             for reach in [0.01, 0.1, 0.5] {

@@ -7,53 +7,42 @@
 use sesame_plan::Test;
 
 use crate::rng::{Stream, derive_seed, keyed_unit};
+use crate::search::Permitted;
 use crate::search::decoded::{BELOW_ONE, decoded};
-use crate::search::in_turn::InTurn;
-use crate::search::{Candidate, Evaluated, Permitted, Strategy};
+use crate::search::in_turn::Sampling;
 
-/// As many tests as evaluations, spread evenly over each choice, in generations of 50. Nothing is learned from results.
+/// So many tests, spread evenly over each choice.
 #[derive(Debug, Clone)]
 pub struct LatinHypercube {
     permitted: Permitted,
     seed: u64,
     /// Per choice, the order in which its strata are taken.
     strata: Vec<Vec<usize>>,
-    turn: InTurn,
+    evaluations: u32,
 }
 
 impl LatinHypercube {
     /// So many tests of what is permitted.
     pub fn new(permitted: Permitted, evaluations: u32, seed: u64) -> Self {
-        LatinHypercube { permitted, seed, strata: Vec::new(), turn: InTurn::new(evaluations) }
+        LatinHypercube { permitted, seed, strata: Vec::new(), evaluations }
     }
 
     /// The value of the `index`th test for a choice, in `0..1`: each of as many equal parts holds one test's.
     fn value(&mut self, choice: usize, index: u32) -> f64 {
         while self.strata.len() <= choice {
             let mut stream = Stream::derive(self.seed, "latin hypercube", &[self.strata.len() as u64]);
-            self.strata.push(stream.permutation(self.turn.evaluations as usize));
+            self.strata.push(stream.permutation(self.evaluations as usize));
         }
         let stratum = self.strata[choice][index as usize] as f64;
         let within = keyed_unit(derive_seed(self.seed, "in stratum", &[]), u64::from(index), choice as u64);
-        ((stratum + within) / f64::from(self.turn.evaluations)).min(BELOW_ONE)
-    }
-
-    fn test(&mut self, index: u32) -> Test {
-        let permitted = self.permitted.clone();
-        decoded(&permitted, self.seed, index, |choice| self.value(choice, index))
+        ((stratum + within) / f64::from(self.evaluations)).min(BELOW_ONE)
     }
 }
 
-impl Strategy for LatinHypercube {
-    fn ask(&mut self) -> Vec<Candidate> {
-        let mut turn = self.turn;
-        let batch = turn.ask(|index| self.test(index));
-        self.turn = turn;
-        batch
-    }
-
-    fn tell(&mut self, results: &[Evaluated]) {
-        self.turn.tell(results.len());
+impl Sampling for LatinHypercube {
+    fn test(&mut self, index: u32) -> Test {
+        let permitted = self.permitted.clone();
+        decoded(&permitted, self.seed, index, |choice| self.value(choice, index))
     }
 }
 

@@ -5,41 +5,29 @@
 
 use sesame_plan::Test;
 
+use crate::search::Permitted;
 use crate::search::decoded::decoded;
-use crate::search::in_turn::InTurn;
+use crate::search::in_turn::Sampling;
 use crate::search::sobol_points::SobolPoints;
-use crate::search::{Candidate, Evaluated, Permitted, Strategy};
 
-/// As many tests as evaluations, along scrambled Sobol' points, in generations of 50. Nothing is learned from results.
+/// Tests along scrambled Sobol' points. The nth depends on the seed and n alone.
 #[derive(Debug, Clone)]
 pub struct Sobol {
     permitted: Permitted,
     seed: u64,
     points: SobolPoints,
-    turn: InTurn,
 }
 
 impl Sobol {
-    /// So many tests of what is permitted. The nth test depends on the seed and n alone.
-    pub fn new(permitted: Permitted, evaluations: u32, seed: u64) -> Self {
-        Sobol { permitted, seed, points: SobolPoints::new(seed), turn: InTurn::new(evaluations) }
-    }
-
-    pub(super) fn test(&mut self, index: u32) -> Test {
-        decoded(&self.permitted, self.seed, index, |choice| self.points.value(choice, index))
+    /// Tests of what is permitted.
+    pub fn new(permitted: Permitted, seed: u64) -> Self {
+        Sobol { permitted, seed, points: SobolPoints::new(seed) }
     }
 }
 
-impl Strategy for Sobol {
-    fn ask(&mut self) -> Vec<Candidate> {
-        let mut turn = self.turn;
-        let batch = turn.ask(|index| self.test(index));
-        self.turn = turn;
-        batch
-    }
-
-    fn tell(&mut self, results: &[Evaluated]) {
-        self.turn.tell(results.len());
+impl Sampling for Sobol {
+    fn test(&mut self, index: u32) -> Test {
+        decoded(&self.permitted, self.seed, index, |choice| self.points.value(choice, index))
     }
 }
 
@@ -54,7 +42,7 @@ mod tests {
     #[test]
     fn every_beginning_has_tests_of_all_lengths_alike() {
         let plan = LANDSCAPES[0].plan(sesame_plan::Search::Random { evaluations: 1 });
-        let mut search = Sobol::new(Permitted::of(&plan).unwrap(), 64, 3);
+        let mut search = Sobol::new(Permitted::of(&plan).unwrap(), 3);
         let mut lengths = [0; 6];
         (0..64).for_each(|index| lengths[search.test(index).operations.len()] += 1);
         // One to five operations follow from fifths of the first choice, of which 64ths are taken once each.
@@ -64,7 +52,7 @@ mod tests {
     proptest! {
         #[test]
         fn tests_are_permitted(plan in any_timed_plan(), seed: u64) {
-            let mut search = Sobol::new(Permitted::of(&plan).unwrap(), 20, seed);
+            let mut search = Sobol::new(Permitted::of(&plan).unwrap(), seed);
             for index in 0..20 {
                 prop_assert_eq!(broken_rule(&plan, &search.test(index)), None);
             }
