@@ -317,11 +317,11 @@ impl Comparison {
                     Datum::Text(name.to_owned()),
                     Datum::Text((*group).to_owned()),
                     Datum::count(values.len()),
-                    Datum::real(quantile(&values, 0.25)),
-                    Datum::real(quantile(&values, 0.5)),
-                    Datum::real(quantile(&values, 0.75)),
+                    Datum::lone(quantile(&values, 0.25)),
+                    Datum::lone(quantile(&values, 0.5)),
+                    Datum::lone(quantile(&values, 0.75)),
                     Datum::real(compared.map(|it| it.a12)),
-                    Datum::real(compared.map(|it| it.p)),
+                    Datum::lone(compared.map(|it| it.p)),
                     way.map_or(Datum::Missing, |way| Datum::Text(way.to_owned())),
                 ]);
             }

@@ -24,6 +24,8 @@ pub enum Datum {
     Whole(i64),
     /// A number, finite.
     Real(f64),
+    /// A number, finite, in a column of numbers of other things.
+    Lone(f64),
     /// Yes or no.
     Truth(bool),
 }
@@ -32,6 +34,11 @@ impl Datum {
     /// A number that may be missing.
     pub fn real(value: Option<f64>) -> Datum {
         value.filter(|value| value.is_finite()).map_or(Datum::Missing, Datum::Real)
+    }
+
+    /// A number that may be missing, in a column of numbers of other things: people are shown digits that befit it alone.
+    pub fn lone(value: Option<f64>) -> Datum {
+        value.filter(|value| value.is_finite()).map_or(Datum::Missing, Datum::Lone)
     }
 
     /// How many of something.
@@ -44,7 +51,7 @@ impl Datum {
             Datum::Missing => Value::Null,
             Datum::Text(text) => Value::from(text.as_str()),
             Datum::Whole(number) => Value::from(*number),
-            Datum::Real(number) => Value::from(*number),
+            Datum::Real(number) | Datum::Lone(number) => Value::from(*number),
             Datum::Truth(truth) => Value::from(*truth),
         }
     }
@@ -98,7 +105,7 @@ impl Dataset {
                 Datum::Text(text) => quoted(text),
                 Datum::Whole(number) => number.to_string(),
                 // The shortest text that reads back as this very number.
-                Datum::Real(number) => number.to_string(),
+                Datum::Real(number) | Datum::Lone(number) => number.to_string(),
                 Datum::Truth(truth) => truth.to_string(),
             }));
         }

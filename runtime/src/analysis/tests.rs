@@ -139,12 +139,24 @@ fn what_is_printed_for_programs_reads_back() {
     assert_eq!(Datum::real(Some(f64::NAN)), Datum::Missing);
 }
 
+#[test]
+fn numbers_of_unlike_things_in_one_column_have_digits_of_their_own() {
+    let mut dataset = Dataset::new(["measure".to_owned(), "median".to_owned()]);
+    for (name, value) in [("hypervolume", 19_852.6), ("igd_plus", 0.1346), ("p", 1.75e-4), ("tests", 210.0)] {
+        dataset.row([Datum::Text(name.to_owned()), Datum::lone(Some(value))]);
+    }
+    let text = dataset.text(crate::report::TextOptions { width: None, colour: false });
+    let shown: Vec<&str> = text.lines().skip(1).filter_map(|line| line.split_whitespace().last()).collect();
+    assert_eq!(shown, ["19853", "0.135", "1.75e-4", "210"], "{text}");
+    assert_eq!(Datum::lone(Some(f64::INFINITY)), Datum::Missing);
+}
+
 /// Numbers of a column, by its name.
 fn numbers(dataset: &Dataset, column: &str) -> Vec<Option<f64>> {
     let at = dataset.columns().iter().position(|name| name == column).unwrap();
     let number = |row: &Vec<Datum>| match row[at] {
         Datum::Missing => None,
-        Datum::Real(number) => Some(number),
+        Datum::Real(number) | Datum::Lone(number) => Some(number),
         Datum::Whole(number) => Some(number as f64),
         ref other => panic!("{other:?} is no number"),
     };

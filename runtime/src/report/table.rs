@@ -116,7 +116,7 @@ pub(crate) fn text_table(dataset: &Dataset, options: TextOptions) -> String {
                 _ => None,
             })
         };
-        let numeric = column(at).any(|datum| matches!(datum, Datum::Real(_) | Datum::Whole(_)));
+        let numeric = column(at).any(|datum| matches!(datum, Datum::Real(_) | Datum::Lone(_) | Datum::Whole(_)));
         aligned.push((title.clone(), if numeric { Align::Right } else { Align::Left }));
         decimals.push(number::decimals(numbers()));
     }
@@ -127,6 +127,7 @@ pub(crate) fn text_table(dataset: &Dataset, options: TextOptions) -> String {
             Datum::Text(text) => text.clone(),
             Datum::Whole(number) => number.to_string(),
             Datum::Real(value) => number::fixed(*value, decimals),
+            Datum::Lone(value) => number::number(*value),
             Datum::Truth(truth) => if *truth { "yes" } else { "no" }.to_owned(),
         }));
     }
