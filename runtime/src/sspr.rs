@@ -166,16 +166,27 @@ impl Intensity {
 /// `largest_count`. Give the most operations a test of the campaign may hold, or 1 for counts as they are (as the
 /// original and the paper have it). `None` if one of the points lacks one of the dimensions.
 pub fn distance(a: &Point, b: &Point, over: &[Dimension], largest_count: f64) -> Option<f64> {
+    let whole = over.iter().all(|&dimension| a.get(dimension).is_some() && b.get(dimension).is_some());
+    whole.then(|| distance_of_any(a, b, over, largest_count))
+}
+
+/// The same for points that may lack a dimension: where one of two does they are as far apart in it as can be, where both
+/// do not at all. Operations without parameters are unlike any parameter.
+pub fn distance_of_any(a: &Point, b: &Point, over: &[Dimension], largest_count: f64) -> f64 {
     let mut sum = 0.0;
     for &dimension in over {
-        let difference = a.get(dimension)? - b.get(dimension)?;
+        let difference = match (a.get(dimension), b.get(dimension)) {
+            (Some(a), Some(b)) => a - b,
+            (None, None) => 0.0,
+            _ => 1.0,
+        };
         let scale = match dimension {
             Dimension::O0 | Dimension::O1 | Dimension::O2 | Dimension::O3 => largest_count,
             Dimension::T1 | Dimension::T2 | Dimension::T3 | Dimension::P1 | Dimension::P2 => 1.0,
         };
         sum += (difference / scale) * (difference / scale);
     }
-    Some(libm::sqrt(sum))
+    libm::sqrt(sum)
 }
 
 fn mean(values: &[f64]) -> f64 {

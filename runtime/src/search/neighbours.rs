@@ -27,10 +27,6 @@ const ALL: [Dimension; 8] = [
     Dimension::O2,
     Dimension::O3,
 ];
-/// What every test has: operations without parameters have no strength.
-const ALWAYS: [Dimension; 6] =
-    [Dimension::T1, Dimension::T2, Dimension::T3, Dimension::O1, Dimension::O2, Dimension::O3];
-
 /// The tests of a campaign whose neighbours are asked for.
 #[derive(Debug, Clone)]
 pub struct Neighbours {
@@ -70,8 +66,11 @@ impl Neighbours {
     fn mean(&self, number: u32) -> Option<Vec<f64>> {
         let (point, own) = self.tests.get(&number)?;
         let others = self.tests.iter().filter(|&(&other, _)| other != number);
-        let mut others: Vec<(f64, u32, &[f64])> =
-            others.map(|(&other, (at, values))| (self.distance(point, at), other, values.as_slice())).collect();
+        let mut others: Vec<(f64, u32, &[f64])> = others
+            .map(|(&other, (at, values))| {
+                (sspr::distance_of_any(point, at, &ALL, self.largest_count), other, values.as_slice())
+            })
+            .collect();
         let nearer = |a: &(f64, u32, &[f64]), b: &(f64, u32, &[f64])| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
         if others.len() > self.count {
             others.select_nth_unstable_by(self.count, nearer);
@@ -87,13 +86,6 @@ impl Neighbours {
         }
         let tests = (others.len() + 1) as f64;
         Some(sums.into_iter().map(|sum| sum / tests).collect())
-    }
-
-    /// How strong operations are is compared where both tests have it.
-    fn distance(&self, a: &Point, b: &Point) -> f64 {
-        sspr::distance(a, b, &ALL, self.largest_count)
-            .or_else(|| sspr::distance(a, b, &ALWAYS, self.largest_count))
-            .expect("every point has times and counts")
     }
 }
 
@@ -125,12 +117,16 @@ mod tests {
             .filter(|other| other.number != of.number)
             .filter_map(|other| {
                 let at = other.point.as_ref()?;
-                let over: Vec<Dimension> = Dimension::ALL
-                    .into_iter()
-                    .filter(|&it| it != Dimension::O0)
-                    .filter(|&it| point.get(it).is_some() && at.get(it).is_some())
-                    .collect();
-                let far = sspr::distance(point, at, &over, f64::from(plan.campaign.count.max))?;
+                let apart = |dimension| match (point.get(dimension), at.get(dimension)) {
+                    (Some(a), Some(b)) => a - b,
+                    (a, b) => f64::from(u8::from(a.is_some() != b.is_some())),
+                };
+                let most = f64::from(plan.campaign.count.max);
+                let counts = [Dimension::O1, Dimension::O2, Dimension::O3].map(|it| apart(it) / most);
+                let [t1, t2, t3, p1, p2] =
+                    [Dimension::T1, Dimension::T2, Dimension::T3, Dimension::P1, Dimension::P2].map(apart);
+                let far = [t1, t2, t3, p1, p2].iter().chain(&counts).fold(0.0, |sum, it| sum + it * it);
+                let far = libm::sqrt(far);
                 Some((far, other.number, other.fitness.objectives()?))
             })
             .collect();

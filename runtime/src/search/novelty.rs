@@ -14,7 +14,7 @@ use sesame_plan::Dimension;
 use crate::search::dominance::Fitness;
 use crate::search::nsga2::{Nsga2, Told};
 use crate::search::{Candidate, Evaluated, Strategy, TestVariation};
-use crate::sspr::Point;
+use crate::sspr::{self, Point};
 
 /// Points that are compared with at most.
 const MOST: usize = 500;
@@ -80,23 +80,8 @@ pub(crate) struct Measure {
 }
 
 impl Measure {
-    /// The distance of two points. Of a dimension that one of them lacks they are as far apart as can be, of one that both
-    /// lack not at all: operations without parameters are unlike any parameter.
     fn distance(&self, a: &Point, b: &Point) -> f64 {
-        let mut sum = 0.0;
-        for &dimension in &self.over {
-            let difference = match (a.get(dimension), b.get(dimension)) {
-                (Some(a), Some(b)) => a - b,
-                (None, None) => 0.0,
-                _ => 1.0,
-            };
-            let scale = match dimension {
-                Dimension::O0 | Dimension::O1 | Dimension::O2 | Dimension::O3 => self.largest_count,
-                Dimension::T1 | Dimension::T2 | Dimension::T3 | Dimension::P1 | Dimension::P2 => 1.0,
-            };
-            sum += (difference / scale) * (difference / scale);
-        }
-        libm::sqrt(sum)
+        sspr::distance_of_any(a, b, &self.over, self.largest_count)
     }
 }
 
