@@ -59,6 +59,7 @@ pub(crate) fn plan(operations: Vec<Operation>) -> CampaignPlan {
             objectives: Vec::new(),
             operations: ids,
             count: Count { min: 1, max: 5 },
+            copies: sesame_plan::Copies::default(),
             activation: ActivationMode::Time,
             search: Search::Random { evaluations: 1 },
             coverage: None,

@@ -202,6 +202,7 @@ impl Selection {
             objectives: campaign.objectives.iter().map(|&id| self.metric(id)).collect(),
             operations: operations.iter().map(|&id| self.operation(id)).collect(),
             count,
+            copies: plan::Copies::default(),
             activation: match content(campaign) {
                 Some(content) => self.activation_mode(space, &content.activation),
                 // A repeated test brings its own.

@@ -515,6 +515,9 @@ pub struct Campaign {
     pub operations: Vec<OperationId>,
     /// How many operations a test holds.
     pub count: Count,
+    /// What holds of several copies of one operation in a test.
+    #[serde(default, skip_serializing_if = "Copies::is_default")]
+    pub copies: Copies,
     /// How tests switch their operations on and off.
     pub activation: ActivationMode,
     /// How tests are found.
@@ -561,6 +564,27 @@ pub struct Count {
     pub min: u32,
     /// At most.
     pub max: u32,
+}
+
+/// What holds of several copies of one operation in a test.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Copies {
+    /// They are never active at the same time, so that together they stay within what the operation declares. By time
+    /// their windows are disjoint; by condition a copy waits while another one is active.
+    #[default]
+    Apart,
+    /// They may be active at the same time.
+    MayOverlap,
+    /// There is at most one.
+    Once,
+}
+
+impl Copies {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
+    fn is_default(&self) -> bool {
+        *self == Copies::default()
+    }
 }
 
 /// How tests switch their operations on and off.

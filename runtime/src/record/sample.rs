@@ -121,6 +121,7 @@ pub(crate) fn plan() -> CampaignPlan {
             objectives: vec![MetricId(1), MetricId(0)],
             operations: vec![OperationId(0), OperationId(1), OperationId(2), OperationId(3)],
             count: Count { min: 1, max: 5 },
+            copies: sesame_plan::Copies::default(),
             activation: ActivationMode::Time,
             search: Search::Nsga2 { population: 10, evaluations: 210 },
             coverage: None,

@@ -126,6 +126,7 @@ impl Landscape {
                 objectives: vec![MetricId(0), MetricId(1)],
                 operations: (0u32..).take(self.signals).map(OperationId).collect(),
                 count: Count { min: 1, max: 5 },
+                copies: sesame_plan::Copies::default(),
                 activation: ActivationMode::Time,
                 search,
                 coverage: None,

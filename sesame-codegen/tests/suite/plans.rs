@@ -97,6 +97,7 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 objectives: vec![MetricId(0)],
                 operations: Vec::new(),
                 count: Count { min: 1, max: 5 },
+                copies: sesame_plan::Copies::default(),
                 activation: ActivationMode::Time,
                 search: Search::Random { evaluations: 10 },
                 coverage: None,
