@@ -31,6 +31,7 @@ pub mod sorting;
 pub mod stop;
 pub mod vary;
 
+mod apart;
 mod boost;
 mod cells;
 mod construct;
@@ -48,6 +49,8 @@ mod repeat;
 pub mod shrink;
 mod sobol;
 
+#[cfg(test)]
+mod drawn;
 #[cfg(test)]
 mod explored;
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
-    ActivationMode, BoostedChildren, CampaignPlan, Confirmation, CoverageGoal, Distribution, Domain, Drain,
+    ActivationMode, BoostedChildren, CampaignPlan, Confirmation, Copies, CoverageGoal, Distribution, Domain, Drain,
     Exploration, MetricSource, Operation, OperationKind, Parameter, Recorded, Search, StopRule, Typical,
     place_in_words,
 };
@@ -84,7 +84,13 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
     let operations: Vec<&str> =
         campaign.operations.iter().map(|id| plan.operations[id.index()].name.as_str()).collect();
     let count = campaign.count;
-    clauses.push(("operations", format!("{}   {}..{} per test", operations.join(", "), count.min, count.max)));
+    let copies = match campaign.copies {
+        Copies::Apart => "",
+        Copies::MayOverlap => " may overlap",
+        Copies::Once => " each at most once",
+    };
+    let operations = format!("{}   {}..{} per test{copies}", operations.join(", "), count.min, count.max);
+    clauses.push(("operations", operations));
     clauses.push(("activate", format!("by {}", activation(plan, &campaign.activation))));
     clauses.push(("search", searches));
     if let Some(goal) = &campaign.coverage {

@@ -202,7 +202,7 @@ impl Selection {
             objectives: campaign.objectives.iter().map(|&id| self.metric(id)).collect(),
             operations: operations.iter().map(|&id| self.operation(id)).collect(),
             count,
-            copies: plan::Copies::default(),
+            copies: copies(space, campaign),
             activation: match content(campaign) {
                 Some(content) => self.activation_mode(space, &content.activation),
                 // A repeated test brings its own.
@@ -239,6 +239,16 @@ fn content(campaign: &model::Campaign) -> Option<&model::Content> {
 /// Which operations the tests of a search hold, and how many.
 fn held(content: &model::Content) -> (&Vec<model::OperationId>, plan::Count) {
     (&content.operations, plan::Count { min: content.min, max: content.max })
+}
+
+/// What holds of several copies of one operation in a campaign's tests. A known test that a campaign repeats is run as tests
+/// of the space's searches are: its copies may act together where those of all of them may.
+fn copies(space: &Space, campaign: &model::Campaign) -> plan::Copies {
+    match content(campaign) {
+        Some(content) => content.copies,
+        None if space.copies_may_overlap() => plan::Copies::MayOverlap,
+        None => plan::Copies::Apart,
+    }
 }
 
 /// What a campaign grows conditions from, if it does.

@@ -99,6 +99,7 @@ impl Constructor {
                     operation.draw_seed = stream.bits();
                 }
             }
+            self.permitted.settle(&mut built, stream);
             let point = Point::of(&planned(plan, &built)?, Convention::Ours)?;
             (self.grid.cell_of(&point) == Some(cell)).then_some(built)
         })

@@ -3,25 +3,25 @@
 use sesame_plan::{Activation, Choice, Shape, Test, TestOperation};
 
 use crate::rng::derive_seed;
+use crate::search::apart;
 use crate::search::choice::PermittedChoice;
-use crate::search::permitted::{Permitted, PermittedActivation, PermittedOperation};
+use crate::search::initial::{fresh_kinds, place};
+use crate::search::permitted::{Permitted, PermittedActivation};
 use crate::search::range::Range;
 
-/// The test of these numbers, given by the place of the choice: first how many operations there are, then of each in
-/// turn which it is, its window's length and place, and its parameters. Numbers that are uniform give tests with lengths,
-/// windows and parameters as uniform as those of random tests. By condition there are no such choices: it is for campaigns
-/// by time.
+/// The test of these numbers, given by the place of the choice: first how many operations there are and which, then of each
+/// in turn its window's length and place, and its parameters. Numbers that are uniform and independent give the distribution
+/// of [random tests](crate::search::initial). By condition there are no such choices: it is for campaigns by time.
 pub(super) fn decoded(permitted: &Permitted, seed: u64, index: u32, mut number: impl FnMut(usize) -> f64) -> Test {
     let mut next = 0;
     let mut value = || {
         next += 1;
         number(next - 1)
     };
-    let (fewest, most) = (permitted.fewest(), permitted.most());
-    let length = fewest + place(value(), most - fewest + 1);
-    let operations = (0..length)
-        .map(|slot| {
-            let kind = &permitted.operations()[weighted(permitted.operations(), value())];
+    let operations = fresh_kinds(permitted, &mut value)
+        .into_iter()
+        .enumerate()
+        .map(|(slot, kind)| {
             let activation = match kind.activation {
                 PermittedActivation::Time(window) => {
                     let (start, end) = interval(window, [value(), value()]);
@@ -34,32 +34,13 @@ pub(super) fn decoded(permitted: &Permitted, seed: u64, index: u32, mut number: 
             TestOperation { operation: kind.operation, activation, parameters, draw_seed }
         })
         .collect();
-    Test { operations }
+    let mut test = Test { operations };
+    permitted.settle_windows(&mut test, apart::spread);
+    test
 }
 
 /// The greatest number below 1.
 pub(super) const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
-
-/// The place of a value in `0..1` among so many equal parts.
-pub(super) fn place(value: f64, parts: usize) -> usize {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is below the number of parts")]
-    let place = libm::floor(value * parts as f64) as usize;
-    place.min(parts - 1)
-}
-
-/// An operation, each as likely as it is to be included in a fresh test; all alike where none is.
-fn weighted(operations: &[PermittedOperation], value: f64) -> usize {
-    let total: f64 = operations.iter().map(|it| it.inclusion).sum();
-    if total <= 0.0 {
-        return place(value, operations.len());
-    }
-    let mut left = value * total;
-    let found = operations.iter().position(|it| {
-        left -= it.inclusion;
-        left < 0.0
-    });
-    found.unwrap_or(operations.len() - 1)
-}
 
 /// An interval, uniform over all that fit: the first value decides its length, the second where it lies.
 fn interval(range: Range, [length, place]: [f64; 2]) -> (f64, f64) {

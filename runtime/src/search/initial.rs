@@ -1,38 +1,89 @@
-//! Fresh tests: what a random search is made of and an evolution begins with.
+//! Fresh tests: what a random search is made of and an evolution begins with. Sobol and Latin hypercube tests are drawn the
+//! same way, along their own numbers.
 //!
 //! The kinds of a fresh test are the operations of the campaign, each included with its own probability; if none is,
 //! one of those with a probability above zero (or of all), each alike. Its length is uniform over what the campaign
-//! permits. If there are more kinds than places, a random choice of them stays; if there are fewer, each has its place
-//! and the other places are filled with them at random: a test may hold an operation several times, with windows and
-//! parameters of its own each time. Windows and sub-ranges are uniform over all feasible pairs of ends, values uniform
-//! over their range. The order of the list is random. Where conditions switch, start and end are grown independently, and
-//! lengths are uniform.
+//! permits. In three of four tests, if there are more kinds than places, a random choice of them stays; if there are fewer,
+//! each has its place and the other places are filled with them at random. In the others each place is drawn for itself,
+//! so that every permitted list can come up. A test may hold an operation several times, then, with windows, parameters
+//! and draws of its own each time. Where each operation is there at most once, every test is of the first sort, and one
+//! with fewer kinds than places is shorter, as far as that is permitted.
+//!
+//! Windows and sub-ranges are uniform over all feasible pairs of ends, values uniform over their range; windows of copies
+//! that must not overlap are uniform over all [disjoint ones](crate::search::apart). The order of the list is random. Where
+//! conditions switch, start and end are grown independently, and lengths are uniform.
 
 use sesame_plan::condition::ConditionEnd;
-use sesame_plan::{Activation, Test, TestOperation};
+use sesame_plan::{Activation, Copies, Test, TestOperation};
 
 use crate::rng::Stream;
+use crate::search::apart;
 use crate::search::condition::grown;
 use crate::search::permitted::{Permitted, PermittedActivation, PermittedOperation};
 use crate::search::range::Range;
 
+/// The share of fresh tests in which each place is drawn for itself.
+const EACH_FOR_ITSELF: f64 = 0.25;
+
 /// A fresh test; one that the campaign permits.
 pub fn fresh_test(permitted: &Permitted, stream: &mut Stream) -> Test {
+    let kinds = fresh_kinds(permitted, &mut || stream.unit());
+    let mut test = Test { operations: kinds.into_iter().map(|kind| fresh_operation(kind, stream)).collect() };
+    permitted.settle_windows(&mut test, apart::spread);
+    test
+}
+
+/// The kinds of operations of a fresh test, in their order, by numbers in `0..1`. Numbers that are uniform and independent
+/// give the distribution that the head of this module states.
+pub(super) fn fresh_kinds<'a>(
+    permitted: &'a Permitted,
+    number: &mut impl FnMut() -> f64,
+) -> Vec<&'a PermittedOperation> {
     let operations = permitted.operations();
-    let mut kinds: Vec<&PermittedOperation> = operations.iter().filter(|op| stream.chance(op.inclusion)).collect();
+    let (fewest, most) = (permitted.fewest(), permitted.most());
+    let length = fewest + place(number(), most - fewest + 1);
+    let each_for_itself = permitted.copies() != Copies::Once && number() < EACH_FOR_ITSELF;
+    let mut kinds: Vec<&PermittedOperation> = Vec::new();
+    for kind in operations {
+        // What is certain takes no number.
+        if kind.inclusion >= 1.0 || (kind.inclusion > 0.0 && number() < kind.inclusion) {
+            kinds.push(kind);
+        }
+    }
     if kinds.is_empty() {
         let likely: Vec<_> = operations.iter().filter(|op| op.inclusion > 0.0).collect();
         let pool = if likely.is_empty() { operations.iter().collect() } else { likely };
-        kinds.push(pool[stream.below(pool.len())]);
+        kinds.push(pool[place(number(), pool.len())]);
     }
-    let length = permitted.fewest() + stream.below(permitted.most() - permitted.fewest() + 1);
-    let mut places: Vec<&PermittedOperation> = stream.permutation(kinds.len()).into_iter().map(|i| kinds[i]).collect();
-    places.truncate(length);
+    let mut places: Vec<&PermittedOperation> = Vec::with_capacity(length);
     while places.len() < length {
-        let kind = kinds[stream.below(kinds.len())];
-        places.insert(stream.below(places.len() + 1), kind);
+        let held = |kind: &PermittedOperation| places.iter().filter(|it| it.operation == kind.operation).count();
+        let mut pool: Vec<_> = kinds.iter().copied().filter(|kind| held(kind) < permitted.most_copies(kind)).collect();
+        let new: Vec<_> = pool.iter().copied().filter(|kind| held(kind) == 0).collect();
+        let copies = new.is_empty();
+        if !each_for_itself && !copies {
+            pool = new;
+        }
+        if pool.is_empty() {
+            // No more of what is included has room.
+            if places.len() >= fewest {
+                break;
+            }
+            pool = operations.iter().filter(|kind| held(kind) < permitted.most_copies(kind)).collect();
+        }
+        let kind = pool[place(number(), pool.len())];
+        // The first copies are as likely at the beginning of the list as at its end.
+        let at = if each_for_itself || !copies { places.len() } else { place(number(), places.len() + 1) };
+        places.insert(at, kind);
     }
-    Test { operations: places.into_iter().map(|kind| fresh_operation(kind, stream)).collect() }
+    places
+}
+
+/// The place of a value in `0..1` among so many equal parts.
+pub(super) fn place(value: f64, parts: usize) -> usize {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is below the number of parts")]
+    let place = libm::floor(value * parts as f64) as usize;
+    place.min(parts - 1)
 }
 
 /// A fresh instance of an operation, with a draw seed of its own.
@@ -97,7 +148,10 @@ mod tests {
             assert!((share(&tests, |kinds| kinds.len() == length) - 0.2).abs() < 0.02, "length {length}");
         }
         assert!((share(&tests, |kinds| kinds[0] == 0) - 0.5).abs() < 0.02, "the order is random");
-        assert!(tests.iter().all(|kinds| kinds.len() == 1 || (kinds.contains(&0) && kinds.contains(&1))));
+        // Three of four hold both; of the others with n places all but one of 2^(n-1).
+        let alike = [2, 3, 4, 5].map(|length| 0.25 / 5.0 * libm::pow(0.5, f64::from(length - 1)));
+        let one_kind = share(&tests, |kinds| kinds.len() > 1 && (!kinds.contains(&0) || !kinds.contains(&1)));
+        assert!((one_kind - alike.iter().sum::<f64>()).abs() < 0.01, "{one_kind}");
     }
 
     #[test]

@@ -6,9 +6,9 @@
 
 use sesame_plan::condition::{ConditionEnd, ConditionSpace, Integers, Variable};
 use sesame_plan::{
-    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Count, Direction, Domain, Metric, MetricId,
-    MetricSource, Operation, OperationId, OperationKind, Parameter, Requirement, SCHEMA, Search, Shape, Simulator,
-    Span, Test, TestOperation, TopicId, Transport, ValueMode,
+    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Copies, Count, Direction, Domain, Metric,
+    MetricId, MetricSource, Operation, OperationId, OperationKind, Parameter, Requirement, SCHEMA, Search, Shape,
+    Simulator, Span, Test, TestOperation, TopicId, Transport, ValueMode,
 };
 
 use crate::activation::Activity;
@@ -74,7 +74,8 @@ pub(crate) const LANDSCAPES: [Landscape; 4] = [
 const REFERENCE_TIME: f64 = 130.0;
 
 impl Landscape {
-    /// A campaign on this robot: `random offset [-0.3, 0.3] within [0s, 65s]` on each signal, 1 to 5 per test.
+    /// A campaign on this robot: `random offset [-0.3, 0.3] within [0s, 65s]` on each signal, 1 to 5 per test,
+    /// which may overlap.
     pub(crate) fn plan(&self, search: Search) -> CampaignPlan {
         let operation = |k: usize| Operation {
             name: format!("jitter{k}"),
@@ -126,7 +127,8 @@ impl Landscape {
                 objectives: vec![MetricId(0), MetricId(1)],
                 operations: (0u32..).take(self.signals).map(OperationId).collect(),
                 count: Count { min: 1, max: 5 },
-                copies: sesame_plan::Copies::default(),
+                // As in the paper.
+                copies: Copies::MayOverlap,
                 activation: ActivationMode::Time,
                 search,
                 coverage: None,

@@ -51,7 +51,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::search::decoded::place;
+    use crate::search::initial::place;
     use crate::search::landscape::LANDSCAPES;
     use crate::search::permitted::tests::{any_timed_plan, broken_rule};
 

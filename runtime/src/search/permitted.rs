@@ -1,13 +1,27 @@
 //! What a campaign permits its tests: which operations, how many, when, and how strong.
+//!
+//! Every strategy draws from these tests and from no others. Single operations are made of what [`PermittedOperation`]
+//! says; what holds of several copies of one operation, [`Permitted::settle`] brings about in a test that was put together,
+//! and [`Permitted::permits_copies`] tells:
+//!
+//! - no two copies have the same draw seed, so that each draws for itself;
+//! - [`Copies::Apart`], by time: their windows are disjoint;
+//! - [`Copies::Apart`], by condition: nothing, as the relay makes a copy wait while another is active;
+//! - [`Copies::Apart`], before the start or after the end: there is one, as all would act at the same moment;
+//! - [`Copies::Once`]: there is one.
+
+use std::collections::BTreeSet;
 
 use sesame_plan::condition::{Condition, ConditionSpace, Constraint};
-use sesame_plan::{ActivationMode, CampaignPlan, Count, OperationId};
+use sesame_plan::{Activation, ActivationMode, CampaignPlan, Copies, Count, OperationId, Test, TestOperation};
 use thiserror::Error;
 
 use crate::coverage::GridError;
 use crate::rng::Stream;
+use crate::search::apart::{self, MOST_APART};
 use crate::search::choice::PermittedChoice;
 use crate::search::condition::grown;
+use crate::search::initial::fresh_operation;
 use crate::search::range::Range;
 
 /// How often a first condition is tried before a campaign is said to have none; so rarely does one try fail where there
@@ -32,6 +46,19 @@ pub enum SearchError {
         min: u32,
         /// The upper bound.
         max: u32,
+    },
+    /// A test has to hold more operations than there are, and may hold each only so often.
+    #[error(
+        "campaign `{campaign}` demands {min} operations per test, and its tests can hold {most}; demand fewer, offer more \
+         operations, or let copies overlap"
+    )]
+    TooFew {
+        /// The campaign.
+        campaign: String,
+        /// The lower bound.
+        min: u32,
+        /// How many operations a test can hold.
+        most: usize,
     },
     /// A parameter must be whole, and no whole number is permitted.
     #[error("operation `{operation}` permits no whole number for `{parameter}`; widen its range to include one")]
@@ -97,6 +124,7 @@ pub enum SearchError {
 pub struct Permitted {
     operations: Vec<PermittedOperation>,
     count: Count,
+    copies: Copies,
     conditions: Option<ConditionSpace>,
 }
 
@@ -191,7 +219,106 @@ impl Permitted {
         if operations.is_empty() {
             return Err(SearchError::NoOperation { campaign: name() });
         }
-        Ok(Permitted { operations, count, conditions })
+        let permitted = Permitted { operations, count, copies: campaign.copies, conditions };
+        let most = permitted.most();
+        if most < permitted.fewest() {
+            return Err(SearchError::TooFew { campaign: name(), min: count.min, most });
+        }
+        Ok(permitted)
+    }
+
+    /// What holds of several copies of one operation.
+    pub fn copies(&self) -> Copies {
+        self.copies
+    }
+
+    /// How many copies of an operation a test may hold.
+    pub fn most_copies(&self, kind: &PermittedOperation) -> usize {
+        match (self.copies, &kind.activation) {
+            (Copies::Once, _) | (Copies::Apart, PermittedActivation::Offline) => 1,
+            (Copies::Apart, PermittedActivation::Time(_)) => MOST_APART,
+            (Copies::Apart, PermittedActivation::Condition { .. }) | (Copies::MayOverlap, _) => usize::MAX,
+        }
+    }
+
+    /// Whether a test of these operations may hold one more copy of an operation.
+    pub fn has_room(&self, operations: &[TestOperation], kind: &PermittedOperation) -> bool {
+        operations.iter().filter(|it| it.operation == kind.operation).count() < self.most_copies(kind)
+    }
+
+    /// Whether the copies of each operation in a test of this campaign are permitted.
+    pub fn permits_copies(&self, test: &Test) -> bool {
+        let mut draws = BTreeSet::new();
+        let drawn_alone = test.operations.iter().all(|it| draws.insert((it.operation, it.draw_seed)));
+        drawn_alone
+            && self.operations.iter().all(|kind| {
+                let copies = places_of(test, kind.operation);
+                if copies.len() > self.most_copies(kind) {
+                    return false;
+                }
+                let Some(windows) = self.windows_apart(test, kind, &copies) else { return true };
+                let mut settled = windows.clone();
+                if let PermittedActivation::Time(range) = kind.activation {
+                    apart::nearest(range, &mut settled);
+                }
+                settled == windows
+            })
+    }
+
+    /// Makes the copies of each operation in a test what they have to be, and changes nothing else: too many copies leave
+    /// the test, each as likely as the others, and where too few operations remain fresh ones of other kinds come in;
+    /// windows are moved apart to the [nearest](apart::nearest) ones; a copy that draws like an earlier one gets a draw seed
+    /// of its own. A test that is permitted already stays as it is and takes nothing from the stream.
+    pub fn settle(&self, test: &mut Test, stream: &mut Stream) {
+        for kind in &self.operations {
+            let mut copies = places_of(test, kind.operation);
+            while copies.len() > self.most_copies(kind) {
+                test.operations.remove(copies[stream.below(copies.len())]);
+                copies = places_of(test, kind.operation);
+            }
+        }
+        while test.operations.len() < self.fewest() {
+            let kinds: Vec<_> = self.operations.iter().filter(|kind| self.has_room(&test.operations, kind)).collect();
+            let kind = kinds[stream.below(kinds.len())];
+            let place = stream.below(test.operations.len() + 1);
+            test.operations.insert(place, fresh_operation(kind, stream));
+        }
+        self.settle_windows(test, apart::nearest);
+        let mut draws = BTreeSet::new();
+        for operation in &mut test.operations {
+            while !draws.insert((operation.operation, operation.draw_seed)) {
+                operation.draw_seed = stream.bits();
+            }
+        }
+    }
+
+    /// Moves the windows of copies apart in this way, if they have to be.
+    pub(super) fn settle_windows(&self, test: &mut Test, way: fn(Range, &mut [(f64, f64)])) {
+        for kind in &self.operations {
+            let copies = places_of(test, kind.operation);
+            let (Some(mut windows), PermittedActivation::Time(range)) =
+                (self.windows_apart(test, kind, &copies), &kind.activation)
+            else {
+                continue;
+            };
+            way(*range, &mut windows);
+            for (&place, (start, end)) in copies.iter().zip(windows) {
+                test.operations[place].activation = Activation::Time { start, end };
+            }
+        }
+    }
+
+    /// The windows of copies that must not overlap; `None` where they may, and where there is one.
+    fn windows_apart(&self, test: &Test, kind: &PermittedOperation, copies: &[usize]) -> Option<Vec<(f64, f64)>> {
+        let by_time = matches!(kind.activation, PermittedActivation::Time(_));
+        if self.copies != Copies::Apart || !by_time || copies.len() < 2 {
+            return None;
+        }
+        let window = |&place: &usize| match test.operations[place].activation {
+            Activation::Time { start, end } => Some((start, end)),
+            _ => None,
+        };
+        copies.iter().map(window).collect()
     }
 
     /// The operations, in the campaign's order; at least one.
@@ -211,13 +338,19 @@ impl Permitted {
 
     /// The greatest number of operations of a test, at least [`Permitted::fewest`].
     pub fn most(&self) -> usize {
-        self.count.max as usize
+        let copies = self.operations.iter().fold(0usize, |sum, kind| sum.saturating_add(self.most_copies(kind)));
+        copies.min(self.count.max as usize)
     }
 
     /// What is permitted of an operation; `None` for one that the campaign does not use.
     pub fn find(&self, operation: OperationId) -> Option<&PermittedOperation> {
         self.operations.iter().find(|permitted| permitted.operation == operation)
     }
+}
+
+/// Where in a test the copies of an operation are.
+fn places_of(test: &Test, operation: OperationId) -> Vec<usize> {
+    (0..test.operations.len()).filter(|&at| test.operations[at].operation == operation).collect()
 }
 
 /// A start condition and an end condition that are permitted, if there are any. No seed decides them, since a campaign can
@@ -286,8 +419,9 @@ pub(crate) mod tests {
                 constraints: Vec::new(),
             },
         );
-        (proptest::collection::vec(operation, 1..6), 1u32..4, 0u32..6, 0.5..120.0f64).prop_map(
-            |(operations, min, more, end_after)| {
+        let copies = prop_oneof![Just(Copies::Apart), Just(Copies::MayOverlap), Just(Copies::Once)];
+        let plans = (proptest::collection::vec(operation, 1..6), 1u32..4, 0u32..6, 0.5..120.0f64, copies).prop_map(
+            |(operations, min, more, end_after, copies)| {
                 let mut plan = LANDSCAPES[0].plan(Search::Nsga2 { population: 7, evaluations: 40 });
                 plan.campaign.operations = (0u32..).map(OperationId).take(operations.len()).collect();
                 plan.campaign.count = Count { min, max: min + more };
@@ -297,9 +431,11 @@ pub(crate) mod tests {
                     operation.within = Span { start: 0.0, end: end_after };
                 }
                 plan.operations[0].within.start = plan.operations[0].within.start.min(end_after / 2.0);
+                plan.campaign.copies = copies;
                 plan
             },
-        )
+        );
+        plans.prop_filter("room for the least number of operations", |plan| Permitted::of(plan).is_ok())
     }
 
     /// Such plans, by time or by condition.
@@ -343,11 +479,36 @@ pub(crate) mod tests {
         wrong(start, space, space.depth)
     }
 
+    /// Two copies of one operation in a test that the plan does not permit beside each other, if there are any.
+    pub(crate) fn broken_copies(plan: &CampaignPlan, test: &Test) -> Option<String> {
+        for (at, second) in test.operations.iter().enumerate() {
+            for first in test.operations[..at].iter().filter(|first| first.operation == second.operation) {
+                let offline = plan.operation(second.operation).kind.is_offline();
+                let overlap = match (&first.activation, &second.activation) {
+                    (Activation::Time { start: a, end: b }, Activation::Time { start: c, end: d }) => a < d && c < b,
+                    _ => false,
+                };
+                let wrong = match plan.campaign.copies {
+                    Copies::Apart => overlap || offline,
+                    Copies::MayOverlap => false,
+                    Copies::Once => true,
+                };
+                if wrong || first.draw_seed == second.draw_seed {
+                    return Some(format!("{first:?} and {second:?}"));
+                }
+            }
+        }
+        None
+    }
+
     /// What of the plan a test breaks, if anything: read off the plan itself.
     pub(crate) fn broken_rule(plan: &CampaignPlan, test: &Test) -> Option<String> {
         let count = plan.campaign.count;
         if !(count.min.max(1)..=count.max).contains(&u32::try_from(test.operations.len()).ok()?) {
             return Some(format!("{} operations", test.operations.len()));
+        }
+        if let Some(broken) = broken_copies(plan, test) {
+            return Some(broken);
         }
         for applied in &test.operations {
             let operation = plan.operation(applied.operation);
@@ -358,6 +519,10 @@ pub(crate) mod tests {
                 }
                 (&Activation::Time { start, end }, ActivationMode::Time) => {
                     let within = operation.within;
+                    let shortest = (within.end.min(plan.campaign.end_after) - within.start) * 0.000_999;
+                    if end - start < shortest {
+                        return Some(format!("window {start} to {end}"));
+                    }
                     if !(within.start <= start && start < end && end <= within.end && start < plan.campaign.end_after) {
                         return Some(format!("window {start} to {end}"));
                     }

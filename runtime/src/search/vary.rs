@@ -1,6 +1,8 @@
 //! Variation of tests: crossover of their lists of operations, mutation of single operations and of the list.
 //!
-//! A mutated operation draws with a new seed; a copied one with that of its parent. A child is never one of the tests
+//! A mutated operation draws with a new seed; one that a child has from a parent with that parent's, also if its window had
+//! to give way to another copy. Of copies that come to one child with equal seeds, the later gets a new one: two copies never
+//! draw alike. A child is never one of the tests
 //! asked before in the same campaign (draw seeds aside), unless [`Rates::tries`] attempts to change it all fail.
 //!
 //! # Rates
@@ -163,6 +165,7 @@ impl Variation for TestVariation {
                 }
                 let k = stream.below(genome.operations.len());
                 change_somehow(&mut genome.operations[k], &self.permitted, &self.rates, &mut stream);
+                self.permitted.settle(&mut genome, &mut stream);
             }
             self.made.insert(identity(&genome));
             Child { genome, heritage }
@@ -210,7 +213,7 @@ fn identity(test: &Test) -> Vec<Vec<u64>> {
 
 /// One-point crossover of two lists: each is cut in two, and the tails are exchanged. The cuts are uniform over all that
 /// leave both children with a permitted number of operations and exchange neither nothing nor everything; `None` when
-/// there are none such.
+/// there are none such. Copies of one operation that come together [settle](Permitted::settle).
 pub fn crossover([a, b]: [&Test; 2], permitted: &Permitted, stream: &mut Stream) -> Option<[Test; 2]> {
     let (a, b) = (&a.operations, &b.operations);
     let lengths = permitted.fewest()..=permitted.most();
@@ -228,7 +231,11 @@ pub fn crossover([a, b]: [&Test; 2], permitted: &Permitted, stream: &mut Stream)
         return None;
     }
     let (i, j) = cuts[stream.below(cuts.len())];
-    Some([[&a[..i], &b[j..]].concat(), [&b[..j], &a[i..]].concat()].map(|operations| Test { operations }))
+    Some([[&a[..i], &b[j..]].concat(), [&b[..j], &a[i..]].concat()].map(|operations| {
+        let mut test = Test { operations };
+        permitted.settle(&mut test, stream);
+        test
+    }))
 }
 
 /// Exchanges parts of conditions between two tests, the children of a crossover or, where there was none, their parents;
@@ -263,8 +270,8 @@ fn exchange_conditions(
 
 /// Mutates a permitted test; the result is permitted too. Perhaps nothing changes.
 pub fn mutate(test: &mut Test, permitted: &Permitted, rates: &Rates, stream: &mut Stream) {
-    for operation in &mut test.operations {
-        mutate_operation(operation, permitted, rates, stream);
+    for at in 0..test.operations.len() {
+        mutate_operation(&mut test.operations, at, permitted, rates, stream);
     }
     // Each is decided by a draw of its own, whether or not the list has room for it.
     let [add, duplicate, drop] = [rates.add, rates.duplicate, rates.drop].map(|rate| stream.chance(rate));
@@ -273,21 +280,40 @@ pub fn mutate(test: &mut Test, permitted: &Permitted, rates: &Rates, stream: &mu
         operations.remove(stream.below(operations.len()));
     }
     if duplicate && operations.len() < permitted.most() {
-        let mut copy = operations[stream.below(operations.len())].clone();
-        change_somehow(&mut copy, permitted, rates, stream);
-        operations.insert(stream.below(operations.len() + 1), copy);
+        let has_room = |it: &&TestOperation| permitted.has_room(operations, kind_of(it, permitted));
+        let originals: Vec<&TestOperation> = operations.iter().filter(has_room).collect();
+        if !originals.is_empty() {
+            let mut copy = originals[stream.below(originals.len())].clone();
+            change_somehow(&mut copy, permitted, rates, stream);
+            operations.insert(stream.below(operations.len() + 1), copy);
+        }
     }
     if add && operations.len() < permitted.most() {
-        let kind = &permitted.operations()[stream.below(permitted.operations().len())];
+        // As the list is not full, there is one.
+        let kinds: Vec<_> = permitted.operations().iter().filter(|kind| permitted.has_room(operations, kind)).collect();
+        let kind = kinds[stream.below(kinds.len())];
         let place = stream.below(operations.len() + 1);
         operations.insert(place, fresh_operation(kind, stream));
     }
+    permitted.settle(test, stream);
 }
 
-fn mutate_operation(operation: &mut TestOperation, permitted: &Permitted, rates: &Rates, stream: &mut Stream) {
+fn mutate_operation(
+    operations: &mut [TestOperation],
+    at: usize,
+    permitted: &Permitted,
+    rates: &Rates,
+    stream: &mut Stream,
+) {
     if permitted.operations().len() > 1 && stream.chance(rates.retarget) {
-        retarget(operation, permitted, stream);
+        let current = operations[at].operation;
+        let is_other = |kind: &&PermittedOperation| kind.operation != current && permitted.has_room(operations, kind);
+        let others: Vec<_> = permitted.operations().iter().filter(is_other).collect();
+        if !others.is_empty() {
+            retarget(&mut operations[at], others[stream.below(others.len())], stream);
+        }
     }
+    let operation = &mut operations[at];
     if stream.chance(rates.window) {
         change_activation(operation, permitted, rates, stream);
     }
@@ -306,9 +332,7 @@ fn mutate_operation(operation: &mut TestOperation, permitted: &Permitted, rates:
 
 /// Puts a fresh instance of another operation in an operation's place, with the same window or the same conditions where
 /// that one permits them.
-fn retarget(operation: &mut TestOperation, permitted: &Permitted, stream: &mut Stream) {
-    let others: Vec<_> = permitted.operations().iter().filter(|kind| kind.operation != operation.operation).collect();
-    let kind = others[stream.below(others.len())];
+fn retarget(operation: &mut TestOperation, kind: &PermittedOperation, stream: &mut Stream) {
     let mut fresh = fresh_operation(kind, stream);
     match (&operation.activation, &kind.activation) {
         (&Activation::Time { start, end }, PermittedActivation::Time(window)) => {
@@ -394,7 +418,7 @@ fn kind_of<'a>(operation: &TestOperation, permitted: &'a Permitted) -> &'a Permi
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use sesame_plan::Search;
+    use sesame_plan::{CampaignPlan, Copies, Search};
 
     use super::*;
     use crate::search::landscape::LANDSCAPES;
@@ -435,6 +459,7 @@ mod tests {
 
         #[test]
         fn crossover_exchanges_tails_and_loses_nothing(plan in any_plan(), seed: u64) {
+            let plan = overlapping(plan);
             let permitted = Permitted::of(&plan).unwrap();
             let mut stream = Stream::derive(seed, "test", &[]);
             let [a, b] = [(); 2].map(|()| fresh_test(&permitted, &mut stream));
@@ -461,12 +486,43 @@ mod tests {
             mutate(&mut after, &permitted, &rates, &mut stream);
             for operation in &after.operations {
                 match before.operations.iter().find(|old| old.draw_seed == operation.draw_seed) {
-                    Some(old) => prop_assert_eq!(old, operation),
+                    // Only a window that gives way to another copy's changes alone.
+                    Some(old) => {
+                        let copies = after.operations.iter().filter(|it| it.operation == operation.operation).count();
+                        let kept = TestOperation { activation: old.activation.clone(), ..operation.clone() };
+                        let gives_way = plan.campaign.copies == Copies::Apart && copies > 1;
+                        prop_assert_eq!(old, if gives_way { &kept } else { operation });
+                    }
                     // A step may end where it began, at an end of the range; a new seed alone is then what changed.
                     None => prop_assert!(!before.operations.contains(operation)),
                 }
             }
         }
+    }
+
+    /// The plan with copies that may overlap: there, crossover leaves operations as they are.
+    fn overlapping(mut plan: CampaignPlan) -> CampaignPlan {
+        plan.campaign.copies = Copies::MayOverlap;
+        plan
+    }
+
+    #[test]
+    fn an_operation_that_a_child_gets_twice_from_one_ancestor_draws_for_itself_the_second_time() {
+        let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+        let permitted = Permitted::of(&plan).unwrap();
+        let mut met = 0;
+        for seed in 0..200 {
+            let mut stream = Stream::derive(seed, "test", &[]);
+            let parent = fresh_test(&permitted, &mut stream);
+            let mut turned = parent.clone();
+            turned.operations.reverse();
+            let Some(children) = crossover([&parent, &turned], &permitted, &mut stream) else { continue };
+            for child in children {
+                assert!(permitted.permits_copies(&child), "{child:?}");
+                met += u32::from(!seeds(&child).is_subset(&seeds(&parent)));
+            }
+        }
+        assert!(met > 20, "{met} children met a twin");
     }
 
     /// Offspring of two tests by condition when only this is varied.
@@ -481,6 +537,7 @@ mod tests {
     #[test]
     fn conditions_of_a_pair_exchange_parts_and_keep_their_operations() {
         let only = Rates { exchange: 1.0, crossover: 1.0, tries: 0, ..IDLE };
+        let mut unlike = 0;
         for seed in 0..50 {
             let (parents, children) = offspring_of(only, ConditionEnd::Condition, seed);
             assert!(children.iter().all(|child| child.heritage == Heritage::Both));
@@ -496,8 +553,10 @@ mod tests {
             let before: Vec<&Activation> =
                 [a, b].iter().flat_map(|it| &it.operations).map(|it| &it.activation).collect();
             let new = children.iter().flat_map(|child| &child.genome.operations);
-            assert!(new.filter(|it| !before.contains(&&it.activation)).count() >= 1, "seed {seed}");
+            unlike += u32::from(new.filter(|it| !before.contains(&&it.activation)).count() >= 1);
         }
+        // Now and then conditions are exchanged whole.
+        assert!(unlike >= 45, "{unlike} of 50 pairs");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace};
-use sesame_plan::{CampaignPlan, Dimension, Search, Shape};
+use sesame_plan::{CampaignPlan, Copies, Dimension, Search, Shape};
 use sesame_runtime::coverage::{Feasible, Grid};
 use sesame_runtime::search::Permitted;
 use sesame_runtime::search::choice::PermittedChoice;
@@ -68,9 +68,16 @@ pub(super) fn described(plan: &CampaignPlan) -> String {
 fn space(plan: &CampaignPlan, permitted: &Permitted, lines: &mut Vec<(&str, String)>) {
     let kinds = permitted.operations();
     let (fewest, most) = (permitted.fewest(), permitted.most());
-    let ways = total(&chosen(&vec![0.0; kinds.len()], most)[fewest..]);
+    let copies: Vec<usize> = kinds.iter().map(|kind| permitted.most_copies(kind)).collect();
+    let ways = total(&chosen(&vec![0.0; kinds.len()], &copies, most)[fewest..]);
     let count = if fewest == most { format!("{fewest}") } else { format!("{fewest} to {most}") };
-    lines.push(("operations", format!("{count} per test, of {}: {} ways to choose them", kinds.len(), power(ways))));
+    let apart = match plan.campaign.copies {
+        Copies::Apart => "; copies of one never act at the same time",
+        Copies::MayOverlap => "; copies of one may act at the same time",
+        Copies::Once => ", each at most once",
+    };
+    let ways = format!("{} ways to choose them", power(ways));
+    lines.push(("operations", format!("{count} per test, of {}: {ways}{apart}", kinds.len())));
     let numbers: Vec<usize> = kinds.iter().map(numbers).collect();
     let per_operation = match (numbers.iter().min(), numbers.iter().max()) {
         (Some(least), Some(greatest)) if least < greatest => format!("{least} to {greatest}"),
@@ -80,8 +87,11 @@ fn space(plan: &CampaignPlan, permitted: &Permitted, lines: &mut Vec<(&str, Stri
     let chosen_by_each = if permitted.conditions().is_some() { "numbers and conditions" } else { "numbers" };
     lines.push(("choices", format!("{per_operation} {chosen_by_each} per operation, and a seed for its draws")));
     let sizes: Vec<f64> = kinds.iter().map(size).collect();
-    let size = total(&chosen(&sizes, most)[fewest..]);
-    lines.push(("size", format!("{} tests, seeds left out, with numbers in steps of 1 %", power(size))));
+    let size = total(&chosen(&sizes, &copies, most)[fewest..]);
+    // Windows that have to lie apart are fewer than all; how many is not counted.
+    let bound =
+        if permitted.copies() == Copies::Apart && copies.iter().any(|&copies| copies > 1) { "at most " } else { "" };
+    lines.push(("size", format!("{bound}{} tests, seeds left out, with numbers in steps of 1 %", power(size))));
 
     let extents = Dimension::ALL.iter().filter_map(|&dimension| {
         let (low, high) = extent(plan, permitted, dimension)?;
@@ -178,14 +188,15 @@ fn conditions(space: &ConditionSpace) -> f64 {
 }
 
 /// Per number of operations, from none to `most`, the decimal logarithm of the number of ways to choose them, of kinds
-/// each of which has so many variants (a logarithm too). Their order does not matter, and a kind may come repeatedly.
-fn chosen(kinds: &[f64], most: usize) -> Vec<f64> {
+/// each of which has so many variants (a logarithm too). Their order does not matter, and each kind may come as often as
+/// `copies` says.
+fn chosen(kinds: &[f64], copies: &[usize], most: usize) -> Vec<f64> {
     let mut ways = vec![f64::NEG_INFINITY; most + 1];
     ways[0] = 0.0;
-    for size in kinds {
+    for (size, &copies) in kinds.iter().zip(copies) {
         ways = (0..=most)
             .map(|count| {
-                let with = (0..=count).map(|of_this| ways[count - of_this] + of_this as f64 * size);
+                let with = (0..=count.min(copies)).map(|of_this| ways[count - of_this] + of_this as f64 * size);
                 total(&with.collect::<Vec<_>>())
             })
             .collect();

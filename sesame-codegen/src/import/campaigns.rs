@@ -145,7 +145,8 @@ fn campaign_text(
         let most = operations.len().max(longest.unwrap_or(0));
         lines.push(format!("objectives {}", objectives.join(", ")));
         observed.retain(|name| !objectives.contains(name));
-        lines.push(format!("operations {}   1..{most} per test", operations.join(", ")));
+        // The original platform lets copies of one operation act together.
+        lines.push(format!("operations {}   1..{most} per test may overlap", operations.join(", ")));
         activation(writer, campaign, &shown, &mut observed, &mut lines);
         search(writer, campaign, &shown, &mut lines);
     }

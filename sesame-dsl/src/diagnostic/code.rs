@@ -103,6 +103,8 @@ codes! {
     UNUSED_TOPIC = "W0014": "A topic has no node and no use.",
     UNUSED_EVIDENCE = "W0015": "No guarantee of a monitor needs the evidence or demand.",
     ONE_OUTCOME = "W0016": "A comparison in a formula goes one way whatever is heard.",
+    COPIES_OVERLAP = "W0020": "Copies of one operation act at the same time in a known test.",
+    EQUAL_SEEDS = "W0021": "Copies of one operation in a known test have equal seeds.",
 }
 
 /// The page of a code, found by its text in any case, for example `e0203`.

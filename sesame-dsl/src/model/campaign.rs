@@ -2,8 +2,8 @@
 
 use super::condition::ConditionSpace;
 use super::{
-    CampaignId, Confirmation, Declaration, Dimension, Exploration, MetricId, OperationId, Range, Recorded, StopRule,
-    TestId,
+    CampaignId, Confirmation, Copies, Declaration, Dimension, Exploration, MetricId, OperationId, Range, Recorded,
+    StopRule, TestId,
 };
 
 /// A campaign.
@@ -152,6 +152,8 @@ pub struct Content {
     pub min: u32,
     /// At most so many operations: `min` or more.
     pub max: u32,
+    /// What holds of several copies of one operation in a test. Default that they are never active at the same time.
+    pub copies: Copies,
     /// How tests switch their operations on and off.
     pub activation: ActivationMode,
 }

@@ -28,8 +28,8 @@ use std::collections::BTreeMap;
 // What holds no names and no units is the same here and in a plan.
 pub use sesame_plan::stl::Interval;
 pub use sesame_plan::{
-    BoostedChildren, Comparison, Confirmation, Dimension, Direction, Distribution, Drain, Exploration, Members, Moment,
-    NotFinite, OperationKind, Recorded, Shape, Step, StopRule, Typical, ValueMode,
+    BoostedChildren, Comparison, Confirmation, Copies, Dimension, Direction, Distribution, Drain, Exploration, Members,
+    Moment, NotFinite, OperationKind, Recorded, Shape, Step, StopRule, Typical, ValueMode,
 };
 
 use crate::span::{FileId, Span};
@@ -71,6 +71,13 @@ impl Space {
     /// The campaign of a name.
     pub fn campaign(&self, name: &str) -> Option<CampaignId> {
         self.campaigns.iter().find(|(_, campaign)| campaign.declaration.name == name).map(|(id, _)| id)
+    }
+
+    /// Whether copies of one operation may act at the same time in the tests of all campaigns that search, of which there
+    /// is one at least.
+    pub fn copies_may_overlap(&self) -> bool {
+        let mut searching = self.campaigns.values().filter_map(|campaign| campaign.search.content()).peekable();
+        searching.peek().is_some() && searching.all(|content| content.copies == Copies::MayOverlap)
     }
 
     /// The file that something is declared in, as seen from the folder of the space's own file.

@@ -3,7 +3,7 @@
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
-    self, Activation, ActivationMode, CampaignId, Content, Id as _, MetricId, OperationId, Search, TestId,
+    self, Activation, ActivationMode, CampaignId, Content, Copies, Id as _, MetricId, OperationId, Search, TestId,
 };
 use crate::span::Span;
 use crate::syntax::ast::{self, Count, Strategy};
@@ -194,8 +194,44 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         }
-        let operations = found?.into_iter().map(OperationId::from_index).collect();
-        Some(Content { operations, min, max, activation: activation? })
+        let found: Vec<OperationId> = found?.into_iter().map(OperationId::from_index).collect();
+        let copies = operations.copies.map_or_else(Copies::default, |(_, copies)| copies);
+        self.enough_operations(campaign, operations, &found, min)?;
+        Some(Content { operations: found, min, max, copies, activation: activation? })
+    }
+
+    /// Reports a test that would have to hold more operations than there are, where one may hold each only once.
+    fn enough_operations(
+        &mut self,
+        campaign: &'a ast::Campaign,
+        written: &'a ast::Operations,
+        operations: &[OperationId],
+        min: u32,
+    ) -> Option<()> {
+        let offline = |id: &OperationId| {
+            self.operations[id.index()].as_ref().is_some_and(|operation| operation.kind.is_offline())
+        };
+        let (once, why) = match written.copies {
+            Some((span, Copies::Once)) => (true, Some((span, "each at most once"))),
+            Some((_, Copies::MayOverlap)) => return Some(()),
+            // Whatever acts before the start or after the end has no time of its own in which only one copy acts.
+            Some((_, Copies::Apart)) | None => (operations.iter().all(offline), None),
+        };
+        let most = operations.len();
+        if !once || min as usize <= most {
+            return Some(());
+        }
+        let title = format!("a test of campaign `{}` cannot hold {min} operations", campaign.head.name.text);
+        let each = if most == 1 { "there is 1".to_owned() } else { format!("there are {most}") };
+        let diagnostic = Diagnostic::new(Code::BAD_COUNT, written.min.span, title).label(format!("{each} to hold"));
+        self.report(match why {
+            Some((span, words)) => diagnostic.also(span, format!("it may hold {words}")),
+            None => diagnostic.note(
+                "operations before the start and after the end of a run have no windows that could lie apart, so a test \
+                 holds each at most once; say `may overlap` to permit copies",
+            ),
+        });
+        None
     }
 
     /// Compares the permitted window of an operation with the end of a campaign that uses it.

@@ -143,6 +143,7 @@ impl<'a> Resolver<'a> {
                 None => complete = false,
             }
         }
+        self.copies_in_test(test, &operations);
         let mut expectations = Vec::new();
         for expectation in &test.expectations {
             match self.bound(&expectation.metric, &expectation.bound) {
@@ -151,6 +152,50 @@ impl<'a> Resolver<'a> {
             }
         }
         complete.then(|| model::Test { declaration: self.declaration(&test.head), operations, expectations })
+    }
+
+    /// Warns of copies of one operation that act at the same time, where no campaign's tests do, and of copies that draw
+    /// alike. Of each copy, only the first before it that it clashes with is named.
+    fn copies_in_test(&mut self, test: &'a ast::Test, operations: &[model::TestOperation]) {
+        if operations.len() != test.operations.len() {
+            return;
+        }
+        let may_overlap = copies_may_overlap(self.file);
+        let written: Vec<_> = operations.iter().zip(&test.operations).collect();
+        for (at, (later, at_later)) in written.iter().enumerate() {
+            let name = &at_later.operation.text;
+            let earlier = || written[..at].iter().filter(|(earlier, _)| earlier.operation == later.operation);
+            let clash = earlier().find_map(|(earlier, at_earlier)| {
+                let (Activation::Window(a), Activation::Window(b)) = (&earlier.activation, &later.activation) else {
+                    return None;
+                };
+                let (ast::Activation::Window(first), ast::Activation::Window(second)) =
+                    (&at_earlier.activation, &at_later.activation)
+                else {
+                    return None;
+                };
+                (a.low < b.high && b.low < a.high).then_some((first.span, second.span))
+            });
+            if let (Some((first, second)), false) = (clash, may_overlap) {
+                let title = format!("`{name}` acts twice at the same time in test `{}`", test.head.name.text);
+                let diagnostic = Diagnostic::new(Code::COPIES_OVERLAP, second, title)
+                    .label("together the two may go beyond what the operation declares")
+                    .also(first, "it acts here already")
+                    .note("where that is meant, say `may overlap` behind `per test` in the campaigns");
+                self.report(diagnostic);
+            }
+            let twin = earlier().find(|(earlier, _)| earlier.draw_seed == later.draw_seed);
+            if let (Some((_, twin)), Some(seed)) = (twin, at_later.seed) {
+                let span = twin.seed.map_or(twin.operation.span, |seed| seed.span);
+                let title = format!("two copies of `{name}` draw alike in test `{}`", test.head.name.text);
+                let diagnostic = Diagnostic::new(Code::EQUAL_SEEDS, seed.span, title)
+                    .label("the same seed as an earlier copy")
+                    .also(span, "the earlier copy");
+                self.report(
+                    diagnostic.note("where both act on a message, both draw the same; give each a seed of its own"),
+                );
+            }
+        }
     }
 
     fn test_operation(&mut self, test: &'a ast::TestOperation) -> Option<(OperationId, Vec<Choice>, Activation)> {
@@ -404,4 +449,11 @@ fn example(parameter: &Parameter, kind: &OperationKind) -> String {
         Domain::Texts(items) | Domain::Files(items) => quoted(items.first().map_or("", String::as_str)),
     };
     format!("{} {chosen}", parameter.name)
+}
+
+/// Whether there are campaigns that search, and all of them permit copies of one operation to act at the same time.
+fn copies_may_overlap(file: &ast::File) -> bool {
+    let mut searching = file.campaigns.iter().filter_map(|campaign| campaign.operations.first()).peekable();
+    searching.peek().is_some()
+        && searching.all(|operations| operations.copies.is_some_and(|(_, it)| it == model::Copies::MayOverlap))
 }

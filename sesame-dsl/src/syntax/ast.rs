@@ -7,6 +7,7 @@ use super::eddi::Eddi;
 use super::physical::Physical;
 use super::surroundings::{Command, Launch, RelayBudget};
 use crate::span::Span;
+use sesame_plan::Copies;
 
 /// A whole file. Order between kinds never matters; within a kind it is the order of the file.
 #[derive(Debug, Default)]
@@ -665,6 +666,8 @@ pub(crate) struct Operations {
     pub(crate) names: Vec<Name>,
     pub(crate) min: Count,
     pub(crate) max: Count,
+    /// What is written of several copies of one operation, and where; `None` where nothing is.
+    pub(crate) copies: Option<(Span, Copies)>,
 }
 
 #[derive(Debug, Clone)]

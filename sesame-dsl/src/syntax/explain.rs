@@ -511,6 +511,8 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::until_condition | Rule::construct_until => "`until`",
         Rule::for_length | Rule::for_lengths => "`for`",
         Rule::at_most_times => "`at most`",
+        Rule::may_overlap => "`may overlap`",
+        Rule::at_most_once => "`each at most once`",
         Rule::by_condition => "`condition`",
         Rule::start_contains => "`start contains`",
         Rule::contained_integer => "`integer`",

@@ -14,6 +14,7 @@ use super::limits::{MAX_BYTES, parse_bounded, too_deep};
 use super::token::{TokenKind, token_at};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::{FileId, Span};
+use sesame_plan::Copies;
 
 pub(super) type Pair<'i> = PestPair<'i, Rule>;
 
@@ -589,7 +590,11 @@ impl Reader<'_> {
                     let counts: Vec<Count> = children(&count, Rule::number).map(|it| reader.count(&it)).collect();
                     let min = *counts.first().expect("a count has a number");
                     let max = *counts.last().expect("a count has a number");
-                    campaign.operations.push(Operations { span, names: reader.names(&member), min, max });
+                    let copies = [(Rule::may_overlap, Copies::MayOverlap), (Rule::at_most_once, Copies::Once)];
+                    let copies = copies
+                        .into_iter()
+                        .find_map(|(rule, copies)| Some((reader.span(&child(&member, rule)?), copies)));
+                    campaign.operations.push(Operations { span, names: reader.names(&member), min, max, copies });
                 }
                 Rule::activate => {
                     let mode = match child(&member, Rule::by_condition) {
