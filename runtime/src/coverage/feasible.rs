@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use sesame_plan::{ActivationMode, CampaignPlan, Dimension, Domain, GridAxis, Shape};
+use sesame_plan::{ActivationMode, CampaignPlan, Copies, Dimension, Domain, GridAxis, Shape};
 
 use crate::coverage::grid::{Grid, place_on};
 use crate::coverage::spread::{self, Member};
@@ -29,6 +29,9 @@ const MARGIN: f64 = 1e-9;
 /// - P1 takes all values, and P2 all from 0 to a greatest that depends on P1;
 /// - whole-number parameters take the values they have.
 ///
+/// Copies of one operation whose windows may not overlap are at most as long together as one window; how else they are in
+/// each other's way is left out.
+///
 /// A cell that is only touched, in a point or along an edge, is not feasible: no test falls there but by chance of
 /// probability zero.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,6 +57,7 @@ impl Feasible {
     }
 
     /// Whether exactly these cells are feasible. Otherwise no other cell is, but some of these may not be either: where
+    /// windows of copies of one operation may not overlap, and timing is asked for; where
     /// T3 is asked for and midpoints in different windows cannot meet, or those windows are many; where P2 is asked for
     /// and only some parameters are whole numbers, or those are very many; or where there are very many kinds of
     /// operations.
@@ -74,28 +78,41 @@ impl Feasible {
         let all = Feasible { reaches: vec![true; grid.len()], exact: false };
         let Ok(permitted) = Permitted::of(plan) else { return all };
         let sectors = Sectors::of(grid, one_interval_each, margin);
-        let kinds = sectors.kinds(plan, &permitted);
+        let (kinds, alike) = sectors.kinds(plan, &permitted);
         // Operations beside the run are no part of the point and may take the place of others.
         let offline = permitted.operations().iter().any(|it| it.activation == PermittedActivation::Offline);
         let fewest = if one_interval_each && !offline { permitted.fewest() } else { 1 };
         let Some(mixtures) = mixtures(kinds.len(), fewest, permitted.most()) else { return all };
 
+        // Windows of copies that lie apart have only one window's length together.
+        let apart = one_interval_each
+            && permitted.copies() == Copies::Apart
+            && sectors.has(&[Dimension::T1, Dimension::T2, Dimension::T3]);
         let mut exact = one_interval_each;
-        let mut timings: BTreeMap<Vec<usize>, Reached> = BTreeMap::new();
+        let mut timings: BTreeMap<[Vec<usize>; 2], Reached> = BTreeMap::new();
         let mut intensities: BTreeMap<Vec<usize>, Reached> = BTreeMap::new();
         let (windows, window_of) = distinct(kinds.iter().map(|kind| kind.window));
         let (parameters, parameters_of) = distinct(kinds.iter().map(|kind| kind.parameters.clone()));
         let mut done = BTreeSet::new();
         let mut reaches = vec![false; grid.len()];
         for mixture in mixtures {
-            let by_window = counted(&mixture, &window_of, windows.len());
+            if mixture.iter().zip(&alike).any(|(&count, alike)| count > alike.most_copies) {
+                continue;
+            }
+            // How many windows of a sort can be whole.
+            let whole: Vec<usize> =
+                mixture.iter().zip(&alike).map(|(&n, it)| if apart { n.min(it.operations) } else { n }).collect();
+            exact &= whole == mixture;
+            let by_window = [&mixture, &whole].map(|counts| counted(counts, &window_of, windows.len()));
             let by_parameters = counted(&mixture, &parameters_of, parameters.len());
             let numbers = sectors.numbers(&kinds, &mixture);
             if !done.insert((by_window.clone(), by_parameters.clone(), numbers)) {
                 continue;
             }
-            let timing =
-                timings.entry(by_window).or_insert_with_key(|counts| sectors.timing(&paired(&windows, counts)));
+            let timing = timings.entry(by_window).or_insert_with_key(|[counts, whole]| {
+                let lengths = windows.iter().zip(whole).map(|(it, &n)| (it.end - it.start) * n as f64);
+                sectors.timing(&paired(&windows, counts), lengths.sum())
+            });
             let intensity = intensities
                 .entry(by_parameters)
                 .or_insert_with_key(|counts| sectors.intensity(&paired(&parameters, counts)));
@@ -116,6 +133,14 @@ struct KindOfOperation {
     window: Window,
     parameters: Vec<Values>,
     class: Class,
+}
+
+/// The operations that are one kind to the grid.
+#[derive(Debug, Clone, Copy)]
+struct Alike {
+    operations: usize,
+    /// How often a test may hold them together.
+    most_copies: usize,
 }
 
 /// What a normalised parameter can be.
@@ -202,11 +227,12 @@ impl Sectors {
     }
 
     /// The operations of a campaign that are active during the run; those that the grid cannot tell apart are one.
-    fn kinds(&self, plan: &CampaignPlan, permitted: &Permitted) -> Vec<KindOfOperation> {
+    fn kinds(&self, plan: &CampaignPlan, permitted: &Permitted) -> (Vec<KindOfOperation>, Vec<Alike>) {
         let timed = self.has(&[Dimension::T1, Dimension::T2, Dimension::T3]);
         let graded = self.has(&[Dimension::P1, Dimension::P2]);
         let classed = self.has(&[Dimension::O1, Dimension::O2, Dimension::O3]);
         let mut kinds: Vec<KindOfOperation> = Vec::new();
+        let mut alike: Vec<Alike> = Vec::new();
         for it in permitted.operations() {
             let operation = plan.operation(it.operation);
             let Some(window) = Window::of(plan, it) else { continue };
@@ -220,11 +246,16 @@ impl Sectors {
                     .collect(),
                 class: if classed { class_of(&operation.kind) } else { Class::Other },
             };
-            if !kinds.contains(&kind) {
+            let most_copies = permitted.most_copies(it);
+            if let Some(at) = kinds.iter().position(|other| *other == kind) {
+                alike[at].operations += 1;
+                alike[at].most_copies = alike[at].most_copies.saturating_add(most_copies);
+            } else {
                 kinds.push(kind);
+                alike.push(Alike { operations: 1, most_copies });
             }
         }
-        kinds
+        (kinds, alike)
     }
 
     /// The cells of an axis; one without bounds where the grid lacks the dimension.
@@ -278,8 +309,8 @@ impl Sectors {
         offsets.sum()
     }
 
-    /// The cells of T1, T2 and T3 that intervals in these windows can reach.
-    fn timing(&self, windows: &[(Window, usize)]) -> Reached {
+    /// The cells of T1, T2 and T3 that intervals in these windows can reach, which are at most so long together.
+    fn timing(&self, windows: &[(Window, usize)], longest: f64) -> Reached {
         let count: usize = windows.iter().map(|(_, count)| count).sum();
         let n = count as f64;
         let mean = |value: fn(&Window) -> f64| windows.iter().map(|(it, n)| value(it) * *n as f64).sum::<f64>() / n;
@@ -307,7 +338,8 @@ impl Sectors {
             };
             // The shortest intervals of the cell leave most room for their midpoints.
             let length = t2.low.max(shortest);
-            if t2.high.min(width) - length <= self.margin {
+            let longest = if self.one_interval_each { longest / n } else { width };
+            if t2.high.min(width).min(longest) - length <= self.margin {
                 continue;
             }
             let room = (width - length) / 2.0;

@@ -1,5 +1,5 @@
 use proptest::prelude::*;
-use sesame_plan::{Choice, Count, Dimension, Distribution, Drain, OperationKind, Search, Test, ValueMode};
+use sesame_plan::{Choice, Copies, Count, Dimension, Distribution, Drain, OperationKind, Search, Test, ValueMode};
 
 use super::*;
 use crate::rng::Stream;
@@ -238,4 +238,22 @@ fn whole_numbers_reach_the_values_they_have() {
 fn very_many_kinds_of_operations_make_no_cell_infeasible() {
     assert_eq!(mixtures(30, 1, 20), None);
     assert_eq!(mixtures(2, 1, 2).unwrap(), [vec![0, 1], vec![0, 2], vec![1, 0], vec![1, 1], vec![2, 0]]);
+}
+
+#[test]
+fn windows_of_copies_that_lie_apart_are_as_long_together_as_one() {
+    let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let grid = Grid::parse("T2:0:1:10,O0:0.5:5.5:5").unwrap();
+    let longest = |plan: &CampaignPlan, count: usize| {
+        let feasible = Feasible::of(plan, &grid);
+        (0..10).filter(|t2| feasible.reaches(t2 * 5 + count - 1)).max().map(|t2| t2 + 1)
+    };
+    assert_eq!([1, 2, 3, 4, 5].map(|n| longest(&plan, n)), [Some(10); 5]);
+    // Two operations: of three copies two are whole windows, or three share two of them.
+    plan.campaign.copies = Copies::Apart;
+    assert_eq!([1, 2, 3, 4, 5].map(|n| longest(&plan, n)), [10, 10, 7, 5, 4].map(Some));
+    assert!(!Feasible::of(&plan, &grid).is_exact());
+    plan.campaign.copies = Copies::Once;
+    assert_eq!([1, 2, 3, 4, 5].map(|n| longest(&plan, n)), [Some(10), Some(10), None, None, None]);
+    assert!(Feasible::of(&plan, &grid).is_exact());
 }
