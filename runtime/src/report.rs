@@ -23,6 +23,7 @@ mod replay;
 mod scatter;
 mod show;
 mod shrinking;
+mod stacked;
 mod summary;
 mod table;
 mod text;
@@ -45,6 +46,7 @@ pub use show::{
     ChoiceReport, ListedTest, MetricReport, OperationReport, TestList, TestReport, VerdictReport, list, show,
 };
 pub use shrinking::{ShrinkStep, Shrinking, TestSize};
+pub use stacked::{Stacked, StackedSum};
 pub use summary::{
     Counts, ExpectationSummary, Failure, FrontTest, Objective, RequirementSummary, Spread, Summary, Worst, summary,
 };

@@ -21,7 +21,7 @@ use crate::report::shrinking::{self, Shrinking};
 use crate::report::summary::{RequirementSummary, Summary, operations, summarise, value_text};
 use crate::report::text::{
     came_out, choices_text, confirmed_column, counts_sentence, effect_text, expectation_value, headline,
-    objective_columns, outcome_sentence, planned_text, rate_text, spans_text,
+    objective_columns, outcome_sentence, planned_text, rate_text, spans_text, stacked_column,
 };
 use crate::report::timeline::timeline;
 
@@ -402,6 +402,8 @@ fn front_table(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     titles.push("Violates");
     let again = confirmed_column(summary);
     titles.extend(again.is_some().then_some("Confirmed"));
+    let stacked = stacked_column(summary);
+    titles.extend(stacked.is_some().then_some("At once"));
     titles.push("Operations");
     heading_row(body, &titles, 1..1 + columns.len());
     body.open("tbody", &[]);
@@ -416,6 +418,9 @@ fn front_table(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
         body.element("td", &[("class", "bad keep")], &test.violates.join(" "));
         if let Some(column) = &again {
             body.element("td", &[("class", "keep")], &column[at]);
+        }
+        if let Some(column) = &stacked {
+            body.element("td", &[("class", "sentence")], &column[at]);
         }
         body.element("td", &[("class", "sentence")], &test.operations);
         body.close();
@@ -584,6 +589,9 @@ fn figures(body: &mut Markup, report: &TestReport) {
                 row(body, &operation.operation, &cells);
             }
         });
+    }
+    for stacked in &report.stacked {
+        body.element("p", &[("class", "quiet")], &stacked.words());
     }
     table(body, &["Metric", "Value", "Changes"], |body| {
         for metric in &report.metrics {

@@ -10,6 +10,7 @@ use crate::record::{
     EventKind, MetricValue, Origin, RecordError, Repository, TestRecord, TestRow, Verdict, verdict, violation_spans,
 };
 use crate::report::confirmed::{ConfirmedTest, confirmed_test};
+use crate::report::stacked::{Stacked, stacked};
 use crate::report::{export, number, summary};
 
 /// A line in the list of all tests.
@@ -75,6 +76,9 @@ pub struct TestReport {
     pub front: bool,
     /// Its operations.
     pub operations: Vec<OperationReport>,
+    /// The operations whose copies acted at the same time.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stacked: Vec<Stacked>,
     /// All metrics of the plan.
     pub metrics: Vec<MetricReport>,
     /// All requirements of the space.
@@ -230,6 +234,7 @@ pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, front: bool) -
         messages: observation.messages,
         front,
         operations: operations(plan, record),
+        stacked: stacked_in(plan, record),
         metrics: plan
             .metrics
             .iter()
@@ -251,6 +256,12 @@ pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, front: bool) -
         notes: Vec::new(),
         trace: None,
     }
+}
+
+/// The operations whose copies acted at the same time in a recorded test.
+pub(crate) fn stacked_in(plan: &CampaignPlan, record: &TestRecord) -> Vec<Stacked> {
+    let observed: Vec<&[Span]> = record.observation.operations.iter().map(|it| it.intervals.as_slice()).collect();
+    stacked(plan, &record.test, &observed)
 }
 
 fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> {

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use serde::Serialize;
-use sesame_plan::{Bound, CampaignPlan, Confirmation, Direction, MetricId, Requirement};
+use sesame_plan::{Bound, CampaignPlan, Confirmation, Copies, Direction, MetricId, Requirement};
 
 use crate::observation::Outcome;
 use crate::record::{EventKind, MetricValue, Origin, RecordError, Repository, TestRow, Verdict, verdict};
@@ -11,7 +11,9 @@ use crate::report::confirmed::{ConfirmedTest, confirmed_tests};
 use crate::report::coverage::{CoverageSummary, coverage};
 use crate::report::number;
 use crate::report::repetition::{Repetition, repetition};
+use crate::report::show::stacked_in;
 use crate::report::shrinking::{Shrinking, shrinking};
+use crate::report::stacked::Stacked;
 
 /// What a campaign found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -97,6 +99,9 @@ pub struct FrontTest {
     pub values: Vec<Option<f64>>,
     /// Its operations, as in `jitter_link0 ×2, lose_link0`.
     pub operations: String,
+    /// The operations whose copies acted at the same time.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stacked: Vec<Stacked>,
     /// Names of the requirements it violates.
     pub violates: Vec<String>,
 }
@@ -216,7 +221,7 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
         seed: facts.seed,
         stop: facts.stop.clone(),
         counts: counts(plan, rows),
-        front: front(plan, &objectives, rows, members, &confirmed),
+        front: front(repository, &objectives, rows, members, &confirmed)?,
         requirements: plan
             .requirements
             .iter()
@@ -255,12 +260,13 @@ fn counts(plan: &CampaignPlan, rows: &[TestRow]) -> Counts {
 }
 
 fn front(
-    plan: &CampaignPlan,
+    repository: &Repository,
     objectives: &[Objective],
     rows: &[TestRow],
     members: &[u32],
     confirmed: &[ConfirmedTest],
-) -> Vec<FrontTest> {
+) -> Result<Vec<FrontTest>, RecordError> {
+    let plan = repository.plan();
     let repeated = |number: u32| confirmed.iter().find(|test| test.number == number);
     let values = |row: &TestRow| -> Vec<Option<f64>> {
         match repeated(row.number).and_then(|test| test.values.as_ref()) {
@@ -279,16 +285,28 @@ fn front(
     let members: BTreeSet<u32> = members.iter().copied().collect();
     let mut sorted: Vec<&TestRow> = rows.iter().filter(|row| members.contains(&row.number)).collect();
     sorted.sort_by(|a, b| danger(b).total_cmp(&danger(a)).then(a.number.cmp(&b.number)));
-    sorted
-        .into_iter()
-        .map(|row| FrontTest {
+    let on_front = sorted.into_iter().map(|row| {
+        Ok(FrontTest {
             test: format!("T{}", row.number),
             number: row.number,
             values: values(row),
             operations: operations(plan, row),
+            stacked: stacked_of(repository, row)?,
             violates: violated(plan, row),
         })
-        .collect()
+    });
+    on_front.collect()
+}
+
+/// The operations whose copies acted at the same time. A test is read whole only where there can be any.
+fn stacked_of(repository: &Repository, row: &TestRow) -> Result<Vec<Stacked>, RecordError> {
+    let plan = repository.plan();
+    let apart = plan.campaign.copies != Copies::MayOverlap && row.origin == Origin::Search;
+    let kinds: BTreeSet<_> = row.test.operations.iter().map(|used| used.operation).collect();
+    if apart || kinds.len() == row.test.operations.len() {
+        return Ok(Vec::new());
+    }
+    Ok(stacked_in(plan, &repository.test(row.number)?))
 }
 
 /// Names of the requirements a test violates.

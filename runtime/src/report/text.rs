@@ -13,7 +13,8 @@ use crate::report::number::{self, fixed, join_words, plural, with_unit};
 use crate::report::repetition::{Repetition, ViolationRate};
 use crate::report::show::{OperationReport, TestList, TestReport};
 use crate::report::shrinking;
-use crate::report::summary::{ExpectationSummary, Objective, Spread, Summary, value_text};
+use crate::report::stacked::Stacked;
+use crate::report::summary::{ExpectationSummary, FrontTest, Objective, Spread, Summary, value_text};
 use crate::report::table::{Align, Table, TextOptions, visible, wrap};
 
 pub(super) fn left(title: &str) -> (String, Align) {
@@ -166,6 +167,8 @@ fn front(summary: &Summary) -> Table {
     columns.push(left("violates"));
     let again = confirmed_column(summary);
     columns.extend(again.is_some().then(|| left("confirmed")));
+    let stacked = stacked_column(summary);
+    columns.extend(stacked.is_some().then(|| left("at once")));
     columns.push(left("operations"));
     let mut table = Table::new(columns);
     let values = objective_columns(summary);
@@ -174,6 +177,7 @@ fn front(summary: &Summary) -> Table {
         cells.extend(values.iter().map(|column| column[row].clone()));
         cells.push(test.violates.join(" "));
         cells.extend(again.as_ref().map(|column| column[row].clone()));
+        cells.extend(stacked.as_ref().map(|column| column[row].clone()));
         cells.push(test.operations.clone());
         table.row(cells);
     }
@@ -185,6 +189,13 @@ pub(crate) fn confirmed_column(summary: &Summary) -> Option<Vec<String>> {
     let of = |number: u32| summary.confirmed.iter().find(|test| test.number == number);
     let any = summary.front.iter().any(|test| of(test.number).is_some());
     any.then(|| summary.front.iter().map(|test| of(test.number).map_or("–".to_owned(), ConfirmedTest::words)).collect())
+}
+
+/// Which operations' copies acted at the same time, and what they came to; `None` where none did.
+pub(crate) fn stacked_column(summary: &Summary) -> Option<Vec<String>> {
+    let words = |test: &FrontTest| test.stacked.iter().map(Stacked::words).collect::<Vec<_>>().join("; ");
+    let any = summary.front.iter().any(|test| !test.stacked.is_empty());
+    any.then(|| summary.front.iter().map(words).collect())
 }
 
 /// The front's values in words, a column per objective.
@@ -330,6 +341,9 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
             ]);
         }
         section(&mut text, "Operations", &table, options);
+    }
+    for stacked in &test.stacked {
+        paragraph(&mut text, &stacked.words(), options);
     }
     let mut table = Table::new([left("metric"), left("value"), right("changes")]);
     for metric in &test.metrics {
