@@ -434,7 +434,7 @@ mod tests {
             for [1s, 15s] at most 3 times
           search nsga2 { population 4  evaluations 8 }  end after 1min }";
     const DEFAULTS: &str = "
-        campaign some { objectives time  operations cut, swing 1 per test
+        campaign some { objectives time  operations cut, swing 1 per test may overlap
           activate by condition over near, collisions { integers [1, 1000]  depth 1 }
           search random { evaluations 8  seed 7 }  end after 70s }";
     const BY_TIME: &str = "
@@ -460,7 +460,7 @@ mod tests {
         campaign elites { objectives time  operations cut, swing 1..3 per test
           search map_elites { population 4  evaluations 8 }  confirm 2 times { by median }  coverage { T1 [0, 1] cells 6 }  end after 70s }";
     const LATIN: &str = "
-        campaign latin { objectives time  operations cut, swing 1..3 per test
+        campaign latin { objectives time  operations cut, swing 1..2 per test each at most once
           search latin_hypercube { evaluations 8 }  end after 70s }";
     const SOBOL: &str = "
         campaign even { objectives time  operations cut, swing 1..3 per test

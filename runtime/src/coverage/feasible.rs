@@ -88,7 +88,8 @@ impl Feasible {
         let apart = one_interval_each
             && permitted.copies() == Copies::Apart
             && sectors.has(&[Dimension::T1, Dimension::T2, Dimension::T3]);
-        let mut exact = one_interval_each;
+        // What a way to make up a test reaches for certain settles a cell, whatever is not known of other ways.
+        let mut certain = vec![false; grid.len()];
         let mut timings: BTreeMap<[Vec<usize>; 2], Reached> = BTreeMap::new();
         let mut intensities: BTreeMap<Vec<usize>, Reached> = BTreeMap::new();
         let (windows, window_of) = distinct(kinds.iter().map(|kind| kind.window));
@@ -102,7 +103,6 @@ impl Feasible {
             // How many windows of a sort can be whole.
             let whole: Vec<usize> =
                 mixture.iter().zip(&alike).map(|(&n, it)| if apart { n.min(it.operations) } else { n }).collect();
-            exact &= whole == mixture;
             let by_window = [&mixture, &whole].map(|counts| counted(counts, &window_of, windows.len()));
             let by_parameters = counted(&mixture, &parameters_of, parameters.len());
             let numbers = sectors.numbers(&kinds, &mixture);
@@ -116,14 +116,15 @@ impl Feasible {
             let intensity = intensities
                 .entry(by_parameters)
                 .or_insert_with_key(|counts| sectors.intensity(&paired(&parameters, counts)));
-            exact &= timing.exact && intensity.exact;
+            let exact = whole == mixture && timing.exact && intensity.exact;
             for &timing in &timing.cells {
                 for &intensity in &intensity.cells {
                     reaches[timing + intensity + numbers] = true;
+                    certain[timing + intensity + numbers] |= exact;
                 }
             }
         }
-        Feasible { reaches, exact }
+        Feasible { exact: one_interval_each && reaches == certain, reaches }
     }
 }
 
@@ -338,8 +339,9 @@ impl Sectors {
             };
             // The shortest intervals of the cell leave most room for their midpoints.
             let length = t2.low.max(shortest);
-            let longest = if self.one_interval_each { longest / n } else { width };
-            if t2.high.min(width).min(longest) - length <= self.margin {
+            // Windows that were moved apart touch, so that all of what they have is reached too.
+            let too_long = self.one_interval_each && length > longest / n + MARGIN;
+            if too_long || t2.high.min(width) - length <= self.margin {
                 continue;
             }
             let room = (width - length) / 2.0;

@@ -240,11 +240,14 @@ mod tests {
     #[test]
     fn ways_to_choose_are_multisets() {
         // Of two kinds 2, 3, 4, 5 and 6 multisets of 1 to 5.
-        let ways: Vec<f64> = chosen(&[0.0, 0.0], 5).iter().map(|it| 10f64.powf(*it).round()).collect();
+        let ways: Vec<f64> = chosen(&[0.0, 0.0], &[9, 9], 5).iter().map(|it| 10f64.powf(*it).round()).collect();
         assert_eq!(ways, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
-        assert_eq!(power(total(&chosen(&[0.0, 0.0], 5)[1..])), "20");
+        assert_eq!(power(total(&chosen(&[0.0, 0.0], &[9, 9], 5)[1..])), "20");
         // Ten and a hundred variants: two of them are 100, 1000 or 10000.
-        assert!((10f64.powf(chosen(&[1.0, 2.0], 2)[2]) - 11_100.0).abs() < 1e-6);
+        assert!((10f64.powf(chosen(&[1.0, 2.0], &[9, 9], 2)[2]) - 11_100.0).abs() < 1e-6);
+        // Each at most once: both or one of them, or none.
+        let once: Vec<f64> = chosen(&[0.0, 0.0], &[1, 1], 3).iter().map(|it| 10f64.powf(*it).round()).collect();
+        assert_eq!(once, [1.0, 2.0, 1.0, 0.0]);
     }
 
     /// Of n tests the nth is the best so far with a probability of 1/n; with two objectives, by hand: 1, 3/4 and 11/18.
