@@ -24,6 +24,7 @@ pub(crate) fn plan(operations: Vec<Operation>) -> CampaignPlan {
         default: None,
         initial: None,
         source,
+        trend: None,
         line: 1,
     };
     CampaignPlan {

@@ -6,7 +6,7 @@ use sesame_plan::{CampaignPlan, Formula, MetricId, MetricSource, Side, Span, Top
 use super::aggregate::FormulaState;
 use super::robustness::RobustnessState;
 use super::{Context, Hook, HookEntry};
-use crate::observation::MetricObservation;
+use crate::observation::{MetricObservation, Reach};
 use crate::stl::FormulaError;
 use crate::time::SimTime;
 use crate::value::{Text, Value};
@@ -112,6 +112,7 @@ impl<'p> MetricTable<'p> {
                     _ => None,
                 },
                 context: Context::default(),
+                ended: false,
             })
             .collect();
         Metrics { table: self, states }
@@ -129,6 +130,8 @@ struct State<'p> {
     formula: Option<FormulaState<'p>>,
     robustness: Option<RobustnessState<'p>>,
     context: Context,
+    /// Whether it was told of the end of the run.
+    ended: bool,
 }
 
 impl Metrics<'_> {
@@ -143,7 +146,7 @@ impl Metrics<'_> {
 
     /// Tells hooks and formulas that the run has come to its end. After a failure nobody does.
     pub fn end(&mut self, now: SimTime) {
-        for State { hook, formula, robustness, context } in &mut self.states {
+        for State { hook, formula, robustness, context, ended } in &mut self.states {
             context.now = now;
             if let Some(formula) = formula {
                 formula.end(context);
@@ -154,13 +157,14 @@ impl Metrics<'_> {
             if let Some(hook) = hook {
                 hook.on_end(context);
             }
+            *ended = true;
         }
     }
 
     /// A message, as the simulator sent it.
     pub fn message(&mut self, now: SimTime, wire: Wire, value: &Value) {
         for &(at, input) in &self.table.taps[wire.index()] {
-            let State { hook, formula, robustness, context } = &mut self.states[at];
+            let State { hook, formula, robustness, context, .. } = &mut self.states[at];
             if let Some(robustness) = robustness {
                 let (path, topic, member) = &self.table.wires[wire.index()];
                 context.now = now;
@@ -234,9 +238,17 @@ impl Metrics<'_> {
             warnings.extend(context.problem.take().map(|problem| format!("metric `{}`: {problem}", metric.name)));
             let set = context.value.is_some();
             let value = if context.unimplemented { None } else { context.value.or(metric.default) };
+            let set = set && value.is_some();
+            let reach = if state.ended {
+                Reach::of_whole_run(value)
+            } else {
+                Reach::onwards(metric.trend, value.filter(|_| set))
+            };
             observations.push(MetricObservation {
                 value,
-                set: set && value.is_some(),
+                set,
+                reach,
+                not_finite: None,
                 series: std::mem::take(&mut context.series),
             });
         }
