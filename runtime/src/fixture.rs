@@ -25,6 +25,7 @@ pub(crate) fn plan(operations: Vec<Operation>) -> CampaignPlan {
         initial: None,
         source,
         trend: None,
+        accepts_not_finite: false,
         line: 1,
     };
     CampaignPlan {

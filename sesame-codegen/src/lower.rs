@@ -372,6 +372,7 @@ fn metric(metric: &model::Metric) -> plan::Metric {
         default: metric.default,
         initial: metric.initial,
         trend: trend(metric),
+        accepts_not_finite: false,
         source: match &metric.source {
             model::MetricSource::Hook(topics) => {
                 plan::MetricSource::Hook { topics: topics.iter().map(|&id| topic_id(id)).collect() }

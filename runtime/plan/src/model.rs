@@ -254,6 +254,10 @@ pub struct Metric {
     /// hook declares is checked while it runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trend: Option<Trend>,
+    /// Whether infinity and NaN are ordinary values of what its hook reads, as in laser scans. Default false, and then not
+    /// written.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub accepts_not_finite: bool,
     /// Line of its declaration, from 1.
     pub line: u32,
 }

@@ -20,6 +20,7 @@ fn metric(name: &str, unit: Option<&str>, direction: Direction, default: Option<
         default,
         initial: None,
         trend: trends(name),
+        accepts_not_finite: false,
         source,
         line: 1,
     }

@@ -102,6 +102,7 @@ impl Landscape {
             initial: None,
             source: MetricSource::FuzzingTime,
             trend: None,
+            accepts_not_finite: false,
             line: 1,
         };
         CampaignPlan {
