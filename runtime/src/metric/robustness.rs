@@ -55,6 +55,7 @@ impl<'p> RobustnessState<'p> {
     /// Before the first message. Fails for a formula that the generator would not write.
     pub(super) fn new(robustness: &'p Robustness, plan: &CampaignPlan) -> Result<Self, FormulaError> {
         let monitor = Monitor::new(&robustness.formula, robustness.signals.len())?;
+        let monitor = if robustness.whole_windows { monitor.over_whole_windows() } else { monitor };
         let each = robustness.inputs.iter().find(|input| input.members == Members::Each).map(|input| input.field.topic);
         let count = each.map_or(1, |topic| plan.topic(topic).paths.len());
         let instance =
@@ -195,7 +196,7 @@ mod tests {
     /// The robustness of a formula the signals of which are the inputs.
     fn of(inputs: Vec<Input>, formula: Formula) -> Robustness {
         let signals = (0..inputs.len()).map(|at| Expression::Input(u32::try_from(at).unwrap()));
-        Robustness { signals: signals.collect(), inputs, formula, side: Side::Inbound }
+        Robustness { signals: signals.collect(), inputs, formula, side: Side::Inbound, whole_windows: false }
     }
 
     /// Value and warnings of a run that ends at this time in milliseconds, or breaks off after its last message.
