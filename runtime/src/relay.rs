@@ -306,12 +306,16 @@ impl<'a> Relay<'a> {
             self.leave(deliveries);
             let edges = self.operations.iter().filter_map(|stage| stage.activity.next_edge());
             let moments = edges.chain(self.queue.next_release()).chain(self.next_comparison());
-            self.now = moments.min().map_or(now, |moment| moment.min(now));
+            let Some(moment) = moments.min().filter(|&moment| moment <= now) else {
+                self.now = now;
+                return;
+            };
+            self.now = moment;
             self.arrive(deliveries);
         }
     }
 
-    /// What an instant begins with: its edges.
+    /// What an instant begins with, if something is due then: its edges.
     fn arrive(&mut self, deliveries: &mut Vec<Delivery>) {
         for at in 0..self.operations.len() {
             match self.operations[at].activity.follow(self.now) {
