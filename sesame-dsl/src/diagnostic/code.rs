@@ -105,6 +105,7 @@ codes! {
     ONE_OUTCOME = "W0016": "A comparison in a formula goes one way whatever is heard.",
     COPIES_OVERLAP = "W0020": "Copies of one operation act at the same time in a known test.",
     EQUAL_SEEDS = "W0021": "Copies of one operation in a known test have equal seeds.",
+    NOBODY_HEARS = "W0022": "Nobody hears what an operation disturbs.",
 }
 
 /// The page of a code, found by its text in any case, for example `e0203`.
