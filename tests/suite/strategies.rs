@@ -96,7 +96,7 @@ fn construction_reaches_half_of_the_cells_almost_at_once_and_does_not_lose_the_f
         write!(
             campaigns,
             "campaign {name} {{\n  objectives fuzzing_time, collision_occurrence\n  operations jitter_link0, jitter_link1   \
-             1..5 per test\n  search {search}\n  coverage {{ T1 [0, 1] cells 6  T2 [0, 0.5] cells 6  P1 [0, 1] cells 3 }}\n  \
+             1..5 per test may overlap\n  search {search}\n  coverage {{ T1 [0, 1] cells 6  T2 [0, 0.5] cells 6  P1 [0, 1] cells 3 }}\n  \
              {exploration}\n  end after 70s\n}}\n"
         )
         .unwrap();
@@ -136,7 +136,7 @@ fn prediction_covers_more_by_condition_than_evolution_alone() {
         write!(
             campaigns,
             "campaign {name} {{\n  objectives fuzzing_time, collision_occurrence\n  operations jitter_link0, \
-             jitter_link1   1..5 per test\n  activate by condition over link0_high in [0, 10], link0_low in [0, 10], \
+             jitter_link1   1..5 per test may overlap\n  activate by condition over link0_high in [0, 10], link0_low in [0, 10], \
              link1_high, link1_low, near_zone1 in [-50, 10], near_zone2 in [-50, 10], near_zone3 in [-50, 10] {{ depth 4  \
              integers [1, 20] }}\n  search nsga2 {{ population 10  evaluations 210 }}\n  coverage {{ T1 [0, 1] cells 6  \
              T2 [0, 0.5] cells 6  P1 [0, 1] cells 3 }}\n  {exploration}\n  end after 70s\n}}\n"

@@ -565,14 +565,20 @@ impl Space {
         let operations = self.draw.some(self.operations.len(), 4);
         let operations: Vec<&str> = operations.iter().map(|&at| self.operations[at].name.as_str()).collect();
         let operations = operations.join(", ");
-        let count = *self.draw.one(&["1", "1..3", "2", "3..4"]);
+        // There may be operations beside the run only, which a test holds once unless copies may overlap.
+        let count = *self.draw.one(&[
+            "1 per test each at most once",
+            "1..3 per test",
+            "2 per test may overlap",
+            "3..4 per test may overlap",
+        ]);
         let search = *self.draw.one(&[
             "search random { evaluations 1 }",
             "search nsga2 { population 2  evaluations 2  seed 18446744073709551615 }",
         ]);
         let mut members = vec![
             format!("objectives {}", self.list_metrics(&objectives)),
-            format!("operations {operations} {count} per test"),
+            format!("operations {operations} {count}"),
             search.to_owned(),
         ];
         let variables: Vec<usize> = (0..self.metrics.len()).filter(|&at| self.metrics[at].boundless).collect();
