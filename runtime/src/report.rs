@@ -46,7 +46,8 @@ pub use show::{
 };
 pub use shrinking::{ShrinkStep, Shrinking, TestSize};
 pub use summary::{
-    Counts, ExpectationSummary, Failure, FrontTest, Objective, RequirementSummary, Spread, Summary, Worst, summary,
+    Counts, ExpectationSummary, Failure, FrontTest, NotFinite, Objective, RequirementSummary, Spread, Summary, Worst,
+    summary,
 };
 pub use table::TextOptions;
 pub(crate) use table::text_table;
