@@ -48,7 +48,8 @@ pub use show::{
 pub use shrinking::{ShrinkStep, Shrinking, TestSize};
 pub use stacked::{Stacked, StackedSum};
 pub use summary::{
-    Counts, ExpectationSummary, Failure, FrontTest, Objective, RequirementSummary, Spread, Summary, Worst, summary,
+    Counts, ExpectationSummary, Failure, FrontTest, NotFinite, Objective, RequirementSummary, Spread, Summary, Worst,
+    summary,
 };
 pub use table::TextOptions;
 pub(crate) use table::text_table;

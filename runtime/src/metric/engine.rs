@@ -216,7 +216,8 @@ impl Metrics<'_> {
                     hook.on_message(input, value, context);
                 }
                 (MetricSource::Formula { .. }, _, Some(formula)) => {
-                    if formula.message(*topic, *member, value, context) && !std::mem::replace(waits, true) {
+                    let wait = formula.message(*topic, *member, value, context);
+                    if wait && !std::mem::replace(waits, true) {
                         self.waiting.push(at);
                     }
                 }

@@ -52,7 +52,7 @@ fn everything_that_is_recorded_is_read_back() {
         for (row, record) in rows.iter().zip(&records) {
             assert_eq!((row.number, row.origin, &row.test), (record.number, record.origin, &record.test));
             assert_eq!((&row.outcome, row.end), (&record.observation.outcome, record.observation.end));
-            let values: Vec<_> = record.observation.metrics.iter().map(|m| MetricValue::from(m)).collect();
+            let values: Vec<_> = record.observation.metrics.iter().map(MetricValue::from).collect();
             assert_eq!(row.values, values);
         }
         let sets = repository.result_sets().unwrap();

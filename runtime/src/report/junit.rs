@@ -7,7 +7,7 @@ use crate::report::confirmed::ConfirmedTest;
 use crate::report::markup::Markup;
 use crate::report::number;
 use crate::report::page::write_aside;
-use crate::report::summary::{ExpectationSummary, Failure, RequirementSummary, Summary, summary};
+use crate::report::summary::{ExpectationSummary, Failure, NotFinite, RequirementSummary, Summary, summary};
 use crate::report::text::headline;
 
 /// Writes the JUnit file of a campaign's results.
@@ -19,7 +19,7 @@ pub fn write_junit(repository: &Repository, path: &Path) -> Result<(), RecordErr
 ///
 /// Each requirement is a test case: it fails when a test violates it, and is skipped when no test says anything. Each
 /// expectation of a known test is one: it fails when it is violated, and is an error when nothing is known. Each crash
-/// and each timeout is an error.
+/// and each timeout is an error, and so is each test in which a metric read a number that was not finite.
 pub fn junit(summary: &Summary) -> String {
     let class = format!("{}.{}", summary.space, summary.campaign);
     let mut cases = Vec::new();
@@ -28,6 +28,7 @@ pub fn junit(summary: &Summary) -> String {
     );
     cases.extend(summary.expectations.iter().map(|expectation| expectation_case(&class, expectation)));
     cases.extend(summary.failures.iter().map(|failure| failure_case(&class, failure)));
+    cases.extend(summary.not_finite.iter().map(|found| not_finite_case(&class, found)));
     let count = |tag: &str| {
         let of_this_kind = |case: &&Case| case.result.as_ref().is_some_and(|result| result.tag == tag);
         cases.iter().filter(of_this_kind).count().to_string()
@@ -134,6 +135,17 @@ fn failure_case(class: &str, failure: &Failure) -> Case {
         class: format!("{class}.runs"),
         name: format!("{test} runs to its end"),
         result: Some(Outcome { tag: "error", kind, message, text: detail.clone() }),
+    }
+}
+
+fn not_finite_case(class: &str, found: &NotFinite) -> Case {
+    let NotFinite { test, at, metrics } = found;
+    let message = format!("a number that is not finite at {} s", number::fixed(*at, 2));
+    let text = format!("read by {}", metrics.join(", "));
+    Case {
+        class: format!("{class}.runs"),
+        name: format!("{test} has finite numbers only"),
+        result: Some(Outcome { tag: "error", kind: Some("not_finite"), message, text }),
     }
 }
 

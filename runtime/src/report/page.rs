@@ -71,6 +71,7 @@ fn page_in(repository: &Repository, folder: &Path) -> Result<String, RecordError
     repetition(&mut body, &summary);
     expectations(&mut body, &summary, &drawn);
     failures(&mut body, &summary, &drawn);
+    not_finite(&mut body, &summary, &drawn);
     for group in groups.iter().filter(|group| !group.tests.is_empty()) {
         body.open("section", &[]);
         body.element("h2", &[], group.title);
@@ -539,6 +540,35 @@ fn failures(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
             &[("class", "quiet")],
             &format!("And {} more; `list` tells all.", summary.failures.len() - 50),
         );
+    }
+    body.close();
+}
+
+fn not_finite(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
+    if summary.not_finite.is_empty() {
+        return;
+    }
+    body.open("section", &[]);
+    body.element("h2", &[], "Numbers that are not finite");
+    body.open("div", &[("class", "scroll")]);
+    body.open("table", &[]);
+    heading_row(body, &["Test", "At", "Read by"], 1..2);
+    body.open("tbody", &[]);
+    for found in summary.not_finite.iter().take(50) {
+        body.open("tr", &[]);
+        body.open("th", &[("scope", "row")]);
+        test_link(body, &found.test, drawn);
+        body.close();
+        body.element("td", &[("class", "number")], &number::quantity(found.at, Some("s")));
+        body.element("td", &[("class", "sentence")], &found.metrics.join(", "));
+        body.close();
+    }
+    body.close();
+    body.close();
+    body.close();
+    if summary.not_finite.len() > 50 {
+        let more = format!("And {} more.", summary.not_finite.len() - 50);
+        body.element("p", &[("class", "quiet")], &more);
     }
     body.close();
 }

@@ -44,6 +44,9 @@ pub struct Summary {
     pub expectations: Vec<ExpectationSummary>,
     /// Crashes and timeouts, by test.
     pub failures: Vec<Failure>,
+    /// Tests in which a metric read a number that was not finite, by test.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_finite: Vec<NotFinite>,
     /// What repeating says, where the campaign repeats one test.
     pub repetition: Option<Repetition>,
     /// How a test was made smaller, where the campaign does that.
@@ -170,6 +173,17 @@ pub struct Failure {
     pub detail: String,
 }
 
+/// A run in which metrics read numbers that were not finite.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NotFinite {
+    /// The test.
+    pub test: String,
+    /// Simulation time of the first such number, in seconds.
+    pub at: f64,
+    /// The metrics that read one.
+    pub metrics: Vec<String>,
+}
+
 /// How far a metric went over all tests that have a value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spread {
@@ -231,6 +245,7 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
         repetition: repetition(plan, rows),
         shrinking: shrinking(repository, rows)?,
         failures: rows.iter().filter_map(failure).collect(),
+        not_finite: rows.iter().filter_map(|row| not_finite(plan, row)).collect(),
         spreads: spreads(plan, rows),
         coverage: coverage(repository)?,
         warnings: warnings.collect(),
@@ -412,6 +427,13 @@ fn failure(row: &TestRow) -> Option<Failure> {
         at: row.end,
         detail: row.outcome.detail().unwrap_or_default(),
     })
+}
+
+fn not_finite(plan: &CampaignPlan, row: &TestRow) -> Option<NotFinite> {
+    let read = || row.values.iter().zip(&plan.metrics).filter(|(shown, _)| shown.not_finite.is_some());
+    let at = read().filter_map(|(shown, _)| shown.not_finite).min_by(f64::total_cmp)?;
+    let metrics = read().map(|(_, metric)| metric.name.clone()).collect();
+    row.duplicate_of.is_none().then(|| NotFinite { test: format!("T{}", row.number), at, metrics })
 }
 
 fn spreads(plan: &CampaignPlan, rows: &[TestRow]) -> Vec<Spread> {

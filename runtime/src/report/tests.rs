@@ -25,6 +25,35 @@ fn the_summary_fits_a_terminal() {
 }
 
 #[test]
+fn numbers_that_are_not_finite_are_a_finding_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = sample::plan();
+    let mut recorder = crate::record::Recorder::create(folder.path(), &plan, 42, 1).unwrap();
+    for mut record in sample::records(&plan, 8) {
+        if record.number == 5 {
+            for (metric, time) in [(0, 12.5), (4, 3.25)] {
+                let shown = &mut record.observation.metrics[metric];
+                (shown.not_finite, shown.reach) = (Some(time), crate::observation::Reach::ANY);
+            }
+        }
+        recorder.commit(&record).unwrap();
+    }
+    let repository = recorder.finish("all evaluations done").unwrap();
+    let summary = summary(&repository).unwrap();
+    assert_eq!(summary.requirements[0].unsaid, 1, "it bounds one of these metrics");
+    let text = summary_text(&summary, WIDE);
+    let (_, table) = text.split_once("Numbers that are not finite\n").unwrap();
+    let row: Vec<&str> = table.lines().nth(1).unwrap().split_whitespace().collect();
+    assert_eq!(row, ["T5", "3.25", "s", "collision_occurrence,", "arm_distance"]);
+    let xml = crate::report::junit(&summary);
+    assert!(xml.contains("T5 has finite numbers only") && xml.contains("type=\"not_finite\""), "{xml}");
+    let page = crate::report::page(&repository).unwrap();
+    assert!(page.contains("Numbers that are not finite"));
+    let json = serde_json::to_value(&summary).unwrap();
+    assert_eq!(json["not_finite"][0]["at"], 3.25);
+}
+
+#[test]
 fn the_list_has_a_line_for_each_test() {
     let (_folder, repository) = repository();
     insta::assert_snapshot!("list", list_text(&list(&repository).unwrap(), WIDE));

@@ -109,6 +109,13 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
         }
         section(&mut text, "Crashes and timeouts", &table, options);
     }
+    if !summary.not_finite.is_empty() {
+        let mut table = Table::new([left("test"), right("at"), left("read by")]);
+        for found in &summary.not_finite {
+            table.row([found.test.clone(), with_unit(fixed(found.at, 2), Some("s")), found.metrics.join(", ")]);
+        }
+        section(&mut text, "Numbers that are not finite", &table, options);
+    }
     text.push('\n');
     if let Some(coverage) = &summary.coverage {
         paragraph(&mut text, &coverage_sentence(coverage), options);

@@ -25,8 +25,6 @@ pub(crate) fn hook(metric: &str, line: u32, inputs: &[u32]) -> HookPlan {
         doc: String::new(),
         unit: None,
         direction: None,
-        trend: None,
-        accepts_not_finite: false,
         source: "kuka_cell.sesame".into(),
         line,
         inputs: inputs.iter().map(|&input| TopicId(input)).collect(),
@@ -56,8 +54,6 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
         plan: CampaignPlan {
             schema: sesame_plan::SCHEMA,
             generator: "sesamec 0.1.0".into(),
-            trend: None,
-            accepts_not_finite: false,
             source: "kuka_cell.sesame".into(),
             space: "kuka_cell".into(),
             doc: "The gearbox cell.".into(),
