@@ -77,8 +77,22 @@ pub struct Relay<'a> {
     heard: Vec<bool>,
     /// The topics that operations of the plan act on, whether this test has them or not.
     acted_on: Vec<TopicId>,
+    conditions: Conditions,
+    /// The instant at hand.
+    now: SimTime,
+    phase: Phase,
+    messages: u64,
+    overflowed: bool,
+    /// Copies made in the event at hand.
+    copies: u32,
+    flooded: bool,
+    tap: Option<&'a mut dyn Tap>,
+}
+
+/// What switches operations by condition.
+struct Conditions {
     /// The operations that conditions switch.
-    conditional: Vec<usize>,
+    operations: Vec<usize>,
     /// Those of them that have just gone off; here so that weighing does not allocate.
     ended: Vec<usize>,
     /// Per wire: whether a condition reads a metric of its messages as they are published.
@@ -89,18 +103,16 @@ pub struct Relay<'a> {
     compared: Vec<Operand>,
     /// Whether copies of one operation wait for each other.
     apart: bool,
-    /// The instant at hand.
-    now: SimTime,
-    /// Whether the run has begun: the edges at time zero are carried out.
-    begun: bool,
-    messages: u64,
-    overflowed: bool,
-    /// Copies made in the event at hand.
-    copies: u32,
-    flooded: bool,
-    /// The run is over: nothing is delivered any more.
-    over: bool,
-    tap: Option<&'a mut dyn Tap>,
+}
+
+/// How far a run is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// Nothing has happened, not even the edges at time zero.
+    New,
+    Running,
+    /// Nothing is delivered any more.
+    Over,
 }
 
 /// One operation of the test.
@@ -194,13 +206,15 @@ impl<'a> Relay<'a> {
             wires,
             heard: wires.iter().map(|wire| metrics.delivers(wire)).collect(),
             acted_on: plan.operations.iter().filter_map(|operation| operation.topic).collect(),
-            conditional,
-            ended: Vec::with_capacity(operations.len()),
-            read: wires.iter().map(|wire| reads(wire, Side::Inbound)).collect(),
-            reads_delivered: wires.iter().any(|wire| reads(wire, Side::Outbound)),
-            compared,
-            apart: plan.campaign.copies != Copies::MayOverlap,
-            begun: false,
+            conditions: Conditions {
+                ended: Vec::with_capacity(operations.len()),
+                operations: conditional,
+                read: wires.iter().map(|wire| reads(wire, Side::Inbound)).collect(),
+                reads_delivered: wires.iter().any(|wire| reads(wire, Side::Outbound)),
+                compared,
+                apart: plan.campaign.copies != Copies::MayOverlap,
+            },
+            phase: Phase::New,
             operations,
             order,
             pipelines,
@@ -212,7 +226,6 @@ impl<'a> Relay<'a> {
             overflowed: false,
             copies: 0,
             flooded: false,
-            over: false,
             tap: None,
         })
     }
@@ -247,7 +260,8 @@ impl<'a> Relay<'a> {
 
     /// Closes the books at `end`, where the run ended or broke off: what is still held is lost, open intervals are closed.
     pub fn finish(mut self, end: SimTime) -> Finished {
-        self.over = true;
+        self.begin_time(&mut Vec::new());
+        self.phase = Phase::Over;
         self.follow_time(end, &mut Vec::new());
         let operations: Vec<OperationEffect> = self
             .operations
@@ -289,10 +303,7 @@ impl<'a> Relay<'a> {
     /// Carries out, in order of time, every activation edge and every release up to `now`; at one instant edges come
     /// first, since an operation is active for `start <= t < end`.
     fn follow_time(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
-        if !self.begun {
-            self.begun = true;
-            self.arrive(deliveries);
-        }
+        self.begin_time(deliveries);
         loop {
             while self.queue.next_release().is_some_and(|release| release <= self.now) {
                 if let Some(held) = self.release() {
@@ -317,6 +328,14 @@ impl<'a> Relay<'a> {
         }
     }
 
+    /// Carries out the edges at time zero, once.
+    fn begin_time(&mut self, deliveries: &mut Vec<Delivery>) {
+        if self.phase == Phase::New {
+            self.phase = Phase::Running;
+            self.arrive(deliveries);
+        }
+    }
+
     /// What an instant begins with, if something is due then: its edges.
     fn arrive(&mut self, deliveries: &mut Vec<Delivery>) {
         for at in 0..self.operations.len() {
@@ -337,7 +356,7 @@ impl<'a> Relay<'a> {
 
     /// Weighs conditions after messages were delivered.
     fn weigh_delivered(&mut self, deliveries: &mut Vec<Delivery>) {
-        if self.reads_delivered {
+        if self.conditions.reads_delivered {
             self.weigh_conditions(deliveries);
         }
     }
@@ -345,7 +364,7 @@ impl<'a> Relay<'a> {
     /// Weighs the conditions of all operations on the same values: first which go off, then which go on, so that one may
     /// begin where its copy ends. What operations let go as they end may be delivered and change values again.
     fn weigh_conditions(&mut self, deliveries: &mut Vec<Delivery>) {
-        if self.conditional.is_empty() {
+        if self.conditions.operations.is_empty() {
             return;
         }
         let now = self.now;
@@ -353,27 +372,27 @@ impl<'a> Relay<'a> {
             let fuzzing_time = self.fuzzing_time().seconds();
             let metrics = &self.metrics;
             let value = |metric| metrics.value(metric, fuzzing_time);
-            for &at in &self.conditional {
+            for &at in &self.conditions.operations {
                 if self.operations[at].activity.weigh_end(now, &value) == Edge::Ended {
-                    self.ended.push(at);
+                    self.conditions.ended.push(at);
                 }
             }
-            for next in 0..self.conditional.len() {
-                let at = self.conditional[next];
-                let free = !self.apart || !self.copy_is_active(at);
+            for next in 0..self.conditions.operations.len() {
+                let at = self.conditions.operations[next];
+                let free = !self.conditions.apart || !self.copy_is_active(at);
                 let value = |metric| self.metrics.value(metric, fuzzing_time);
                 if self.operations[at].activity.weigh_start(now, free, &value) == Edge::Started {
                     self.begin_activity(at, now);
                 }
             }
-            if self.ended.is_empty() {
+            if self.conditions.ended.is_empty() {
                 return;
             }
-            for next in 0..self.ended.len() {
-                self.end_activity(self.ended[next], now, deliveries);
+            for next in 0..self.conditions.ended.len() {
+                self.end_activity(self.conditions.ended[next], now, deliveries);
             }
-            self.ended.clear();
-            if !self.reads_delivered {
+            self.conditions.ended.clear();
+            if !self.conditions.reads_delivered {
                 return;
             }
         }
@@ -499,7 +518,7 @@ impl<'a> Relay<'a> {
                 return;
             }
         }
-        if !self.over {
+        if self.phase != Phase::Over {
             self.metrics.delivered(now, message.wire, &message.value);
             if let Some(tap) = &mut self.tap {
                 tap.delivered(now, message.wire, message.published, &message.value);
@@ -602,7 +621,7 @@ impl Exchange for Relay<'_> {
     }
 
     fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>) {
-        if now > self.now || !self.begun {
+        if now > self.now || self.phase == Phase::New {
             self.follow_time(now, deliveries);
         }
         self.messages += 1;
@@ -613,7 +632,7 @@ impl Exchange for Relay<'_> {
             tap.published(self.now, wire, index, &value);
         }
         self.metrics.message(self.now, wire, &value);
-        if self.read[wire.index()] {
+        if self.conditions.read[wire.index()] {
             self.weigh_conditions(deliveries);
         }
         self.pass(self.now, Held { wire, published: index, index, value, next_stage: 0 }, deliveries);

@@ -9,7 +9,7 @@ const HIDDEN: &str = "
     operation hide_zones on zones = blackhole within [0s, 65s]
     operation hide_speed on speed = blackhole within [0s, 65s]
     campaign hidden {
-      observes   top_speed
+      objectives fuzzing_time
       operations hide_zones, hide_speed 1..3 per test
       activate   by time
       search     falsification { evaluations 10  seed 1 }

@@ -46,6 +46,9 @@ type Window = (Option<f64>, Option<f64>);
 /// Start condition, end condition, length and times of an activation by condition.
 type Conditions = (Option<String>, Option<String>, Option<f64>, Option<u32>);
 
+/// Which intervals of an operation a table has.
+type SpansOf = fn(&mut OperationEffect) -> &mut Vec<Span>;
+
 impl Repository {
     /// Opens the results in a run's folder, or a results file itself, for reading only. A run may be writing them.
     pub fn open(path: &Path) -> Result<Repository, RecordError> {
@@ -441,6 +444,7 @@ impl Repository {
         }
     }
 
+    /// What operations of a test did.
     fn effects(&self, number: u32, outcome: &Outcome) -> Result<Vec<OperationEffect>, RecordError> {
         let mut effects: Vec<OperationEffect> = self.read(
             "SELECT seen, changed, dropped, delayed, queued, injected, side_effects, unheard, first_touch_s, last_touch_s \
@@ -468,8 +472,7 @@ impl Repository {
                 })
             },
         )?;
-        type Spans = fn(&mut OperationEffect) -> &mut Vec<Span>;
-        let tables: [(&str, Spans); 2] = [
+        let tables: [(&str, SpansOf); 2] = [
             (
                 "SELECT operation, start_s, end_s FROM intervals WHERE test = ?1 ORDER BY operation, position",
                 |effect| &mut effect.intervals,

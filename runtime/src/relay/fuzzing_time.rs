@@ -45,13 +45,13 @@ impl Relay<'_> {
     /// When the fuzzing time next comes to a number that a condition compares it with, or goes beyond it, if nothing else
     /// happens before.
     pub(super) fn next_comparison(&self) -> Option<SimTime> {
-        if self.compared.is_empty() {
+        if self.conditions.compared.is_empty() {
             return None;
         }
         let busy = self.operations.iter().filter(|stage| stage.timed && stage.is_busy()).count();
         let pace = i64::try_from(busy).ok().filter(|&pace| pace > 0)?;
         let total = self.fuzzing_time().nanos();
-        let numbers = self.compared.iter().filter_map(|operand| match *operand {
+        let numbers = self.conditions.compared.iter().filter_map(|operand| match *operand {
             Operand::Number(number) => Some(number),
             Operand::Variable(metric) => self.metrics.value(metric, 0.0),
         });

@@ -99,3 +99,43 @@ pub fn observed(plan: &CampaignPlan, test: &Test, observation: &Observation) -> 
 pub fn observed_point(plan: &CampaignPlan, test: &Test, observation: &Observation) -> Option<Point> {
     Point::of(&observed(plan, test, observation), Convention::Ours)
 }
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::Dimension;
+
+    use super::*;
+    use crate::fixture::{operation, plan, test_of, use_of};
+    use crate::observation::{Counters, OperationEffect, WallTime};
+
+    #[test]
+    fn an_operation_without_effect_is_no_part_of_the_point_unless_nobody_counted() {
+        let plan = plan(vec![operation(0, OperationKind::Blackhole)]);
+        let test = test_of(vec![use_of(0, 1.0, 2.0, vec![], 1), use_of(0, 5.0, 9.0, vec![], 2)]);
+        let effect = |dropped, start, end| OperationEffect {
+            intervals: vec![Span { start, end }],
+            counters: Counters { seen: 10, dropped, unheard: 3, ..Counters::default() },
+            ..OperationEffect::default()
+        };
+        let of = |outcome, first, second| {
+            let operations = vec![effect(first, 1.0, 2.0), effect(second, 5.0, 9.0)];
+            let run = Observation {
+                outcome,
+                end: 10.0,
+                operations,
+                unheard: Vec::new(),
+                metrics: Vec::new(),
+                messages: 100,
+                warnings: Vec::new(),
+                wall: WallTime::default(),
+            };
+            observed_point(&plan, &test, &run)
+                .map(|point| [Dimension::O0, Dimension::T1].map(|dimension| point.get(dimension).unwrap_or(f64::NAN)))
+        };
+        assert_eq!(of(Outcome::Completed, 7, 7), Some([2.0, 0.425]));
+        assert_eq!(of(Outcome::Completed, 0, 7), Some([1.0, 0.7]));
+        assert_eq!(of(Outcome::Crash { message: String::new() }, 7, 0), Some([1.0, 0.15]));
+        assert_eq!(of(Outcome::Void, 0, 0), None);
+        assert_eq!(of(Outcome::Unknown, 0, 0), Some([2.0, 0.425]), "imported");
+    }
+}

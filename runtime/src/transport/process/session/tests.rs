@@ -132,6 +132,24 @@ fn an_operation_stands_between_publisher_and_subscriber() {
 }
 
 #[test]
+fn what_the_answer_to_reset_does_not_list_as_subscribed_nobody_hears() {
+    let lost = |subscribes: &str| {
+        let ready = format!(
+            r#"{{"ready":{{"publishes":["arm/command","zones/Z1","zones/Z2"],"subscribes":[{subscribes}],"resets":true}}}}"#
+        );
+        let step = r#"{"publish":[{"topic":"arm/command","value":1}]}"#;
+        let said = format!("{ready}\n{step}\n{{\"done\":{{}}}}\n");
+        let hole = vec![operation(0, OperationKind::Blackhole)];
+        let talk = talk_about(hole, &test_of(vec![use_of(0, 0.0, 1.0, vec![], 1)]), 1, &said);
+        assert!(talk.end.is_ok(), "{:?}", talk.end);
+        let counters = talk.finished.operations[0].counters;
+        (counters.dropped, counters.unheard, talk.finished.unheard)
+    };
+    assert_eq!(lost(r#""arm/command""#), (1, 0, vec![]));
+    assert_eq!(lost(r#""zones/Z1""#), (0, 1, vec!["arm/command".to_owned()]));
+}
+
+#[test]
 fn a_changed_message_keeps_what_is_not_declared() {
     let kind = crate::fixture::offset(sesame_plan::ValueMode::Absolute, false);
     let uses = vec![use_of(0, 0.0, 1.0, vec![Choice::Range { low: 5.0, high: 5.0 }], 1)];
