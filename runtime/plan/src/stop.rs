@@ -18,12 +18,13 @@ pub enum StopRule {
         /// By less than this share of what it is now; above 0.
         below: f64,
     },
-    /// A next test would hardly fall into a cell that none has fallen into, as Good and Turing estimate it.
+    /// A next test would hardly fall into a cell that none has fallen into: an upper bound after Good and Turing.
     Discovery {
         /// Less likely than this, in `0..=1` and above 0.
         below: f64,
     },
-    /// It has hit nearly all the cells that it would ever hit, as Chao estimates it.
+    /// It has hit nearly all the cells that its tests can reach, or of those it has hit and those it has not that have a
+    /// chance of at least a thousandth per test: an upper bound after Good and Turing.
     Completeness {
         /// At least this share of them, in `0..=1` and above 0.
         share: f64,

@@ -78,6 +78,8 @@ struct Measured {
     worst: Vec<f64>,
     coverage: Option<f64>,
     hypervolume: Option<f64>,
+    /// The standard error of an estimated hypervolume.
+    standard_error: Option<f64>,
     igd_plus: Option<f64>,
     joint_share: Option<f64>,
 }
@@ -149,7 +151,9 @@ pub fn compare(runs: &[Run], reference: Option<&[f64]>, grid: Option<Grid>) -> R
     let joint = Front::of((0..).zip(&fitness));
     let distance = IgdPlus::to(joint.members().iter().map(|member| member.objectives.as_slice()));
     for run in measured.iter_mut().filter(|_| needed > 0) {
-        run.hypervolume = if finite { volume(&run.front, &reference) } else { None };
+        let volume = if finite { volume(&run.front, &reference) } else { None };
+        run.hypervolume = volume.map(|volume| volume.value);
+        run.standard_error = volume.and_then(|volume| volume.error);
         let mut distance = distance.clone();
         for member in run.front.members() {
             if let Some(distance) = &mut distance {
@@ -201,6 +205,7 @@ fn measure(run: &Run, cells: Option<&(Grid, u32)>) -> Result<Measured, RecordErr
         worst: vec![f64::NEG_INFINITY; plan.campaign.objectives.len()],
         coverage: None,
         hypervolume: None,
+        standard_error: None,
         igd_plus: None,
         joint_share: None,
     };
@@ -269,6 +274,7 @@ impl Comparison {
             "timeouts",
             "front",
             "hypervolume",
+            "standard_error",
             "igd_plus",
             "joint_share",
             "coverage",
@@ -288,6 +294,7 @@ impl Comparison {
                 whole(run.timeouts),
                 Datum::count(run.front.members().len()),
                 Datum::real(run.hypervolume),
+                Datum::real(run.standard_error),
                 Datum::real(run.igd_plus),
                 Datum::real(run.joint_share),
                 Datum::real(run.coverage),

@@ -5,6 +5,7 @@ use sesame_plan::CampaignPlan;
 use crate::analysis::{Dataset, Datum};
 use crate::coverage::{Coverage, Feasible, Grid};
 use crate::record::{Origin, RecordError, Repository, ResultSet};
+use crate::search::hypervolume::Volume;
 use crate::search::igd::IgdPlus;
 use crate::search::indicators::{reference_point, volume};
 use crate::search::{Fitness, Front, in_unit};
@@ -31,6 +32,8 @@ pub struct Indicator {
     pub front: u32,
     /// The hypervolume of the front up to the reference point, in the product of the objectives' units.
     pub hypervolume: Option<f64>,
+    /// The standard error of the hypervolume where it is an estimate, as an exact one would have taken too long.
+    pub standard_error: Option<f64>,
     /// IGD⁺ to the front of all tests of the file, each objective divided by the range that this front has in it.
     pub igd_plus: Option<f64>,
     /// Cells covered, where the campaign counts them.
@@ -113,6 +116,7 @@ pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<
                 timeouts: Some(it.timeouts),
                 front: it.front,
                 hypervolume: if given.is_some() { None } else { it.hypervolume },
+                standard_error: if given.is_some() { None } else { it.standard_error },
                 igd_plus: None,
                 covered: None,
             })
@@ -148,7 +152,7 @@ fn follow(
     mut coverage: Option<Coverage>,
 ) {
     let mut front = Front::default();
-    let mut volumes: Option<(Vec<u32>, Option<f64>)> = None;
+    let mut volumes: Option<(Vec<u32>, Option<Volume>)> = None;
     let mut rest = tests.iter();
     let mut done = 0;
     for indicator in generations {
@@ -169,11 +173,13 @@ fn follow(
         if let Some(reference) = reference {
             let members = front.numbers();
             // Most generations leave the front as it is.
-            indicator.hypervolume = match volumes.take() {
+            let measured = match volumes.take() {
                 Some((before, volume)) if before == members => volume,
                 _ => volume(&front, reference),
             };
-            volumes = Some((members, indicator.hypervolume));
+            indicator.hypervolume = measured.map(|volume| volume.value);
+            indicator.standard_error = measured.and_then(|volume| volume.error);
+            volumes = Some((members, measured));
         }
     }
 }
@@ -207,6 +213,7 @@ fn of_sets(
             }
         }
         let evaluations = evaluations_of(&set, tests.len());
+        let measured = reference.and_then(|reference| volume(&front, reference));
         found.push(Indicator {
             generation: set.generation,
             evaluations,
@@ -215,7 +222,8 @@ fn of_sets(
             crashes: None,
             timeouts: None,
             front: u32::try_from(front.members().len()).unwrap_or(u32::MAX),
-            hypervolume: reference.and_then(|reference| volume(&front, reference)),
+            hypervolume: measured.map(|volume| volume.value),
+            standard_error: measured.and_then(|volume| volume.error),
             igd_plus: distance.as_ref().and_then(IgdPlus::value),
             covered: evaluations.and_then(|n| covered.get((n as usize).checked_sub(1)?).copied()),
             set: Some(set.name),
@@ -236,7 +244,7 @@ impl IndicatorAnalysis {
         let imported = self.generations.iter().any(|it| it.set.is_some());
         let head = if imported { vec!["set"] } else { Vec::new() };
         let counts = ["generation", "evaluations", "unique", "void", "crashes", "timeouts", "front"];
-        let measures = ["hypervolume", "igd_plus"];
+        let measures = ["hypervolume", "standard_error", "igd_plus"];
         let cells: &[&str] = if self.cells.is_some() { &["covered", "cells", "coverage"] } else { &[] };
         let columns = head.into_iter().chain(counts).chain(measures).chain(cells.iter().copied());
         let mut dataset = Dataset::new(columns.map(str::to_owned));
@@ -251,7 +259,7 @@ impl IndicatorAnalysis {
             let row = head
                 .into_iter()
                 .chain(counts.map(whole))
-                .chain([Datum::real(it.hypervolume), Datum::real(it.igd_plus)])
+                .chain([Datum::real(it.hypervolume), Datum::real(it.standard_error), Datum::real(it.igd_plus)])
                 .chain(cells.into_iter().flatten());
             dataset.row(row);
         }

@@ -65,8 +65,8 @@ const CONTENT: &[(&str, &str)] = &[
     ("coverage", "SELECT generation, evaluations, covered, cells, feasible FROM coverage ORDER BY generation"),
     (
         "indicators",
-        "SELECT generation, evaluations, unique_tests, void, crashes, timeouts, front, hypervolume FROM indicators \
-         ORDER BY generation",
+        "SELECT generation, evaluations, unique_tests, void, crashes, timeouts, front, hypervolume, estimated, \
+         standard_error FROM indicators ORDER BY generation",
     ),
     ("reference_point", "SELECT objective, metric, value FROM reference_point ORDER BY objective"),
     // Warnings of the campaign itself may come in another order with other workers, so their order is their text's.

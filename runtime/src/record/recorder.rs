@@ -180,15 +180,35 @@ impl Recorder {
         reference: Option<&[f64]>,
     ) -> Result<(), RecordError> {
         let plan = &self.repository.facts.plan;
-        let GenerationIndicators { generation, evaluations, unique, void, crashes, timeouts, front, hypervolume } =
-            *indicators;
+        let GenerationIndicators {
+            generation,
+            evaluations,
+            unique,
+            void,
+            crashes,
+            timeouts,
+            front,
+            hypervolume,
+            standard_error,
+        } = *indicators;
         let written = self.repository.connection.transaction().and_then(|transaction| {
             transaction
                 .prepare_cached(
                     "INSERT OR REPLACE INTO indicators (generation, evaluations, unique_tests, void, crashes, timeouts, \
-                     front, hypervolume) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+                     front, hypervolume, estimated, standard_error) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
                 )?
-                .execute(params![generation, evaluations, unique, void, crashes, timeouts, front, hypervolume])?;
+                .execute(params![
+                    generation,
+                    evaluations,
+                    unique,
+                    void,
+                    crashes,
+                    timeouts,
+                    front,
+                    hypervolume,
+                    standard_error.is_some(),
+                    standard_error
+                ])?;
             let objectives = plan.campaign.objectives.iter().zip(reference.unwrap_or_default()).enumerate();
             for (position, (&metric, &value)) in objectives {
                 transaction

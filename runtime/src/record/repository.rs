@@ -278,8 +278,8 @@ impl Repository {
     /// The indicators after each generation; none of an imported campaign, whose tests are of no generation.
     pub fn indicators(&self) -> Result<Vec<GenerationIndicators>, RecordError> {
         self.read(
-            "SELECT generation, evaluations, unique_tests, void, crashes, timeouts, front, hypervolume FROM indicators \
-             ORDER BY generation",
+            "SELECT generation, evaluations, unique_tests, void, crashes, timeouts, front, hypervolume, standard_error \
+             FROM indicators ORDER BY generation",
             [],
             |row| {
                 Ok(GenerationIndicators {
@@ -291,6 +291,7 @@ impl Repository {
                     timeouts: row.get(5)?,
                     front: row.get(6)?,
                     hypervolume: row.get(7)?,
+                    standard_error: row.get(8)?,
                 })
             },
         )

@@ -222,8 +222,10 @@ CREATE TABLE indicators (
     crashes         INTEGER NOT NULL,
     timeouts        INTEGER NOT NULL,
     front           INTEGER NOT NULL, -- tests on the front
-    hypervolume     REAL            -- of the front up to the reference point; NULL without objectives, before anything was
+    hypervolume     REAL,           -- of the front up to the reference point; NULL without objectives, before anything was
                                     -- measured, and where the front has no end
+    estimated       INTEGER NOT NULL CHECK (estimated IN (0, 1)), -- 1: an exact hypervolume would have taken too long
+    standard_error  REAL            -- of an estimated hypervolume
 ) STRICT;
 
 -- The point that hypervolumes are measured from: of each objective the worst value of the undisturbed run and of the tests

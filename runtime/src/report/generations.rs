@@ -72,6 +72,16 @@ fn caption(analysis: &IndicatorAnalysis) -> String {
             analysis.reference.iter().map(|(metric, value)| format!("{metric} {}", number::number(*value))).collect();
         let _ = write!(text, "Hypervolumes are measured from {}; more is better. ", number::join_words(&point));
     }
+    if analysis.generations.iter().any(|it| it.standard_error.is_some()) {
+        let share = |it: &Indicator| it.hypervolume.zip(it.standard_error).map(|(volume, error)| error / volume);
+        let worst = analysis.generations.iter().filter_map(share).fold(0.0, f64::max);
+        let _ = write!(
+            text,
+            "Some of them are estimates with standard errors of {} of the value at most, as exact ones would have taken \
+             too long. ",
+            percent(worst)
+        );
+    }
     text.push_str(
         "IGD⁺ is how far a front is, on average, from the front of all tests, in shares of its extent; less is better.",
     );

@@ -8,7 +8,7 @@
 use serde::Serialize;
 
 use crate::observation::Outcome;
-use crate::search::hypervolume::hypervolume;
+use crate::search::hypervolume::{self, Volume};
 use crate::search::{Fitness, Front};
 
 /// How far beyond the worst value the reference point lies, as a share of the range of values: far enough that a front
@@ -35,6 +35,9 @@ pub struct GenerationIndicators {
     /// The hypervolume of the front up to the reference point, in the product of the objectives' units; `None` without
     /// objectives, before there is a reference point, and where the front has no end.
     pub hypervolume: Option<f64>,
+    /// The standard error of the hypervolume where it is an estimate, as an exact one would have taken too long; `None`
+    /// where it is exact, and where there is none.
+    pub standard_error: Option<f64>,
 }
 
 /// Watches a search. Tests of one generation may come in any order.
@@ -49,7 +52,7 @@ pub struct Indicators {
     crashes: u32,
     timeouts: u32,
     /// The front's members at the latest generation with their hypervolume: mostly the next one has the same.
-    latest: Option<(Vec<u32>, Option<f64>)>,
+    latest: Option<(Vec<u32>, Option<Volume>)>,
 }
 
 impl Indicators {
@@ -81,12 +84,12 @@ impl Indicators {
             self.early.clear();
         }
         let numbers = front.numbers();
-        let hypervolume = match &self.latest {
+        let measured = match &self.latest {
             Some((members, volume)) if *members == numbers => *volume,
             _ => self.reference.as_ref().and_then(|reference| volume(front, reference)),
         };
         // Before there is a reference point nothing is remembered: the same front has a volume once there is one.
-        self.latest = self.reference.is_some().then_some((numbers, hypervolume));
+        self.latest = self.reference.is_some().then_some((numbers, measured));
         GenerationIndicators {
             generation,
             evaluations: self.evaluations,
@@ -95,7 +98,8 @@ impl Indicators {
             crashes: self.crashes,
             timeouts: self.timeouts,
             front: u32::try_from(front.members().len()).unwrap_or(u32::MAX),
-            hypervolume,
+            hypervolume: measured.map(|volume| volume.value),
+            standard_error: measured.and_then(|volume| volume.error),
         }
     }
 
@@ -105,10 +109,11 @@ impl Indicators {
     }
 }
 
-/// The hypervolume of a front up to a point; `None` where it has no end.
-pub fn volume(front: &Front, reference: &[f64]) -> Option<f64> {
+/// The hypervolume of a front up to a point, estimated where an exact one would take too long; `None` where it has no end.
+pub fn volume(front: &Front, reference: &[f64]) -> Option<Volume> {
     let points: Vec<&[f64]> = front.members().iter().map(|member| member.objectives.as_slice()).collect();
-    Some(hypervolume(&points, reference)).filter(|volume| volume.is_finite() && !reference.is_empty())
+    let volume = hypervolume::measured(&points, reference, hypervolume::WORK);
+    (volume.value.is_finite() && !reference.is_empty()).then_some(volume)
 }
 
 /// Of each objective the worst finite value, and half of the range of all beyond it; `None` where an objective has no
@@ -168,5 +173,22 @@ mod tests {
         let front = Front::of([(1, &Fitness::Measured(Vec::new()))]);
         indicators.add(&Outcome::Completed, false, &Fitness::Measured(Vec::new()));
         assert_eq!(indicators.after(0, &front).hypervolume, None);
+    }
+
+    #[test]
+    fn a_front_of_many_objectives_has_an_estimated_hypervolume_that_says_so() {
+        let mut stream = crate::rng::Stream::derive(1, "test", &[]);
+        let points: Vec<Fitness> =
+            (0..80).map(|_| Fitness::Measured((0..12).map(|_| stream.unit()).collect())).collect();
+        let mut indicators = Indicators::new(None);
+        for point in &points {
+            indicators.add(&Outcome::Completed, false, point);
+        }
+        let front = Front::of((0u32..).zip(&points));
+        let after = indicators.after(0, &front);
+        let (volume, error) = (after.hypervolume.unwrap(), after.standard_error.unwrap());
+        assert!(error > 0.0 && error < 0.05 * volume, "{volume} and {error}");
+        // The front of the next generation is the same, and so is what is known of it.
+        assert_eq!(indicators.after(1, &front), GenerationIndicators { generation: 1, ..after });
     }
 }

@@ -1,12 +1,13 @@
-//! What the search costs without any simulation: evaluations per second of NSGA-II on published problems, and the
-//! hypervolume they reach. Beside it, where `SESAME_OPTIMISERS_PYTHON` names a Python with them, pygmo and pymoo in the
+//! What the search costs without any simulation: hypervolumes of many objectives, exact and as a campaign has them; and
+//! evaluations per second of NSGA-II on published problems, and the hypervolume they reach. Beside it, where `SESAME_OPTIMISERS_PYTHON` names a Python with them, pygmo and pymoo in the
 //! same run, turn by turn.
 
 use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use sesame_runtime::search::hypervolume::hypervolume;
+use sesame_runtime::rng::Stream;
+use sesame_runtime::search::hypervolume::{WORK, hypervolume, measured};
 use sesame_runtime::search::problems::{Problem, approximate};
 use sesame_tests::optimisers::{Ran, Run, ask};
 
@@ -19,6 +20,32 @@ fn runs(criterion: &mut Criterion) {
     for problem in Problem::ALL {
         group.bench_function(BenchmarkId::new(problem.name(), EVALUATIONS), |bencher| {
             bencher.iter(|| black_box(approximate(problem, POPULATION, EVALUATIONS, 1)));
+        });
+    }
+    group.finish();
+}
+
+/// Points on a sphere, of which none dominates another.
+fn sphere(objectives: usize, count: usize) -> Vec<Vec<f64>> {
+    let mut stream = Stream::derive(1, "sphere", &[]);
+    let point = |_| {
+        let ray: Vec<f64> = (0..objectives).map(|_| stream.normal().abs()).collect();
+        let length = ray.iter().map(|x| x * x).sum::<f64>().sqrt();
+        ray.iter().map(|x| x / length).collect()
+    };
+    (0..count).map(point).collect()
+}
+
+fn volumes(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("hypervolume");
+    group.sample_size(10);
+    for (objectives, count) in [(3, 400), (4, 400), (5, 400), (6, 400), (8, 100), (8, 200)] {
+        let points = sphere(objectives, count);
+        let points: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+        let reference = vec![1.1; objectives];
+        let name = format!("{objectives} objectives");
+        group.bench_function(BenchmarkId::new(&name, count), |bencher| {
+            bencher.iter(|| black_box(measured(&points, &reference, WORK)));
         });
     }
     group.finish();
@@ -83,5 +110,5 @@ fn beside_others(_: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, runs, beside_others);
+criterion_group!(benches, volumes, runs, beside_others);
 criterion_main!(benches);
