@@ -19,7 +19,9 @@ use crate::record::{
 };
 use crate::rng::derive_seed;
 use crate::search::indicators::Indicators;
-use crate::search::{self, Candidate, Confirming, Course, Evaluated, Front, Neighbours, SearchError, StopRules};
+use crate::search::{
+    self, Candidate, Confirming, Course, Evaluated, Front, Judged, Neighbours, SearchError, StopRules,
+};
 use crate::sspr::{self, Point};
 
 /// A test that runs this many times as long as the undisturbed run is taken to hang.
@@ -173,6 +175,7 @@ pub fn conduct(
     let mut again = Again::default();
     let mut neighbours = Neighbours::of(plan);
     let mut originals = BTreeMap::new();
+    let mut violating = BTreeSet::new();
     let mut numbered = 0;
     let mut done = 0;
     let mut stop = "all tests were evaluated".to_owned();
@@ -209,6 +212,9 @@ pub fn conduct(
                 again.remember(record);
             }
             front.add(record.number, &fitness);
+            if violates(plan, &record.observation) {
+                violating.insert(record.number);
+            }
             let failing = failing.is_some_and(|failing| {
                 record::fails(plan, failing, &record.observation.outcome, |id| value(&record.observation, id))
             });
@@ -238,7 +244,12 @@ pub fn conduct(
         told.sort_by_key(|evaluated| evaluated.number);
         let stands_for = |number: u32| originals.get(&number).copied().unwrap_or(number);
         if let Some((confirmation, confirming)) = &mut confirming {
-            confirming.begin(told.iter().map(|it| (it.number, stands_for(it.number), it.fitness.clone())));
+            confirming.begin(told.iter().map(|it| Judged {
+                number: it.number,
+                stands_for: stands_for(it.number),
+                first: it.fitness.clone(),
+                violates: confirmation.violations && violating.contains(&it.number),
+            }));
             loop {
                 let wanted = confirming.unconfirmed();
                 if wanted.is_empty() {
@@ -260,6 +271,10 @@ pub fn conduct(
             }
             for (evaluated, fitness) in told.iter_mut().zip(confirming.fitness()) {
                 evaluated.fitness = fitness.clone();
+                let runs = desk.repetitions(stands_for(evaluated.number));
+                if let Some(confirmed) = record::confirmed_margins(plan, runs).filter(|_| margins) {
+                    evaluated.margins = confirmed;
+                }
             }
             front = confirming.front();
         }
@@ -533,6 +548,14 @@ impl Desk<'_> {
 fn value(observation: &Observation, id: MetricId) -> MetricValue {
     let metric = observation.metrics.get(id.index());
     metric.map_or_else(MetricValue::default, |metric| MetricValue { value: metric.value, set: metric.set })
+}
+
+/// Whether a run violates a requirement.
+fn violates(plan: &CampaignPlan, observation: &Observation) -> bool {
+    plan.requirements.iter().any(|requirement| {
+        let value = value(observation, requirement.metric);
+        verdict(requirement.bound, &observation.outcome, value) == Verdict::Violated
+    })
 }
 
 /// What is wrong with a system before anything is fuzzed.

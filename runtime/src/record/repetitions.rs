@@ -3,23 +3,62 @@
 use std::collections::BTreeMap;
 
 use rusqlite::params;
-use sesame_plan::CampaignPlan;
+use sesame_plan::{CampaignPlan, Requirement};
 
-use crate::observation::Outcome;
+use crate::observation::{MetricObservation, Observation, Outcome, WallTime};
 use crate::record::recorder::write_event;
 use crate::record::schema::index;
-use crate::record::{Event, EventKind, MetricValue, RecordError, Recorder, Repetition, Repository, ScannedTest};
-use crate::search::confirming::typical;
-use crate::search::{self, Fitness};
+use crate::record::{
+    Event, EventKind, MetricValue, RecordError, Recorder, Repetition, Repository, ScannedTest, Tally, TestRow, Verdict,
+};
+use crate::search::confirming::{typical, typical_margin};
+use crate::search::{self, Fitness, Margin};
 
 /// What the repetitions of a test say of its fitness, by the campaign's way to sum them up; `None` where the campaign does
 /// not confirm, or not all of its repetitions are there. Further ones, which a user asked for later, change nothing.
 pub fn confirmed_fitness(plan: &CampaignPlan, repetitions: &[Repetition]) -> Option<Fitness> {
     let confirmation = plan.campaign.confirm?;
-    let runs = repetitions.iter().take_while(|run| run.position <= confirmation.times);
-    let runs: Vec<Fitness> =
-        runs.map(|run| search::fitness_of(plan, &run.outcome, |metric| run.value(metric).value)).collect();
-    (runs.len() == confirmation.times as usize).then(|| typical(&runs, confirmation.by))
+    let runs: Vec<Fitness> = own(plan, repetitions)?
+        .iter()
+        .map(|run| search::fitness_of(plan, &run.outcome, |metric| run.value(metric).value))
+        .collect();
+    Some(typical(&runs, confirmation.by))
+}
+
+/// How far the repetitions of a test are from violating each requirement, by the campaign's way to sum them up; `None` as
+/// for [`confirmed_fitness`]. The margin of a requirement is unknown where too few repetitions say something about it.
+pub fn confirmed_margins(plan: &CampaignPlan, repetitions: &[Repetition]) -> Option<Vec<Margin>> {
+    let confirmation = plan.campaign.confirm?;
+    let runs: Vec<Vec<Margin>> =
+        own(plan, repetitions)?.iter().map(|run| search::margins(plan, &run.observation())).collect();
+    let of = |requirement: usize| {
+        let margins: Vec<Margin> = runs.iter().map(|run| run[requirement]).collect();
+        typical_margin(&margins, confirmation.by)
+    };
+    Some((0..plan.requirements.len()).map(of).collect())
+}
+
+/// The repetitions by which a campaign confirms a test of its own accord, if it does and all are there.
+fn own<'a>(plan: &CampaignPlan, repetitions: &'a [Repetition]) -> Option<&'a [Repetition]> {
+    let times = plan.campaign.confirm?.times;
+    let count = repetitions.iter().take_while(|run| run.position <= times).count();
+    (count == times as usize).then(|| &repetitions[..count])
+}
+
+impl Repetition {
+    /// What is recorded of the run, in the form that a run reports. Series, operations and warnings are not kept.
+    fn observation(&self) -> Observation {
+        let shown = |it: &MetricValue| MetricObservation { value: it.value, set: it.set, series: Vec::new() };
+        Observation {
+            outcome: self.outcome.clone(),
+            end: self.end,
+            operations: Vec::new(),
+            metrics: self.values.iter().map(shown).collect(),
+            messages: self.messages,
+            warnings: Vec::new(),
+            wall: WallTime::default(),
+        }
+    }
 }
 
 /// By what the tests of a campaign are judged.
@@ -36,6 +75,27 @@ impl Judge<'_> {
         let runs = self.repetitions.get(&test.duplicate_of.unwrap_or(test.number));
         runs.and_then(|runs| confirmed_fitness(self.plan, runs))
             .unwrap_or_else(|| search::fitness_of(self.plan, &test.outcome, |metric| test.value(metric).value))
+    }
+
+    /// What a test says about a requirement: its fresh runs where it was run again, else its one run. A duplicate says
+    /// what its original says.
+    pub fn verdict(&self, row: &TestRow, requirement: &Requirement) -> Verdict {
+        self.tally(row.duplicate_of.unwrap_or(row.number), requirement).verdict(row.verdict(requirement))
+    }
+
+    /// What a test says about a requirement, as [`Judge::verdict`] has it.
+    pub fn verdict_of_scanned(&self, test: &ScannedTest, requirement: &Requirement) -> Verdict {
+        self.tally(test.duplicate_of.unwrap_or(test.number), requirement).verdict(test.verdict(requirement))
+    }
+
+    /// What the fresh runs of a test say about a requirement; of a test that is no duplicate.
+    pub fn tally(&self, test: u32, requirement: &Requirement) -> Tally {
+        Tally::of(self.runs(test).iter().map(|run| run.verdict(requirement)))
+    }
+
+    /// The fresh runs of a test, in their order; none of one that was run once only.
+    pub fn runs(&self, test: u32) -> &[Repetition] {
+        self.repetitions.get(&test).map_or(&[], Vec::as_slice)
     }
 
     /// All repetitions, by the numbers of their tests.
@@ -256,10 +316,26 @@ mod tests {
         let completed = |position, collisions| repetition(3, position, Outcome::Completed, Some(collisions));
         let runs = [completed(1, 2.0), completed(2, 4.0), completed(3, 90.0)];
         assert_eq!(confirmed_fitness(&plan, &runs), None, "it does not confirm");
-        plan.campaign.confirm = Some(Confirmation { times: 2, by: Typical::Mean });
+        plan.campaign.confirm = Some(Confirmation { times: 2, by: Typical::Mean, violations: false });
         // Fuzzing time is minimised, collisions are maximised.
         let Some(Fitness::Measured(values)) = confirmed_fitness(&plan, &runs) else { panic!("both have values") };
         assert_eq!(values, [f64::midpoint(1.1, 2.1), -3.0]);
         assert_eq!(confirmed_fitness(&plan, &runs[1..]), None, "one of its own is missing");
+    }
+    #[test]
+    fn margins_are_those_of_the_fresh_runs() {
+        let mut plan = sample::plan();
+        let completed = |position, collisions| repetition(3, position, Outcome::Completed, Some(collisions));
+        let runs = [completed(1, 2.0), completed(2, 4.0), completed(3, 90.0)];
+        assert_eq!(confirmed_margins(&plan, &runs), None, "it does not confirm");
+        plan.campaign.confirm = Some(Confirmation { times: 2, by: Typical::Mean, violations: false });
+        // R1: at most 0 collisions. R4 bounds a metric without value here.
+        let margins = confirmed_margins(&plan, &runs).unwrap();
+        assert_eq!(margins[0], Margin { value: Some(-3.0), violated: true });
+        assert_eq!(margins[3], Margin { value: None, violated: false });
+        let crash = Outcome::Crash { message: "gone".to_owned() };
+        let one_crash = [repetition(3, 1, crash, Some(0.0)), completed(2, 4.0)];
+        assert_eq!(confirmed_margins(&plan, &one_crash).unwrap()[0], Margin { value: None, violated: false });
+        assert_eq!(confirmed_margins(&plan, &runs[1..]), None, "one of its own is missing");
     }
 }

@@ -47,16 +47,14 @@ pub(super) fn described(plan: &CampaignPlan) -> String {
     if let Some(confirmation) = plan.campaign.confirm {
         let times = f64::from(confirmation.times);
         let tests = plan.campaign.search.evaluations();
+        let most = f64::from(tests) * times;
         let likely = (entering(tests, plan.campaign.objectives.len()) * times).round();
-        lines.push((
-            "confirming",
-            format!(
-                "at most {} more runs, {} for each test that enters the front: about {likely} if tests were drawn \
-                 independently, more where a search improves",
-                f64::from(tests) * times,
-                confirmation.times
-            ),
-        ));
+        let (each, times) = ("for each test that", confirmation.times);
+        let front =
+            format!("about {likely} for the front if tests were drawn independently, more where a search improves");
+        let or = if confirmation.violations { " or violates a requirement" } else { "" };
+        let line = format!("at most {most} more runs, {times} {each} enters the front{or}: {front}");
+        lines.push(("confirming", line));
     }
     let mut out = String::new();
     for (name, line) in lines {
