@@ -111,7 +111,7 @@ fn a_front_is_of_confirmed_tests_and_says_how_often_each_finding_came_again() {
         })
         .unwrap();
     assert_eq!(rows, standings.values().sum::<u32>());
-    assert_eq!(again, counted);
+    assert_eq!(usize::try_from(again).unwrap(), counted);
 }
 
 /// Whether a row's first run violates the one requirement of gusts.
