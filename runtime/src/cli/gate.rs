@@ -157,13 +157,11 @@ mod tests {
     fn each_finding_closes_its_own_gate_and_that_of_any_finding() {
         let (clean, plan) = found();
         assert_eq!(objections(&[Finding::Any], &clean, &plan), [""; 0]);
-        let mut timeout = crash(3);
-        timeout.outcome = "timeout".to_owned();
-        let changes: [(Finding, Box<dyn Fn(&mut Summary)>); 4] = [
-            (Finding::Violation, Box::new(|it| it.requirements[0].violated = 2)),
-            (Finding::Crash, Box::new(|it| it.failures.push(crash(2)))),
-            (Finding::Timeout, Box::new(move |it| it.failures.push(timeout.clone()))),
-            (Finding::Inconclusive, Box::new(|it| it.requirements[1].unsaid = 1)),
+        let changes: [(Finding, fn(&mut Summary)); 4] = [
+            (Finding::Violation, |it| it.requirements[0].violated = 2),
+            (Finding::Crash, |it| it.failures.push(crash(2))),
+            (Finding::Timeout, |it| it.failures.push(Failure { outcome: "timeout".to_owned(), ..crash(3) })),
+            (Finding::Inconclusive, |it| it.requirements[1].unsaid = 1),
         ];
         for (at, (finding, change)) in changes.iter().enumerate() {
             let mut summary = clean.clone();

@@ -124,7 +124,7 @@ mod tests {
         /// The oracle goes by the sentences of the documentation, one after the other.
         #[test]
         fn the_rule_is_that_of_a_naive_recount(first in said(), runs in prop::collection::vec(said(), 0..8)) {
-            let any = |wanted: Verdict| runs.iter().any(|&run| run == wanted);
+            let any = |wanted: Verdict| runs.contains(&wanted);
             let verdict = if runs.is_empty() {
                 first
             } else if any(Violated) {

@@ -206,6 +206,7 @@ impl Repository {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
     use sesame_plan::{Confirmation, Typical};
 
     use super::*;
@@ -337,5 +338,75 @@ mod tests {
         let one_crash = [repetition(3, 1, crash, Some(0.0)), completed(2, 4.0)];
         assert_eq!(confirmed_margins(&plan, &one_crash).unwrap()[0], Margin { value: None, violated: false });
         assert_eq!(confirmed_margins(&plan, &runs[1..]), None, "one of its own is missing");
+    }
+    /// A run: how it ended, and whether it shows a collision; `None` where it has no value.
+    fn run() -> impl Strategy<Value = (Outcome, Option<bool>)> {
+        let crash = Outcome::Crash { message: String::new() };
+        let outcomes = vec![Outcome::Completed, Outcome::Void, Outcome::Timeout { limit: 1.0 }, crash];
+        (prop::sample::select(outcomes), prop::option::of(any::<bool>()))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// The oracle counts the runs by hand, each by what it is.
+        #[test]
+        fn database_and_reports_say_the_same_of_a_test_that_was_run_again(
+            first in run(), fresh in prop::collection::vec(run(), 0..5),
+        ) {
+            let said = |(outcome, shows): &(Outcome, Option<bool>)| match (outcome, shows) {
+                (_, Some(true)) => "violated",
+                (Outcome::Completed | Outcome::Void, Some(false)) => "kept",
+                _ => "unsaid",
+            };
+            let count = |word: &str| fresh.iter().filter(|run| said(run) == word).count();
+            let expected = match (fresh.len(), count("violated"), count("kept")) {
+                (0, ..) => said(&first),
+                (_, 1.., _) => "violated",
+                (_, _, 1..) => "kept",
+                _ if said(&first) == "violated" => "violated",
+                _ => "unsaid",
+            };
+            let value = |shows: Option<bool>| shows.map(|shows| f64::from(u8::from(shows)));
+
+            let folder = tempfile::tempdir().unwrap();
+            let mut plan = sample::plan();
+            plan.requirements.truncate(1);
+            let mut record = sample::record(&plan, 3, crate::record::Origin::Search, sesame_plan::Test::default());
+            record.observation.outcome = first.0.clone();
+            record.observation.metrics[0] =
+                MetricObservation { value: value(first.1), set: first.1.is_some(), series: Vec::new() };
+            let mut recorder = Recorder::create(folder.path(), &plan, 1, 1).unwrap();
+            recorder.commit(&record).unwrap();
+            for (position, (outcome, shows)) in (1..).zip(&fresh) {
+                recorder.put_repetition(&repetition(3, position, outcome.clone(), value(*shows)), &[]).unwrap();
+            }
+            let repository = recorder.finish("all evaluations done").unwrap();
+
+            let row = repository.row(3).unwrap();
+            let judge = repository.judge().unwrap();
+            prop_assert_eq!(judge.verdict(&row, &plan.requirements[0]).word(), expected);
+            let open = rusqlite::Connection::open(folder.path().join(DATABASE)).unwrap();
+            let word = |view: &str| -> String {
+                open.query_row(&format!("SELECT verdict FROM {view}"), [], |row| row.get(0)).unwrap()
+            };
+            prop_assert_eq!(word("verdicts"), expected);
+            prop_assert_eq!(word("first_verdicts"), said(&first));
+            let counts: Vec<(u32, u32, u32)> = open
+                .prepare("SELECT confirmed, said, repetitions FROM confirmations")
+                .unwrap()
+                .query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
+                .unwrap()
+                .collect::<Result<_, _>>()
+                .unwrap();
+            let listed = !fresh.is_empty() && (said(&first) == "violated" || count("violated") > 0);
+            let counted = [count("violated"), count("violated") + count("kept"), fresh.len()];
+            let [violated, told, all] = counted.map(|count| u32::try_from(count).unwrap());
+            prop_assert_eq!(counts, if listed { vec![(violated, told, all)] } else { vec![] });
+            let is_finding: bool = open
+                .query_row("SELECT count(*) > 0 FROM findings WHERE finding = 'violation'", [], |row| row.get(0))
+                .unwrap();
+            prop_assert_eq!(is_finding, expected == "violated");
+        }
     }
 }
