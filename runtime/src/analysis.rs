@@ -138,9 +138,9 @@ fn operations(plan: &CampaignPlan, test: &ScannedTest) -> String {
 /// the campaign confirmed them. Equal tests are all there; `same_as` names the one that stands for them in the campaign's
 /// own fronts. Without a selection these are the tests of the whole file.
 ///
-/// Where tests were run again, `confirmed` says in how many of the `repetitions` came again what was found, from
-/// `confirmed_low` to `confirmed_high` is the 95 % Wilson interval, and `standing` is `confirmed`, `flaky` or
-/// `not confirmed`.
+/// Where tests were run again, `finding` is what fresh runs show most often (a requirement, `crash` or `timeout`), `confirmed`
+/// is in how many of the `said` runs that say anything about it, of all `repetitions`. From `confirmed_low` to
+/// `confirmed_high` is the 95 % Wilson interval, and `standing` is `confirmed`, `flaky` or `not confirmed`.
 pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, RecordError> {
     let plan = repository.plan();
     let objectives = &plan.campaign.objectives;
@@ -155,11 +155,11 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, 
     let confirmed = if judge.repetitions().is_empty() {
         Vec::new()
     } else {
-        confirmed_tests(repository, &repository.tests()?, &[])?
+        confirmed_tests(plan, &judge, &repository.tests()?, &[])
     };
     let again: &[&str] = match confirmed.len() {
         0 => &[],
-        _ => &["confirmed", "repetitions", "confirmed_low", "confirmed_high", "standing"],
+        _ => &["finding", "confirmed", "said", "repetitions", "confirmed_low", "confirmed_high", "standing"],
     };
     let again_columns = again.iter().map(|&column| column.to_owned());
     let mut dataset =
@@ -176,13 +176,16 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, 
         let values = objectives.iter().zip(oriented).map(|(&id, &value)| Datum::real(Some(in_unit(plan, id, value))));
         let same = if members[at].number == *number { Datum::Missing } else { name(members[at].number) };
         let of = confirmed.iter().find(|test| test.number == *number);
-        let ends = of.and_then(|test| test.interval);
+        let surest = of.and_then(|test| test.surest());
+        let ends = surest.and_then(|finding| finding.interval);
         let came_again = [
-            of.filter(|test| test.standing.is_some()).map_or(Datum::Missing, |test| Datum::count(test.again)),
+            surest.map_or(Datum::Missing, |finding| Datum::Text(finding.finding.clone())),
+            surest.map_or(Datum::Missing, |finding| Datum::count(finding.again)),
+            surest.map_or(Datum::Missing, |finding| Datum::count(finding.said)),
             of.map_or(Datum::Missing, |test| Datum::count(test.repetitions)),
             Datum::real(ends.map(|[low, _]| low)),
             Datum::real(ends.map(|[_, high]| high)),
-            of.and_then(|test| test.standing).map_or(Datum::Missing, |it| Datum::Text(it.words().to_owned())),
+            surest.and_then(|finding| finding.standing).map_or(Datum::Missing, |it| Datum::Text(it.words().to_owned())),
         ];
         let came_again = came_again.into_iter().take(again.len());
         dataset.row([name(*number)].into_iter().chain(values).chain([same]).chain(came_again));

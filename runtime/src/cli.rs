@@ -5,6 +5,7 @@
 
 mod confirm;
 mod export;
+mod gate;
 mod known;
 mod progress;
 mod recorded;
@@ -28,8 +29,8 @@ use crate::campaign;
 use crate::report::{self, TextOptions};
 use crate::runner::Runner;
 
-/// Exit code of a command that did its work and found that something is not as required: a requirement or expectation
-/// is violated, where that was asked for, or a test came out different.
+/// Exit code of a command that did its work and found that something is not as required: what `--fail-on` names was found, a
+/// campaign says too little, or a test came out different.
 const NOT_AS_REQUIRED: u8 = 3;
 
 /// Exit code of a run that the user stopped, as shells have it for an interrupted program.
@@ -40,8 +41,9 @@ const STOPPED: u8 = 130;
     version,
     args_conflicts_with_subcommands = true,
     after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but not as required (`known`: an expectation is not \
-                  kept; `replay`: the test came out different; `replay-recording`: a metric did; `--fail-on-violation`: a requirement or expectation is \
-                  violated); 130 stopped by the user."
+                  kept; `replay`: the test came out different; `replay-recording`: a metric did; `--fail-on`: what it names was found; \
+                  a campaign says too little: most of its tests broke off, none was disturbed, or no requirement was judged); 130 stopped by \
+                  the user."
 )]
 struct Cli {
     #[command(subcommand)]

@@ -11,6 +11,7 @@ mod difference;
 mod digest;
 mod error;
 mod folder;
+mod fresh;
 mod recorder;
 mod repetitions;
 mod repository;
@@ -23,7 +24,7 @@ mod tests;
 mod verdict;
 
 use serde::Serialize;
-use sesame_plan::{KnownTestId, Test};
+use sesame_plan::{KnownTestId, Requirement, Test};
 
 use crate::observation::{MetricObservation, Observation, Outcome, Reach};
 
@@ -31,8 +32,9 @@ pub use difference::{Difference, differences};
 pub use digest::digest;
 pub use error::RecordError;
 pub use folder::{Claim, DATABASE, LOCK, TRACES, claim_folder, latest_folder, trace_file};
+pub use fresh::{Standing, Tally};
 pub use recorder::Recorder;
-pub use repetitions::{Judge, confirmed_fitness};
+pub use repetitions::{Judge, confirmed_fitness, confirmed_margins};
 pub use repository::{CampaignFacts, Repository};
 pub use scan::{ScannedOperation, ScannedTest};
 pub use schema::SCHEMA;
@@ -99,6 +101,11 @@ impl Repetition {
     /// The value of the plan's metric at this position; unmeasured when the run reported none.
     pub fn value(&self, metric: sesame_plan::MetricId) -> MetricValue {
         self.values.get(metric.index()).copied().unwrap_or_default()
+    }
+
+    /// What this run says about a requirement.
+    pub fn verdict(&self, requirement: &Requirement) -> Verdict {
+        verdict(requirement.bound, &self.outcome, self.value(requirement.metric))
     }
 }
 
@@ -183,6 +190,11 @@ impl TestRow {
     /// The value of the plan's metric at this position; unmeasured when the run reported none.
     pub fn value(&self, metric: sesame_plan::MetricId) -> MetricValue {
         self.values.get(metric.index()).copied().unwrap_or_default()
+    }
+
+    /// What this run says about a requirement.
+    pub fn verdict(&self, requirement: &Requirement) -> Verdict {
+        verdict(requirement.bound, &self.outcome, self.value(requirement.metric))
     }
 }
 

@@ -29,8 +29,8 @@ mod table;
 mod text;
 mod timeline;
 
-pub(crate) use confirmed::confirmed_tests;
-pub use confirmed::{ConfirmedTest, FindingAgain, Standing};
+pub use confirmed::{ConfirmedTest, FindingAgain};
+pub(crate) use confirmed::{confirmed_tests, failed, failed_tally};
 pub use coverage::CoverageSummary;
 #[cfg(feature = "campaign")]
 pub(crate) use export::is_name;
@@ -43,7 +43,8 @@ pub(crate) use repetition::wilson;
 pub use repetition::{Repetition, ViolationRate};
 pub use replay::{Replay, replay_text};
 pub use show::{
-    ChoiceReport, ListedTest, MetricReport, OperationReport, TestList, TestReport, VerdictReport, list, show,
+    ChoiceReport, FreshVerdicts, ListedTest, MetricReport, OperationReport, TestList, TestReport, VerdictReport, list,
+    show,
 };
 pub use shrinking::{ShrinkStep, Shrinking, TestSize};
 pub use stacked::{Stacked, StackedSum};

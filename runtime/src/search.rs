@@ -69,7 +69,7 @@ use novelty::{Measure, Novel};
 use nsga2::{Survival, Variation};
 use predict::Predicting;
 
-pub use confirming::Confirming;
+pub use confirming::{Confirming, Judged};
 pub use dominance::{Fitness, Unfit};
 pub use falsification::Falsification;
 pub use front::Front;

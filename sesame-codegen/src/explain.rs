@@ -99,13 +99,14 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
     if let Some(exploration) = &campaign.exploration {
         clauses.push(explored(exploration));
     }
-    if let Some(Confirmation { times, by }) = campaign.confirm {
+    if let Some(Confirmation { times, by, violations }) = campaign.confirm {
         let by = match by {
             Typical::Mean => "mean".to_owned(),
             Typical::Median => "median".to_owned(),
             Typical::Quantile { share } => format!("quantile {}%", percent(share)),
         };
-        clauses.push(("confirm", format!("{times} times {{ by {by} }}")));
+        let violations = if violations { "  violations" } else { "" };
+        clauses.push(("confirm", format!("{times} times {{ by {by}{violations} }}")));
     }
     if !campaign.stop.is_empty() {
         let rules: Vec<String> = campaign.stop.iter().map(stop_rule).collect();
@@ -458,7 +459,7 @@ mod tests {
           coverage { T1 [0, 1] cells 6 }  predict { }  end after 70s }";
     const ELITES: &str = "
         campaign elites { objectives time  operations cut, swing 1..3 per test
-          search map_elites { population 4  evaluations 8 }  confirm 2 times { by median }  coverage { T1 [0, 1] cells 6 }  end after 70s }";
+          search map_elites { population 4  evaluations 8 }  confirm 2 times { by median  violations }  coverage { T1 [0, 1] cells 6 }  end after 70s }";
     const LATIN: &str = "
         campaign latin { objectives time  operations cut, swing 1..2 per test each at most once
           search latin_hypercube { evaluations 8 }  end after 70s }";

@@ -51,7 +51,7 @@ fn known_tests_are_held_to_what_they_expect() {
     let kept = json(&kept);
     assert_eq!(kept["expectations"][0]["verdict"], "kept");
     assert_eq!(kept["results"], "r/known-2");
-    runner.run(&["known", "known_jitter", "--results", "r", "--fail-on-violation"]).expect(3);
+    runner.run(&["known", "known_jitter", "--results", "r", "--fail-on", "violation"]).expect(3);
     let stranger = runner.run(&["known", "jitter", "--results", "r"]).expect(1);
     assert!(
         stranger.err.contains("it can run known_jitter, jitter_near_zone, jitter_bursts, mistaken"),
@@ -115,7 +115,7 @@ fn a_repetition_has_seeds_of_its_own_and_says_how_often_requirements_were_violat
     let known = runner.run(&["repeat", "known_jitter", "3", "--into", "r"]).expect(0);
     assert!(known.out.contains("known_jitter repeated"), "{}", known.out);
     assert!(known.out.contains("3 of 3 [44 %, 100 %]"), "{}", known.out);
-    runner.run(&["repeat", "known_jitter", "2", "--into", "r", "--fail-on-violation"]).expect(3);
+    runner.run(&["repeat", "known_jitter", "2", "--into", "r", "--fail-on", "violation"]).expect(3);
 
     // A stopped one goes on as any run does.
     let folder = runner.folder.join("r/repeat-T3");
@@ -176,7 +176,7 @@ fn a_report_is_made_anew_also_of_an_unfinished_run() {
     assert_eq!((&told["seed"], &told["digest"]), (&5.into(), &digest.trim().into()));
     let violated = told["requirements"].as_array().unwrap().iter().any(|it| it["violated"].as_u64() > Some(0));
     let code = if violated { 3 } else { 0 };
-    runner.run(&["report", "--results", "r/5", "--fail-on-violation"]).expect(code);
+    runner.run(&["report", "--results", "r/5", "--fail-on", "violation"]).expect(code);
 
     sql(&folder, "UPDATE campaign SET stop = NULL");
     let unfinished = runner.run(&["report", "--results", "r/5"]).expect(0);

@@ -2,14 +2,17 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How tests that enter the front are confirmed: each is run again, the same disturbance with fresh seeds of the
-/// simulator, and its fitness is then what these runs say.
+/// How tests are confirmed: each is run again, the same disturbance with fresh seeds of the simulator, and its fitness is then
+/// what these runs say. Tests that enter the front are, and those that violate a requirement where it is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Confirmation {
     /// How often each is run again; at least 1.
     pub times: u32,
     /// How the values of these runs become one.
     pub by: Typical,
+    /// Whether each test that violates a requirement is confirmed too, wherever it lies.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub violations: bool,
 }
 
 /// How the values of an objective in several runs become one. The run that selected a test is none of them.

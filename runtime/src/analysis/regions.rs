@@ -14,8 +14,8 @@ mod tree;
 use sesame_plan::{CampaignPlan, RequirementId};
 
 use super::{Dataset, Datum, Selection};
-use crate::observation::Outcome;
-use crate::record::{Origin, RecordError, Repository, ScannedTest, Verdict, verdict};
+use crate::record::{Judge, Origin, RecordError, Repository, ScannedTest, Verdict};
+use crate::report::{failed, failed_tally};
 use feature::{Feature, features, numbers};
 use tree::{Columns, Growth, Node, Question};
 
@@ -175,6 +175,7 @@ fn gather(repository: &Repository, selection: &Selection, targets: Vec<Target>) 
     let features = features(plan);
     let mut values: Vec<Vec<f64>> = vec![Vec::new(); features.len()];
     let mut labels: Vec<(Target, Vec<Option<bool>>)> = targets.into_iter().map(|target| (target, Vec::new())).collect();
+    let judge = repository.judge()?;
     repository.scan(&mut |test| {
         if !is_counted(&test, selection) {
             return;
@@ -183,7 +184,7 @@ fn gather(repository: &Repository, selection: &Selection, targets: Vec<Target>) 
             column.push(number);
         }
         for (target, labels) in &mut labels {
-            labels.push(fails(plan, *target, &test));
+            labels.push(fails(plan, &judge, *target, &test));
         }
     })?;
     Ok(Gathered { features, columns: Columns::new(values), labels })
@@ -193,19 +194,18 @@ fn is_counted(test: &ScannedTest, selection: &Selection) -> bool {
     test.origin != Origin::Reference && test.duplicate_of.is_none() && selection.holds(test.number)
 }
 
-/// Whether a test fails; `None` if it does not say.
-fn fails(plan: &CampaignPlan, target: Target, test: &ScannedTest) -> Option<bool> {
-    match target {
-        Target::Crash => Some(matches!(test.outcome, Outcome::Crash { .. })),
-        Target::Timeout => Some(matches!(test.outcome, Outcome::Timeout { .. })),
-        Target::Requirement(id) => {
-            let requirement = plan.requirement(id);
-            match verdict(requirement.bound, &test.outcome, test.value(requirement.metric)) {
-                Verdict::Violated => Some(true),
-                Verdict::Kept => Some(false),
-                Verdict::Unsaid => None,
-            }
-        }
+/// Whether a test fails, by its fresh runs where it was run again; `None` if it does not say.
+fn fails(plan: &CampaignPlan, judge: &Judge<'_>, target: Target, test: &ScannedTest) -> Option<bool> {
+    let broke_off = |word: &str| failed_tally(judge.runs(test.number), word).verdict(failed(&test.outcome, word));
+    let said = match target {
+        Target::Crash => broke_off("crash"),
+        Target::Timeout => broke_off("timeout"),
+        Target::Requirement(id) => judge.verdict_of_scanned(test, plan.requirement(id)),
+    };
+    match said {
+        Verdict::Violated => Some(true),
+        Verdict::Kept => Some(false),
+        Verdict::Unsaid => None,
     }
 }
 

@@ -20,7 +20,9 @@ use crate::record::{
 };
 use crate::rng::derive_seed;
 use crate::search::indicators::Indicators;
-use crate::search::{self, Candidate, Confirming, Course, Evaluated, Front, Neighbours, SearchError, StopRules};
+use crate::search::{
+    self, Candidate, Confirming, Course, Evaluated, Front, Judged, Neighbours, SearchError, StopRules,
+};
 use crate::sspr::{self, Point};
 
 /// A test that runs this many times as long as the undisturbed run is taken to hang.
@@ -194,6 +196,7 @@ pub fn conduct(
     let mut again = Again::default();
     let mut neighbours = Neighbours::of(plan);
     let mut originals = BTreeMap::new();
+    let mut violating = BTreeSet::new();
     let mut numbered = 0;
     let mut done = 0;
     let mut stop = "all tests were evaluated".to_owned();
@@ -230,6 +233,9 @@ pub fn conduct(
                 again.remember(record);
             }
             front.add(record.number, &fitness);
+            if violates(plan, &record.observation) {
+                violating.insert(record.number);
+            }
             let failing = failing.is_some_and(|failing| {
                 record::fails(plan, failing, &record.observation.outcome, |id| record.observation.value(id))
             });
@@ -259,7 +265,12 @@ pub fn conduct(
         told.sort_by_key(|evaluated| evaluated.number);
         let stands_for = |number: u32| originals.get(&number).copied().unwrap_or(number);
         if let Some((confirmation, confirming)) = &mut confirming {
-            confirming.begin(told.iter().map(|it| (it.number, stands_for(it.number), it.fitness.clone())));
+            confirming.begin(told.iter().map(|it| Judged {
+                number: it.number,
+                stands_for: stands_for(it.number),
+                first: it.fitness.clone(),
+                violates: confirmation.violations && violating.contains(&it.number),
+            }));
             loop {
                 let wanted = confirming.unconfirmed();
                 if wanted.is_empty() {
@@ -281,6 +292,10 @@ pub fn conduct(
             }
             for (evaluated, fitness) in told.iter_mut().zip(confirming.fitness()) {
                 evaluated.fitness = fitness.clone();
+                let runs = desk.repetitions(stands_for(evaluated.number));
+                if let Some(confirmed) = record::confirmed_margins(plan, runs).filter(|_| margins) {
+                    evaluated.margins = confirmed;
+                }
             }
             front = confirming.front();
         }
@@ -608,6 +623,14 @@ fn unheard(plan: &CampaignPlan, reference: &Observation) -> Vec<Unheard> {
         (!unheard.paths.is_empty()).then_some(unheard)
     });
     found.collect()
+}
+
+/// Whether a run violates a requirement.
+fn violates(plan: &CampaignPlan, observation: &Observation) -> bool {
+    plan.requirements.iter().any(|requirement| {
+        let value = value(observation, requirement.metric);
+        verdict(requirement.bound, &observation.outcome, value) == Verdict::Violated
+    })
 }
 
 /// What is wrong with a system before anything is fuzzed.

@@ -8,11 +8,12 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use sesame_plan::CampaignPlan;
 
+use super::gate::Gate;
 use super::recorded::{open, refuse_changed};
 use super::work::{Work, claim_files, interruptible, refuse_unfilled, shown};
 use super::{Failure, Format, STOPPED, print, print_json, text_options};
 use crate::campaign::{Further, confirm_further};
-use crate::record::Recorder;
+use crate::record::{Origin, Recorder, Repository, TestRow, Verdict};
 use crate::report;
 use crate::runner::Runner;
 
@@ -22,9 +23,12 @@ const LINE_EVERY: Duration = Duration::from_secs(10);
 /// Which tests are run again, and how.
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// The tests, for example `T158 T17`; by default those of the front
+    /// The tests, for example `T158 T17`; by default those of the front (with `--violations` those that violate)
     #[arg(value_name = "TEST")]
     tests: Vec<String>,
+    /// Run each test again that violates a requirement and was run once only, on the front or not
+    #[arg(long, conflicts_with = "tests")]
+    violations: bool,
     /// How often each is run again, beside the times it was before
     #[arg(short = 'n', long, default_value_t = 5, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     times: u32,
@@ -34,6 +38,8 @@ pub(super) struct Options {
     /// How to show what came of it
     #[arg(long, value_enum, default_value_t)]
     format: Format,
+    #[command(flatten)]
+    gate: Gate,
     #[command(flatten)]
     work: Work,
 }
@@ -46,9 +52,14 @@ pub(super) fn confirm(
 ) -> Result<ExitCode, Failure> {
     let repository = open(results, options.results.as_deref())?;
     let mut tests = match options.tests.as_slice() {
+        [] if options.violations => run_once(&repository)?,
         [] => repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members),
         names => names.iter().map(|name| repository.find(name)).collect::<Result<_, _>>()?,
     };
+    if tests.is_empty() && options.violations {
+        eprintln!("there is no test that violates a requirement and was run once only");
+        return say(&repository, &tests, options);
+    }
     if tests.is_empty() {
         return Err(Failure(format!(
             "there is no front in {}: name the tests that are to be run again, for example `confirm T1`",
@@ -94,12 +105,28 @@ pub(super) fn confirm(
         eprintln!("stopped; the runs that had ended are kept");
         return Ok(ExitCode::from(STOPPED));
     }
-    let page = folder.join("report.html");
-    report::write_page(&repository, &page)?;
-    let summary = report::summary(&repository)?;
-    let confirmed: Vec<_> = summary.confirmed.into_iter().filter(|test| further.tests.contains(&test.number)).collect();
+    report::write_page(&repository, &folder.join("report.html"))?;
+    say(&repository, &further.tests, options)
+}
+
+/// The tests that violate a requirement and were run once only, by number; none of a duplicate.
+fn run_once(repository: &Repository) -> Result<Vec<u32>, Failure> {
+    let (plan, repetitions) = (repository.plan(), repository.repetitions()?);
+    let violates = |row: &TestRow| plan.requirements.iter().any(|it| row.verdict(it) == Verdict::Violated);
+    let counts = |row: &&TestRow| row.origin != Origin::Reference && row.duplicate_of.is_none();
+    let rows = repository.tests()?;
+    let once = rows.iter().filter(counts).filter(|row| !repetitions.contains_key(&row.number) && violates(row));
+    Ok(once.map(|row| row.number).collect())
+}
+
+/// Prints what fresh runs say of these tests. The exit code is for all that is recorded.
+fn say(repository: &Repository, tests: &[u32], options: &Options) -> Result<ExitCode, Failure> {
+    let summary = report::summary(repository)?;
+    let code = options.gate.code(&summary, repository.plan());
+    let confirmed: Vec<_> = summary.confirmed.into_iter().filter(|test| tests.contains(&test.number)).collect();
     match options.format {
-        Format::Text => print(&report::confirmed_text(&confirmed, text_options())),
-        Format::Json => print_json(&confirmed),
-    }
+        Format::Text => print(&report::confirmed_text(&confirmed, text_options()))?,
+        Format::Json => print_json(&confirmed)?,
+    };
+    Ok(code)
 }

@@ -142,6 +142,7 @@ fn shrinking(plan: &mut CampaignPlan, name: &str, record: &TestRecord, failing: 
     // Nothing is sought, so there is no front.
     plan.campaign.objectives.clear();
     plan.campaign.coverage = None;
+    plan.campaign.confirm = None;
 }
 
 #[cfg(test)]

@@ -9,15 +9,16 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde::Serialize;
-use sesame_plan::{CampaignPlan, Domain, Search};
+use sesame_plan::{CampaignPlan, Domain};
 
+use super::gate::Gate;
 use super::progress::{Display, wait};
-use super::{Failure, Format, NOT_AS_REQUIRED, STOPPED, print, print_json, text_options};
+use super::{Failure, Format, STOPPED, print, print_json, text_options};
 use crate::campaign::{Conducted, Settings, conduct};
 use crate::changed_files::ChangedFiles;
 use crate::fuzz::unimplemented_operations;
 use crate::metric::unimplemented_hooks;
-use crate::record::{self, Claim, Recorder, Repository, Verdict};
+use crate::record::{self, Claim, Recorder, Repository};
 use crate::report::{self, Summary};
 use crate::runner::Runner;
 
@@ -44,9 +45,8 @@ pub(super) struct Ending {
     /// Write requirements, expectations, crashes and timeouts as JUnit test cases into this file
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
-    /// Exit with code 3 when a requirement or an expectation is violated
-    #[arg(long)]
-    fail_on_violation: bool,
+    #[command(flatten)]
+    gate: Gate,
 }
 
 /// A length of wall time from the command line.
@@ -252,21 +252,7 @@ pub(super) fn conclude(
             print_json(&Concluded { results: folder, report: page, digest, summary: &summary })?;
         }
     }
-    let code = if as_required(&summary, repository.plan(), ending.fail_on_violation) { 0 } else { NOT_AS_REQUIRED };
-    Ok(ExitCode::from(code))
-}
-
-/// Whether what was found is what was asked for.
-///
-/// Whoever asks for no violation wants requirements and expectations kept. Whoever runs known tests asks that each
-/// comes to its end as expected; what nobody can tell is not as expected.
-fn as_required(summary: &Summary, plan: &CampaignPlan, fail_on_violation: bool) -> bool {
-    let known = matches!(plan.campaign.search, Search::Known { .. });
-    let broken = summary.requirements.iter().any(|requirement| requirement.violated > 0)
-        || summary.expectations.iter().any(|expectation| expectation.verdict == Verdict::Violated);
-    let expected = summary.failures.is_empty()
-        && summary.expectations.iter().all(|expectation| expectation.verdict == Verdict::Kept);
-    !(fail_on_violation && broken) && (!known || expected)
+    Ok(ending.gate.code(&summary, repository.plan()))
 }
 
 /// A path as the user would type it: relative to where they are, if it is below.

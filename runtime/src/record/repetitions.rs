@@ -3,23 +3,62 @@
 use std::collections::BTreeMap;
 
 use rusqlite::params;
-use sesame_plan::CampaignPlan;
+use sesame_plan::{CampaignPlan, Requirement};
 
-use crate::observation::Outcome;
+use crate::observation::{MetricObservation, Observation, Outcome, WallTime};
 use crate::record::recorder::write_event;
 use crate::record::schema::index;
-use crate::record::{Event, EventKind, MetricValue, RecordError, Recorder, Repetition, Repository, ScannedTest};
-use crate::search::confirming::typical;
-use crate::search::{self, Fitness};
+use crate::record::{
+    Event, EventKind, MetricValue, RecordError, Recorder, Repetition, Repository, ScannedTest, Tally, TestRow, Verdict,
+};
+use crate::search::confirming::{typical, typical_margin};
+use crate::search::{self, Fitness, Margin};
 
 /// What the repetitions of a test say of its fitness, by the campaign's way to sum them up; `None` where the campaign does
 /// not confirm, or not all of its repetitions are there. Further ones, which a user asked for later, change nothing.
 pub fn confirmed_fitness(plan: &CampaignPlan, repetitions: &[Repetition]) -> Option<Fitness> {
     let confirmation = plan.campaign.confirm?;
-    let runs = repetitions.iter().take_while(|run| run.position <= confirmation.times);
-    let runs: Vec<Fitness> =
-        runs.map(|run| search::fitness_of(plan, &run.outcome, |metric| run.value(metric).value)).collect();
-    (runs.len() == confirmation.times as usize).then(|| typical(&runs, confirmation.by))
+    let runs: Vec<Fitness> = own(plan, repetitions)?
+        .iter()
+        .map(|run| search::fitness_of(plan, &run.outcome, |metric| run.value(metric).value))
+        .collect();
+    Some(typical(&runs, confirmation.by))
+}
+
+/// How far the repetitions of a test are from violating each requirement, by the campaign's way to sum them up; `None` as
+/// for [`confirmed_fitness`]. The margin of a requirement is unknown where too few repetitions say something about it.
+pub fn confirmed_margins(plan: &CampaignPlan, repetitions: &[Repetition]) -> Option<Vec<Margin>> {
+    let confirmation = plan.campaign.confirm?;
+    let runs: Vec<Vec<Margin>> =
+        own(plan, repetitions)?.iter().map(|run| search::margins(plan, &run.observation())).collect();
+    let of = |requirement: usize| {
+        let margins: Vec<Margin> = runs.iter().map(|run| run[requirement]).collect();
+        typical_margin(&margins, confirmation.by)
+    };
+    Some((0..plan.requirements.len()).map(of).collect())
+}
+
+/// The repetitions by which a campaign confirms a test of its own accord, if it does and all are there.
+fn own<'a>(plan: &CampaignPlan, repetitions: &'a [Repetition]) -> Option<&'a [Repetition]> {
+    let times = plan.campaign.confirm?.times;
+    let count = repetitions.iter().take_while(|run| run.position <= times).count();
+    (count == times as usize).then(|| &repetitions[..count])
+}
+
+impl Repetition {
+    /// What is recorded of the run, in the form that a run reports. Series, operations and warnings are not kept.
+    fn observation(&self) -> Observation {
+        let shown = |it: &MetricValue| MetricObservation { value: it.value, set: it.set, series: Vec::new() };
+        Observation {
+            outcome: self.outcome.clone(),
+            end: self.end,
+            operations: Vec::new(),
+            metrics: self.values.iter().map(shown).collect(),
+            messages: self.messages,
+            warnings: Vec::new(),
+            wall: WallTime::default(),
+        }
+    }
 }
 
 /// By what the tests of a campaign are judged.
@@ -36,6 +75,27 @@ impl Judge<'_> {
         let runs = self.repetitions.get(&test.duplicate_of.unwrap_or(test.number));
         runs.and_then(|runs| confirmed_fitness(self.plan, runs))
             .unwrap_or_else(|| search::fitness_of(self.plan, &test.outcome, |metric| test.value(metric).value))
+    }
+
+    /// What a test says about a requirement: its fresh runs where it was run again, else its one run. A duplicate says
+    /// what its original says.
+    pub fn verdict(&self, row: &TestRow, requirement: &Requirement) -> Verdict {
+        self.tally(row.duplicate_of.unwrap_or(row.number), requirement).verdict(row.verdict(requirement))
+    }
+
+    /// What a test says about a requirement, as [`Judge::verdict`] has it.
+    pub fn verdict_of_scanned(&self, test: &ScannedTest, requirement: &Requirement) -> Verdict {
+        self.tally(test.duplicate_of.unwrap_or(test.number), requirement).verdict(test.verdict(requirement))
+    }
+
+    /// What the fresh runs of a test say about a requirement; of a test that is no duplicate.
+    pub fn tally(&self, test: u32, requirement: &Requirement) -> Tally {
+        Tally::of(self.runs(test).iter().map(|run| run.verdict(requirement)))
+    }
+
+    /// The fresh runs of a test, in their order; none of one that was run once only.
+    pub fn runs(&self, test: u32) -> &[Repetition] {
+        self.repetitions.get(&test).map_or(&[], Vec::as_slice)
     }
 
     /// All repetitions, by the numbers of their tests.
@@ -157,6 +217,7 @@ impl Repository {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
     use sesame_plan::{Confirmation, Typical};
 
     use super::*;
@@ -270,10 +331,96 @@ mod tests {
         let completed = |position, collisions| repetition(3, position, Outcome::Completed, Some(collisions));
         let runs = [completed(1, 2.0), completed(2, 4.0), completed(3, 90.0)];
         assert_eq!(confirmed_fitness(&plan, &runs), None, "it does not confirm");
-        plan.campaign.confirm = Some(Confirmation { times: 2, by: Typical::Mean });
+        plan.campaign.confirm = Some(Confirmation { times: 2, by: Typical::Mean, violations: false });
         // Fuzzing time is minimised, collisions are maximised.
         let Some(Fitness::Measured(values)) = confirmed_fitness(&plan, &runs) else { panic!("both have values") };
         assert_eq!(values, [f64::midpoint(1.1, 2.1), -3.0]);
         assert_eq!(confirmed_fitness(&plan, &runs[1..]), None, "one of its own is missing");
+    }
+    #[test]
+    fn margins_are_those_of_the_fresh_runs() {
+        let mut plan = sample::plan();
+        let completed = |position, collisions| repetition(3, position, Outcome::Completed, Some(collisions));
+        let runs = [completed(1, 2.0), completed(2, 4.0), completed(3, 90.0)];
+        assert_eq!(confirmed_margins(&plan, &runs), None, "it does not confirm");
+        plan.campaign.confirm = Some(Confirmation { times: 2, by: Typical::Mean, violations: false });
+        // R1: at most 0 collisions. R4 bounds a metric without value here.
+        let margins = confirmed_margins(&plan, &runs).unwrap();
+        assert_eq!(margins[0], Margin { value: Some(-3.0), violated: true });
+        assert_eq!(margins[3], Margin { value: None, violated: false });
+        let crash = Outcome::Crash { message: "gone".to_owned() };
+        let one_crash = [repetition(3, 1, crash, Some(0.0)), completed(2, 4.0)];
+        assert_eq!(confirmed_margins(&plan, &one_crash).unwrap()[0], Margin { value: None, violated: false });
+        assert_eq!(confirmed_margins(&plan, &runs[1..]), None, "one of its own is missing");
+    }
+    /// A run: how it ended, and whether it shows a collision; `None` where it has no value.
+    fn run() -> impl Strategy<Value = (Outcome, Option<bool>)> {
+        let crash = Outcome::Crash { message: String::new() };
+        let outcomes = vec![Outcome::Completed, Outcome::Void, Outcome::Timeout { limit: 1.0 }, crash];
+        (prop::sample::select(outcomes), prop::option::of(any::<bool>()))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// The oracle counts the runs by hand, each by what it is.
+        #[test]
+        fn database_and_reports_say_the_same_of_a_test_that_was_run_again(
+            first in run(), fresh in prop::collection::vec(run(), 0..5),
+        ) {
+            let said = |(outcome, shows): &(Outcome, Option<bool>)| match (outcome, shows) {
+                (_, Some(true)) => "violated",
+                (Outcome::Completed | Outcome::Void, Some(false)) => "kept",
+                _ => "unsaid",
+            };
+            let count = |word: &str| fresh.iter().filter(|run| said(run) == word).count();
+            let expected = match (fresh.len(), count("violated"), count("kept")) {
+                (0, ..) => said(&first),
+                (_, 1.., _) => "violated",
+                (_, _, 1..) => "kept",
+                _ if said(&first) == "violated" => "violated",
+                _ => "unsaid",
+            };
+            let value = |shows: Option<bool>| shows.map(|shows| f64::from(u8::from(shows)));
+
+            let folder = tempfile::tempdir().unwrap();
+            let mut plan = sample::plan();
+            plan.requirements.truncate(1);
+            let mut record = sample::record(&plan, 3, crate::record::Origin::Search, sesame_plan::Test::default());
+            record.observation.outcome = first.0.clone();
+            record.observation.metrics[0] =
+                MetricObservation { value: value(first.1), set: first.1.is_some(), series: Vec::new() };
+            let mut recorder = Recorder::create(folder.path(), &plan, 1, 1).unwrap();
+            recorder.commit(&record).unwrap();
+            for (position, (outcome, shows)) in (1..).zip(&fresh) {
+                recorder.put_repetition(&repetition(3, position, outcome.clone(), value(*shows)), &[]).unwrap();
+            }
+            let repository = recorder.finish("all evaluations done").unwrap();
+
+            let row = repository.row(3).unwrap();
+            let judge = repository.judge().unwrap();
+            prop_assert_eq!(judge.verdict(&row, &plan.requirements[0]).word(), expected);
+            let open = rusqlite::Connection::open(folder.path().join(DATABASE)).unwrap();
+            let word = |view: &str| -> String {
+                open.query_row(&format!("SELECT verdict FROM {view}"), [], |row| row.get(0)).unwrap()
+            };
+            prop_assert_eq!(word("verdicts"), expected);
+            prop_assert_eq!(word("first_verdicts"), said(&first));
+            let counts: Vec<(u32, u32, u32)> = open
+                .prepare("SELECT confirmed, said, repetitions FROM confirmations")
+                .unwrap()
+                .query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
+                .unwrap()
+                .collect::<Result<_, _>>()
+                .unwrap();
+            let listed = !fresh.is_empty() && (said(&first) == "violated" || count("violated") > 0);
+            let counted = [count("violated"), count("violated") + count("kept"), fresh.len()];
+            let [violated, told, all] = counted.map(|count| u32::try_from(count).unwrap());
+            prop_assert_eq!(counts, if listed { vec![(violated, told, all)] } else { vec![] });
+            let is_finding: bool = open
+                .query_row("SELECT count(*) > 0 FROM findings WHERE finding = 'violation'", [], |row| row.get(0))
+                .unwrap();
+            prop_assert_eq!(is_finding, expected == "violated");
+        }
     }
 }

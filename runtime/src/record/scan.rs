@@ -51,7 +51,12 @@ impl ScannedTest {
         self.values.get(metric.index()).copied().unwrap_or_default()
     }
 
-    /// Where it lies in the reduced parameter space; `None` where no operation was active with an effect.
+    /// What this run says about a requirement.
+    pub fn verdict(&self, requirement: &sesame_plan::Requirement) -> super::Verdict {
+        super::verdict(requirement.bound, &self.outcome, self.value(requirement.metric))
+    }
+
+        /// Where it lies in the reduced parameter space; `None` where no operation was active with an effect.
     pub fn point(&self, plan: &CampaignPlan, convention: Convention) -> Option<Point> {
         let disturbances: Vec<Disturbance> = self
             .operations

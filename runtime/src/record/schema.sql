@@ -4,6 +4,7 @@
 -- Values of metrics and parameters are in the unit that stands beside their name. Numbers that need 64 unsigned bits
 -- (seeds) are decimal text, since SQLite's integers are signed.
 -- Questions most people have are answered by the views: results, front, findings, confirmations, verdicts, series.
+-- A test that was run again is what its fresh runs say: verdicts and findings go by them.
 
 -- The campaign: one row.
 CREATE TABLE campaign (
@@ -261,9 +262,10 @@ CREATE TABLE wall_times (
     run_s           REAL NOT NULL   -- wall time of the run as its worker saw it
 ) STRICT;
 
--- Per test and requirement: violated if no value that the metric could have had is inside the bound, kept if the run came
--- to its end, everything that the metric read was finite, and its value is inside the bound; otherwise unsaid.
-CREATE VIEW verdicts AS
+-- Per test and requirement what its own run says, the one that selected it: violated if no value that the metric could have
+-- had is inside the bound, kept if the run came to its end, everything that the metric read was finite, and its value is
+-- inside the bound; otherwise unsaid.
+CREATE VIEW first_verdicts AS
     SELECT t.number AS test, t.name AS test_name, r.name AS requirement, r.text AS requirement_text, v.value AS value,
            CASE
                WHEN v.reach_high < r.low OR v.reach_low > r.high OR (r.low_excluded AND v.reach_high = r.low)
@@ -274,33 +276,76 @@ CREATE VIEW verdicts AS
                     OR (r.high_excluded AND v.value = r.high) THEN 'unsaid'
                ELSE 'kept'
            END AS verdict
-      FROM tests t CROSS JOIN requirements r LEFT JOIN metric_values v ON v.test = t.number AND v.metric = r.metric
+      FROM tests t CROSS JOIN requirements r LEFT JOIN metric_values v ON v.test = t.number AND v.metric = r.metric;
+
+-- The same per repetition and requirement.
+CREATE VIEW repetition_verdicts AS
+    SELECT n.test AS test, n.position AS position, r.name AS requirement, v.value AS value,
+           CASE
+               WHEN v.reach_high < r.low OR v.reach_low > r.high OR (r.low_excluded AND v.reach_high = r.low)
+                    OR (r.high_excluded AND v.reach_low = r.high) THEN 'violated'
+               WHEN v.value IS NULL OR v.not_finite_s IS NOT NULL OR n.outcome NOT IN ('completed', 'void')
+                    THEN 'unsaid'
+               WHEN v.value < r.low OR v.value > r.high OR (r.low_excluded AND v.value = r.low)
+                    OR (r.high_excluded AND v.value = r.high) THEN 'unsaid'
+               ELSE 'kept'
+           END AS verdict
+      FROM repetitions n CROSS JOIN requirements r
+           LEFT JOIN repetition_values v ON v.test = n.test AND v.position = n.position AND v.metric = r.metric;
+
+-- Per test and requirement what the test says. One that was run again violates a requirement if a repetition does, and keeps
+-- it if repetitions say something and none violates it; where none says anything, only a violation by its own run stands.
+-- The value is that of its own run.
+CREATE VIEW verdicts AS
+    SELECT f.test AS test, f.test_name AS test_name, f.requirement AS requirement, f.requirement_text AS requirement_text,
+           f.value AS value,
+           CASE
+               WHEN EXISTS (SELECT 1 FROM repetition_verdicts n WHERE n.test = coalesce(t.duplicate_of, t.number)
+                               AND n.requirement = f.requirement AND n.verdict = 'violated') THEN 'violated'
+               WHEN EXISTS (SELECT 1 FROM repetition_verdicts n WHERE n.test = coalesce(t.duplicate_of, t.number)
+                               AND n.requirement = f.requirement AND n.verdict = 'kept') THEN 'kept'
+               WHEN f.verdict = 'kept'
+                    AND EXISTS (SELECT 1 FROM repetitions n WHERE n.test = coalesce(t.duplicate_of, t.number)) THEN 'unsaid'
+               ELSE f.verdict
+           END AS verdict
+      FROM first_verdicts f JOIN tests t ON t.number = f.test JOIN requirements r ON r.name = f.requirement
      ORDER BY t.number, r.id;
 
 -- What a tester looks for: violated requirements, crashes, timeouts, and metrics that read numbers that are not finite (NaN,
--- infinity), with the time of the first one as their value. Duplicates are left out.
+-- infinity), with the time of the first one as their value. Duplicates are left out, and so is what a test's own run showed
+-- and none of its repetitions does.
 CREATE VIEW findings AS
     SELECT v.test, v.test_name, 'violation' AS finding, v.requirement, v.value, v.requirement_text AS detail
       FROM verdicts v JOIN tests t ON t.number = v.test
      WHERE v.verdict = 'violated' AND t.duplicate_of IS NULL
     UNION ALL
-    SELECT number, name, outcome, NULL, NULL, outcome_detail
-      FROM tests WHERE outcome IN ('crash', 'timeout') AND duplicate_of IS NULL
+    SELECT t.number, t.name, t.outcome, NULL, NULL, t.outcome_detail
+      FROM tests t
+     WHERE t.outcome IN ('crash', 'timeout') AND t.duplicate_of IS NULL
+       AND (NOT EXISTS (SELECT 1 FROM repetitions n WHERE n.test = t.number)
+            OR EXISTS (SELECT 1 FROM repetitions n WHERE n.test = t.number AND n.outcome = t.outcome))
+    UNION ALL
+    SELECT t.number, t.name, n.outcome, NULL, NULL, n.outcome_detail
+      FROM repetitions n JOIN tests t ON t.number = n.test
+     WHERE n.outcome IN ('crash', 'timeout') AND n.outcome <> t.outcome AND t.duplicate_of IS NULL
+       AND n.position = (SELECT min(m.position) FROM repetitions m WHERE m.test = n.test AND m.outcome = n.outcome)
     UNION ALL
     SELECT t.number, t.name, 'not_finite', NULL, v.not_finite_s, 'read by ' || m.name
       FROM metric_values v JOIN tests t ON t.number = v.test JOIN metrics m ON m.id = v.metric
      WHERE v.not_finite_s IS NOT NULL AND t.duplicate_of IS NULL
      ORDER BY 1, 3, 4;
 
--- Violated requirements of tests that were repeated: how many of the repetitions violate the same requirement.
+-- Requirements that a test which was run again violates, in its own run or in a repetition: what its own run says, and how
+-- many of the repetitions violate it, of those that say anything, of all.
 CREATE VIEW confirmations AS
-    SELECT f.test AS test, f.test_name AS test_name, f.requirement AS requirement,
-           count(*) FILTER (WHERE v.reach_high < r.low OR v.reach_low > r.high OR (r.low_excluded AND v.reach_high = r.low)
-                                  OR (r.high_excluded AND v.reach_low = r.high)) AS confirmed,
-           count(*) AS repetitions
-      FROM findings f JOIN requirements r ON r.name = f.requirement JOIN repetitions n ON n.test = f.test
-           LEFT JOIN repetition_values v ON v.test = n.test AND v.position = n.position AND v.metric = r.metric
-     GROUP BY f.test, r.id ORDER BY f.test, r.id;
+    SELECT f.test AS test, f.test_name AS test_name, f.requirement AS requirement, f.verdict AS first,
+           count(*) FILTER (WHERE n.verdict = 'violated') AS confirmed,
+           count(*) FILTER (WHERE n.verdict <> 'unsaid') AS said, count(*) AS repetitions
+      FROM repetition_verdicts n JOIN first_verdicts f ON f.test = n.test AND f.requirement = n.requirement
+           JOIN requirements r ON r.name = f.requirement
+     GROUP BY f.test, r.id
+    HAVING f.verdict = 'violated' OR count(*) FILTER (WHERE n.verdict = 'violated') > 0
+     ORDER BY f.test, r.id;
 
 -- Time series with the names of their metrics.
 CREATE VIEW series AS

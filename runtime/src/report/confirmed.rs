@@ -1,13 +1,12 @@
 //! What running tests again says of what was found: how often each finding came again, and how sure that is.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use serde::Serialize;
 use sesame_plan::{CampaignPlan, Confirmation, Direction, Typical};
 
 use crate::observation::Outcome;
-use crate::record::{RecordError, Repetition, Repository, TestRow, Verdict, confirmed_fitness, verdict};
+use crate::record::{Judge, RecordError, Repetition, Repository, Standing, Tally, TestRow, Verdict, confirmed_fitness};
 use crate::report::number::{self, fixed, join_words, plural};
 use crate::report::repetition::wilson;
 
@@ -27,13 +26,9 @@ pub struct ConfirmedTest {
     /// A value per objective by which the front takes the test, where the campaign confirms; `None` where too few
     /// repetitions have one.
     pub values: Option<Vec<f64>>,
-    /// What was found in its first run; none for a test that violates no requirement and came to its end.
+    /// All that its first run or a fresh one shows: violated requirements in the space's order, then a crash and a timeout.
     pub findings: Vec<FindingAgain>,
-    /// Repetitions in which all of that came again.
-    pub again: usize,
-    /// The 95 % Wilson interval of the probability that a run shows all of it; `None` where nothing was found.
-    pub interval: Option<[f64; 2]>,
-    /// Whether what was found is to be believed; `None` where nothing was found.
+    /// Of its findings, how the surest one stands; `None` where nothing was found, or no fresh run says anything about it.
     pub standing: Option<Standing>,
 }
 
@@ -42,41 +37,95 @@ pub struct ConfirmedTest {
 pub struct FindingAgain {
     /// The name of the violated requirement, or `crash` or `timeout`.
     pub finding: String,
-    /// Repetitions in which it came again.
+    /// Whether the first run shows it; otherwise it was first seen in a fresh one.
+    pub first: bool,
+    /// Fresh runs that show it.
     pub again: usize,
+    /// Fresh runs that say whether it is there: these, and those that show that it is not.
+    pub said: usize,
+    /// Fresh runs that do not say: they broke off too early, or a value is missing.
+    pub unsaid: usize,
+    /// The 95 % Wilson interval of the probability that a run shows it; `None` where no fresh run says anything.
+    pub interval: Option<[f64; 2]>,
+    /// Whether it is to be believed; `None` where no fresh run says anything.
+    pub standing: Option<Standing>,
 }
 
-/// Whether a finding is to be believed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Standing {
-    /// It came again in every repetition.
-    Confirmed,
-    /// It came again in some.
-    Flaky,
-    /// It came again in none.
-    NotConfirmed,
-}
-
-impl Standing {
-    /// In words.
-    pub fn words(self) -> &'static str {
-        match self {
-            Standing::Confirmed => "confirmed",
-            Standing::Flaky => "flaky",
-            Standing::NotConfirmed => "not confirmed",
-        }
+impl FindingAgain {
+    /// What fresh runs say of a finding; `None` where neither they nor the first run show it.
+    fn of(finding: &str, tally: Tally, first: Verdict) -> Option<FindingAgain> {
+        (first == Verdict::Violated || tally.violated > 0).then(|| FindingAgain {
+            finding: finding.to_owned(),
+            first: first == Verdict::Violated,
+            again: tally.violated,
+            said: tally.said(),
+            unsaid: tally.unsaid,
+            interval: wilson(tally.violated, tally.said()),
+            standing: tally.standing(first),
+        })
     }
+
+    /// How often it came again, as in `4 of 5 (0.38–0.96) flaky`.
+    pub(crate) fn words(&self) -> String {
+        let silent = plural(self.unsaid, "run says nothing", "runs say nothing");
+        let Some(interval) = self.interval else { return silent };
+        let mut words = rate(self.again, self.said, interval);
+        if let Some(standing) = self.standing.filter(|&it| it != Standing::Confirmed) {
+            let _ = write!(words, " {}", standing.words());
+        }
+        if !self.first {
+            words.push_str(", not in its first run");
+        }
+        if self.unsaid > 0 {
+            let _ = write!(words, ", {silent}");
+        }
+        words
+    }
+}
+
+/// How often something was seen, as in `4 of 5 (0.38–0.96)`.
+fn rate(shown: usize, said: usize, [low, high]: [f64; 2]) -> String {
+    format!("{shown} of {said} ({}–{})", fixed(low, 2), fixed(high, 2))
+}
+
+/// What fresh runs say of a requirement, whichever it is, as in `0 of 5 (0.00–0.43)`.
+pub(crate) fn tally_words(tally: Tally) -> String {
+    let silent = plural(tally.unsaid, "run says nothing", "runs say nothing");
+    match wilson(tally.violated, tally.said()) {
+        None => silent,
+        Some(interval) if tally.unsaid == 0 => rate(tally.violated, tally.said(), interval),
+        Some(interval) => format!("{}, {silent}", rate(tally.violated, tally.said(), interval)),
+    }
+}
+
+/// The outcomes that are findings of their own, by their words.
+pub(crate) const FAILURES: [&str; 2] = ["crash", "timeout"];
+
+/// Whether a run ended with this outcome, said like a verdict: every run says whether it did.
+pub(crate) fn failed(outcome: &Outcome, word: &str) -> Verdict {
+    if outcome.word() == word { Verdict::Violated } else { Verdict::Kept }
+}
+
+/// What runs say of a crash or a timeout.
+pub(crate) fn failed_tally(runs: &[Repetition], word: &str) -> Tally {
+    Tally::of(runs.iter().map(|run| failed(&run.outcome, word)))
+}
+
+/// What the fresh runs of a test say of a crash or a timeout; `None` where it was run once only, or no run shows it.
+pub(crate) fn failed_again(judge: &Judge<'_>, row: &TestRow, word: &str) -> Option<FindingAgain> {
+    let runs = judge.runs(row.number);
+    let tally = failed_tally(runs, word);
+    FindingAgain::of(word, tally, failed(&row.outcome, word)).filter(|_| !runs.is_empty())
 }
 
 /// All tests that were run again, by number.
 pub(crate) fn confirmed_tests(
-    repository: &Repository,
+    plan: &CampaignPlan,
+    judge: &Judge<'_>,
     rows: &[TestRow],
     front: &[u32],
-) -> Result<Vec<ConfirmedTest>, RecordError> {
-    let repetitions = repository.repetitions()?;
-    Ok(confirmed(repository.plan(), &repetitions, rows, front))
+) -> Vec<ConfirmedTest> {
+    rows.iter().filter_map(|row| confirmed(plan, judge, row, front.contains(&row.number))).collect()
 }
 
 /// One test, if it was run again.
@@ -85,78 +134,32 @@ pub(crate) fn confirmed_test(
     number: u32,
     front: bool,
 ) -> Result<Option<ConfirmedTest>, RecordError> {
-    let Some(runs) = repository.repetitions()?.remove(&number) else { return Ok(None) };
-    let row = repository.row(number)?;
-    let members = if front { vec![number] } else { Vec::new() };
-    Ok(confirmed(repository.plan(), &BTreeMap::from([(number, runs)]), &[row], &members).pop())
+    Ok(confirmed(repository.plan(), &repository.judge()?, &repository.row(number)?, front))
 }
 
-fn confirmed(
-    plan: &CampaignPlan,
-    repetitions: &BTreeMap<u32, Vec<Repetition>>,
-    rows: &[TestRow],
-    front: &[u32],
-) -> Vec<ConfirmedTest> {
-    let of = |row: &TestRow| {
-        let runs = repetitions.get(&row.number)?;
-        let shown =
-            |it: &Shown<'_>, outcome: &Outcome, value: &dyn Fn(sesame_plan::MetricId) -> crate::record::MetricValue| {
-                match it {
-                    Shown::Requirement(it) => verdict(it.bound, outcome, value(it.metric)) == Verdict::Violated,
-                    Shown::Failure(word) => outcome.word() == *word,
-                }
-            };
-        let requirements = plan.requirements.iter().map(Shown::Requirement);
-        let failed = matches!(row.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. });
-        let failure = failed.then(|| Shown::Failure(row.outcome.word()));
-        let found: Vec<Shown<'_>> =
-            requirements.chain(failure).filter(|it| shown(it, &row.outcome, &|metric| row.value(metric))).collect();
-        let came_again = |it: &Shown<'_>, run: &Repetition| shown(it, &run.outcome, &|metric| run.value(metric));
-        let again = runs.iter().filter(|run| found.iter().all(|it| came_again(it, run))).count();
-        let anything = !found.is_empty();
-        Some(ConfirmedTest {
-            test: format!("T{}", row.number),
-            number: row.number,
-            front: front.contains(&row.number),
-            repetitions: runs.len(),
-            failures: runs
-                .iter()
-                .filter(|run| matches!(run.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. }))
-                .count(),
-            values: confirmed_values(plan, runs),
-            findings: found
-                .iter()
-                .map(|it| FindingAgain {
-                    finding: it.name().to_owned(),
-                    again: runs.iter().filter(|run| came_again(it, run)).count(),
-                })
-                .collect(),
-            again: if anything { again } else { 0 },
-            interval: wilson(again, runs.len()).filter(|_| anything),
-            standing: anything.then_some(match again {
-                0 => Standing::NotConfirmed,
-                again if again == runs.len() => Standing::Confirmed,
-                _ => Standing::Flaky,
-            }),
-        })
-    };
-    rows.iter().filter_map(of).collect()
-}
-
-/// Something that a run can show.
-enum Shown<'p> {
-    Requirement(&'p sesame_plan::Requirement),
-    /// The word of its outcome.
-    Failure(&'static str),
-}
-
-impl Shown<'_> {
-    fn name(&self) -> &str {
-        match self {
-            Shown::Requirement(requirement) => &requirement.name,
-            Shown::Failure(word) => word,
-        }
+fn confirmed(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow, front: bool) -> Option<ConfirmedTest> {
+    let runs = judge.runs(row.number);
+    if runs.is_empty() {
+        return None;
     }
+    let requirements = plan.requirements.iter().filter_map(|requirement| {
+        FindingAgain::of(&requirement.name, judge.tally(row.number, requirement), row.verdict(requirement))
+    });
+    let failures = FAILURES.into_iter().filter_map(|word| failed_again(judge, row, word));
+    let findings: Vec<FindingAgain> = requirements.chain(failures).collect();
+    Some(ConfirmedTest {
+        test: format!("T{}", row.number),
+        number: row.number,
+        front,
+        repetitions: runs.len(),
+        failures: runs
+            .iter()
+            .filter(|run| matches!(run.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. }))
+            .count(),
+        values: confirmed_values(plan, runs),
+        standing: findings.iter().filter_map(|finding| finding.standing).min(),
+        findings,
+    })
 }
 
 /// The objective values by which a campaign's front takes a test that was run again, as its metrics have them.
@@ -170,17 +173,20 @@ pub(crate) fn confirmed_values(plan: &CampaignPlan, runs: &[Repetition]) -> Opti
 }
 
 impl ConfirmedTest {
-    /// How often what was found came again, as in `4 of 5 (0.38–0.96) flaky`.
+    /// How often each finding came again, as in `R1 4 of 5 (0.38–0.96) flaky`.
     pub(crate) fn words(&self) -> String {
-        let failures = match self.failures {
-            0 => String::new(),
-            count => format!(", {}", plural(count, "run failed", "runs failed")),
-        };
-        let (Some([low, high]), Some(standing)) = (self.interval, self.standing) else {
-            return format!("{}{failures}", plural(self.repetitions, "run", "runs"));
-        };
-        let mark = if standing == Standing::Confirmed { String::new() } else { format!(" {}", standing.words()) };
-        format!("{} of {} ({}–{}){mark}{failures}", self.again, self.repetitions, fixed(low, 2), fixed(high, 2))
+        if self.findings.is_empty() {
+            return format!("nothing in {}", plural(self.repetitions, "run", "runs"));
+        }
+        let words = self.findings.iter().map(|finding| format!("{} {}", finding.finding, finding.words()));
+        words.collect::<Vec<_>>().join("; ")
+    }
+
+    /// The finding that fresh runs show most often; of equal ones the first.
+    pub(crate) fn surest(&self) -> Option<&FindingAgain> {
+        let share = |finding: &FindingAgain| finding.again as f64 / finding.said as f64;
+        let said = self.findings.iter().filter(|finding| finding.said > 0);
+        said.reduce(|best, finding| if share(finding) > share(best) { finding } else { best })
     }
 }
 
@@ -212,7 +218,19 @@ pub(crate) fn confirmation_sentence(tests: &[ConfirmedTest]) -> Option<String> {
             let _ = write!(sentence, "; on the front {front}");
         }
     }
+    let surprises = tests.iter().filter(|test| test.findings.iter().any(|finding| !finding.first)).count();
+    if surprises > 0 {
+        let tests = plural(surprises, "test shows", "tests show");
+        let _ = write!(sentence, "; {tests} something that its first run did not");
+    }
     Some(sentence)
+}
+
+/// How many tests with violations nobody looked at again, in a sentence; nothing where there is none, and where the
+/// campaign does not confirm and nothing was run again.
+pub(crate) fn once_sentence(once: usize, confirms: bool) -> Option<String> {
+    let tests = plural(once, "test that violates a requirement was", "tests that violate a requirement were");
+    (confirms && once > 0).then(|| format!("{tests} run once only"))
 }
 
 /// What the values of a front of confirmed tests are, in a sentence.

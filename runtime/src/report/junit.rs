@@ -17,9 +17,11 @@ pub fn write_junit(repository: &Repository, path: &Path) -> Result<(), RecordErr
 
 /// A summary as a JUnit test suite.
 ///
-/// Each requirement is a test case: it fails when a test violates it, and is skipped when no test says anything. Each
-/// expectation of a known test is one: it fails when it is violated, and is an error when nothing is known. Each crash
-/// and each timeout is an error, and so is each test in which a metric read a number that was not finite.
+/// Each requirement is a test case: it fails when a test violates it, and is skipped with a reason when none does but some
+/// say nothing about it. Each expectation of a known test is one: it fails when it is violated, and is an error when nothing
+/// is known. Each crash and each timeout is an error, and so is each test in which a metric read a number that was not finite.
+/// A test that was run again is what its fresh runs say: what its first run showed and no fresh one does fails nothing, and is
+/// named.
 pub fn junit(summary: &Summary) -> String {
     let class = format!("{}.{}", summary.space, summary.campaign);
     let mut cases = Vec::new();
@@ -50,7 +52,10 @@ pub fn junit(summary: &Summary) -> String {
     for case in &cases {
         xml.open("testcase", &[("classname", &case.class), ("name", &case.name)]);
         if let Some(Outcome { tag, kind, message, text }) = &case.result {
-            let mut attributes = vec![("message", message.as_str())];
+            let mut attributes = Vec::new();
+            if !message.is_empty() {
+                attributes.push(("message", message.as_str()));
+            }
             if let Some(kind) = kind {
                 attributes.push(("type", kind));
             }
@@ -74,11 +79,11 @@ pub fn junit(summary: &Summary) -> String {
 struct Case {
     class: String,
     name: String,
-    /// `None` for one that passed.
+    /// `None` for one that passed and has nothing to say.
     result: Option<Outcome>,
 }
 
-/// What became of a case that did not pass.
+/// What became of a case that did not pass, or what one that passed has to say.
 struct Outcome {
     tag: &'static str,
     kind: Option<&'static str>,
@@ -89,24 +94,30 @@ struct Outcome {
 fn requirement_case(class: &str, requirement: &RequirementSummary, confirmed: &[ConfirmedTest]) -> Case {
     let RequirementSummary { requirement: name, text, metric, bound, kept, violated, unsaid, worst, .. } = requirement;
     let counts = format!("{violated} violated, {kept} kept, {unsaid} unsaid");
+    let again: Vec<String> = confirmed
+        .iter()
+        .filter_map(|test| {
+            let finding = test.findings.iter().find(|finding| finding.finding == *name)?;
+            Some(format!("{} {}", test.test, finding.words()))
+        })
+        .collect();
+    let again = if again.is_empty() { String::new() } else { format!("; in fresh runs: {}", again.join("; ")) };
     let result = if *violated > 0 {
         let tests = number::plural(*violated, "test", "tests");
         let worst = worst.as_ref().map_or(String::new(), |worst| format!("; worst is {}: {}", worst.test, worst.text));
-        let again: Vec<String> = confirmed
-            .iter()
-            .filter_map(|test| {
-                let finding = test.findings.iter().find(|finding| finding.finding == *name)?;
-                Some(format!("{} {} of {}", test.test, finding.again, test.repetitions))
-            })
-            .collect();
-        let again = if again.is_empty() { String::new() } else { format!("; came again: {}", again.join(", ")) };
         let message = format!("violated by {tests}{worst}, required is {metric} {bound}{again}");
         Some(Outcome { tag: "failure", kind: Some("requirement"), message, text: counts })
     } else if *kept == 0 {
-        let message = "no test says anything about it".to_owned();
+        let message = format!("no test says anything about it{again}");
         Some(Outcome { tag: "skipped", kind: None, message, text: counts })
-    } else {
+    } else if *unsaid > 0 {
+        let message = format!("{unsaid} of {} tests say nothing about it, the others keep it{again}", unsaid + kept);
+        Some(Outcome { tag: "skipped", kind: None, message, text: counts })
+    } else if again.is_empty() {
         None
+    } else {
+        // The case passes; what the first run showed stays named.
+        Some(Outcome { tag: "system-out", kind: None, message: String::new(), text: format!("{counts}{again}") })
     };
     Case { class: format!("{class}.requirements"), name: format!("{name}: {text}"), result }
 }
@@ -128,13 +139,18 @@ fn expectation_case(class: &str, expectation: &ExpectationSummary) -> Case {
 }
 
 fn failure_case(class: &str, failure: &Failure) -> Case {
-    let Failure { test, outcome, at, detail } = failure;
-    let kind = Some(if outcome == "timeout" { "timeout" } else { "crash" });
-    let message = format!("{outcome} at {} s", number::fixed(*at, 2));
+    let Failure { test, outcome, at, detail, again } = failure;
+    let again = again.as_ref().map_or(String::new(), |again| format!("; in fresh runs: {}", again.words()));
+    let message = format!("{outcome} at {} s{again}", number::fixed(*at, 2));
+    let (tag, kind) = match outcome.as_str() {
+        _ if !failure.stands() => ("skipped", None),
+        "timeout" => ("error", Some("timeout")),
+        _ => ("error", Some("crash")),
+    };
     Case {
         class: format!("{class}.runs"),
         name: format!("{test} runs to its end"),
-        result: Some(Outcome { tag: "error", kind, message, text: detail.clone() }),
+        result: Some(Outcome { tag, kind, message, text: detail.clone() }),
     }
 }
 
@@ -206,6 +222,17 @@ mod tests {
     }
 
     #[test]
+    fn a_requirement_that_some_tests_leave_open_is_skipped_with_the_reason() {
+        let mut summary = sample_summary();
+        summary.requirements.truncate(1);
+        (summary.requirements[0].violated, summary.requirements[0].kept, summary.requirements[0].unsaid) = (0, 30, 2);
+        let xml = junit(&summary);
+        let document = parsed(&xml);
+        let skipped = document.descendants().find(|node| node.has_tag_name("skipped")).unwrap();
+        assert_eq!(skipped.attribute("message"), Some("2 of 32 tests say nothing about it, the others keep it"));
+    }
+
+    #[test]
     fn hostile_words_stay_words() {
         let hostile = "<b a='\"'>]]>& \u{1b}\u{0}\u{FFFE}\r\n--><!--";
         let mut summary = sample_summary();
@@ -228,6 +255,7 @@ mod tests {
             "testcase",
             "failure",
             "error",
+            "skipped",
             "system-out",
             "system-err",
         ];

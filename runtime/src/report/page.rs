@@ -10,7 +10,7 @@ use crate::observation::Outcome;
 use crate::record::{MetricValue, Origin, RecordError, Repository, TestRow, Verdict, trace_file};
 use crate::report::cells;
 use crate::report::chart::evenly;
-use crate::report::confirmed::{confirmation_sentence, values_sentence};
+use crate::report::confirmed::{confirmation_sentence, once_sentence, tally_words, values_sentence};
 use crate::report::generations::generations;
 use crate::report::markup::{Markup, coordinate, fill};
 use crate::report::number::{self, plural, with_unit};
@@ -52,6 +52,7 @@ fn page_in(repository: &Repository, folder: &Path) -> Result<String, RecordError
     let rows = repository.tests()?;
     let members = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
     let summary = summarise(repository, &rows, &members)?;
+    let judge = repository.judge()?;
     let groups = chosen(&summary, &rows);
     let drawn: Vec<u32> = groups.iter().flat_map(|group| group.tests.iter().copied()).collect();
 
@@ -79,7 +80,8 @@ fn page_in(repository: &Repository, folder: &Path) -> Result<String, RecordError
         for &number in &group.tests {
             let record = repository.test(number)?;
             let on_front = summary.front.iter().any(|test| test.number == number);
-            let report = report_on(repository.plan(), &record, on_front);
+            let fresh = judge.runs(record.duplicate_of.unwrap_or(number));
+            let report = report_on(repository.plan(), &record, fresh, on_front);
             body.open("article", &[("class", "test"), ("id", &report.test)]);
             test_heading(&mut body, &summary, &report);
             timeline(&mut body, repository.plan(), &record, &report);
@@ -215,11 +217,10 @@ fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     body.element("h2", &[], "Requirements");
     body.open("div", &[("class", "scroll")]);
     body.open("table", &[]);
-    heading_row(
-        body,
-        &["", "Requirement", "Tests", "Violated", "Kept", "Unsaid", "Bound", "Undisturbed", "Worst"],
-        3..6,
-    );
+    let mut titles = vec!["", "Requirement", "Tests", "Violated", "Kept", "Unsaid", "Bound", "Undisturbed", "Worst"];
+    let again = !summary.confirmed.is_empty();
+    titles.extend(again.then_some("Run again"));
+    heading_row(body, &titles, 3..6);
     body.open("tbody", &[]);
     for requirement in &summary.requirements {
         body.open("tr", &[]);
@@ -244,11 +245,17 @@ fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
             None => body.text("–"),
         }
         body.close();
+        if again {
+            body.element("td", &[("class", "words")], &requirement.standings());
+        }
         body.close();
     }
     body.close();
     body.close();
     body.close();
+    if let Some(sentence) = once_sentence(summary.once, again || summary.confirmation.is_some()) {
+        body.element("p", &[("class", "quiet")], &format!("{sentence}."));
+    }
     body.close();
 }
 
@@ -519,7 +526,10 @@ fn failures(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     body.element("h2", &[], "Crashes and timeouts");
     body.open("div", &[("class", "scroll")]);
     body.open("table", &[]);
-    heading_row(body, &["Test", "Outcome", "At", "Cause"], 2..3);
+    let mut titles = vec!["Test", "Outcome", "At", "Cause"];
+    let again = summary.failures.iter().any(|failure| failure.again.is_some());
+    titles.extend(again.then_some("Came again"));
+    heading_row(body, &titles, 2..3);
     body.open("tbody", &[]);
     for failure in summary.failures.iter().take(50) {
         body.open("tr", &[]);
@@ -529,6 +539,9 @@ fn failures(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
         body.element("td", &[("class", "bad")], &failure.outcome);
         body.element("td", &[("class", "number")], &number::quantity(failure.at, Some("s")));
         body.element("td", &[("class", "sentence")], &failure.detail);
+        if again {
+            body.element("td", &[("class", "words")], &failure.again_words());
+        }
         body.close();
     }
     body.close();
@@ -630,14 +643,22 @@ fn figures(body: &mut Markup, report: &TestReport) {
         }
     });
     if !report.requirements.is_empty() {
-        table(body, &["Requirement", "Verdict", "Bound", "Value", "Outside"], |body| {
+        let again = report.requirements.iter().any(|requirement| requirement.fresh.is_some());
+        let titles: &[&str] = if again {
+            &["Requirement", "Verdict", "Bound", "Violated in fresh runs", "In the first run", "Value", "Outside"]
+        } else {
+            &["Requirement", "Verdict", "Bound", "Value", "Outside"]
+        };
+        table(body, titles, |body| {
             for requirement in &report.requirements {
-                let cells = [
+                let mut cells = vec![
                     requirement.verdict.word().to_owned(),
                     format!("{} {}", requirement.metric, requirement.bound),
-                    requirement.value.clone(),
-                    spans_text(&requirement.outside),
                 ];
+                if let Some(fresh) = &requirement.fresh {
+                    cells.extend([tally_words(fresh.tally), requirement.first.word().to_owned()]);
+                }
+                cells.extend([requirement.value.clone(), spans_text(&requirement.outside)]);
                 row(body, &requirement.requirement, &cells);
             }
         });

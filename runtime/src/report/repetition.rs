@@ -3,7 +3,7 @@
 use serde::Serialize;
 use sesame_plan::{CampaignPlan, Search};
 
-use crate::record::{Origin, TestRow, Verdict, verdict};
+use crate::record::{Origin, Tally, TestRow};
 
 /// What the repetitions of one test say.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -33,18 +33,14 @@ pub struct ViolationRate {
 pub(crate) fn repetition(plan: &CampaignPlan, rows: &[TestRow]) -> Option<Repetition> {
     let Search::Repeat { test, .. } = plan.campaign.search else { return None };
     let requirements = plan.requirements.iter().map(|requirement| {
-        let verdicts = rows.iter().filter(|row| row.origin == Origin::Search).map(|row| {
-            let value = row.value(requirement.metric);
-            verdict(requirement.bound, &row.outcome, value)
-        });
-        let said: Vec<Verdict> = verdicts.filter(|&said| said != Verdict::Unsaid).collect();
-        let violated = said.iter().filter(|&&said| said == Verdict::Violated).count();
+        let runs = rows.iter().filter(|row| row.origin == Origin::Search);
+        let tally = Tally::of(runs.map(|row| row.verdict(requirement)));
         ViolationRate {
             requirement: requirement.name.clone(),
             text: requirement.text.clone(),
-            violated,
-            said: said.len(),
-            interval: wilson(violated, said.len()),
+            violated: tally.violated,
+            said: tally.said(),
+            interval: wilson(tally.violated, tally.said()),
         }
     });
     Some(Repetition { test: plan.test(test).name.clone(), requirements: requirements.collect() })

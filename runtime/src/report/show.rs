@@ -7,9 +7,11 @@ use sesame_plan::{Activation, CampaignPlan, Choice, Span};
 
 use crate::observation::Counters;
 use crate::record::{
-    EventKind, MetricValue, Origin, RecordError, Repository, TestRecord, TestRow, Verdict, verdict, violation_spans,
+    EventKind, Judge, MetricValue, Origin, RecordError, Repetition, Repository, Tally, TestRecord, TestRow, Verdict,
+    verdict, violation_spans,
 };
 use crate::report::confirmed::{ConfirmedTest, confirmed_test};
+use crate::report::repetition::wilson;
 use crate::report::stacked::{Stacked, stacked};
 use crate::report::{export, number, summary};
 
@@ -163,26 +165,42 @@ pub struct VerdictReport {
     pub metric: String,
     /// The bound in words.
     pub bound: String,
-    /// What the run says.
+    /// What the test says: its fresh runs where it was run again, else its one run.
     pub verdict: Verdict,
-    /// The metric's value, in words.
+    /// What its first run says.
+    pub first: Verdict,
+    /// What its fresh runs say, where it was run again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fresh: Option<FreshVerdicts>,
+    /// The metric's value in the first run, in words.
     pub value: String,
-    /// When the metric's series was outside the bound, in seconds.
+    /// When the metric's series was outside the bound in the first run, in seconds.
     pub outside: Vec<Span>,
+}
+
+/// What the fresh runs of a test say about a requirement.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FreshVerdicts {
+    /// How many say what.
+    #[serde(flatten)]
+    pub tally: Tally,
+    /// The 95 % Wilson interval of the probability that a run violates it; `None` where none says anything.
+    pub interval: Option<[f64; 2]>,
 }
 
 /// All tests of a campaign.
 pub fn list(repository: &Repository) -> Result<TestList, RecordError> {
     let plan = repository.plan();
     let front = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
+    let judge = repository.judge()?;
     Ok(TestList {
         metrics: plan.metrics.iter().map(|metric| metric.name.clone()).collect(),
         units: plan.metrics.iter().map(|metric| metric.unit.clone()).collect(),
-        tests: repository.tests()?.iter().map(|row| listed(plan, row, front.contains(&row.number))).collect(),
+        tests: repository.tests()?.iter().map(|row| listed(plan, &judge, row, front.contains(&row.number))).collect(),
     })
 }
 
-fn listed(plan: &CampaignPlan, row: &TestRow, front: bool) -> ListedTest {
+fn listed(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow, front: bool) -> ListedTest {
     ListedTest {
         test: format!("T{}", row.number),
         origin: origin(plan, row.origin),
@@ -191,7 +209,7 @@ fn listed(plan: &CampaignPlan, row: &TestRow, front: bool) -> ListedTest {
         duplicate_of: row.duplicate_of.map(|number| format!("T{number}")),
         front,
         values: row.values.clone(),
-        violates: summary::violated(plan, row),
+        violates: summary::violated(plan, judge, row),
         operations: summary::operations(plan, row),
     }
 }
@@ -207,8 +225,8 @@ fn origin(plan: &CampaignPlan, origin: Origin) -> String {
 pub fn show(repository: &Repository, name: &str) -> Result<TestReport, RecordError> {
     let record = repository.test(repository.find(name)?)?;
     let front = repository.latest_result_set()?.is_some_and(|set| set.members.contains(&record.number));
-    let mut report = report_on(repository.plan(), &record, front);
     let ran = record.duplicate_of.unwrap_or(record.number);
+    let mut report = report_on(repository.plan(), &record, repository.judge()?.runs(ran), front);
     let notes = repository.events()?.into_iter();
     let notes = notes.filter(|event| event.kind == EventKind::Session && event.test == Some(ran));
     report.notes = notes.map(|event| event.text).collect();
@@ -217,8 +235,8 @@ pub fn show(repository: &Repository, name: &str) -> Result<TestReport, RecordErr
     Ok(report)
 }
 
-/// Everything on a test, from its record; repetitions, notes and trace are not there.
-pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, front: bool) -> TestReport {
+/// Everything on a test, from its record and its fresh runs; findings that came again, notes and trace are not there.
+pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, fresh: &[Repetition], front: bool) -> TestReport {
     let observation = &record.observation;
     TestReport {
         test: format!("T{}", record.number),
@@ -250,7 +268,7 @@ pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, front: bool) -
                 }
             })
             .collect(),
-        requirements: verdicts(plan, record),
+        requirements: verdicts(plan, record, fresh),
         confirmed: None,
         warnings: observation.warnings.clone(),
         notes: Vec::new(),
@@ -302,18 +320,23 @@ fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> 
     reports.collect()
 }
 
-fn verdicts(plan: &CampaignPlan, record: &TestRecord) -> Vec<VerdictReport> {
+fn verdicts(plan: &CampaignPlan, record: &TestRecord, fresh: &[Repetition]) -> Vec<VerdictReport> {
     let observation = &record.observation;
     let reports = plan.requirements.iter().map(|requirement| {
         let metric = plan.metric(requirement.metric);
         let shown = observation.metrics.get(requirement.metric.index());
         let value = observation.value(requirement.metric);
+        let first = verdict(requirement.bound, &observation.outcome, value);
+        let tally = Tally::of(fresh.iter().map(|run| run.verdict(requirement)));
+        let interval = wilson(tally.violated, tally.said());
         VerdictReport {
             requirement: requirement.name.clone(),
             text: requirement.text.clone(),
             metric: metric.name.clone(),
             bound: number::bound(requirement.bound, metric.unit.as_deref()),
-            verdict: verdict(requirement.bound, &observation.outcome, value),
+            verdict: tally.verdict(first),
+            first,
+            fresh: (!fresh.is_empty()).then_some(FreshVerdicts { tally, interval }),
             value: summary::value_text(value, metric.unit.as_deref()),
             outside: shown
                 .map_or_else(Vec::new, |shown| violation_spans(&shown.series, requirement.bound, observation.end)),

@@ -6,8 +6,10 @@ use serde::Serialize;
 use sesame_plan::{Bound, CampaignPlan, Confirmation, Copies, Direction, MetricId, Requirement};
 
 use crate::observation::Outcome;
-use crate::record::{EventKind, MetricValue, Origin, RecordError, Repository, TestRow, Verdict, verdict};
-use crate::report::confirmed::{ConfirmedTest, confirmed_tests};
+use crate::record::{
+    EventKind, Judge, MetricValue, Origin, RecordError, Repository, Standing, TestRow, Verdict, verdict,
+};
+use crate::report::confirmed::{ConfirmedTest, FAILURES, FindingAgain, confirmed_tests, failed, failed_again};
 use crate::report::coverage::{CoverageSummary, coverage};
 use crate::report::number;
 use crate::report::repetition::{Repetition, repetition};
@@ -38,11 +40,13 @@ pub struct Summary {
     /// Tests that were run again, by number.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub confirmed: Vec<ConfirmedTest>,
+    /// Tests that violate a requirement and were run once only.
+    pub once: usize,
     /// All requirements of the space, in its order.
     pub requirements: Vec<RequirementSummary>,
     /// Expectations of known tests, in the order of the tests.
     pub expectations: Vec<ExpectationSummary>,
-    /// Crashes and timeouts, by test.
+    /// Crashes and timeouts, by test: of its first run, and those that only fresh runs showed.
     pub failures: Vec<Failure>,
     /// Tests in which a metric read a number that was not finite, by test.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -109,7 +113,8 @@ pub struct FrontTest {
     pub violates: Vec<String>,
 }
 
-/// What the campaign says about a requirement. Duplicates and the reference run are not counted.
+/// What the campaign says about a requirement. Duplicates and the reference run are not counted. A test that was run again is
+/// what its fresh runs say, see [`Tally::verdict`](crate::record::Tally::verdict).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RequirementSummary {
     /// Its name.
@@ -122,8 +127,18 @@ pub struct RequirementSummary {
     pub bound: String,
     /// Tests that keep it.
     pub kept: usize,
-    /// Tests that violate it.
+    /// Tests that violate it: those whose violation is confirmed or flaky, and those that were run once only.
     pub violated: usize,
+    /// Of these, tests of which every fresh run violates it that says anything.
+    pub confirmed: usize,
+    /// Of these, tests of which some fresh runs violate it and some do not.
+    pub flaky: usize,
+    /// Of these, tests that no fresh run says anything about; most were run once only.
+    pub once: usize,
+    /// Of these, tests whose first run did not violate it.
+    pub fresh_only: usize,
+    /// Tests whose first run violates it, and no fresh one does. They are none of the violated ones.
+    pub not_confirmed: usize,
     /// Tests that say nothing about it.
     pub unsaid: usize,
     /// What the undisturbed run says; `None` where there was none.
@@ -171,6 +186,21 @@ pub struct Failure {
     pub at: f64,
     /// What is known of the cause.
     pub detail: String,
+    /// What its fresh runs say, where it was run again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub again: Option<FindingAgain>,
+}
+
+impl Failure {
+    /// How often it came again, in words; a dash where it was run once only.
+    pub(crate) fn again_words(&self) -> String {
+        self.again.as_ref().map_or("–".to_owned(), FindingAgain::words)
+    }
+
+    /// Whether it counts as a finding: one that no fresh run shows does not.
+    pub fn stands(&self) -> bool {
+        self.again.as_ref().is_none_or(|again| again.standing != Some(Standing::NotConfirmed))
+    }
 }
 
 /// A run in which metrics read numbers that were not finite.
@@ -228,24 +258,30 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
             None => event.text,
         }
     });
-    let confirmed = confirmed_tests(repository, rows, members)?;
+    let judge = repository.judge()?;
+    let confirmed = confirmed_tests(plan, &judge, rows, members);
     Ok(Summary {
         space: plan.space.clone(),
         campaign: plan.campaign.name.clone(),
         seed: facts.seed,
         stop: facts.stop.clone(),
         counts: counts(plan, rows),
-        front: front(repository, &objectives, rows, members, &confirmed)?,
+        front: front(repository, &judge, &objectives, rows, members, &confirmed)?,
         requirements: plan
             .requirements
             .iter()
-            .map(|requirement| summarise_requirement(plan, requirement, rows))
+            .map(|requirement| summarise_requirement(plan, &judge, requirement, rows))
             .collect(),
         expectations: expectations(plan, rows),
         repetition: repetition(plan, rows),
         shrinking: shrinking(repository, rows)?,
-        failures: rows.iter().filter_map(failure).collect(),
+        failures: rows.iter().flat_map(|row| failures(&judge, row)).collect(),
         not_finite: rows.iter().filter_map(|row| not_finite(plan, row)).collect(),
+        once: rows
+            .iter()
+            .filter(|row| counts_as_test(row) && judge.runs(row.number).is_empty())
+            .filter(|row| plan.requirements.iter().any(|it| row.verdict(it) == Verdict::Violated))
+            .count(),
         spreads: spreads(plan, rows),
         coverage: coverage(repository)?,
         warnings: warnings.collect(),
@@ -274,8 +310,14 @@ fn counts(plan: &CampaignPlan, rows: &[TestRow]) -> Counts {
     counts
 }
 
+/// Whether a test is counted in what is said about requirements.
+fn counts_as_test(row: &TestRow) -> bool {
+    row.origin != Origin::Reference && row.duplicate_of.is_none()
+}
+
 fn front(
     repository: &Repository,
+    judge: &Judge<'_>,
     objectives: &[Objective],
     rows: &[TestRow],
     members: &[u32],
@@ -307,7 +349,7 @@ fn front(
             values: values(row),
             operations: operations(plan, row),
             stacked: stacked_of(repository, row)?,
-            violates: violated(plan, row),
+            violates: violated(plan, judge, row),
         })
     });
     on_front.collect()
@@ -325,11 +367,11 @@ fn stacked_of(repository: &Repository, row: &TestRow) -> Result<Vec<Stacked>, Re
 }
 
 /// Names of the requirements a test violates.
-pub(crate) fn violated(plan: &CampaignPlan, row: &TestRow) -> Vec<String> {
+pub(crate) fn violated(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow) -> Vec<String> {
     plan.requirements
         .iter()
-        .filter(|r| verdict(r.bound, &row.outcome, row.value(r.metric)) == Verdict::Violated)
-        .map(|r| r.name.clone())
+        .filter(|requirement| judge.verdict(row, requirement) == Verdict::Violated)
+        .map(|requirement| requirement.name.clone())
         .collect()
 }
 
@@ -350,34 +392,75 @@ pub(crate) fn operations(plan: &CampaignPlan, row: &TestRow) -> String {
     if named.is_empty() { "undisturbed".to_owned() } else { named.join(", ") }
 }
 
-fn summarise_requirement(plan: &CampaignPlan, requirement: &Requirement, rows: &[TestRow]) -> RequirementSummary {
+fn summarise_requirement(
+    plan: &CampaignPlan,
+    judge: &Judge<'_>,
+    requirement: &Requirement,
+    rows: &[TestRow],
+) -> RequirementSummary {
     let metric = plan.metric(requirement.metric);
     let unit = metric.unit.as_deref();
-    let said = |row: &TestRow| verdict(requirement.bound, &row.outcome, row.value(requirement.metric));
-    let counted = || rows.iter().filter(|row| row.origin != Origin::Reference && row.duplicate_of.is_none());
-    let count = |verdict| counted().filter(|row| said(row) == verdict).count();
-    let mut worst: Option<(f64, &TestRow)> = None;
-    for row in counted().filter(|row| said(row) == Verdict::Violated) {
-        let outside =
-            row.value(requirement.metric).value.map_or(0.0, |value| distance_outside(requirement.bound, value));
-        if worst.is_none_or(|(farthest, _)| outside > farthest) {
-            worst = Some((outside, row));
-        }
-    }
-    RequirementSummary {
+    let mut found = RequirementSummary {
         requirement: requirement.name.clone(),
         text: requirement.text.clone(),
         metric: metric.name.clone(),
         bound: number::bound(requirement.bound, unit),
-        kept: count(Verdict::Kept),
-        violated: count(Verdict::Violated),
-        unsaid: count(Verdict::Unsaid),
-        reference: rows.iter().find(|row| row.origin == Origin::Reference).map(said),
-        worst: worst.and_then(|(_, row)| {
-            let shown = row.value(requirement.metric);
-            let value = shown.value?;
-            Some(Worst { test: format!("T{}", row.number), value, text: value_text(shown, unit) })
-        }),
+        kept: 0,
+        violated: 0,
+        confirmed: 0,
+        flaky: 0,
+        once: 0,
+        fresh_only: 0,
+        not_confirmed: 0,
+        unsaid: 0,
+        reference: rows.iter().find(|row| row.origin == Origin::Reference).map(|row| row.verdict(requirement)),
+        worst: None,
+    };
+    let mut worst: Option<(f64, &TestRow, MetricValue)> = None;
+    for row in rows.iter().filter(|row| counts_as_test(row)) {
+        let (first, tally) = (row.verdict(requirement), judge.tally(row.number, requirement));
+        let standing = tally.standing(first);
+        found.not_confirmed += usize::from(standing == Some(Standing::NotConfirmed));
+        match tally.verdict(first) {
+            Verdict::Kept => found.kept += 1,
+            Verdict::Unsaid => found.unsaid += 1,
+            Verdict::Violated => {
+                found.violated += 1;
+                found.confirmed += usize::from(standing == Some(Standing::Confirmed));
+                found.flaky += usize::from(standing == Some(Standing::Flaky));
+                found.once += usize::from(standing.is_none());
+                found.fresh_only += usize::from(first != Verdict::Violated);
+                let fresh = judge.runs(row.number).iter().filter(|run| run.verdict(requirement) == Verdict::Violated);
+                let fresh = fresh.map(|run| run.value(requirement.metric));
+                let own = (tally.violated == 0).then(|| row.value(requirement.metric));
+                for shown in fresh.chain(own) {
+                    let outside = shown.value.map_or(0.0, |value| distance_outside(requirement.bound, value));
+                    if worst.is_none_or(|(farthest, ..)| outside > farthest) {
+                        worst = Some((outside, row, shown));
+                    }
+                }
+            }
+        }
+    }
+    found.worst = worst.and_then(|(_, row, shown)| {
+        let value = shown.value?;
+        Some(Worst { test: format!("T{}", row.number), value, text: value_text(shown, unit) })
+    });
+    found
+}
+
+impl RequirementSummary {
+    /// What fresh runs say of its violations, as in `3 confirmed, 1 flaky, 8 run once; 2 not confirmed`; a dash where there
+    /// are none.
+    pub(crate) fn standings(&self) -> String {
+        let standing = [(self.confirmed, "confirmed"), (self.flaky, "flaky"), (self.once, "run once")];
+        let words = standing.iter().filter(|(count, _)| *count > 0).map(|(count, word)| format!("{count} {word}"));
+        let mut parts = vec![words.collect::<Vec<_>>().join(", ")];
+        parts.retain(|part| !part.is_empty());
+        if self.not_confirmed > 0 {
+            parts.push(format!("{} not confirmed", self.not_confirmed));
+        }
+        if parts.is_empty() { "–".to_owned() } else { parts.join("; ") }
     }
 }
 
@@ -419,14 +502,24 @@ fn expectations(plan: &CampaignPlan, rows: &[TestRow]) -> Vec<ExpectationSummary
     found
 }
 
-fn failure(row: &TestRow) -> Option<Failure> {
-    let failed = matches!(row.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. }) && row.duplicate_of.is_none();
-    failed.then(|| Failure {
-        test: format!("T{}", row.number),
-        outcome: row.outcome.word().to_owned(),
-        at: row.end,
-        detail: row.outcome.detail().unwrap_or_default(),
-    })
+/// The crash and the timeout that a test's first run or a fresh one shows.
+fn failures(judge: &Judge<'_>, row: &TestRow) -> Vec<Failure> {
+    if row.duplicate_of.is_some() {
+        return Vec::new();
+    }
+    let of = |word: &'static str| {
+        let own = (failed(&row.outcome, word) == Verdict::Violated).then_some((row.end, &row.outcome));
+        let fresh = judge.runs(row.number).iter().filter(|run| failed(&run.outcome, word) == Verdict::Violated);
+        let (at, outcome) = own.or_else(|| fresh.map(|run| (run.end, &run.outcome)).next())?;
+        Some(Failure {
+            test: format!("T{}", row.number),
+            outcome: word.to_owned(),
+            at,
+            detail: outcome.detail().unwrap_or_default(),
+            again: failed_again(judge, row, word),
+        })
+    };
+    FAILURES.into_iter().filter_map(of).collect()
 }
 
 fn not_finite(plan: &CampaignPlan, row: &TestRow) -> Option<NotFinite> {

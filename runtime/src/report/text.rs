@@ -7,7 +7,7 @@ use sesame_plan::Span;
 use crate::observation::Counters;
 use crate::record::MetricValue;
 use crate::record::Verdict;
-use crate::report::confirmed::{ConfirmedTest, confirmation_sentence, values_sentence};
+use crate::report::confirmed::{ConfirmedTest, confirmation_sentence, once_sentence, tally_words, values_sentence};
 use crate::report::coverage::coverage_sentence;
 use crate::report::number::{self, fixed, join_words, plural, with_unit};
 use crate::report::repetition::{Repetition, ViolationRate};
@@ -50,11 +50,11 @@ pub fn headline(summary: &Summary) -> String {
         all if kept == all => parts.push(plural(all, "expectation kept", "expectations kept")),
         all => parts.push(format!("{kept} of {} kept", plural(all, "expectation", "expectations"))),
     }
-    if summary.counts.crashes > 0 {
-        parts.push(plural(summary.counts.crashes, "crash", "crashes"));
-    }
-    if summary.counts.timeouts > 0 {
-        parts.push(plural(summary.counts.timeouts, "timeout", "timeouts"));
+    for (word, several) in [("crash", "crashes"), ("timeout", "timeouts")] {
+        let count = summary.failures.iter().filter(|failure| failure.outcome == word && failure.stands()).count();
+        if count > 0 {
+            parts.push(plural(count, word, several));
+        }
     }
     let mut sentence = parts.join(", ");
     if let Some(first) = sentence.get_mut(..1) {
@@ -102,10 +102,17 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
         section(&mut text, &format!("{} repeated", repetition.test), &repeated(repetition), options);
     }
     if !summary.failures.is_empty() {
-        let mut table = Table::new([left("test"), left("outcome"), right("at"), left("cause")]);
+        let again = summary.failures.iter().any(|failure| failure.again.is_some());
+        let mut columns = vec![left("test"), left("outcome"), right("at")];
+        columns.extend(again.then(|| left("came again")));
+        columns.push(left("cause"));
+        let mut table = Table::new(columns);
         for failure in &summary.failures {
             let at = with_unit(fixed(failure.at, 2), Some("s"));
-            table.row([failure.test.clone(), failure.outcome.clone(), at, failure.detail.clone()]);
+            let mut cells = vec![failure.test.clone(), failure.outcome.clone(), at];
+            cells.extend(again.then(|| failure.again_words()));
+            cells.push(failure.detail.clone());
+            table.row(cells);
         }
         section(&mut text, "Crashes and timeouts", &table, options);
     }
@@ -124,10 +131,18 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     if let Some(sentence) = confirmation_sentence(&summary.confirmed) {
         paragraph(&mut text, &sentence, options);
     }
+    if let Some(sentence) = once_sentence(summary.once, confirms(summary)) {
+        paragraph(&mut text, &sentence, options);
+    }
     for warning in &summary.warnings {
         paragraph(&mut text, &format!("warning: {}", visible(warning)), options);
     }
     text
+}
+
+/// Whether a reader may expect that tests were run again.
+fn confirms(summary: &Summary) -> bool {
+    summary.confirmation.is_some() || !summary.confirmed.is_empty()
 }
 
 /// How many tests ran, and what became of those that say nothing.
@@ -218,27 +233,26 @@ pub(crate) fn objective_columns(summary: &Summary) -> Vec<Vec<String>> {
 }
 
 fn requirements(summary: &Summary) -> Table {
-    let mut table = Table::new([
-        left("name"),
-        left("bound"),
-        right("violated"),
-        right("kept"),
-        right("unsaid"),
-        left("undisturbed"),
-        left("worst"),
-        left("sentence"),
-    ]);
+    let again = !summary.confirmed.is_empty();
+    let mut columns = vec![left("name"), left("bound"), right("violated"), right("kept"), right("unsaid")];
+    columns.extend(again.then(|| left("run again")));
+    columns.extend([left("undisturbed"), left("worst"), left("sentence")]);
+    let mut table = Table::new(columns);
     for requirement in &summary.requirements {
-        table.row([
+        let mut cells = vec![
             requirement.requirement.clone(),
             format!("{} {}", requirement.metric, requirement.bound),
             requirement.violated.to_string(),
             requirement.kept.to_string(),
             requirement.unsaid.to_string(),
+        ];
+        cells.extend(again.then(|| requirement.standings()));
+        cells.extend([
             requirement.reference.map_or("–", Verdict::word).to_owned(),
             requirement.worst.as_ref().map_or("–".to_owned(), |worst| format!("{} {}", worst.test, worst.text)),
             requirement.text.clone(),
         ]);
+        table.row(cells);
     }
     table
 }
@@ -359,23 +373,24 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     }
     section(&mut text, "Metrics", &table, options);
     if !test.requirements.is_empty() {
-        let mut table = Table::new([
-            left("name"),
-            left("verdict"),
-            left("bound"),
-            left("value"),
-            left("outside"),
-            left("sentence"),
-        ]);
+        let again = test.requirements.iter().any(|requirement| requirement.fresh.is_some());
+        let mut columns = vec![left("name"), left("verdict"), left("bound")];
+        if again {
+            columns.extend([left("violated in fresh runs"), left("in the first run")]);
+        }
+        columns.extend([left("value"), left("outside"), left("sentence")]);
+        let mut table = Table::new(columns);
         for requirement in &test.requirements {
-            table.row([
+            let mut cells = vec![
                 requirement.requirement.clone(),
                 requirement.verdict.word().to_owned(),
                 format!("{} {}", requirement.metric, requirement.bound),
-                requirement.value.clone(),
-                spans_text(&requirement.outside),
-                requirement.text.clone(),
-            ]);
+            ];
+            if let Some(fresh) = &requirement.fresh {
+                cells.extend([tally_words(fresh.tally), requirement.first.word().to_owned()]);
+            }
+            cells.extend([requirement.value.clone(), spans_text(&requirement.outside), requirement.text.clone()]);
+            table.row(cells);
         }
         section(&mut text, "Requirements", &table, options);
     }
@@ -394,12 +409,16 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     text
 }
 
-/// What was found in tests that were run again, and how often it came again: a line for each.
+/// What was found in tests that were run again, and how often it came again: a line for each finding.
 pub fn confirmed_text(tests: &[ConfirmedTest], options: TextOptions) -> String {
     let mut table = Table::new([left("test"), left("finding"), left("came again")]);
     for test in tests {
-        let findings: Vec<&str> = test.findings.iter().map(|finding| finding.finding.as_str()).collect();
-        table.row([test.test.clone(), findings.join(" "), test.words()]);
+        if test.findings.is_empty() {
+            table.row([test.test.clone(), "nothing".to_owned(), plural(test.repetitions, "run", "runs")]);
+        }
+        for finding in &test.findings {
+            table.row([test.test.clone(), finding.finding.clone(), finding.words()]);
+        }
     }
     table.render(options)
 }
@@ -407,17 +426,12 @@ pub fn confirmed_text(tests: &[ConfirmedTest], options: TextOptions) -> String {
 /// What was found in a test, and how often it came again.
 fn run_again(confirmed: &ConfirmedTest) -> Table {
     let mut table = Table::new([left("finding"), left("came again")]);
-    let what = match confirmed.findings.as_slice() {
-        [] => "nothing found",
-        [one] => &one.finding,
-        several => {
-            for finding in several {
-                table.row([finding.finding.clone(), format!("{} of {}", finding.again, confirmed.repetitions)]);
-            }
-            "all of it"
-        }
-    };
-    table.row([what.to_owned(), confirmed.words()]);
+    if confirmed.findings.is_empty() {
+        table.row(["nothing".to_owned(), plural(confirmed.repetitions, "run", "runs")]);
+    }
+    for finding in &confirmed.findings {
+        table.row([finding.finding.clone(), finding.words()]);
+    }
     table
 }
 

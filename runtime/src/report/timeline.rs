@@ -300,7 +300,7 @@ mod tests {
         record.observation.end = 60.0;
         record.observation.metrics.iter_mut().for_each(|metric| metric.series.truncate(3));
         let mut markup = Markup::default();
-        timeline(&mut markup, &plan, &record, &report_on(&plan, &record, true));
+        timeline(&mut markup, &plan, &record, &report_on(&plan, &record, &[], true));
         insta::assert_snapshot!("timeline", markup.finish().replace("><", ">\n<"));
     }
 
@@ -309,7 +309,7 @@ mod tests {
         let plan = sample::plan();
         let record = sample::record(&plan, 1, Origin::Search, sample::conditional_test());
         let mut markup = Markup::default();
-        let report = report_on(&plan, &record, true);
+        let report = report_on(&plan, &record, &[], true);
         timeline(&mut markup, &plan, &record, &report);
         let drawn = markup.finish();
         assert_eq!(drawn.matches(r#"class="planned""#).count(), 3, "{drawn}");

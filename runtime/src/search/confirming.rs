@@ -5,6 +5,9 @@
 //! run that selected it is left out. A test that was only lucky leaves the front by that, those that it had pushed out
 //! come back, and who is new among them is confirmed in turn, until every test on the front is confirmed.
 //!
+//! Tests that violate a requirement can be confirmed too, wherever they lie: that changes what is known of them, and so
+//! perhaps the front, by the same rule.
+//!
 //! Each test is confirmed once, so that this ends. Only tests of the latest generation ever are: what an earlier one left
 //! behind is dominated by a confirmed test of the front, whose values change no more.
 
@@ -12,8 +15,8 @@ use std::collections::BTreeMap;
 
 use sesame_plan::Typical;
 
-use crate::search::Front;
 use crate::search::dominance::{Fitness, Unfit};
+use crate::search::{Front, Margin};
 
 /// The front of a campaign that confirms its tests.
 #[derive(Debug, Clone, Default)]
@@ -27,20 +30,22 @@ pub struct Confirming {
 
 /// A test of the latest generation.
 #[derive(Debug, Clone)]
-struct Judged {
-    number: u32,
+pub struct Judged {
+    /// Its number.
+    pub number: u32,
     /// The test whose result stands for it; itself unless it is a duplicate.
-    stands_for: u32,
-    first: Fitness,
+    pub stands_for: u32,
+    /// The fitness of its first run.
+    pub first: Fitness,
+    /// Whether it is confirmed wherever it lies, since its first run violates a requirement and that was asked for.
+    pub violates: bool,
 }
 
 impl Confirming {
-    /// Takes the next generation: of each test its number, the test whose result stands for it (itself unless it is a
-    /// duplicate), and the fitness of its first run.
-    pub fn begin(&mut self, generation: impl IntoIterator<Item = (u32, u32, Fitness)>) {
+    /// Takes the tests of the next generation.
+    pub fn begin(&mut self, generation: impl IntoIterator<Item = Judged>) {
         self.settled = self.front();
-        let judged = |(number, stands_for, first)| Judged { number, stands_for, first };
-        self.generation = generation.into_iter().map(judged).collect();
+        self.generation = generation.into_iter().collect();
     }
 
     /// The front, by what is known of each test by now.
@@ -52,12 +57,16 @@ impl Confirming {
         front
     }
 
-    /// The tests on the front that are not confirmed, by number; none once the generation is settled.
+    /// The tests that are to be confirmed and are not: those on the front, and those that are wherever they lie. By number;
+    /// none once the generation is settled. A campaign without objectives has no front.
     pub fn unconfirmed(&self) -> Vec<u32> {
         let front = self.front();
+        let is_on_front = |test: &Judged| {
+            front.members().iter().any(|member| member.number == test.number && !member.objectives.is_empty())
+        };
         let unsure = |test: &&Judged| {
             !self.confirmed.contains_key(&test.stands_for)
-                && front.members().iter().any(|member| member.number == test.number)
+                && (is_on_front(test) || test.violates && test.number == test.stands_for)
         };
         self.generation.iter().filter(unsure).map(|test| test.number).collect()
     }
@@ -113,6 +122,17 @@ pub fn typical(runs: &[Fitness], by: Typical) -> Fitness {
     values.map_or_else(unfit, Fitness::Measured)
 }
 
+/// One margin for several runs of a test: as [`typical`] has it of an objective that is minimised, so a quantile is the
+/// margin that this share of the runs reach or go below. It counts as a violation if such a run violates.
+pub fn typical_margin(runs: &[Margin], by: Typical) -> Margin {
+    let value = |run: &Margin| run.value.map_or(Fitness::Unfit(Unfit::Unmeasured), |it| Fitness::Measured(vec![it]));
+    let values: Vec<Fitness> = runs.iter().map(value).collect();
+    let value = typical(&values, by).objectives().map(|values| values[0]);
+    // On the edge itself a bound decides, and so the runs that are there know.
+    let on_edge = |it: f64| it == 0.0 && runs.iter().any(|run| run.value == Some(0.0) && run.violated);
+    Margin { value, violated: value.is_some_and(|it| it < 0.0 || on_edge(it)) }
+}
+
 /// The least number of runs that are at least this share of all; 1 or more.
 fn reached_by(share: f64, runs: usize) -> usize {
     // A share such as 0.55 is no binary fraction: 55 of 100 are 55 %.
@@ -129,6 +149,11 @@ mod tests {
 
     fn measured(values: &[f64]) -> Fitness {
         Fitness::Measured(values.to_vec())
+    }
+
+    /// A test that violates nothing.
+    fn judged((number, stands_for, first): (u32, u32, Fitness)) -> Judged {
+        Judged { number, stands_for, first, violates: false }
     }
 
     /// Confirms by what a landscape says until the front is settled; how many tests that took.
@@ -167,30 +192,72 @@ mod tests {
 
         // In the same generation, and in a later one.
         let mut together = Confirming::default();
-        together.begin(generation(&(0..=11).collect::<Vec<_>>()));
+        together.begin(generation(&(0..=11).collect::<Vec<_>>()).into_iter().map(judged));
         assert_eq!(together.unconfirmed(), [11]);
         assert_eq!(settle(&mut together, truth), 12, "those that it hid are confirmed in turn");
         assert_eq!(together.front().numbers(), honest);
 
         let mut later = Confirming::default();
-        later.begin(generation(&honest));
+        later.begin(generation(&honest).into_iter().map(judged));
         assert_eq!(settle(&mut later, truth), 11);
-        later.begin(generation(&[11]));
+        later.begin(generation(&[11]).into_iter().map(judged));
         assert_eq!(settle(&mut later, truth), 1, "the others are confirmed already");
         assert_eq!(later.front().numbers(), honest);
         assert_eq!(later.fitness().collect::<Vec<_>>(), [&measured(&[20.0, 20.0])]);
     }
 
     #[test]
+    fn tests_that_violate_are_confirmed_wherever_they_lie_and_may_enter_the_front() {
+        let violating = |number, first| Judged { violates: true, ..judged((number, number, first)) };
+        let mut confirming = Confirming::default();
+        let unfit = Fitness::Unfit(Unfit::Crash);
+        confirming.begin([judged((1, 1, measured(&[1.0]))), violating(2, measured(&[3.0])), violating(3, unfit)]);
+        assert_eq!(confirming.unconfirmed(), [1, 2, 3]);
+        for (number, value) in [(1, 1.0), (2, 4.0), (3, 0.5)] {
+            confirming.confirm(number, measured(&[value]));
+        }
+        assert_eq!(confirming.unconfirmed(), [0; 0]);
+        assert_eq!(confirming.front().numbers(), [3]);
+        // A duplicate costs no runs: its original is confirmed.
+        confirming.begin([Judged { stands_for: 2, ..violating(4, measured(&[3.0])) }]);
+        assert_eq!(confirming.unconfirmed(), [0; 0]);
+    }
+
+    #[test]
+    fn without_objectives_only_violations_are_confirmed() {
+        let mut confirming = Confirming::default();
+        let violating = Judged { violates: true, ..judged((2, 2, measured(&[]))) };
+        confirming.begin([judged((1, 1, measured(&[]))), violating]);
+        assert_eq!(confirming.unconfirmed(), [2]);
+    }
+
+    #[test]
+    fn a_lucky_margin_gives_way_to_that_of_the_fresh_runs() {
+        let kept = |value: f64| Margin { value: Some(value), violated: false };
+        let broken = |value: f64| Margin { value: Some(value), violated: true };
+        let silent = Margin { value: None, violated: false };
+        let runs = [broken(-1.0), kept(3.0), kept(4.0)];
+        assert_eq!(typical_margin(&runs, Typical::Mean), kept(2.0));
+        assert_eq!(typical_margin(&runs, Typical::Median), kept(3.0));
+        assert_eq!(typical_margin(&runs, Typical::Quantile { share: 0.3 }), broken(-1.0));
+        assert_eq!(typical_margin(&runs, Typical::Quantile { share: 1.0 }), kept(4.0), "as near as in the worst run");
+        assert_eq!(typical_margin(&[silent, silent, broken(-1.0)], Typical::Mean), silent, "too few say anything");
+        assert_eq!(typical_margin(&[silent, broken(-1.0), broken(-3.0)], Typical::Mean), broken(-2.0));
+        // On the edge the kind of the bound decides.
+        assert_eq!(typical_margin(&[broken(0.0)], Typical::Mean), broken(0.0));
+        assert_eq!(typical_margin(&[kept(0.0)], Typical::Mean), kept(0.0));
+    }
+
+    #[test]
     fn a_duplicate_is_what_its_original_is() {
         let mut confirming = Confirming::default();
-        confirming.begin([(1, 1, measured(&[0.0])), (2, 2, measured(&[3.0])), (3, 1, measured(&[0.0]))]);
+        confirming.begin([(1, 1, measured(&[0.0])), (2, 2, measured(&[3.0])), (3, 1, measured(&[0.0]))].map(judged));
         assert_eq!(confirming.unconfirmed(), [1]);
         confirming.confirm(1, measured(&[5.0]));
         assert_eq!(confirming.unconfirmed(), [2]);
         confirming.confirm(2, measured(&[4.0]));
         assert_eq!(confirming.unconfirmed(), [0u32; 0]);
-        confirming.begin([(4, 1, measured(&[0.0]))]);
+        confirming.begin([(4, 1, measured(&[0.0]))].map(judged));
         assert_eq!(confirming.unconfirmed(), [0u32; 0], "its first run is no luck to be had again");
         assert_eq!((confirming.front().numbers(), confirming.fitness().next()), (vec![2], Some(&measured(&[5.0]))));
     }
@@ -198,7 +265,7 @@ mod tests {
     #[test]
     fn a_test_that_does_not_even_run_again_leaves_the_front() {
         let mut confirming = Confirming::default();
-        confirming.begin([(1, 1, measured(&[0.0])), (2, 2, Fitness::Unfit(Unfit::Void))]);
+        confirming.begin([(1, 1, measured(&[0.0])), (2, 2, Fitness::Unfit(Unfit::Void))].map(judged));
         assert_eq!(settle(&mut confirming, |_| Fitness::Unfit(Unfit::Crash)), 1);
         assert_eq!(confirming.front().numbers(), [0u32; 0]);
     }
@@ -243,7 +310,7 @@ mod tests {
             let numbers: Vec<u32> = (0u32..).take(tests.len()).collect();
             let mut confirmations = 0;
             for generation in numbers.chunks(size) {
-                confirming.begin(generation.iter().map(|&n| (n, n, fitness(tests[n as usize].0))));
+                confirming.begin(generation.iter().map(|&n| judged((n, n, fitness(tests[n as usize].0)))));
                 confirmations += settle(&mut confirming, truth);
             }
             let known = |number: u32| {

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace};
-use sesame_plan::{CampaignPlan, Copies, Dimension, Search, Shape};
+use sesame_plan::{CampaignPlan, Confirmation, Copies, Dimension, Search, Shape};
 use sesame_runtime::coverage::{Feasible, Grid};
 use sesame_runtime::search::Permitted;
 use sesame_runtime::search::choice::PermittedChoice;
@@ -45,18 +45,8 @@ pub(super) fn described(plan: &CampaignPlan) -> String {
         ),
     ));
     if let Some(confirmation) = plan.campaign.confirm {
-        let times = f64::from(confirmation.times);
         let tests = plan.campaign.search.evaluations();
-        let likely = (entering(tests, plan.campaign.objectives.len()) * times).round();
-        lines.push((
-            "confirming",
-            format!(
-                "at most {} more runs, {} for each test that enters the front: about {likely} if tests were drawn \
-                 independently, more where a search improves",
-                f64::from(tests) * times,
-                confirmation.times
-            ),
-        ));
+        lines.push(("confirming", confirming(confirmation, tests, plan.campaign.objectives.len())));
     }
     let mut out = String::new();
     for (name, line) in lines {
@@ -105,6 +95,18 @@ fn space(plan: &CampaignPlan, permitted: &Permitted, lines: &mut Vec<(&str, Stri
         let known = if feasible.is_exact() { "" } else { ", as far as known" };
         lines.push(("cells", format!("{} of {} can be reached{known}", feasible.count(), grid.len())));
     }
+}
+
+/// How many runs it may take to confirm what a search of so many tests finds.
+fn confirming(confirmation: Confirmation, tests: u32, objectives: usize) -> String {
+    let times = confirmation.times;
+    let most = f64::from(tests) * f64::from(times);
+    let likely = (entering(tests, objectives) * f64::from(times)).round();
+    let or = if confirmation.violations { " or violates a requirement" } else { "" };
+    format!(
+        "at most {most} more runs, {times} for each test that enters the front{or}: about {likely} for the front if tests \
+         were drawn independently, more where a search improves"
+    )
 }
 
 /// How many tests can be expected to enter a front as they come, of so many whose values of so many objectives are
@@ -256,6 +258,19 @@ mod tests {
         assert!((entering(4, 1) - (1.0 + 1.0 / 2.0 + 1.0 / 3.0 + 1.0 / 4.0)).abs() < 1e-12);
         assert!((entering(3, 2) - (1.0 + 3.0 / 4.0 + 11.0 / 18.0)).abs() < 1e-12);
         assert!(entering(0, 2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_cost_of_confirming_says_what_is_confirmed() {
+        let confirmation = Confirmation { times: 4, by: sesame_plan::Typical::Mean, violations: true };
+        let said = confirming(confirmation, 60, 2);
+        assert!(
+            said.starts_with(
+                "at most 240 more runs, 4 for each test that enters the front or violates a requirement: "
+            )
+        );
+        let front_only = confirming(Confirmation { violations: false, ..confirmation }, 60, 2);
+        assert_eq!(front_only, said.replace(" or violates a requirement", ""));
     }
 
     #[test]

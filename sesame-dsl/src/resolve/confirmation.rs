@@ -20,7 +20,15 @@ impl<'a> Resolver<'a> {
                 self.share(share, "the share of a quantile").map(|share| Typical::Quantile { share })
             }
         };
-        Some(Some(Confirmation { times: times?, by: by? }))
+        let violations = self.single(&written.violations, "violations").is_some();
+        if let Some((span, ())) = written.violations.first().filter(|_| !campaign.unread)
+            && self.file.requirements.is_empty()
+        {
+            let title = "there is no requirement whose violations could be confirmed";
+            self.report(Diagnostic::new(Code::NOTHING_TO_EXPLORE, *span, title).label("add a `requirement`"));
+            return None;
+        }
+        Some(Some(Confirmation { times: times?, by: by?, violations }))
     }
 
     /// Over how many neighbours the search averages. The outer `None` says that it is not in order.

@@ -748,6 +748,8 @@ pub(crate) struct Confirm {
     pub(crate) span: Span,
     pub(crate) times: Count,
     pub(crate) by: Vec<(Span, Typical)>,
+    /// Where `violations` is written.
+    pub(crate) violations: Vec<(Span, ())>,
 }
 
 /// What the values of several runs are taken for.

@@ -52,9 +52,13 @@ impl Reader<'_> {
 
     pub(super) fn confirm(&mut self, pair: &Pair<'_>, span: Span) -> Confirm {
         let times = self.count(&expect_child(pair, Rule::number));
-        let mut confirm = Confirm { span, times, by: vec![] };
+        let mut confirm = Confirm { span, times, by: vec![], violations: vec![] };
         if let Some(settings) = child(pair, Rule::confirm_settings) {
             self.members(&settings, Place::Confirm, |reader, setting| {
+                if setting.as_rule() == Rule::confirm_violations {
+                    confirm.violations.push((reader.keyword_span(&setting), ()));
+                    return;
+                }
                 let typical = if child(&setting, Rule::k_mean).is_some() {
                     Typical::Mean
                 } else if child(&setting, Rule::k_median).is_some() {

@@ -2,6 +2,7 @@ use proptest::prelude::*;
 
 use super::tree::simplest_between;
 use super::*;
+use crate::observation::Outcome;
 use crate::record::sample;
 use crate::report::TextOptions;
 
@@ -234,7 +235,7 @@ fn the_counts_of_each_rule_are_those_of_the_tests_that_it_describes() {
                     "timeout" => Some(matches!(row.outcome, Outcome::Timeout { .. })),
                     name => {
                         let requirement = repository.plan().requirements.iter().find(|it| it.name == name).unwrap();
-                        match verdict(requirement.bound, &row.outcome, row.value(requirement.metric)) {
+                        match row.verdict(requirement) {
                             Verdict::Violated => Some(true),
                             Verdict::Kept => Some(false),
                             Verdict::Unsaid => None,

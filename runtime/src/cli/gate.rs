@@ -1,0 +1,226 @@
+//! Gates: what was found decides the exit code.
+//!
+//! Verdicts are those of the summary: a test that was run again is what its fresh runs say, and what no fresh run shows
+//! closes no gate.
+
+use std::collections::BTreeSet;
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+use sesame_plan::{CampaignPlan, Search};
+
+use super::NOT_AS_REQUIRED;
+use crate::record::Verdict;
+use crate::report::Summary;
+
+/// Which findings make a command end with exit code 3.
+#[derive(Debug, Default, Args)]
+pub(super) struct Gate {
+    /// Exit with code 3 when this was found; several are separated by commas, or the option is given again
+    #[arg(long, value_enum, value_name = "FINDING", value_delimiter = ',')]
+    fail_on: Vec<Finding>,
+}
+
+/// What a gate can be closed by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Finding {
+    /// A test violates a requirement, or a known test an expectation
+    Violation,
+    /// A test crashes
+    Crash,
+    /// A test times out
+    Timeout,
+    /// A test says nothing about a requirement, or a known test about an expectation
+    Inconclusive,
+    /// Any of these
+    Any,
+    /// Nothing, not even a campaign that says too little
+    Nothing,
+}
+
+impl Gate {
+    /// The exit code after these findings; says on standard error what closes the gate.
+    pub(super) fn code(&self, summary: &Summary, plan: &CampaignPlan) -> ExitCode {
+        let objections = self.objections(summary, plan);
+        for objection in &objections {
+            eprintln!("not as required: {objection}");
+        }
+        if objections.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(NOT_AS_REQUIRED) }
+    }
+
+    /// All that is not as required, a sentence each.
+    fn objections(&self, summary: &Summary, plan: &CampaignPlan) -> Vec<String> {
+        let asked = |finding| self.fail_on.contains(&finding) || self.fail_on.contains(&Finding::Any);
+        let mut objections = Vec::new();
+        if asked(Finding::Violation) {
+            let broken = summary.requirements.iter().filter(|requirement| requirement.violated > 0);
+            objections.extend(broken.map(|it| format!("{} is violated in {}", it.requirement, tests(it.violated))));
+            objections.extend(expectations(summary, Verdict::Violated, "is not kept"));
+        }
+        for (finding, word) in [(Finding::Crash, "crash"), (Finding::Timeout, "timeout")] {
+            let found = broken_off(summary, &[word]).len();
+            if asked(finding) && found > 0 {
+                objections.push(format!("{} ended by {word}", tests(found)));
+            }
+        }
+        if asked(Finding::Inconclusive) {
+            let open = summary.requirements.iter().filter(|requirement| requirement.unsaid > 0);
+            objections.extend(open.map(|it| format!("{} is left open by {}", it.requirement, tests(it.unsaid))));
+            objections.extend(expectations(summary, Verdict::Unsaid, "is left open"));
+        }
+        if matches!(plan.campaign.search, Search::Known { .. }) {
+            objections.extend(not_as_expected(summary));
+        }
+        if !self.fail_on.contains(&Finding::Nothing) {
+            objections.extend(says_too_little(summary, &plan.campaign.search));
+        }
+        objections.dedup();
+        objections
+    }
+}
+
+fn tests(count: usize) -> String {
+    if count == 1 { "1 test".to_owned() } else { format!("{count} tests") }
+}
+
+/// Tests that ended in one of these ways, where that stands.
+fn broken_off<'a>(summary: &'a Summary, words: &[&str]) -> BTreeSet<&'a str> {
+    let found = summary.failures.iter().filter(|it| words.contains(&it.outcome.as_str()) && it.stands());
+    found.map(|failure| failure.test.as_str()).collect()
+}
+
+fn expectations<'a>(summary: &'a Summary, verdict: Verdict, what: &'a str) -> impl Iterator<Item = String> + 'a {
+    let found = summary.expectations.iter().filter(move |it| it.verdict == verdict);
+    found.map(move |it| format!("what `{}` expects of {} {what}", it.known_test, it.metric))
+}
+
+/// Who runs known tests asks that each comes to its end as expected; what no run tells is not as expected.
+fn not_as_expected(summary: &Summary) -> Vec<String> {
+    let failed = summary.failures.iter().filter(|failure| failure.stands());
+    let mut objections: Vec<String> = failed.map(|it| format!("{} ended by {}", it.test, it.outcome)).collect();
+    objections.extend(expectations(summary, Verdict::Violated, "is not kept"));
+    objections.extend(expectations(summary, Verdict::Unsaid, "is left open"));
+    objections
+}
+
+/// Why a campaign says too little to be taken for one in which nothing was found, whatever gates were asked for.
+///
+/// Making a test smaller, and repeating one, are about that test: where it crashes, so do most of their runs.
+fn says_too_little(summary: &Summary, search: &Search) -> Vec<String> {
+    let counts = summary.counts;
+    let ran = counts.evaluations - counts.duplicates;
+    if ran == 0 || matches!(search, Search::Repeat { .. } | Search::Shrink { .. }) {
+        return Vec::new();
+    }
+    let mut objections = Vec::new();
+    let broken = broken_off(summary, &["crash", "timeout"]).len();
+    if 2 * broken > ran {
+        objections.push(format!("{broken} of {} broke off by crash or timeout, which is more than half", tests(ran)));
+    }
+    if counts.void == counts.evaluations {
+        objections.push(format!("in none of {} an operation had an effect", tests(ran)));
+    }
+    let judged = summary.requirements.iter().any(|requirement| requirement.kept + requirement.violated > 0);
+    if !summary.requirements.is_empty() && !judged {
+        objections.push(format!("none of {} says anything about a requirement", tests(ran)));
+    }
+    objections
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{Standing, sample};
+    use crate::report::{Failure, FindingAgain, summary};
+
+    fn found() -> (Summary, CampaignPlan) {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = sample::plan();
+        let mut summary = summary(&sample::campaign(folder.path(), &plan, 12)).unwrap();
+        summary.failures.clear();
+        for requirement in &mut summary.requirements {
+            (requirement.violated, requirement.kept, requirement.unsaid) = (0, 13, 0);
+        }
+        (summary, plan)
+    }
+
+    fn objections(fail_on: &[Finding], summary: &Summary, plan: &CampaignPlan) -> Vec<String> {
+        Gate { fail_on: fail_on.to_vec() }.objections(summary, plan)
+    }
+
+    fn crash(number: usize) -> Failure {
+        let detail = "gone".to_owned();
+        Failure { test: format!("T{number}"), outcome: "crash".to_owned(), at: 1.0, detail, again: None }
+    }
+
+    #[test]
+    fn each_finding_closes_its_own_gate_and_that_of_any_finding() {
+        let (clean, plan) = found();
+        assert_eq!(objections(&[Finding::Any], &clean, &plan), [""; 0]);
+        let changes: [(Finding, fn(&mut Summary)); 4] = [
+            (Finding::Violation, |it| it.requirements[0].violated = 2),
+            (Finding::Crash, |it| it.failures.push(crash(2))),
+            (Finding::Timeout, |it| it.failures.push(Failure { outcome: "timeout".to_owned(), ..crash(3) })),
+            (Finding::Inconclusive, |it| it.requirements[1].unsaid = 1),
+        ];
+        for (at, (finding, change)) in changes.iter().enumerate() {
+            let mut summary = clean.clone();
+            change(&mut summary);
+            assert_eq!(objections(&[], &summary, &plan), [""; 0], "nobody asked");
+            assert_eq!(objections(&[Finding::Any], &summary, &plan).len(), 1, "{finding:?}");
+            for (other, (gate, _)) in changes.iter().enumerate() {
+                assert_eq!(
+                    objections(&[*gate], &summary, &plan).len(),
+                    usize::from(at == other),
+                    "{gate:?}, {finding:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn nine_crashes_of_twelve_tests_are_not_green_by_default() {
+        let (mut summary, plan) = found();
+        assert_eq!(summary.counts.evaluations, 13);
+        summary.failures = (1..=6).map(crash).collect();
+        assert_eq!(objections(&[], &summary, &plan), [""; 0], "six of thirteen are not more than half");
+        summary.failures = (1..=9).map(crash).collect();
+        let said = ["9 of 13 tests broke off by crash or timeout, which is more than half"];
+        assert_eq!(objections(&[], &summary, &plan), said);
+        assert_eq!(objections(&[Finding::Violation], &summary, &plan), said);
+        assert_eq!(objections(&[Finding::Nothing], &summary, &plan), [""; 0]);
+    }
+
+    #[test]
+    fn a_campaign_that_judges_nothing_or_disturbs_nothing_is_not_green() {
+        let (mut summary, plan) = found();
+        summary.counts.void = summary.counts.evaluations;
+        assert_eq!(objections(&[], &summary, &plan), ["in none of 13 tests an operation had an effect"]);
+        summary.counts.void = 0;
+        for requirement in &mut summary.requirements {
+            (requirement.kept, requirement.unsaid) = (0, 13);
+        }
+        assert_eq!(objections(&[], &summary, &plan), ["none of 13 tests says anything about a requirement"]);
+        summary.requirements.clear();
+        assert_eq!(objections(&[], &summary, &plan), [""; 0], "there was nothing to judge");
+    }
+
+    #[test]
+    fn a_crash_that_no_fresh_run_shows_closes_no_gate() {
+        let (mut summary, plan) = found();
+        let mut failure = crash(2);
+        failure.again = Some(FindingAgain {
+            finding: "crash".to_owned(),
+            first: true,
+            again: 0,
+            said: 4,
+            unsaid: 0,
+            interval: None,
+            standing: Some(Standing::NotConfirmed),
+        });
+        summary.failures.push(failure);
+        assert_eq!(objections(&[Finding::Any], &summary, &plan), [""; 0]);
+        summary.failures[0].again.as_mut().unwrap().standing = Some(Standing::Flaky);
+        assert_eq!(objections(&[Finding::Any], &summary, &plan), ["1 test ended by crash"]);
+    }
+}
