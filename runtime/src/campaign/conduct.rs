@@ -628,7 +628,7 @@ fn unheard(plan: &CampaignPlan, reference: &Observation) -> Vec<Unheard> {
 /// Whether a run violates a requirement.
 fn violates(plan: &CampaignPlan, observation: &Observation) -> bool {
     plan.requirements.iter().any(|requirement| {
-        let value = value(observation, requirement.metric);
+        let value = observation.value(requirement.metric);
         verdict(requirement.bound, &observation.outcome, value) == Verdict::Violated
     })
 }

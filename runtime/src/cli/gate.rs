@@ -30,6 +30,8 @@ enum Finding {
     Crash,
     /// A test times out
     Timeout,
+    /// A metric read a number that is not finite, such as NaN
+    NotFinite,
     /// A test says nothing about a requirement, or a known test about an expectation
     Inconclusive,
     /// Any of these
@@ -62,6 +64,9 @@ impl Gate {
             if asked(finding) && found > 0 {
                 objections.push(format!("{} ended by {word}", tests(found)));
             }
+        }
+        if asked(Finding::NotFinite) && !summary.not_finite.is_empty() {
+            objections.push(format!("metrics read numbers that are not finite in {}", tests(summary.not_finite.len())));
         }
         if asked(Finding::Inconclusive) {
             let open = summary.requirements.iter().filter(|requirement| requirement.unsaid > 0);

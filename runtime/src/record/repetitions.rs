@@ -48,11 +48,15 @@ fn own<'a>(plan: &CampaignPlan, repetitions: &'a [Repetition]) -> Option<&'a [Re
 impl Repetition {
     /// What is recorded of the run, in the form that a run reports. Series, operations and warnings are not kept.
     fn observation(&self) -> Observation {
-        let shown = |it: &MetricValue| MetricObservation { value: it.value, set: it.set, series: Vec::new() };
+        let shown = |it: &MetricValue| {
+            let MetricValue { value, set, reach, not_finite } = *it;
+            MetricObservation { value, set, reach, not_finite, series: Vec::new() }
+        };
         Observation {
             outcome: self.outcome.clone(),
             end: self.end,
             operations: Vec::new(),
+            unheard: Vec::new(),
             metrics: self.values.iter().map(shown).collect(),
             messages: self.messages,
             warnings: Vec::new(),
@@ -388,8 +392,7 @@ mod tests {
             plan.requirements.truncate(1);
             let mut record = sample::record(&plan, 3, crate::record::Origin::Search, sesame_plan::Test::default());
             record.observation.outcome = first.0.clone();
-            record.observation.metrics[0] =
-                MetricObservation { value: value(first.1), set: first.1.is_some(), series: Vec::new() };
+            record.observation.metrics[0] = MetricObservation::whole(value(first.1), first.1.is_some(), Vec::new());
             let mut recorder = Recorder::create(folder.path(), &plan, 1, 1).unwrap();
             recorder.commit(&record).unwrap();
             for (position, (outcome, shows)) in (1..).zip(&fresh) {

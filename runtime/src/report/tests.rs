@@ -510,23 +510,22 @@ fn the_views_of_findings_agree_with_the_report() {
 /// The results of a test that violates R1 in exactly these of its runs, the first one and fresh ones; `None` is a crash at the
 /// very beginning.
 fn run_again(first: bool, fresh: &[Option<bool>]) -> (tempfile::TempDir, Repository) {
-    use crate::observation::Outcome;
+    use crate::observation::{MetricObservation, Outcome};
     use crate::record::{MetricValue, Recorder, Repetition};
 
     let folder = tempfile::tempdir().unwrap();
     let plan = sample::plan();
     let mut recorder = Recorder::create(folder.path(), &plan, 42, 1).unwrap();
-    let collisions = |violates: bool| MetricValue { value: Some(f64::from(u8::from(violates))), set: true };
+    let collisions = |violates: bool| MetricValue::whole(Some(f64::from(u8::from(violates))), true);
     let reference = sample::record(&plan, 0, Origin::Reference, sesame_plan::Test::default());
     recorder.commit(&reference).unwrap();
     let mut record = sample::record(&plan, 1, Origin::Known(sesame_plan::KnownTestId(0)), plan.tests[0].test.clone());
     record.observation.metrics = reference.observation.metrics.clone();
-    record.observation.metrics[0].value = collisions(first).value;
-    record.observation.metrics[0].set = true;
+    record.observation.metrics[0] = MetricObservation::whole(collisions(first).value, true, Vec::new());
     recorder.commit(&record).unwrap();
     for (position, violates) in (1..).zip(fresh) {
         let mut values: Vec<MetricValue> =
-            record.observation.metrics.iter().map(|shown| MetricValue { value: shown.value, set: shown.set }).collect();
+            record.observation.metrics.iter().map(|shown| MetricValue::whole(shown.value, shown.set)).collect();
         values[0] = collisions(*violates == Some(true));
         let mut outcome = Outcome::Completed;
         if violates.is_none() {
