@@ -12,7 +12,6 @@ mod spread;
 
 pub use curve::{CurvePoint, curve};
 pub use feasible::Feasible;
-#[cfg(feature = "report")]
 pub(crate) use grid::edge;
 pub use grid::{Grid, GridError, MOST_CELLS};
 

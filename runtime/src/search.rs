@@ -100,6 +100,11 @@ pub trait Strategy: Send {
     /// Takes how the condition variables went in the undisturbed run, before the first generation is asked.
     fn reference(&mut self, _: Course) {}
 
+    /// What the search gave up, for the record of the campaign.
+    fn given_up(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Why the search is over, where there is more to say than that all tests were evaluated.
     fn ended(&self) -> Option<String> {
         None
@@ -190,7 +195,8 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
                 }
                 &Some(Exploration::Construct { share, until }) => {
                     let cells = cells(plan)?;
-                    let constructor = Constructor::new(permitted, cells.grid().clone());
+                    let (grid, feasible) = (cells.grid().clone(), cells.feasible().clone());
+                    let constructor = Constructor::new(permitted, grid, feasible, plan.campaign.copies);
                     let construction = Construction { share, until: until.unwrap_or(1.0) };
                     Box::new(Nsga2::new(settings, Constructing::new(tests, cells, constructor, construction, seed)))
                 }
@@ -301,6 +307,11 @@ pub(crate) trait Learning: Variation<Genome = Test> {
 
     /// Takes how the condition variables went in the undisturbed run.
     fn reference(&mut self, _: Course) {}
+
+    /// What it gave up, each in a sentence.
+    fn given_up(&self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 impl Learning for TestVariation {
@@ -320,6 +331,10 @@ impl<V: Learning + Send> Strategy for Nsga2<V> {
 
     fn reference(&mut self, course: Course) {
         self.variation_mut().reference(course);
+    }
+
+    fn given_up(&self) -> Vec<String> {
+        self.variation().given_up()
     }
 
     fn tell(&mut self, results: &[Evaluated]) {

@@ -294,6 +294,9 @@ pub fn conduct(
         let text = LIKE_BEFORE.to_owned();
         desk.recorder.put_event(&Event { kind: EventKind::Warning, test: None, text })?;
     }
+    for text in strategy.given_up() {
+        desk.recorder.put_event(&Event { kind: EventKind::Warning, test: None, text })?;
+    }
     if let Some(why) = strategy.ended() {
         stop = why;
     }

@@ -2,10 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use sesame_plan::{ActivationMode, CampaignPlan, Dimension, Domain, GridAxis, Shape};
+use sesame_plan::{ActivationMode, CampaignPlan, Copies, Dimension, Domain, GridAxis, OperationId, Shape};
 
 use crate::coverage::grid::{Grid, place_on};
 use crate::coverage::spread::{self, Member};
+use crate::rng::derive_seed;
 use crate::search::choice::PermittedChoice;
 use crate::search::permitted::{Permitted, PermittedActivation};
 use crate::search::range::Range;
@@ -15,6 +16,8 @@ use crate::sspr::{Class, Window, class_of};
 const MOST_MIXTURES: usize = 20_000;
 /// Sums of whole-number parameters listed at most; beyond, all between them count as reachable.
 const MOST_SUMS: usize = 20_000;
+/// Ways to make up a test remembered per cell, at most.
+const WAYS: usize = 6;
 /// Cells that only touch what can be reached, in a point or along an edge, are not reached: this much is needed.
 const MARGIN: f64 = 1e-9;
 
@@ -31,10 +34,19 @@ const MARGIN: f64 = 1e-9;
 ///
 /// A cell that is only touched, in a point or along an edge, is not feasible: no test falls there but by chance of
 /// probability zero.
+///
+/// Copies of one operation that must not be active at the same time reach less than this says. A cell that only tests
+/// with copies reach counts as feasible; then the computation says that it is not exact.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Feasible {
     reaches: Vec<bool>,
     exact: bool,
+    /// Operations that the grid cannot tell apart.
+    kinds: Vec<Vec<OperationId>>,
+    /// Ways to make up a test: how many operations of each kind.
+    mixtures: Vec<Vec<usize>>,
+    /// Per cell some mixtures that reach it, the surest first.
+    ways: Vec<Vec<u32>>,
 }
 
 impl Feasible {
@@ -53,12 +65,23 @@ impl Feasible {
         self.reaches.iter().filter(|&&reaches| reaches).count()
     }
 
-    /// Whether exactly these cells are feasible. Otherwise no other cell is, but some of these may not be either: where
+    /// Whether exactly these cells are feasible. Otherwise no other cell is, but some of these may not be either: where a
+    /// cell needs several copies of one operation that must not be active at the same time; where
     /// T3 is asked for and midpoints in different windows cannot meet, or those windows are many; where P2 is asked for
     /// and only some parameters are whole numbers, or those are very many; or where there are very many kinds of
     /// operations.
     pub fn is_exact(&self) -> bool {
         self.exact
+    }
+
+    /// Ways to make up a test that reach a cell, the surest first: operations that the grid cannot tell apart, with how
+    /// many of them a test has. Some of all, and none where every cell counts as feasible.
+    pub(crate) fn ways(&self, cell: usize) -> impl Iterator<Item = Vec<(&[OperationId], usize)>> {
+        let mixtures = self.ways.get(cell).into_iter().flatten().map(|&way| &self.mixtures[way as usize]);
+        mixtures.map(|mixture| {
+            let kinds = self.kinds.iter().map(Vec::as_slice).zip(mixture.iter().copied());
+            kinds.filter(|(_, count)| *count > 0).collect()
+        })
     }
 
     fn with_margin(plan: &CampaignPlan, grid: &Grid, margin: f64) -> Feasible {
@@ -71,22 +94,34 @@ impl Feasible {
 
     /// `one_interval_each`: every operation of a test is active once. Otherwise any number of times, or never.
     fn compute(plan: &CampaignPlan, grid: &Grid, one_interval_each: bool, margin: f64) -> Feasible {
-        let all = Feasible { reaches: vec![true; grid.len()], exact: false };
+        let reaches = vec![true; grid.len()];
+        let all = Feasible { reaches, exact: false, kinds: Vec::new(), mixtures: Vec::new(), ways: Vec::new() };
         let Ok(permitted) = Permitted::of(plan) else { return all };
         let sectors = Sectors::of(grid, one_interval_each, margin);
-        let kinds = sectors.kinds(plan, &permitted);
+        let (kinds, operations) = sectors.kinds(plan, &permitted);
         // Operations beside the run are no part of the point and may take the place of others.
         let offline = permitted.operations().iter().any(|it| it.activation == PermittedActivation::Offline);
         let fewest = if one_interval_each && !offline { permitted.fewest() } else { 1 };
-        let Some(mixtures) = mixtures(kinds.len(), fewest, permitted.most()) else { return all };
+        let Some(mut mixtures) = mixtures(kinds.len(), fewest, permitted.most()) else { return all };
 
-        let mut exact = one_interval_each;
+        // Where tests hold copies of one operation, and these constrain each other.
+        let crowded = |mixture: &[usize]| mixture.iter().zip(&operations).any(|(count, kind)| *count > kind.len());
+        match plan.campaign.copies {
+            Copies::MayOverlap => {}
+            Copies::Once => mixtures.retain(|mixture| !crowded(mixture)),
+            // Of ways that are alike the first stands for all: the one without copies.
+            Copies::Apart => mixtures.sort_by_key(|mixture| crowded(mixture)),
+        }
+        let timed = sectors.has(&[Dimension::T1, Dimension::T2, Dimension::T3]);
+        let doubtful =
+            |mixture: &[usize]| timed && one_interval_each && plan.campaign.copies == Copies::Apart && crowded(mixture);
+
         let mut timings: BTreeMap<Vec<usize>, Reached> = BTreeMap::new();
         let mut intensities: BTreeMap<Vec<usize>, Reached> = BTreeMap::new();
         let (windows, window_of) = distinct(kinds.iter().map(|kind| kind.window));
         let (parameters, parameters_of) = distinct(kinds.iter().map(|kind| kind.parameters.clone()));
         let mut done = BTreeSet::new();
-        let mut reaches = vec![false; grid.len()];
+        let mut different = Vec::new();
         for mixture in mixtures {
             let by_window = counted(&mixture, &window_of, windows.len());
             let by_parameters = counted(&mixture, &parameters_of, parameters.len());
@@ -95,18 +130,62 @@ impl Feasible {
                 continue;
             }
             let timing =
-                timings.entry(by_window).or_insert_with_key(|counts| sectors.timing(&paired(&windows, counts)));
+                timings.entry(by_window.clone()).or_insert_with_key(|counts| sectors.timing(&paired(&windows, counts)));
             let intensity = intensities
-                .entry(by_parameters)
+                .entry(by_parameters.clone())
                 .or_insert_with_key(|counts| sectors.intensity(&paired(&parameters, counts)));
+            let rank = if doubtful(&mixture) { 2 } else { u8::from(!(timing.exact && intensity.exact)) };
+            different.push((rank, mixture, by_window, by_parameters, numbers));
+        }
+
+        // The surest ways first, so that they are the ones remembered.
+        different.sort_by_key(|(rank, ..)| *rank);
+        let mut exact = one_interval_each;
+        let mut reaches = vec![false; grid.len()];
+        let mut ways = Ways { kept: vec![Vec::new(); grid.len()], met: vec![(0, 0, 0); grid.len()] };
+        for (way, (rank, _, by_window, by_parameters, numbers)) in different.iter().enumerate() {
+            let (timing, intensity) = (&timings[by_window], &intensities[by_parameters]);
             exact &= timing.exact && intensity.exact;
             for &timing in &timing.cells {
                 for &intensity in &intensity.cells {
-                    reaches[timing + intensity + numbers] = true;
+                    let cell = timing + intensity + numbers;
+                    exact &= *rank < 2 || reaches[cell];
+                    reaches[cell] = true;
+                    ways.add(cell, way, *rank);
                 }
             }
         }
-        Feasible { reaches, exact }
+        let mixtures = different.into_iter().map(|(_, mixture, ..)| mixture).collect();
+        Feasible { reaches, exact, kinds: operations, mixtures, ways: ways.kept }
+    }
+}
+
+/// Some ways per cell: of equally sure ones a choice that gives each the same chance, so that they differ.
+struct Ways {
+    kept: Vec<Vec<u32>>,
+    /// Per cell the rank met last, how many ways of that rank, and how many surer ones are kept.
+    met: Vec<(u8, usize, usize)>,
+}
+
+impl Ways {
+    /// Takes a way that reaches a cell; ranks only rise.
+    fn add(&mut self, cell: usize, way: usize, rank: u8) {
+        let (last, met, surer) = &mut self.met[cell];
+        let kept = &mut self.kept[cell];
+        if *last != rank {
+            (*last, *met, *surer) = (rank, 0, kept.len());
+        }
+        *met += 1;
+        let way = u32::try_from(way).expect("there are at most as many ways as mixtures");
+        if kept.len() < WAYS {
+            kept.push(way);
+            return;
+        }
+        let drawn = derive_seed(0, "ways", &[cell as u64, u64::from(way)]) % *met as u64;
+        let place = usize::try_from(drawn).unwrap_or(WAYS);
+        if let Some(slot) = kept.get_mut(*surer..).and_then(|open| open.get_mut(place)) {
+            *slot = way;
+        }
     }
 }
 
@@ -201,12 +280,14 @@ impl Sectors {
         dimensions.iter().any(|dimension| self.axes.contains_key(dimension))
     }
 
-    /// The operations of a campaign that are active during the run; those that the grid cannot tell apart are one.
-    fn kinds(&self, plan: &CampaignPlan, permitted: &Permitted) -> Vec<KindOfOperation> {
+    /// The operations of a campaign that are active during the run; those that the grid cannot tell apart are one. Of each
+    /// kind beside it the operations that are of it.
+    fn kinds(&self, plan: &CampaignPlan, permitted: &Permitted) -> (Vec<KindOfOperation>, Vec<Vec<OperationId>>) {
         let timed = self.has(&[Dimension::T1, Dimension::T2, Dimension::T3]);
         let graded = self.has(&[Dimension::P1, Dimension::P2]);
         let classed = self.has(&[Dimension::O1, Dimension::O2, Dimension::O3]);
         let mut kinds: Vec<KindOfOperation> = Vec::new();
+        let mut operations: Vec<Vec<OperationId>> = Vec::new();
         for it in permitted.operations() {
             let operation = plan.operation(it.operation);
             let Some(window) = Window::of(plan, it) else { continue };
@@ -220,11 +301,14 @@ impl Sectors {
                     .collect(),
                 class: if classed { class_of(&operation.kind) } else { Class::Other },
             };
-            if !kinds.contains(&kind) {
+            if let Some(at) = kinds.iter().position(|other| *other == kind) {
+                operations[at].push(it.operation);
+            } else {
                 kinds.push(kind);
+                operations.push(vec![it.operation]);
             }
         }
-        kinds
+        (kinds, operations)
     }
 
     /// The cells of an axis; one without bounds where the grid lacks the dimension.

@@ -52,6 +52,11 @@ impl Cells {
         self.feasible.reaches(cell)
     }
 
+    /// The cells that a test of the campaign can fall into.
+    pub(crate) fn feasible(&self) -> &Feasible {
+        &self.feasible
+    }
+
     /// The share of all cells that are covered if all promises are kept, in `0..=1`.
     pub(crate) fn expected_share(&self) -> f64 {
         let served = (0..self.grid().len()).filter(|&cell| !self.wants(cell)).count();

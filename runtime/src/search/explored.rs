@@ -4,7 +4,7 @@ use sesame_plan::{BoostedChildren, CampaignPlan, CoverageGoal, Exploration, Sear
 
 use crate::coverage::{Coverage, Grid};
 use crate::search::landscape::{LANDSCAPES, Landscape};
-use crate::search::{SearchError, strategy};
+use crate::search::{Evaluated, Fitness, SearchError, Unfit, strategy};
 
 const NSGA2: Search = Search::Nsga2 { population: 10, evaluations: 210 };
 const FIXED: Exploration =
@@ -60,13 +60,15 @@ fn boosting_covers_cells_earlier_and_construction_nearly_at_once() {
     assert!((54..=60).contains(&construct), "{construct}");
 }
 
+/// Tests on the robot of two signals may hold copies that overlap, as the figures were measured so.
 /// With 81 seeds the ratios are 0.99, 1.09, 1.00 and 0.99. With fewer they scatter: nine seeds of one robot came to 0.78,
 /// so only all robots together are judged.
 #[test]
 fn construction_does_not_give_up_the_objectives() {
     let ratios = LANDSCAPES.each_ref().map(|landscape| {
         let volumes = |exploration: Option<Exploration>| {
-            let plan = plan(landscape, NSGA2, exploration);
+            let mut plan = plan(landscape, NSGA2, exploration);
+            plan.campaign.copies = sesame_plan::Copies::MayOverlap;
             median((1..=27).map(|seed| reached_and_volume(landscape, &plan, 1.0, seed).1).collect())
         };
         volumes(Some(CONSTRUCT)) / volumes(None)
@@ -89,6 +91,43 @@ fn construction_ends_where_it_was_told_to_and_counts_cells_that_want_several_tes
     assert_eq!(covered(&covering, 1), 96, "every feasible cell");
     covering.campaign.coverage.as_mut().unwrap().hits = 2;
     assert!(covered(&covering, 2) >= 90, "two hits each with 210 tests");
+}
+
+#[test]
+fn cells_that_construction_gives_up_are_named_with_the_reason() {
+    // Four copies of the one operation can never be as long as the upper cells of T2 want them.
+    let mut copies = plan(&LANDSCAPES[0], NSGA2, Some(Exploration::Construct { share: 1.0, until: None }));
+    let grid = Grid::parse("T2:0:1:4").unwrap();
+    copies.campaign.coverage = Some(CoverageGoal { axes: grid.axes().to_vec(), hits: 1, stop_at: None });
+    copies.campaign.operations.truncate(1);
+    copies.campaign.count = sesame_plan::Count { min: 4, max: 4 };
+    let mut search = strategy(&copies, 3).unwrap();
+    assert_eq!(search.given_up(), Vec::<String>::new());
+    LANDSCAPES[0].campaign(search.as_mut());
+    let [why] = &search.given_up()[..] else { panic!("{:?}", search.given_up()) };
+    assert!(why.starts_with("construction gave up ") && why.ends_with("T2 0.75–1"), "{why}");
+    assert!(why.contains("no test could be built, and there may be none: T2 "), "{why}");
+
+    // A simulator on which nothing ever has an effect.
+    let long = Search::Nsga2 { population: 10, evaluations: 400 };
+    let deaf = plan(&LANDSCAPES[0], long, Some(Exploration::Construct { share: 1.0, until: None }));
+    let mut search = strategy(&deaf, 3).unwrap();
+    for number in 0..40 {
+        let asked = search.ask();
+        let told = asked.into_iter().map(|candidate| Evaluated {
+            number,
+            test: candidate.test,
+            fitness: Fitness::Unfit(Unfit::Void),
+            point: None,
+            course: None,
+            margins: Vec::new(),
+            failing: false,
+        });
+        search.tell(&told.collect::<Vec<_>>());
+    }
+    let [why] = &search.given_up()[..] else { panic!("{:?}", search.given_up()) };
+    assert!(why.starts_with("construction gave up 96 cells, for each of which three constructed tests had"), "{why}");
+    assert!(why.ends_with("; and 76 more"), "{why}");
 }
 
 #[test]

@@ -119,6 +119,11 @@ impl<V: Variation> Nsga2<V> {
         self.generation
     }
 
+    /// How its genomes are varied.
+    pub fn variation(&self) -> &V {
+        &self.variation
+    }
+
     /// How its genomes are varied, to be told what else came of them.
     pub fn variation_mut(&mut self) -> &mut V {
         &mut self.variation
