@@ -109,9 +109,10 @@ fn cells_that_construction_gives_up_are_named_with_the_reason() {
     assert!(why.contains("no test could be built, and there may be none: T2 "), "{why}");
 
     // A simulator on which nothing ever has an effect.
-    let deaf = plan(&LANDSCAPES[0], NSGA2, Some(Exploration::Construct { share: 1.0, until: None }));
+    let long = Search::Nsga2 { population: 10, evaluations: 400 };
+    let deaf = plan(&LANDSCAPES[0], long, Some(Exploration::Construct { share: 1.0, until: None }));
     let mut search = strategy(&deaf, 3).unwrap();
-    for number in 0..21 {
+    for number in 0..40 {
         let asked = search.ask();
         let told = asked.into_iter().map(|candidate| Evaluated {
             number,
@@ -125,10 +126,8 @@ fn cells_that_construction_gives_up_are_named_with_the_reason() {
         search.tell(&told.collect::<Vec<_>>());
     }
     let [why] = &search.given_up()[..] else { panic!("{:?}", search.given_up()) };
-    assert!(
-        why.contains("three constructed tests had no effect or fell elsewhere: T1 ") && why.ends_with(" more"),
-        "{why}"
-    );
+    assert!(why.starts_with("construction gave up 96 cells, for each of which three constructed tests had"), "{why}");
+    assert!(why.ends_with("; and 76 more"), "{why}");
 }
 
 #[test]
