@@ -117,6 +117,7 @@ mod tests {
             counters: Counters { seen: 10, dropped, unheard: 3, ..Counters::default() },
             ..OperationEffect::default()
         };
+        // Thousands of O0 and T1.
         let of = |outcome, first, second| {
             let operations = vec![effect(first, 1.0, 2.0), effect(second, 5.0, 9.0)];
             let run = Observation {
@@ -129,13 +130,14 @@ mod tests {
                 warnings: Vec::new(),
                 wall: WallTime::default(),
             };
-            observed_point(&plan, &test, &run)
-                .map(|point| [Dimension::O0, Dimension::T1].map(|dimension| point.get(dimension).unwrap_or(f64::NAN)))
+            observed_point(&plan, &test, &run).map(|point| {
+                [Dimension::O0, Dimension::T1].map(|it| libm::round(1000.0 * point.get(it).unwrap_or(f64::NAN)))
+            })
         };
-        assert_eq!(of(Outcome::Completed, 7, 7), Some([2.0, 0.425]));
-        assert_eq!(of(Outcome::Completed, 0, 7), Some([1.0, 0.7]));
-        assert_eq!(of(Outcome::Crash { message: String::new() }, 7, 0), Some([1.0, 0.15]));
+        assert_eq!(of(Outcome::Completed, 7, 7), Some([2000.0, 425.0]));
+        assert_eq!(of(Outcome::Completed, 0, 7), Some([1000.0, 700.0]));
+        assert_eq!(of(Outcome::Crash { message: String::new() }, 7, 0), Some([1000.0, 150.0]));
         assert_eq!(of(Outcome::Void, 0, 0), None);
-        assert_eq!(of(Outcome::Unknown, 0, 0), Some([2.0, 0.425]), "imported");
+        assert_eq!(of(Outcome::Unknown, 0, 0), Some([2000.0, 425.0]), "imported");
     }
 }
