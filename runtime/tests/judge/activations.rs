@@ -1,0 +1,1 @@
+//! When operations are active, by the words of the documentation.

@@ -1,0 +1,178 @@
+//! All that these properties know of how the runtime is called and what it reports: what changes there, changes here.
+
+use sesame_plan::{
+    ActivationMode, Campaign, CampaignPlan, Copies, Count, Field, MessageId, MessageType, Metric, MetricSource,
+    Operation, Requirement, SCHEMA, Search, Simulator, Test, Topic, Transport, Type,
+};
+use sesame_runtime::evaluate::{Custom, Run, evaluate_tapped};
+use sesame_runtime::metric::MetricTable;
+use sesame_runtime::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome};
+use sesame_runtime::record::{MetricValue, Verdict, verdict};
+use sesame_runtime::transport::in_process;
+use sesame_runtime::wire::WireTable;
+
+use crate::hooks::{HookKind, entries};
+use crate::ledger::Ledger;
+use crate::robot::{Carries, Robot, Script, set_script};
+
+/// The length of a step of every simulator here, in nanoseconds.
+pub(crate) const STEP: i64 = 100_000_000;
+
+/// A metric; of a hook with its trend declared.
+pub(crate) fn metric(name: &str, default: Option<f64>, initial: Option<f64>, source: MetricSource) -> Metric {
+    Metric {
+        name: name.to_owned(),
+        doc: String::new(),
+        unit: None,
+        direction: None,
+        default,
+        initial,
+        source,
+        line: 1,
+    }
+}
+
+/// Whether the runtime is told which way the values of this hook go.
+pub(crate) fn declares_trend(_: HookKind) -> bool {
+    false
+}
+
+/// What a topic carries, as a plan has it.
+pub(crate) fn ty(carries: Carries) -> Type {
+    match carries {
+        Carries::Real => Type::Real { unit: None },
+        Carries::Int => Type::Int { unit: None },
+        Carries::Bool => Type::Bool,
+        Carries::Zone => Type::Message { id: MessageId(0) },
+    }
+}
+
+/// A plan around what a case made up.
+pub(crate) fn plan(
+    topics: Vec<Topic>,
+    metrics: Vec<Metric>,
+    requirements: Vec<Requirement>,
+    operations: Vec<Operation>,
+    copies: Copies,
+    end_after: f64,
+) -> CampaignPlan {
+    let field = |name: &str, ty| Field { name: name.to_owned(), doc: String::new(), ty };
+    CampaignPlan {
+        schema: SCHEMA,
+        generator: "test".to_owned(),
+        source: "made_up.sesame".to_owned(),
+        space: "made_up".to_owned(),
+        doc: String::new(),
+        simulator: Simulator {
+            name: "robot".to_owned(),
+            transport: Transport::InProcess { path: "robot::Robot".to_owned(), step_ns: STEP.unsigned_abs() },
+        },
+        messages: vec![MessageType {
+            name: "Zone".to_owned(),
+            doc: String::new(),
+            fields: vec![
+                field("level", Type::Real { unit: None }),
+                field("count", Type::Int { unit: None }),
+                field("inside", Type::Bool),
+                field("name", Type::Text),
+            ],
+        }],
+        topics,
+        nodes: Vec::new(),
+        metrics,
+        requirements,
+        operations: operations.clone(),
+        tests: Vec::new(),
+        campaign: Campaign {
+            name: "made_up".to_owned(),
+            doc: String::new(),
+            objectives: Vec::new(),
+            operations: (0u32..).take(operations.len()).map(sesame_plan::OperationId).collect(),
+            count: Count { min: 1, max: 5 },
+            copies,
+            activation: ActivationMode::Time,
+            search: Search::Random { evaluations: 1 },
+            coverage: None,
+            exploration: None,
+            confirm: None,
+            neighbours: None,
+            stop: Vec::new(),
+            seed: 1,
+            end_after,
+            record: None,
+        },
+    }
+}
+
+/// What a run of a robot showed, and all its messages.
+pub(crate) fn run(plan: &CampaignPlan, test: &Test, script: &Script) -> (Observation, Ledger) {
+    let wires = WireTable::new(plan);
+    let metrics = MetricTable::new(plan, &wires, &entries()).expect("made-up metrics are sound");
+    let mut transport = in_process::<Robot>().transport(plan);
+    let mut ledger = Ledger::new(&wires);
+    set_script(script.clone());
+    let run = Run { test, simulator_seed: 1 };
+    let observation =
+        evaluate_tapped(plan, &wires, &metrics, transport.as_mut(), &run, &mut Custom::none(), Some(&mut ledger));
+    let observation = observation.expect("made-up tests fit their plans");
+    ledger.end = sesame_runtime::time::SimTime::from_seconds(observation.end).nanos();
+    (observation, ledger)
+}
+
+/// The same run, had its worker been stopped where it crashed.
+pub(crate) fn hung(observation: &Observation) -> Observation {
+    Observation { outcome: Outcome::Timeout { limit: 1.0 }, ..observation.clone() }
+}
+
+/// What a supervisor records of a worker that had to be stopped, or died.
+pub(crate) fn lost(outcome: Outcome) -> Observation {
+    Observation {
+        outcome,
+        end: 0.0,
+        operations: Vec::new(),
+        metrics: Vec::new(),
+        messages: 0,
+        warnings: Vec::new(),
+        wall: sesame_runtime::observation::WallTime::default(),
+    }
+}
+
+/// What the runtime says of a requirement.
+pub(crate) fn said(requirement: &Requirement, observation: &Observation) -> Verdict {
+    let metric = observation.metrics.get(requirement.metric.index());
+    let value = metric.map_or(MetricValue { value: None, set: false }, |metric| MetricValue {
+        value: metric.value,
+        set: metric.set,
+    });
+    verdict(requirement.bound, &observation.outcome, value)
+}
+
+/// The values that the runtime takes a metric to have had at the end of the run, had nothing broken it off.
+pub(crate) fn reach(_: &MetricObservation) -> Option<(f64, f64)> {
+    None
+}
+
+/// Whether the runtime noticed that a metric heard what is no number.
+pub(crate) fn heard_no_number(_: &MetricObservation) -> Option<bool> {
+    None
+}
+
+/// Whether copies of an operation wait for each other, where a campaign keeps them apart.
+pub(crate) const KEEPS_COPIES_APART: bool = false;
+
+/// Whether an operation had an effect.
+pub(crate) fn has_effect(effect: &OperationEffect) -> bool {
+    effect.counters.any_effect()
+}
+
+/// Messages that an operation held back after it had ended, behind others.
+pub(crate) fn queued(_: &Counters) -> u64 {
+    0
+}
+
+/// The time in which operations that count are active, in nanoseconds.
+pub(crate) fn busy(plan: &CampaignPlan, test: &Test, observation: &Observation, _: &Ledger) -> i64 {
+    let timed = test.operations.iter().zip(&observation.operations).filter(|(used, _)| plan.operation(used.operation).timed);
+    let nanos = |seconds: f64| (seconds * 1e9).round() as i64;
+    timed.flat_map(|(_, effect)| &effect.intervals).map(|span| nanos(span.end) - nanos(span.start)).sum()
+}
