@@ -7,8 +7,8 @@ use sesame_runtime::rng::Stream;
 use sesame_runtime::value::{Fields, Record, Value};
 
 use crate::adapter::{self, STEP, declares_trend, hung, lost, said};
-use crate::case::Case;
-use crate::formulas::{Judged, first_blank, judged};
+use crate::case::{Case, topics_of};
+use crate::formulas::{Judged, first_blank, heard as heard_by, judged};
 use crate::hooks::HookKind;
 use crate::ledger::{Ledger, Message};
 use crate::robot::{Carries, Script};
@@ -256,12 +256,12 @@ fn faulty(
                 wrong.push(format!("{} of {}: kept, though it heard what is no number", requirement.name, metric.name));
             }
         } else if broke_off && only_worsens(metric, requirement.bound) && said != Verdict::Violated {
-            // What was set by the messages until the crash; the instant of the crash may not be over.
-            let before = Ledger {
-                published: until(&ledger.published, ledger.end),
-                delivered: until(&ledger.delivered, ledger.end),
-                ..ledger.clone()
-            };
+            // What was known at the last message before the crash, the instant of which may not be over.
+            let (published, delivered) = (until(&ledger.published, ledger.end), until(&ledger.delivered, ledger.end));
+            let heard = Ledger { published, delivered, ..ledger.clone() };
+            let hears = |message: &&Message| is_heard_by(case, metric, message);
+            let last = heard_by(metric, &heard).iter().rfind(hears).map_or(0, |message| message.time);
+            let before = Ledger { end: last, ..heard };
             let set = match &metric.source {
                 MetricSource::FuzzingTime => Some(busy(case, &observed, &ledger)),
                 _ => match judged(&case.plan, metric, &before) {
@@ -279,6 +279,10 @@ fn faulty(
     }
     wrong.extend(unfounded(case, &observed, &ledger, broke_off));
     wrong
+}
+
+fn is_heard_by(case: &Case, metric: &Metric, message: &Message) -> bool {
+    topics_of(metric).iter().any(|&topic| case.plan.topic(topic).paths.contains(&message.path))
 }
 
 fn until(messages: &[Message], end: i64) -> Vec<Message> {
@@ -385,7 +389,8 @@ fn counters(case: &Case, observed: &Observation) -> Vec<String> {
         must(effect.intervals.iter().all(|span| span.start < span.end), "no interval without length");
         must(effect.intervals.windows(2).all(|pair| pair[0].end <= pair[1].start), "intervals follow each other");
         let Span { start, end } = operation.within;
-        must(effect.intervals.iter().all(|span| start <= span.start && span.end <= end), "inside `within`");
+        let inside = |span: &Span| start <= span.start + 1e-9 && span.end <= end + 1e-9;
+        must(effect.intervals.iter().all(inside), "inside `within`");
         let times = match used.activation {
             Activation::Condition { times, .. } | Activation::ConditionFor { times, .. } => times,
             Activation::Time { .. } | Activation::Offline => 1,
@@ -439,7 +444,7 @@ fn all_hold(numbers: std::ops::Range<u64>, check: fn(&Case) -> Vec<String>) {
         wrong.join("\n"),
         words::case(case),
         words::ledger(&ledger),
-        all[..all.len().min(100)].join("\n"),
+        all[..all.len().min(100000)].join("\n"),
     );
 }
 
@@ -452,6 +457,52 @@ fn no_verdict_contradicts_a_judge_who_knows_everything() {
 #[ignore = "long: 100,000 random spaces, each run twice"]
 fn no_verdict_contradicts_a_judge_who_knows_everything_in_many_cases() {
     all_hold(2_000..102_000, contradictions);
+}
+
+/// What is different about a run for topics, metrics and messages that nothing reads.
+fn differences(case: &Case) -> Vec<String> {
+    let wider = case.with_unread();
+    let (narrow, told) = adapter::run(&case.plan, &case.test, &case.script);
+    let (wide, told_wide) = adapter::run(&wider.case.plan, &wider.case.test, &wider.case.script);
+    let mut wrong = Vec::new();
+    let mut same = |same: bool, what: String| {
+        if !same {
+            wrong.push(what);
+        }
+    };
+    same(narrow.outcome == wide.outcome, format!("it ended with {:?}, now {:?}", narrow.outcome, wide.outcome));
+    same(narrow.end == wide.end, format!("it ended at {}, now at {}", narrow.end, wide.end));
+    for (before, now) in narrow.operations.iter().zip(&wide.operations) {
+        same(before == now, format!("an operation: {before:?}, now {now:?}"));
+    }
+    for (at, before) in narrow.metrics.iter().enumerate() {
+        let now = &wide.metrics[wider.metrics[at]];
+        same(before == now, format!("metric {}: {before:?}, now {now:?}", words::metric(&case.plan.metrics[at])));
+    }
+    for (requirement, now) in case.plan.requirements.iter().zip(&wider.case.plan.requirements) {
+        same(said(requirement, &narrow) == said(now, &wide), format!("what it says of {}", requirement.name));
+    }
+    let own = |messages: &[Message]| -> Vec<Message> {
+        messages.iter().filter(|message| !message.path.starts_with("unread/")).cloned().collect()
+    };
+    let alike = |a: &[Message], b: &[Message]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.is(b));
+    same(alike(&told.published, &own(&told_wide.published)), "what is published".to_owned());
+    same(alike(&told.delivered, &own(&told_wide.delivered)), "what is delivered".to_owned());
+    if !wrong.is_empty() {
+        wrong.push(format!("wider:\n{}", words::case(&wider.case)));
+    }
+    wrong
+}
+
+#[test]
+fn what_nothing_reads_changes_nothing() {
+    all_hold(0..2_000, differences);
+}
+
+#[test]
+#[ignore = "long: 100,000 random spaces, each run twice"]
+fn what_nothing_reads_changes_nothing_in_many_cases() {
+    all_hold(2_000..102_000, differences);
 }
 
 /// Else the properties would hold of nothing.
