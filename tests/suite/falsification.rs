@@ -42,6 +42,31 @@ campaign even      from falsifying { search sobol { evaluations 24  seed 3 } }
 campaign wandering from falsifying { search nsga2 { population 6  evaluations 24  seed 3 }  novelty { over T1, T2, O0 } }
 "#;
 
+/// The published problems as campaigns, `OPERATIONS` and `COUNT` left open: three requirements, each on the least margin of
+/// a run. `MODE` is what stands in the place of `windows` or `setup`.
+const PROBLEM: &str = r#"
+space published
+system {
+  simulator model = in_process "model_sim::Model" { crate "simulator"  step 100ms }
+  topic inputs = {"input/a", "input/b"} : real
+  topic a = "signal/a" : real
+  topic b = "signal/b" : real
+  topic c = "signal/c" : real
+  topic first = "margin/first" : real
+  topic second = "margin/second" : real
+  topic third = "margin/third" : real
+}
+metric fuzzing_time minimise = fuzzing_time()
+metric m1 minimise = min(first)
+metric m2 minimise = min(second)
+metric m3 minimise = min(third)
+requirement R1 "The first margin is kept"  = m1 > 0
+requirement R2 "The second margin is kept" = m2 > 0
+requirement R3 "The third margin is kept"  = m3 > 0
+OPERATIONS
+campaign look { objectives OBJECTIVES  COUNT  search SEARCH  end after ENDs }
+"#;
+
 type Attempt = fn(FalsificationProblem, u64) -> Option<usize>;
 
 const STRATEGIES: [(&str, Attempt); 5] = [
