@@ -20,16 +20,7 @@ pub(crate) const STEP: i64 = 100_000_000;
 
 /// A metric; of a hook with its trend declared.
 pub(crate) fn metric(name: &str, default: Option<f64>, initial: Option<f64>, source: MetricSource) -> Metric {
-    Metric {
-        name: name.to_owned(),
-        doc: String::new(),
-        unit: None,
-        direction: None,
-        default,
-        initial,
-        source,
-        line: 1,
-    }
+    Metric { name: name.to_owned(), doc: String::new(), unit: None, direction: None, default, initial, source, line: 1 }
 }
 
 /// Whether the runtime is told which way the values of this hook go.
@@ -140,10 +131,8 @@ pub(crate) fn lost(outcome: Outcome) -> Observation {
 /// What the runtime says of a requirement.
 pub(crate) fn said(requirement: &Requirement, observation: &Observation) -> Verdict {
     let metric = observation.metrics.get(requirement.metric.index());
-    let value = metric.map_or(MetricValue { value: None, set: false }, |metric| MetricValue {
-        value: metric.value,
-        set: metric.set,
-    });
+    let value = metric
+        .map_or(MetricValue { value: None, set: false }, |metric| MetricValue { value: metric.value, set: metric.set });
     verdict(requirement.bound, &observation.outcome, value)
 }
 
@@ -172,7 +161,8 @@ pub(crate) fn queued(_: &Counters) -> u64 {
 
 /// The time in which operations that count are active, in nanoseconds.
 pub(crate) fn busy(plan: &CampaignPlan, test: &Test, observation: &Observation, _: &Ledger) -> i64 {
-    let timed = test.operations.iter().zip(&observation.operations).filter(|(used, _)| plan.operation(used.operation).timed);
+    let timed =
+        test.operations.iter().zip(&observation.operations).filter(|(used, _)| plan.operation(used.operation).timed);
     let nanos = |seconds: f64| (seconds * 1e9).round() as i64;
     timed.flat_map(|(_, effect)| &effect.intervals).map(|span| nanos(span.end) - nanos(span.start)).sum()
 }

@@ -273,7 +273,8 @@ impl Maker {
     fn topics(&mut self) -> Vec<Line> {
         let mut lines = Vec::new();
         for at in 0..self.between(2, 4) {
-            let carries = self.one(&[Carries::Real, Carries::Real, Carries::Int, Carries::Bool, Carries::Zone, Carries::Zone]);
+            let carries =
+                self.one(&[Carries::Real, Carries::Real, Carries::Int, Carries::Bool, Carries::Zone, Carries::Zone]);
             let members = if self.chance(0.3) { self.between(2, 3) } else { 1 };
             let paths: Vec<String> = (0..members).map(|member| format!("robot/{at}/{member}")).collect();
             for path in &paths {
@@ -379,7 +380,7 @@ impl Maker {
     }
 
     fn comparison(&mut self) -> Comparison {
-        use Comparison::{AtLeast, AtMost, Above, Below, Equal, NotEqual};
+        use Comparison::{Above, AtLeast, AtMost, Below, Equal, NotEqual};
         self.one(&[AtLeast, AtMost, Above, Below, Above, Below, Equal, NotEqual])
     }
 
@@ -412,8 +413,7 @@ impl Maker {
             4 => Aggregate::Count { of: held },
             _ => Aggregate::Duration { of: held },
         };
-        let limited =
-            matches!(aggregate, Aggregate::Last { .. } | Aggregate::Mean { .. } | Aggregate::Count { .. });
+        let limited = matches!(aggregate, Aggregate::Last { .. } | Aggregate::Mean { .. } | Aggregate::Count { .. });
         let when = self.chance(0.25).then(|| self.condition(inputs.len(), numbers, 1));
         let every = (limited && self.chance(0.25)).then(|| self.ticks(2, 8));
         let zone = inputs.iter().find(|input| self.carries[input.field.topic.index()] == Carries::Zone);
@@ -693,7 +693,8 @@ impl Maker {
                 };
                 match parameter.domain {
                     Domain::Number { shape: Shape::Range, .. } => {
-                        let width = if parameter.name == "delay" { self.ticks(0, 6) } else { f64::from(self.between(0, 3)) };
+                        let width =
+                            if parameter.name == "delay" { self.ticks(0, 6) } else { f64::from(self.between(0, 3)) };
                         Choice::Range { low: value, high: value + width }
                     }
                     _ => Choice::Value { value },

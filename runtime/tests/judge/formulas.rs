@@ -1,10 +1,10 @@
 //! The value of each metric, from the complete lists of messages of a run, by the words of the documentation.
 
+use sesame_plan::stl::Robustness;
 use sesame_plan::{
     Aggregate, CampaignPlan, Condition, Expression, FieldRef, Formula, Input, Members, Metric, MetricSource, Side,
     TopicId,
 };
-use sesame_plan::stl::Robustness;
 use sesame_runtime::value::Value;
 
 use crate::hooks::HookKind;
@@ -52,14 +52,19 @@ pub(crate) fn judged(plan: &CampaignPlan, metric: &Metric, ledger: &Ledger) -> J
     value.map_or(Judged::Unset, Judged::Value)
 }
 
-/// The messages that a metric hears, those of other topics among them.
-pub(crate) fn heard<'a>(metric: &Metric, ledger: &'a Ledger) -> &'a [Message] {
+/// Whether a metric hears messages as they are delivered.
+pub(crate) fn hears_deliveries(metric: &Metric) -> bool {
     let side = match &metric.source {
         MetricSource::Formula { formula } => formula.side,
         MetricSource::Robustness { robustness } => robustness.side,
         _ => Side::Inbound,
     };
-    if side == Side::Outbound { &ledger.delivered } else { &ledger.published }
+    side == Side::Outbound
+}
+
+/// The messages that a metric hears, those of other topics among them.
+pub(crate) fn heard<'a>(metric: &Metric, ledger: &'a Ledger) -> &'a [Message] {
+    if hears_deliveries(metric) { &ledger.delivered } else { &ledger.published }
 }
 
 /// When a metric first heard what is not finite, in nanoseconds.
@@ -75,9 +80,7 @@ pub(crate) fn first_blank(plan: &CampaignPlan, metric: &Metric, ledger: &Ledger)
             return ledger.published.iter().find(blank).map(|message| message.time);
         }
         MetricSource::Formula { formula } => formula.inputs.iter().map(|input| input.field.clone()).collect(),
-        MetricSource::Robustness { robustness } => {
-            robustness.inputs.iter().map(|input| input.field.clone()).collect()
-        }
+        MetricSource::Robustness { robustness } => robustness.inputs.iter().map(|input| input.field.clone()).collect(),
     };
     let blank = |message: &&Message| {
         fields.iter().any(|field| {

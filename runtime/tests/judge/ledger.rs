@@ -36,6 +36,8 @@ pub(crate) struct Ledger {
     pub(crate) paths: Vec<String>,
     pub(crate) published: Vec<Message>,
     pub(crate) delivered: Vec<Message>,
+    /// In the order in which it happened: whether a message was delivered, or else published, and its place there.
+    pub(crate) order: Vec<(bool, usize)>,
     /// When an operation held back a message, and until when it was to.
     pub(crate) deeds: Vec<(i64, usize, Deed)>,
     /// When the run ended.
@@ -48,6 +50,7 @@ impl Ledger {
             paths: wires.iter().map(|wire| wires.path(wire).to_owned()).collect(),
             published: Vec::new(),
             delivered: Vec::new(),
+            order: Vec::new(),
             deeds: Vec::new(),
             end: 0,
         }
@@ -62,10 +65,12 @@ impl Ledger {
 impl Tap for Ledger {
     fn published(&mut self, now: SimTime, wire: Wire, _: u64, value: &Value) {
         let path = self.paths[wire.index()].clone();
+        self.order.push((false, self.published.len()));
         self.published.push(Message { time: now.nanos(), path, value: value.clone() });
     }
     fn delivered(&mut self, now: SimTime, wire: Wire, _: u64, value: &Value) {
         let path = self.paths[wire.index()].clone();
+        self.order.push((true, self.delivered.len()));
         self.delivered.push(Message { time: now.nanos(), path, value: value.clone() });
     }
     fn operated(&mut self, now: SimTime, operation: usize, deed: Deed) {

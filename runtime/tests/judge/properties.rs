@@ -6,6 +6,7 @@ use sesame_runtime::record::Verdict;
 use sesame_runtime::rng::Stream;
 use sesame_runtime::value::{Fields, Record, Value};
 
+use crate::activations;
 use crate::adapter::{self, STEP, declares_trend, hung, lost, said};
 use crate::case::{Case, topics_of};
 use crate::formulas::{Judged, first_blank, heard as heard_by, judged};
@@ -215,10 +216,8 @@ fn faulty(
             let Ok(value) = value else { continue };
             let (said, true_one) = (said(requirement, report), verdict_of(requirement.bound, *value));
             let metric = &case.plan.metric(requirement.metric);
-            let contradicts = matches!(
-                (said, true_one),
-                (Verdict::Kept, Verdict::Violated) | (Verdict::Violated, Verdict::Kept)
-            );
+            let contradicts =
+                matches!((said, true_one), (Verdict::Kept, Verdict::Violated) | (Verdict::Violated, Verdict::Kept));
             if contradicts {
                 wrong.push(format!(
                     "{what}: {} of {} is {said:?} with {:?}, in truth {true_one:?} with {value:?}",
@@ -503,6 +502,23 @@ fn what_nothing_reads_changes_nothing() {
 #[ignore = "long: 100,000 random spaces, each run twice"]
 fn what_nothing_reads_changes_nothing_in_many_cases() {
     all_hold(2_000..102_000, differences);
+}
+
+/// Intervals of operations that are not where the documentation has them.
+fn misplaced(case: &Case) -> Vec<String> {
+    let (truth, told) = adapter::run(&case.plan, &case.test, &case.truth());
+    activations::contradictions(case, &truth, &told)
+}
+
+#[test]
+fn operations_are_active_where_the_documentation_says() {
+    all_hold(0..2_000, misplaced);
+}
+
+#[test]
+#[ignore = "long: 100,000 random spaces"]
+fn operations_are_active_where_the_documentation_says_in_many_cases() {
+    all_hold(2_000..102_000, misplaced);
 }
 
 /// Else the properties would hold of nothing.

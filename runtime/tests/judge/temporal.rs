@@ -65,7 +65,8 @@ impl Trace<'_> {
         let (from, to) = bounds(interval);
         let inner = self.of(of);
         let changes: Vec<i64> = inner.iter().map(|piece| piece.0).chain([self.end + 1]).collect();
-        let times = changes.iter().flat_map(|&change| [Some(change - from), to.map(|to| change - to)]).flatten().collect();
+        let times =
+            changes.iter().flat_map(|&change| [Some(change - from), to.map(|to| change - to)]).flatten().collect();
         self.pieces(times, |time| {
             let last = to.map_or(self.end, |to| (time + to).min(self.end));
             self.between(&inner, time + from, last).map(|(_, value)| value).fold(none, join)
@@ -98,9 +99,7 @@ impl Trace<'_> {
                 self.pieces(times, |time| {
                     let last = to.map_or(self.end, |to| (time + to).min(self.end));
                     self.between(&right, time + from, last)
-                        .map(|(s, right)| {
-                            self.between(&left, time, s).map(|(_, left)| left).fold(right, f64::min)
-                        })
+                        .map(|(s, right)| self.between(&left, time, s).map(|(_, left)| left).fold(right, f64::min))
                         .fold(f64::NEG_INFINITY, f64::max)
                 })
             }
