@@ -24,6 +24,8 @@ pub(crate) fn plan(operations: Vec<Operation>) -> CampaignPlan {
         default: None,
         initial: None,
         source,
+        trend: None,
+        accepts_not_finite: false,
         line: 1,
     };
     CampaignPlan {

@@ -2,6 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use sesame_plan::Trend;
+
+use crate::observation::Reach;
 use crate::time::SimTime;
 use crate::value::{Text, Value};
 
@@ -47,6 +50,11 @@ pub struct Context {
     last_times: BTreeMap<String, SimTime>,
     unimplemented: bool,
     problem: Option<String>,
+    /// The only way in which the value may change, and whether it went the other way.
+    trend: Option<Trend>,
+    turned: bool,
+    /// When it first read a number that was not finite, and the value at that time.
+    not_finite: Option<(SimTime, Option<f64>)>,
 }
 
 impl Context {
@@ -65,14 +73,27 @@ impl Context {
         self.value
     }
 
-    /// Sets the metric's value. What is not finite is refused and reported as a warning of the run.
+    /// Sets the metric's value. What is not finite is refused and reported as a warning of the run; from then on the run says
+    /// no more of a requirement than if it had broken off.
     pub fn set(&mut self, value: f64) {
         if !value.is_finite() {
             self.note(format!("refused the value {value} at {}", self.now));
+            self.read_not_finite();
             return;
         }
         if self.value == Some(value) {
             return;
+        }
+        if let Some(before) = self.value {
+            let (turned, word) = match self.trend {
+                Some(Trend::Rising) => (value < before, "rising"),
+                Some(Trend::Falling) => (value > before, "falling"),
+                None => (false, ""),
+            };
+            if turned {
+                self.turned = true;
+                self.note(format!("it is declared `{word}`, but its hook set {value} after {before} at {}", self.now));
+            }
         }
         self.value = Some(value);
         let time = self.now.seconds();
@@ -117,6 +138,17 @@ impl Context {
     /// Says that a message was not of its declared type; generated code does.
     pub fn mismatch(&mut self, mismatch: &crate::message::Mismatch) {
         self.note(format!("a message on `{}` is not of its declared type: {mismatch}", self.topic));
+    }
+
+    /// A number that it reads now is not finite.
+    fn read_not_finite(&mut self) {
+        let now = (self.now, self.value);
+        self.not_finite.get_or_insert(now);
+    }
+
+    /// What is left for the value from some time on, when it was this.
+    fn onwards(&self, value: Option<f64>) -> Reach {
+        Reach::onwards(self.trend.filter(|_| !self.turned), value)
     }
 
     /// Keeps the first problem of a run for its warnings.

@@ -1,7 +1,7 @@
 //! What was observed in one run of a test: what a worker reports and the results repository keeps.
 
 use serde::{Deserialize, Serialize};
-use sesame_plan::Span;
+use sesame_plan::{Span, Trend};
 
 /// How a run ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -27,6 +27,11 @@ pub enum Outcome {
 }
 
 impl Outcome {
+    /// Whether the run came to its planned end.
+    pub fn is_whole(&self) -> bool {
+        matches!(self, Outcome::Completed | Outcome::Void | Outcome::Unknown)
+    }
+
     /// One word for tables and the database.
     pub fn word(&self) -> &'static str {
         match self {
@@ -118,6 +123,52 @@ pub struct MetricObservation {
     pub value: Option<f64>,
     /// Whether the value is one that was set, not the default.
     pub set: bool,
+    /// The values that it could have had at the end of the run.
+    pub reach: Reach,
+    /// Simulation time, in seconds, of the first number that was not finite in what it reads.
+    pub not_finite: Option<f64>,
     /// Change points `(seconds, value)` in time order; the value holds until the next point. Always finite.
     pub series: Vec<(f64, f64)>,
+}
+
+impl MetricObservation {
+    /// Of a run that came to its end, with nothing in it that was not finite.
+    pub fn whole(value: Option<f64>, set: bool, series: Vec<(f64, f64)>) -> Self {
+        MetricObservation { value, set, reach: Reach::of_whole_run(value), not_finite: None, series }
+    }
+}
+
+/// The values that a metric could have had at the end of a run: of a run that came to its end, its value; of one that broke
+/// off, all that the rest of the run might have made of it. It is never too narrow.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Reach {
+    /// The least of them, finite; `None` where there is no least.
+    pub low: Option<f64>,
+    /// The greatest of them, finite; `None` where there is no greatest.
+    pub high: Option<f64>,
+}
+
+impl Reach {
+    /// All values.
+    pub const ANY: Reach = Reach { low: None, high: None };
+
+    /// This value only.
+    pub fn only(value: f64) -> Self {
+        Reach { low: Some(value), high: Some(value) }
+    }
+
+    /// That of a metric with this value in a run that came to its end. Without a value nothing is known.
+    pub fn of_whole_run(value: Option<f64>) -> Self {
+        value.map_or(Reach::ANY, Reach::only)
+    }
+
+    /// What is left for a metric that only goes one way and has come to this value; without a value, or where it may go
+    /// both ways, everything.
+    pub fn onwards(trend: Option<Trend>, value: Option<f64>) -> Self {
+        match trend {
+            Some(Trend::Rising) => Reach { low: value, high: None },
+            Some(Trend::Falling) => Reach { low: None, high: value },
+            None => Reach::ANY,
+        }
+    }
 }

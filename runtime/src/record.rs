@@ -25,7 +25,7 @@ mod verdict;
 use serde::Serialize;
 use sesame_plan::{KnownTestId, Test};
 
-use crate::observation::{Observation, Outcome};
+use crate::observation::{MetricObservation, Observation, Outcome, Reach};
 
 pub use difference::{Difference, differences};
 pub use digest::digest;
@@ -84,7 +84,7 @@ pub struct Repetition {
 impl Repetition {
     /// A repetition from what its run showed. Time series are not kept.
     pub fn of(test: u32, position: u32, simulator_seed: u64, observation: &Observation) -> Repetition {
-        let values = observation.metrics.iter().map(|shown| MetricValue { value: shown.value, set: shown.set });
+        let values = observation.metrics.iter().map(MetricValue::from);
         Repetition {
             test,
             position,
@@ -131,6 +131,31 @@ pub struct MetricValue {
     pub value: Option<f64>,
     /// Whether the value is one that was set, not the default.
     pub set: bool,
+    /// The values that it could have had at the end of the run.
+    pub reach: Reach,
+    /// Simulation time, in seconds, of the first number that was not finite in what it reads.
+    pub not_finite: Option<f64>,
+}
+
+impl MetricValue {
+    /// Of a run that came to its end, with nothing in it that was not finite.
+    pub fn whole(value: Option<f64>, set: bool) -> Self {
+        MetricValue { value, set, reach: Reach::of_whole_run(value), not_finite: None }
+    }
+}
+
+impl From<&MetricObservation> for MetricValue {
+    fn from(shown: &MetricObservation) -> Self {
+        let MetricObservation { value, set, reach, not_finite, series: _ } = *shown;
+        MetricValue { value, set, reach, not_finite }
+    }
+}
+
+impl Observation {
+    /// The value of the plan's metric at this position; unmeasured when the run reported none.
+    pub fn value(&self, metric: sesame_plan::MetricId) -> MetricValue {
+        self.metrics.get(metric.index()).map(MetricValue::from).unwrap_or_default()
+    }
 }
 
 /// One test without its time series and effects: what tables over all tests need.

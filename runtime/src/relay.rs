@@ -234,12 +234,14 @@ impl<'a> Relay<'a> {
             let edge = self.operations.iter().filter_map(|stage| stage.activity.next_edge()).min();
             match (edge.filter(|&time| time <= now), release) {
                 (Some(edge), release) if release.is_none_or(|release| edge <= release) => {
+                    self.metrics.follow_time(edge);
                     self.follow_activities(edge, deliveries);
                     if edge < now {
                         self.weigh_conditions(edge, deliveries);
                     }
                 }
                 (_, Some(release)) => {
+                    self.metrics.follow_time(release);
                     if let Some(held) = self.queue.pop() {
                         self.pass(release, held, deliveries);
                     }
@@ -247,7 +249,7 @@ impl<'a> Relay<'a> {
                         self.weigh_conditions(release, deliveries);
                     }
                 }
-                (_, None) => return,
+                (_, None) => return self.metrics.follow_time(now),
             }
         }
     }

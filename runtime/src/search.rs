@@ -341,7 +341,7 @@ mod tests {
     use crate::observation::{MetricObservation, WallTime};
 
     fn observed(outcome: Outcome, values: &[Option<f64>]) -> Observation {
-        let metric = |&value: &Option<f64>| MetricObservation { value, set: value.is_some(), series: Vec::new() };
+        let metric = |&value: &Option<f64>| MetricObservation::whole(value, value.is_some(), Vec::new());
         Observation {
             outcome,
             end: 70.0,

@@ -19,6 +19,12 @@
 //! A window that lies behind it altogether is empty: `always` is then positive infinity, `eventually` and `until`
 //! negative infinity, the least and greatest element of nothing.
 //!
+//! **Whole windows** are the other reading of the end, by [`Monitor::over_whole_windows`]: an operator with a bounded window
+//! has no robustness at times at which its window would be cut, nor has anything that is computed from it at those times.
+//! Operators around it go over the times at which there is one; an unbounded window has no end that could be cut. So
+//! `always (request implies eventually [0, d] answer)` says nothing of requests in the last `d` of the trace, whether they were
+//! answered or not. A formula without a robustness at the beginning of the trace has infinite robustness, as nothing was asked.
+//!
 //! **Until** is non-strict at both ends: for `left until right` at `t` there is a time `s` in the window at which
 //! `right` holds, and `left` holds for `t <= r <= s`. So `left` has to hold at `s` too: a trace on which `left` ends in
 //! the very moment in which `right` begins does not keep it. (It is this that keeps every subformula continuous from
@@ -52,6 +58,9 @@ mod piece;
 #[cfg(test)]
 mod tests;
 mod until;
+
+/// A time behind all that happens, in nanoseconds.
+const FOREVER: i64 = i64::MAX / 2;
 
 /// Why a formula cannot be monitored. The generator writes none of these, so a plan with one was edited.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
@@ -113,6 +122,8 @@ pub struct Monitor {
     start: Option<SimTime>,
     now: SimTime,
     robustness: VecDeque<Piece>,
+    /// Whether only windows count that lie in the trace as a whole.
+    whole: bool,
 }
 
 impl Monitor {
@@ -129,7 +140,14 @@ impl Monitor {
             start: None,
             now: SimTime::from_nanos(i64::MIN),
             robustness: VecDeque::new(),
+            whole: false,
         })
+    }
+
+    /// The same monitor, for which windows that the end of the trace would cut do not count: see the module's words on whole
+    /// windows.
+    pub fn over_whole_windows(self) -> Self {
+        Monitor { whole: true, ..self }
     }
 
     /// Takes a sample: from `time` on, `signal` has this `value`. Samples come in the order of their times; a signal
@@ -142,7 +160,7 @@ impl Monitor {
         if let Some(start) = self.start
             && time > self.now
         {
-            self.extend(Stretch { end: (time - start).nanos(), last: false });
+            self.extend((time - start).nanos(), false, None);
         }
         self.now = time;
         self.values[signal] = value;
@@ -161,13 +179,36 @@ impl Monitor {
     pub fn finish(mut self, end: SimTime) -> Option<f64> {
         assert!(end >= self.now, "a trace ends no earlier than its last sample, and {end} is before {}", self.now);
         let start = self.start?;
-        self.extend(Stretch { end: (end - start).nanos().saturating_add(1), last: true });
-        let first = self.robustness.front().expect("a trace has a first instant, and its end makes that known");
-        // The sum turns the zero that is negative, a matter of how often it was negated, into the other.
-        Some(first.value + 0.0)
+        self.extend((end - start).nanos().saturating_add(1), true, None);
+        // Without it no window is whole that the formula asks for. The sum turns the zero that is negative, a matter of how
+        // often it was negated, into the other.
+        Some(self.robustness.front().map_or(f64::INFINITY, |first| first.value + 0.0))
     }
 
-    fn extend(&mut self, stretch: Stretch) {
+    /// The least and the greatest robustness that the trace may still come to, when it breaks off at `now`, which is no earlier
+    /// than the last sample: whatever the signals do from `now` on, that time included, and whenever the trace then ends. Never
+    /// too narrow.
+    pub fn reach(&self, now: SimTime) -> (f64, f64) {
+        assert!(
+            now >= self.now,
+            "a trace breaks off no earlier than its last sample, and {now} is before {}",
+            self.now
+        );
+        let Some(start) = self.start else { return (f64::NEG_INFINITY, f64::INFINITY) };
+        let known = (now - start).nanos();
+        let extreme = |extreme: f64| {
+            let mut ahead = self.clone();
+            if known > 0 {
+                ahead.extend(known, false, None);
+            }
+            ahead.extend(FOREVER, true, Some(extreme));
+            ahead.robustness.front().map_or(extreme, |first| first.value + 0.0)
+        };
+        (extreme(f64::NEG_INFINITY), extreme(f64::INFINITY))
+    }
+
+    fn extend(&mut self, end: i64, last: bool, unknown: Option<f64>) {
+        let stretch = Stretch { end, last, unknown, whole: self.whole };
         self.root.extend(stretch, &self.values, &mut self.robustness);
     }
 }

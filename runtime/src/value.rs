@@ -176,6 +176,17 @@ impl Value {
         }
     }
 
+    /// Whether all declared numbers in it are finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        match self {
+            Value::Real(x) => x.is_finite(),
+            Value::Point(point) => point.iter().all(|x| x.is_finite()),
+            Value::List(items) => items.iter().all(Value::is_finite),
+            Value::Record(record) => record.values.iter().all(Value::is_finite),
+            Value::Bool(_) | Value::Int(_) | Value::Text(_) | Value::Undeclared(_) => true,
+        }
+    }
+
     /// Whether it is the same in every bit. It is equal to another then, or both hold NaNs in the same places.
     pub(crate) fn is_same(&self, other: &Value) -> bool {
         let all = |left: &[Value], right: &[Value]| {

@@ -348,6 +348,22 @@ fn node(node: &model::Node) -> plan::Node {
     }
 }
 
+/// The only way in which the value of a metric changes during a run, where its formula or the declaration of its hook says so.
+fn trend(metric: &model::Metric) -> Option<plan::Trend> {
+    match &metric.source {
+        model::MetricSource::Hook(_) => metric.trend,
+        model::MetricSource::FuzzingTime => Some(plan::Trend::Rising),
+        model::MetricSource::Formula(formula) => match formula.aggregate {
+            model::Aggregate::Max(_) | model::Aggregate::Count(_) | model::Aggregate::Duration(_) => {
+                Some(plan::Trend::Rising)
+            }
+            model::Aggregate::Min(_) => Some(plan::Trend::Falling),
+            model::Aggregate::Last(_) | model::Aggregate::Mean(_) => None,
+        },
+        model::MetricSource::Last(_) | model::MetricSource::Robustness(_) => None,
+    }
+}
+
 fn metric(metric: &model::Metric) -> plan::Metric {
     plan::Metric {
         name: metric.declaration.name.clone(),
@@ -356,6 +372,8 @@ fn metric(metric: &model::Metric) -> plan::Metric {
         direction: metric.direction,
         default: metric.default,
         initial: metric.initial,
+        trend: trend(metric),
+        accepts_not_finite: metric.accepts_not_finite,
         source: match &metric.source {
             model::MetricSource::Hook(topics) => {
                 plan::MetricSource::Hook { topics: topics.iter().map(|&id| topic_id(id)).collect() }

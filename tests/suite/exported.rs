@@ -85,7 +85,7 @@ fn plan(text: &str) -> CampaignPlan {
 fn check(plan: &CampaignPlan, tests: &[(Test, f64)]) {
     let folder = tempfile::tempdir().unwrap();
     let mut recorder = Recorder::create(folder.path(), plan, 42, 1).unwrap();
-    let metric = |value| MetricObservation { value: Some(value), set: true, series: Vec::new() };
+    let metric = |value| MetricObservation::whole(Some(value), true, Vec::new());
     for (number, (test, value)) in (1..).zip(tests) {
         let observation = Observation {
             outcome: Outcome::Completed,

@@ -65,6 +65,9 @@ fn every_fault_is_the_outcome_of_its_test_and_the_campaign_goes_on() {
             assert!(outcome.detail().unwrap_or_default().contains(detail), "{fault}: T{number} {outcome:?}");
             let warned = !repository.test(*number).unwrap().observation.warnings.is_empty();
             assert_eq!(warned, fault == "do_hook_nan", "{fault}: T{number}");
+            let metrics = repository.test(*number).unwrap().observation.metrics;
+            let not_finite = metrics.iter().any(|shown| shown.not_finite.is_some());
+            assert_eq!(not_finite, fault == "do_hook_nan", "{fault}: T{number}");
             if matches!(word, "crash" | "timeout") {
                 assert!(said.out.contains(&format!("T{number} ")), "T{number} is listed as a finding: {}", said.out);
             }

@@ -95,7 +95,7 @@ fn record(plan: &CampaignPlan, permitted: &Permitted, number: u32) -> TestRecord
     let objectives = u32::try_from(plan.campaign.objectives.len()).unwrap();
     let metric = |value: f64| {
         let series = (0..5u32).map(|at| (f64::from(at) + 1.0, value * f64::from(at + 1) / 5.0)).collect();
-        MetricObservation { value: Some(value), set: true, series }
+        MetricObservation::whole(Some(value), true, series)
     };
     TestRecord {
         number,

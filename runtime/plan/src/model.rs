@@ -250,8 +250,26 @@ pub struct Metric {
     pub initial: Option<f64>,
     /// Where its value comes from.
     pub source: MetricSource,
+    /// The only way in which its value changes during a run, where that is known; `None` where it may go both ways. What a
+    /// hook declares is checked while it runs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trend: Option<Trend>,
+    /// Whether infinity and NaN are ordinary values of what its hook reads, as in laser scans. Default false, and then not
+    /// written.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub accepts_not_finite: bool,
     /// Line of its declaration, from 1.
     pub line: u32,
+}
+
+/// The only way in which a metric's value changes during a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Trend {
+    /// It never gets smaller.
+    Rising,
+    /// It never gets greater.
+    Falling,
 }
 
 /// Where a metric's value comes from.

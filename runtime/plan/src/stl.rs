@@ -18,6 +18,10 @@ pub struct Robustness {
     pub formula: Formula,
     /// Where it listens.
     pub side: Side,
+    /// Whether only windows of operators count that lie in the run as a whole; otherwise the end of the run cuts them. Default
+    /// false, and then not written.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub whole_windows: bool,
 }
 
 /// A formula. Guarantees of a plan written by the generator: signals are in range, constants are finite, intervals

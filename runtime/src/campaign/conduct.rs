@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use sesame_plan::{CampaignPlan, CoverageGoal, MetricId, Recorded, Search, Test};
+use sesame_plan::{CampaignPlan, CoverageGoal, Recorded, Search, Test};
 
 use super::again::{Again, LIKE_BEFORE};
 use super::pool::{Ended, Job, Pool, PoolError, PoolSettings};
@@ -14,8 +14,8 @@ use super::traced::TraceOrder;
 use crate::coverage::{self, Coverage, Feasible, Grid, GridError};
 use crate::observation::{Observation, Outcome};
 use crate::record::{
-    self, Difference, Event, EventKind, GenerationCoverage, MetricValue, Origin, RecordError, Recorder, Repetition,
-    Repository, ResultSet, Status, TestRecord, Verdict, differences, verdict,
+    self, Difference, Event, EventKind, GenerationCoverage, Origin, RecordError, Recorder, Repetition, Repository,
+    ResultSet, Status, TestRecord, Verdict, differences, verdict,
 };
 use crate::rng::derive_seed;
 use crate::search::indicators::Indicators;
@@ -210,7 +210,7 @@ pub fn conduct(
             }
             front.add(record.number, &fitness);
             let failing = failing.is_some_and(|failing| {
-                record::fails(plan, failing, &record.observation.outcome, |id| value(&record.observation, id))
+                record::fails(plan, failing, &record.observation.outcome, |id| record.observation.value(id))
             });
             indicators.add(&record.observation.outcome, record.duplicate_of.is_some(), &fitness);
             let point = counted_point(plan, record);
@@ -529,17 +529,10 @@ impl Desk<'_> {
     }
 }
 
-/// The value of a metric in a run; unmeasured when the run reported none.
-fn value(observation: &Observation, id: MetricId) -> MetricValue {
-    let metric = observation.metrics.get(id.index());
-    metric.map_or_else(MetricValue::default, |metric| MetricValue { value: metric.value, set: metric.set })
-}
-
 /// What is wrong with a system before anything is fuzzed.
 fn reference_warnings(plan: &CampaignPlan, reference: &Observation) -> Vec<String> {
     let broken = plan.requirements.iter().filter_map(|requirement| {
-        let metric = reference.metrics.get(requirement.metric.index())?;
-        let value = MetricValue { value: metric.value, set: metric.set };
+        let value = reference.value(requirement.metric);
         (verdict(requirement.bound, &reference.outcome, value) == Verdict::Violated).then(|| {
             let name = &plan.metric(requirement.metric).name;
             let value = value.value.map_or_else(|| "no value".to_owned(), |value| value.to_string());

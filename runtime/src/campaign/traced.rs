@@ -91,14 +91,12 @@ const NOT_BUILT_IN: &str = "this runner was built without traces: run `sesamec g
 
 #[cfg(feature = "mcap")]
 fn is_kept(plan: &CampaignPlan, keep: Recorded, observation: &Observation) -> bool {
-    use crate::record::{MetricValue, Verdict, verdict};
+    use crate::record::{Verdict, verdict};
 
     let failed = matches!(observation.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. });
     let violated = || {
         plan.requirements.iter().any(|requirement| {
-            let metric = observation.metrics.get(requirement.metric.index());
-            let value = metric.map(|metric| MetricValue { value: metric.value, set: metric.set }).unwrap_or_default();
-            verdict(requirement.bound, &observation.outcome, value) == Verdict::Violated
+            verdict(requirement.bound, &observation.outcome, observation.value(requirement.metric)) == Verdict::Violated
         })
     };
     keep == Recorded::All || failed || violated()

@@ -82,7 +82,7 @@ fn compared(plan: &CampaignPlan, options: &Options, fed: crate::trace::Fed) -> c
             FedMetric {
                 metric: metric.name.clone(),
                 unit: metric.unit.clone(),
-                now: MetricValue { value: now.value, set: now.set },
+                now: MetricValue::from(now),
                 recorded: before.and_then(|before| before.value),
                 sameness,
             }

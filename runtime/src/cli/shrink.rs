@@ -10,7 +10,7 @@ use super::Failure;
 use super::recorded::{open, refuse_changed};
 use super::work::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled};
 use crate::observation::{Observation, Outcome};
-use crate::record::{MetricValue, Origin, Repository, TestRecord, Verdict, verdict};
+use crate::record::{Origin, Repository, TestRecord, Verdict, verdict};
 use crate::runner::Runner;
 
 /// Which test is made smaller, and how.
@@ -117,9 +117,7 @@ fn failing(repository: &Repository, record: &TestRecord, wanted: &[String]) -> R
 /// The requirements that a run violates.
 fn violated(plan: &CampaignPlan, observation: &Observation) -> Vec<RequirementId> {
     let of = |requirement: &sesame_plan::Requirement| {
-        let value = observation.metrics.get(requirement.metric.index());
-        let value = value.map_or_else(MetricValue::default, |it| MetricValue { value: it.value, set: it.set });
-        verdict(requirement.bound, &observation.outcome, value)
+        verdict(requirement.bound, &observation.outcome, observation.value(requirement.metric))
     };
     let requirements = (0u32..).map(RequirementId).zip(&plan.requirements);
     requirements.filter(|(_, requirement)| of(requirement) == Verdict::Violated).map(|(id, _)| id).collect()

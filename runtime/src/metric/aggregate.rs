@@ -1,9 +1,14 @@
 //! Declarative metrics during a run: the last value of each input is held, and what the formula says becomes of the values
-//! over time is kept up with every message.
+//! over time is kept up.
+//!
+//! A formula over one topic is evaluated at each of its messages. One over several is evaluated once per instant of simulation
+//! time at which one of them had a message, when all messages of that instant are known: so it never sees the new value of one
+//! topic beside the old value of another that changes in the same instant. While the last value of an input is not finite, no
+//! formula is evaluated.
 
 use std::collections::BTreeMap;
 
-use sesame_plan::{Aggregate, CampaignPlan, Formula, TopicId};
+use sesame_plan::{Aggregate, CampaignPlan, Formula, Input, Members, TopicId};
 
 use super::Context;
 use super::expression::{Held, greatest, holds, least, number};
@@ -17,6 +22,8 @@ const KEY_LIMIT: usize = 1_000;
 /// A formula in one run.
 pub(super) struct FormulaState<'p> {
     formula: &'p Formula,
+    /// Whether its inputs are of several topics.
+    several: bool,
     /// All there is without keys; with them, what a new key begins with.
     common: Stream,
     keys: BTreeMap<Key, Stream>,
@@ -34,20 +41,29 @@ enum Key {
 impl<'p> FormulaState<'p> {
     /// Before the first message.
     pub(super) fn new(formula: &'p Formula, plan: &CampaignPlan) -> Self {
-        let common = Stream { held: HeldInputs::new(&formula.inputs, plan), tally: Tally::default() };
-        FormulaState { formula, common, keys: BTreeMap::new(), heard: Vec::new() }
+        let held = HeldInputs::new(&formula.inputs, plan);
+        let common = Stream { held, tally: Tally::default(), heard: false, members: Vec::new() };
+        let topics = || formula.inputs.iter().map(|input| input.field.topic);
+        let several = topics().any(|topic| Some(topic) != topics().next());
+        FormulaState { formula, several, common, keys: BTreeMap::new(), heard: Vec::new() }
     }
 
-    /// A message on the `member`th path of a topic, at the context's time.
-    pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) {
-        if let Err(lacking) = hear(&self.formula.inputs, topic, value, &mut self.heard) {
-            context.note(format!("a message on `{}` has no value `{lacking}`", context.topic));
-            return;
+    /// A message on the `member`th path of a topic, at the context's time. Whether the formula waits for the end of the
+    /// instant, of which [`FormulaState::settle`] tells it.
+    pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) -> bool {
+        match hear(&self.formula.inputs, topic, value, &mut self.heard) {
+            Ok(true) => {}
+            Ok(false) => context.read_not_finite(),
+            Err(lacking) => {
+                context.note(format!("a message on `{}` has no value `{lacking}`", context.topic));
+                return false;
+            }
         }
+        let wire = (topic, member);
         match &self.formula.per {
             None => {
                 self.common.held.hold(&self.formula.inputs, &self.heard, member);
-                self.common.step(self.formula, context);
+                self.common.take(self.formula, wire, self.several, context);
             }
             Some(per) if per.topic == topic => {
                 let key = match value.at(&per.path) {
@@ -55,7 +71,7 @@ impl<'p> FormulaState<'p> {
                     Some(Value::Text(text)) => Key::Text(text.clone()),
                     _ => {
                         context.note(format!("a message on `{}` has no key `{}`", context.topic, per.path.join(".")));
-                        return;
+                        return false;
                     }
                 };
                 if self.keys.len() >= KEY_LIMIT && !self.keys.contains_key(&key) {
@@ -63,21 +79,41 @@ impl<'p> FormulaState<'p> {
                         "`per {}` has more than {KEY_LIMIT} values; further ones are not heard",
                         per.path.join(".")
                     ));
-                    return;
+                    return false;
                 }
                 let stream = self.keys.entry(key).or_insert_with(|| self.common.clone());
                 stream.held.hold(&self.formula.inputs, &self.heard, member);
-                stream.step(self.formula, context);
+                stream.take(self.formula, wire, self.several, context);
             }
             Some(_) => {
                 self.common.held.hold(&self.formula.inputs, &self.heard, member);
                 for stream in self.keys.values_mut() {
                     stream.held.hold(&self.formula.inputs, &self.heard, member);
-                    stream.step(self.formula, context);
+                    stream.take(self.formula, wire, self.several, context);
                 }
             }
         }
+        if !self.several {
+            self.set(context);
+        }
+        self.several
+    }
+
+    /// All messages of the instant at the context's time are known.
+    pub(super) fn settle(&mut self, context: &mut Context) {
+        for stream in std::iter::once(&mut self.common).chain(self.keys.values_mut()) {
+            stream.settle(self.formula, context);
+        }
         self.set(context);
+    }
+
+    /// The value that is certain to count in a run in which every number had been finite: what came after the first that was
+    /// not counts too, unless a rate limit might have left it out.
+    pub(super) fn certain(&self, context: &Context) -> Option<f64> {
+        match (self.formula.every, context.not_finite) {
+            (Some(_), Some((_, before))) => before,
+            _ => context.value,
+        }
     }
 
     /// The run has come to its end, at the context's time: what holds has held until now.
@@ -119,13 +155,52 @@ impl<'p> FormulaState<'p> {
 struct Stream {
     held: HeldInputs,
     tally: Tally,
+    /// Whether a message came in the instant at hand that is still to be taken into account.
+    heard: bool,
+    /// The members of groups it came from, where the formula is that of each: each once, the latest last.
+    members: Vec<(TopicId, usize)>,
 }
 
 impl Stream {
+    /// Takes a message into account whose values are held: now, or when its instant is over.
+    fn take(&mut self, formula: &Formula, wire: (TopicId, usize), wait: bool, context: &mut Context) {
+        if !wait {
+            return self.step(formula, context);
+        }
+        self.heard = true;
+        let each = |input: &Input| input.members == Members::Each && input.field.topic == wire.0;
+        if formula.inputs.iter().any(each) {
+            self.members.retain(|&member| member != wire);
+            self.members.push(wire);
+        }
+    }
+
+    /// The instant is over: each member of a group that had a message counts, or what is held, where none had.
+    fn settle(&mut self, formula: &Formula, context: &mut Context) {
+        if !std::mem::take(&mut self.heard) {
+            return;
+        }
+        if self.members.is_empty() {
+            return self.step(formula, context);
+        }
+        let mut members = std::mem::take(&mut self.members);
+        for (topic, member) in members.drain(..) {
+            self.held.turn_to(&formula.inputs, topic, member);
+            self.step(formula, context);
+        }
+        self.members = members;
+    }
+
     /// Takes the values into account as they are now, once all are known.
     fn step(&mut self, formula: &Formula, context: &mut Context) {
-        let Some(inputs) = self.held.values() else { return };
         let now = context.now;
+        let Some(inputs) = self.held.values() else {
+            // Of what holds while a value is not finite nothing is known.
+            if self.tally.holds_since.is_some() {
+                self.tally.hold(now, false);
+            }
+            return;
+        };
         let due = |tally: &mut Tally| formula.every.is_none_or(|period| tally.due(now, SimTime::from_seconds(period)));
         let counts = formula.when.as_ref().is_none_or(|when| holds(when, inputs));
         let of = match &formula.aggregate {

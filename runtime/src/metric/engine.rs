@@ -6,7 +6,7 @@ use sesame_plan::{CampaignPlan, Formula, MetricId, MetricSource, Side, Span, Top
 use super::aggregate::FormulaState;
 use super::robustness::RobustnessState;
 use super::{Context, Hook, HookEntry};
-use crate::observation::MetricObservation;
+use crate::observation::{MetricObservation, Reach};
 use crate::stl::FormulaError;
 use crate::time::SimTime;
 use crate::value::{Text, Value};
@@ -111,10 +111,12 @@ impl<'p> MetricTable<'p> {
                     ),
                     _ => None,
                 },
-                context: Context::default(),
+                context: Context { trend: metric.trend, ..Context::default() },
+                waits: false,
+                ended: false,
             })
             .collect();
-        Metrics { table: self, states }
+        Metrics { table: self, states, now: SimTime::ZERO, waiting: Vec::new() }
     }
 }
 
@@ -122,6 +124,10 @@ impl<'p> MetricTable<'p> {
 pub struct Metrics<'p> {
     table: &'p MetricTable<'p>,
     states: Vec<State<'p>>,
+    /// The time that was last told.
+    now: SimTime,
+    /// The metrics whose formulas wait for the end of the instant at hand.
+    waiting: Vec<usize>,
 }
 
 struct State<'p> {
@@ -129,6 +135,10 @@ struct State<'p> {
     formula: Option<FormulaState<'p>>,
     robustness: Option<RobustnessState<'p>>,
     context: Context,
+    /// Whether it is among those that wait.
+    waits: bool,
+    /// Whether it was told of the end of the run.
+    ended: bool,
 }
 
 impl Metrics<'_> {
@@ -141,9 +151,33 @@ impl Metrics<'_> {
         }
     }
 
+    /// Time has come to `now`: all messages of the instants before are known. Formulas over several topics have their values of
+    /// those instants from here on, for conditions too. Messages tell their time themselves; whoever weighs conditions, or
+    /// knows that time has passed without a message, calls this first.
+    pub fn follow_time(&mut self, now: SimTime) {
+        if now > self.now {
+            self.settle();
+            self.now = now;
+        }
+    }
+
+    /// The instant at hand is over.
+    fn settle(&mut self) {
+        for at in self.waiting.drain(..) {
+            let State { formula, context, waits, .. } = &mut self.states[at];
+            *waits = false;
+            context.now = self.now;
+            if let Some(formula) = formula {
+                formula.settle(context);
+            }
+        }
+    }
+
     /// Tells hooks and formulas that the run has come to its end. After a failure nobody does.
     pub fn end(&mut self, now: SimTime) {
-        for State { hook, formula, robustness, context } in &mut self.states {
+        self.follow_time(now);
+        self.settle();
+        for State { hook, formula, robustness, context, ended, .. } in &mut self.states {
             context.now = now;
             if let Some(formula) = formula {
                 formula.end(context);
@@ -154,13 +188,15 @@ impl Metrics<'_> {
             if let Some(hook) = hook {
                 hook.on_end(context);
             }
+            *ended = true;
         }
     }
 
     /// A message, as the simulator sent it.
     pub fn message(&mut self, now: SimTime, wire: Wire, value: &Value) {
+        self.follow_time(now);
         for &(at, input) in &self.table.taps[wire.index()] {
-            let State { hook, formula, robustness, context } = &mut self.states[at];
+            let State { hook, formula, robustness, context, waits, .. } = &mut self.states[at];
             if let Some(robustness) = robustness {
                 let (path, topic, member) = &self.table.wires[wire.index()];
                 context.now = now;
@@ -172,10 +208,21 @@ impl Metrics<'_> {
             context.now = now;
             context.topic.clone_from(path);
             match (&self.table.plan.metrics[at].source, hook, formula) {
-                (MetricSource::Hook { .. }, Some(hook), _) => hook.on_message(input, value, context),
-                (MetricSource::Formula { .. }, _, Some(formula)) => formula.message(*topic, *member, value, context),
+                (MetricSource::Hook { .. }, Some(hook), _) => {
+                    let accepts = self.table.plan.metrics[at].accepts_not_finite || context.not_finite.is_some();
+                    if !accepts && !value.is_finite() {
+                        context.read_not_finite();
+                    }
+                    hook.on_message(input, value, context);
+                }
+                (MetricSource::Formula { .. }, _, Some(formula)) => {
+                    if formula.message(*topic, *member, value, context) && !std::mem::replace(waits, true) {
+                        self.waiting.push(at);
+                    }
+                }
                 (MetricSource::Last { input }, ..) => match value.number_at(&input.path) {
-                    Some(number) => context.set(number),
+                    Some(number) if number.is_finite() => context.set(number),
+                    Some(_) => context.read_not_finite(),
                     None => context.note(format!(
                         "a message on `{}` has no number `{}`",
                         context.topic,
@@ -199,13 +246,17 @@ impl Metrics<'_> {
 
     /// A message, as it is delivered.
     pub fn delivered(&mut self, now: SimTime, wire: Wire, value: &Value) {
+        self.follow_time(now);
         for &at in &self.table.delivered[wire.index()] {
-            let State { formula, robustness, context, .. } = &mut self.states[at];
+            let State { formula, robustness, context, waits, .. } = &mut self.states[at];
             let (path, topic, member) = &self.table.wires[wire.index()];
             context.now = now;
             context.topic.clone_from(path);
-            if let Some(formula) = formula {
-                formula.message(*topic, *member, value, context);
+            if let Some(formula) = formula
+                && formula.message(*topic, *member, value, context)
+                && !std::mem::replace(waits, true)
+            {
+                self.waiting.push(at);
             }
             if let Some(robustness) = robustness {
                 robustness.message(*topic, *member, value, context);
@@ -223,7 +274,7 @@ impl Metrics<'_> {
         for (state, metric) in self.states.iter_mut().zip(&self.table.plan.metrics) {
             let context = &mut state.context;
             if let Some(robustness) = &mut state.robustness {
-                robustness.break_off(context);
+                robustness.break_off(self.now, context);
             }
             if matches!(metric.source, MetricSource::FuzzingTime) {
                 for (time, total) in fuzzing_time(active) {
@@ -234,9 +285,19 @@ impl Metrics<'_> {
             warnings.extend(context.problem.take().map(|problem| format!("metric `{}`: {problem}", metric.name)));
             let set = context.value.is_some();
             let value = if context.unimplemented { None } else { context.value.or(metric.default) };
+            let set = set && value.is_some();
+            let reach = match (&state.robustness, &state.formula) {
+                _ if context.unimplemented => Reach::ANY,
+                (Some(robustness), _) => robustness.reach(),
+                _ if state.ended && context.not_finite.is_none() => Reach::of_whole_run(value),
+                (_, Some(formula)) => context.onwards(formula.certain(context)),
+                _ => context.onwards(context.not_finite.map_or(context.value, |(_, before)| before)),
+            };
             observations.push(MetricObservation {
                 value,
-                set: set && value.is_some(),
+                set,
+                reach,
+                not_finite: context.not_finite.map(|(time, _)| time.seconds()),
                 series: std::mem::take(&mut context.series),
             });
         }

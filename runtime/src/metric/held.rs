@@ -5,24 +5,32 @@ use sesame_plan::{CampaignPlan, Input, Members, TopicId};
 use super::expression::{Held, greatest, least};
 use crate::value::Value;
 
-/// Reads the values of the inputs that a message on a topic has, with their positions. On failure, the field it lacks.
+/// What is held of an input whose last value was not finite.
+const NOT_FINITE: Held = [f64::NAN; 3];
+
+/// Reads the values of the inputs that a message on a topic has, with their positions, and says whether all of them are
+/// finite. On failure, the field it lacks.
 pub(super) fn hear(
     inputs: &[Input],
     topic: TopicId,
     value: &Value,
     heard: &mut Vec<(usize, Held)>,
-) -> Result<(), String> {
+) -> Result<bool, String> {
     heard.clear();
+    let mut all_finite = true;
     for (at, input) in inputs.iter().enumerate().filter(|(_, input)| input.field.topic == topic) {
-        match value.at(&input.field.path) {
-            Some(Value::Point(point)) => heard.push((at, *point)),
-            Some(Value::Real(x)) => heard.push((at, [*x, 0.0, 0.0])),
-            Some(Value::Int(n)) => heard.push((at, [*n as f64, 0.0, 0.0])),
-            Some(Value::Bool(b)) => heard.push((at, [f64::from(u8::from(*b)), 0.0, 0.0])),
+        let held = match value.at(&input.field.path) {
+            Some(Value::Point(point)) => *point,
+            Some(Value::Real(x)) => [*x, 0.0, 0.0],
+            Some(Value::Int(n)) => [*n as f64, 0.0, 0.0],
+            Some(Value::Bool(b)) => [f64::from(u8::from(*b)), 0.0, 0.0],
             _ => return Err(input.field.path.join(".")),
-        }
+        };
+        let finite = held.iter().all(|x| x.is_finite());
+        all_finite &= finite;
+        heard.push((at, if finite { held } else { NOT_FINITE }));
     }
-    Ok(())
+    Ok(all_finite)
 }
 
 /// The last values of the inputs of a formula.
@@ -67,8 +75,18 @@ impl HeldInputs {
         }
     }
 
-    /// What is held of each input, once all had a message.
+    /// Makes one member of a group the latest, where the inputs are those of each.
+    pub(super) fn turn_to(&mut self, inputs: &[Input], topic: TopicId, member: usize) {
+        for (at, input) in inputs.iter().enumerate() {
+            if input.field.topic == topic && input.members == Members::Each {
+                self.inputs[at] = self.members[at][member].unwrap_or(self.inputs[at]);
+            }
+        }
+    }
+
+    /// What is held of each input, once all had a message and while the last one of each was finite.
     pub(super) fn values(&self) -> Option<&[Held]> {
-        (!self.known.contains(&false)).then_some(&self.inputs)
+        let usable = !self.known.contains(&false) && self.inputs.iter().all(|held| !held[0].is_nan());
+        usable.then_some(&self.inputs)
     }
 }

@@ -7,6 +7,7 @@ use sesame_plan::{CampaignPlan, Members, TopicId};
 use super::Context;
 use super::expression::{Held, least, number};
 use super::held::{HeldInputs, hear};
+use crate::observation::Reach;
 use crate::stl::{FormulaError, Monitor};
 use crate::time::SimTime;
 use crate::value::Value;
@@ -25,17 +26,40 @@ pub(super) struct RobustnessState<'p> {
 
 struct Instance {
     held: HeldInputs,
-    /// None once the run is over.
+    /// None once the run is over, or a number was not finite: then there is what came out.
     monitor: Option<Monitor>,
+    /// None as long as there is a monitor, and where the formula said nothing.
+    said: Option<Said>,
+}
+
+/// What came of one monitor.
+#[derive(Clone, Copy)]
+struct Said {
+    /// The robustness of what was heard; none where the trace had not begun.
+    robustness: Option<f64>,
+    /// The least and the greatest robustness that the whole run may have.
+    reach: (f64, f64),
+}
+
+impl Instance {
+    /// Nothing more is known from `now` on: what was heard is judged up to the `last` message before.
+    fn break_off(&mut self, now: SimTime, last: SimTime) {
+        if let Some(monitor) = self.monitor.take() {
+            let reach = monitor.reach(now);
+            self.said = Some(Said { robustness: monitor.finish(last), reach });
+        }
+    }
 }
 
 impl<'p> RobustnessState<'p> {
     /// Before the first message. Fails for a formula that the generator would not write.
     pub(super) fn new(robustness: &'p Robustness, plan: &CampaignPlan) -> Result<Self, FormulaError> {
         let monitor = Monitor::new(&robustness.formula, robustness.signals.len())?;
+        let monitor = if robustness.whole_windows { monitor.over_whole_windows() } else { monitor };
         let each = robustness.inputs.iter().find(|input| input.members == Members::Each).map(|input| input.field.topic);
         let count = each.map_or(1, |topic| plan.topic(topic).paths.len());
-        let instance = || Instance { held: HeldInputs::new(&robustness.inputs, plan), monitor: Some(monitor.clone()) };
+        let instance =
+            || Instance { held: HeldInputs::new(&robustness.inputs, plan), monitor: Some(monitor.clone()), said: None };
         let instances = (0..count).map(|_| instance()).collect();
         Ok(RobustnessState { robustness, each, instances, last: SimTime::ZERO, heard: Vec::new() })
     }
@@ -43,23 +67,34 @@ impl<'p> RobustnessState<'p> {
     /// A message on the `member`th path of a topic, at the context's time.
     pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) {
         let Robustness { inputs, signals, .. } = self.robustness;
-        if let Err(lacking) = hear(inputs, topic, value, &mut self.heard) {
-            context.note(format!("a message on `{}` has no value `{lacking}`", context.topic));
-            return;
+        match hear(inputs, topic, value, &mut self.heard) {
+            Ok(true) => {}
+            Ok(false) => context.read_not_finite(),
+            Err(lacking) => {
+                context.note(format!("a message on `{}` has no value `{lacking}`", context.topic));
+                return;
+            }
         }
-        self.last = context.now;
-        for (at, Instance { held, monitor }) in self.instances.iter_mut().enumerate() {
+        let before = std::mem::replace(&mut self.last, context.now);
+        for (at, instance) in self.instances.iter_mut().enumerate() {
+            let Instance { held, monitor, .. } = instance;
             // Where each member has a formula, what is said of all of them goes to all, and what is said of one to its own.
             let own = self.each != Some(topic) || at == member;
+            let mut finite = true;
             for &(input, value) in &self.heard {
                 if own || inputs[input].members != Members::Each {
+                    finite &= value.iter().all(|x| x.is_finite());
                     held.hold(inputs, &[(input, value)], member);
                 }
+            }
+            if !finite {
+                instance.break_off(context.now, before);
+                continue;
             }
             let (Some(values), Some(monitor)) = (held.values(), monitor) else { continue };
             for (at, signal) in signals.iter().enumerate() {
                 let value = number(signal, values);
-                // As with other formulas: what is no number says nothing, and what was known goes on.
+                // As with other formulas: arithmetic that comes to no number says nothing, and what was known goes on.
                 if value.is_finite() {
                     monitor.push(context.now, at, value);
                 } else {
@@ -72,8 +107,18 @@ impl<'p> RobustnessState<'p> {
     /// The run is over, at the context's time: by how much the formula was kept.
     pub(super) fn end(&mut self, context: &mut Context) {
         let end = context.now.max(self.last);
-        let monitors = self.instances.iter_mut().filter_map(|instance| instance.monitor.take());
-        let robustness = monitors.filter_map(|monitor| monitor.finish(end)).reduce(least);
+        for instance in &mut self.instances {
+            if let Some(monitor) = instance.monitor.take() {
+                // One without a trace says nothing of the run, as far as it is known.
+                let robustness = monitor.finish(end);
+                instance.said = robustness.map(|it| Said { robustness, reach: (it, it) });
+            }
+        }
+        self.set(context);
+    }
+
+    fn set(&self, context: &mut Context) {
+        let robustness = self.instances.iter().filter_map(|instance| instance.said?.robustness).reduce(least);
         match robustness {
             Some(robustness) if robustness.is_finite() => context.set(robustness),
             Some(_) => context.note("the run ended before the formula says anything of it".to_owned()),
@@ -81,12 +126,24 @@ impl<'p> RobustnessState<'p> {
         }
     }
 
-    /// The run broke off, and the end was not told: it is judged up to its last message.
-    pub(super) fn break_off(&mut self, context: &mut Context) {
+    /// The run broke off at `now`, and the end was not told: it is judged up to its last message.
+    pub(super) fn break_off(&mut self, now: SimTime, context: &mut Context) {
         if self.instances.iter().any(|instance| instance.monitor.is_some()) {
+            for instance in &mut self.instances {
+                instance.break_off(now.max(self.last), self.last);
+            }
             context.now = self.last;
-            self.end(context);
+            self.set(context);
         }
+    }
+
+    /// The values that it may have at the end of the run, once that is over: of all instances the least counts.
+    pub(super) fn reach(&self) -> Reach {
+        let ends = |end: fn((f64, f64)) -> f64| {
+            let ends = self.instances.iter().filter_map(|instance| instance.said).map(|said| end(said.reach));
+            ends.reduce(least).filter(|end| end.is_finite())
+        };
+        Reach { low: ends(|reach| reach.0), high: ends(|reach| reach.1) }
     }
 }
 
@@ -100,6 +157,7 @@ mod tests {
     use super::*;
     use crate::fixture::plan;
     use crate::metric::MetricTable;
+    use crate::observation::MetricObservation;
     use crate::value::{Fields, Record};
     use crate::wire::WireTable;
 
@@ -138,11 +196,16 @@ mod tests {
     /// The robustness of a formula the signals of which are the inputs.
     fn of(inputs: Vec<Input>, formula: Formula) -> Robustness {
         let signals = (0..inputs.len()).map(|at| Expression::Input(u32::try_from(at).unwrap()));
-        Robustness { signals: signals.collect(), inputs, formula, side: Side::Inbound }
+        Robustness { signals: signals.collect(), inputs, formula, side: Side::Inbound, whole_windows: false }
     }
 
     /// Value and warnings of a run that ends at this time in milliseconds, or breaks off after its last message.
     fn measured(robustness: Robustness, sent: &[Sent], end: Option<i64>) -> (Option<f64>, Vec<String>) {
+        let (observed, warnings) = observed(robustness, sent, end);
+        (observed.value, warnings)
+    }
+
+    fn observed(robustness: Robustness, sent: &[Sent], end: Option<i64>) -> (MetricObservation, Vec<String>) {
         let mut plan = plan(Vec::new());
         plan.metrics.truncate(1);
         plan.metrics[0].source = MetricSource::Robustness { robustness };
@@ -157,8 +220,8 @@ mod tests {
         if let Some(end) = end {
             metrics.end(SimTime::from_nanos(end * 1_000_000));
         }
-        let (observed, warnings) = metrics.finish(&[]);
-        (observed[0].value, warnings)
+        let (mut observed, warnings) = metrics.finish(&[]);
+        (observed.remove(0), warnings)
     }
 
     fn value(robustness: Robustness, sent: &[Sent]) -> Option<f64> {
@@ -223,11 +286,30 @@ mod tests {
     }
 
     #[test]
-    fn a_value_that_is_no_number_is_refused_and_the_one_before_it_goes_on() {
-        let robustness = of(vec![level(Members::Min)], always(above(0)));
-        let (value, warnings) = measured(robustness, &[(0, 1, 4.0), (100, 1, f64::NAN), (200, 1, 3.0)], Some(300));
-        assert_eq!(value, Some(3.0));
-        assert_eq!(warnings, ["metric `fuzzing_time`: refused the value NaN at 0.100 s"]);
+    fn from_a_value_that_is_not_finite_on_a_formula_is_judged_as_if_the_run_had_broken_off() {
+        let robustness = |members| of(vec![level(members)], always(above(0)));
+        let stream = [(0, 1, 4.0), (100, 1, f64::NAN), (200, 1, -3.0)];
+        let gap = observed(robustness(Members::Min), &stream, Some(300)).0;
+        assert_eq!((gap.value, gap.not_finite), (Some(4.0), Some(0.1)));
+        assert_eq!(gap.reach, Reach { low: None, high: Some(4.0) });
+        let violated = observed(robustness(Members::Min), &[(0, 1, -1.0), (100, 1, f64::NAN)], Some(300)).0;
+        assert_eq!(violated.reach, Reach { low: None, high: Some(-1.0) });
+        // The other member goes on.
+        let stream = [(0, 1, 4.0), (0, 2, 5.0), (100, 1, f64::NAN), (200, 2, -3.0)];
+        let each = observed(robustness(Members::Each), &stream, Some(300)).0;
+        assert_eq!((each.value, each.reach), (Some(-3.0), Reach { low: None, high: Some(-3.0) }));
+    }
+
+    #[test]
+    fn after_a_run_that_broke_off_the_reach_is_what_no_continuation_can_leave() {
+        let reach = |formula, end| {
+            observed(of(vec![level(Members::Min)], formula), &[(0, 1, 4.0), (100, 1, -2.0)], end).0.reach
+        };
+        assert_eq!(reach(always(above(0)), Some(300)), Reach::only(-2.0));
+        // The instant of the last message is not over as long as nobody says so.
+        assert_eq!(reach(always(above(0)), None), Reach { low: None, high: Some(4.0) });
+        assert_eq!(reach(eventually(0.0, 5.0, above(0)), None), Reach { low: Some(4.0), high: None });
+        assert_eq!(reach(eventually(2.0, 5.0, above(0)), None), Reach::ANY);
     }
 
     #[test]

@@ -80,6 +80,15 @@ impl Differences {
 
     fn metric(&mut self, name: &str, before: &MetricObservation, after: &MetricObservation) {
         let value = |shown: &MetricObservation| (shown.value, shown.set);
+        if value(before) == value(after) {
+            self.compare(&format!("what {name} could have been"), &before.reach, &after.reach, |reach| {
+                let end = |end: Option<f64>| end.map_or("any".to_owned(), |end| end.to_string());
+                format!("{} to {}", end(reach.low), end(reach.high))
+            });
+        }
+        self.compare(&format!("what is not finite for {name}"), &before.not_finite, &after.not_finite, |time| {
+            time.map_or("never".to_owned(), |time| format!("from {time} s on"))
+        });
         let word = |value: &(Option<f64>, bool)| match *value {
             (None, _) => "no value".to_owned(),
             (Some(value), true) => value.to_string(),

@@ -40,7 +40,10 @@ const CONTENT: &[(&str, &str)] = &[
          ORDER BY test, operation, position",
     ),
     ("intervals", "SELECT test, operation, position, start_s, end_s FROM intervals ORDER BY test, operation, position"),
-    ("metric_values", "SELECT test, metric, value, is_set FROM metric_values ORDER BY test, metric"),
+    (
+        "metric_values",
+        "SELECT test, metric, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values ORDER BY test, metric",
+    ),
     (
         "change_points",
         "SELECT test, metric, position, time_s, value FROM change_points ORDER BY test, metric, position",
@@ -52,7 +55,8 @@ const CONTENT: &[(&str, &str)] = &[
     ),
     (
         "repetition_values",
-        "SELECT test, position, metric, value, is_set FROM repetition_values ORDER BY test, position, metric",
+        "SELECT test, position, metric, value, is_set, reach_low, reach_high, not_finite_s FROM repetition_values \
+         ORDER BY test, position, metric",
     ),
     ("result_sets", "SELECT name, generation, status FROM result_sets ORDER BY name"),
     ("result_set_members", "SELECT result_set, position, test FROM result_set_members ORDER BY result_set, position"),

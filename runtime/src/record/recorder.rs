@@ -316,7 +316,9 @@ fn unrecordable(record: &TestRecord) -> Option<String> {
         numbers.extend([effect.first_touch, effect.last_touch].into_iter().flatten().map(|time| ("a touch", time)));
     }
     for metric in metrics {
-        numbers.extend(metric.value.map(|value| ("the value of a metric", value)));
+        let ends = [metric.value, metric.reach.low, metric.reach.high].into_iter().flatten();
+        numbers.extend(ends.map(|value| ("the value of a metric", value)));
+        numbers.extend(metric.not_finite.map(|time| ("the time of what was not finite", time)));
         numbers.extend(
             metric
                 .series
@@ -410,8 +412,19 @@ fn write_test(transaction: &Transaction<'_>, plan: &CampaignPlan, record: &TestR
     write_operations(transaction, plan, record)?;
     for (metric, shown) in observation.metrics.iter().enumerate() {
         transaction
-            .prepare_cached("INSERT INTO metric_values (test, metric, value, is_set) VALUES (?1, ?2, ?3, ?4)")?
-            .execute(params![number, index(metric), shown.value, shown.set])?;
+            .prepare_cached(
+                "INSERT INTO metric_values (test, metric, value, is_set, reach_low, reach_high, not_finite_s) \
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+            )?
+            .execute(params![
+                number,
+                index(metric),
+                shown.value,
+                shown.set,
+                shown.reach.low,
+                shown.reach.high,
+                shown.not_finite
+            ])?;
         if duplicate_of.is_some() {
             continue;
         }

@@ -56,7 +56,8 @@ impl Recorder {
             Outcome::Crash { message } => (Some(message.as_str()), None),
             Outcome::Timeout { limit } => (None, Some(*limit)),
         };
-        let numbers = values.iter().filter_map(|shown| shown.value).chain([*end]).chain(limit);
+        let shown = values.iter().flat_map(|shown| [shown.value, shown.reach.low, shown.reach.high, shown.not_finite]);
+        let numbers = shown.flatten().chain([*end]).chain(limit);
         if let Some(number) = numbers.into_iter().find(|number| !number.is_finite()) {
             return Err(unrecordable(format!("a number of repetition {position} is {number}")));
         }
@@ -81,10 +82,19 @@ impl Recorder {
             for (metric, shown) in values.iter().enumerate() {
                 transaction
                     .prepare_cached(
-                        "INSERT INTO repetition_values (test, position, metric, value, is_set) \
-                         VALUES (?1, ?2, ?3, ?4, ?5)",
+                        "INSERT INTO repetition_values (test, position, metric, value, is_set, reach_low, reach_high, \
+                         not_finite_s) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
                     )?
-                    .execute(params![test, position, index(metric), shown.value, shown.set])?;
+                    .execute(params![
+                        test,
+                        position,
+                        index(metric),
+                        shown.value,
+                        shown.set,
+                        shown.reach.low,
+                        shown.reach.high,
+                        shown.not_finite
+                    ])?;
             }
             for warning in warnings {
                 // Of the campaign: a test's own warnings are those of its own run.
@@ -106,11 +116,12 @@ impl Repository {
     /// All repetitions of all tests: by test, and of each in their order.
     pub fn repetitions(&self) -> Result<BTreeMap<u32, Vec<Repetition>>, RecordError> {
         let values = self.read(
-            "SELECT test, position, value, is_set FROM repetition_values ORDER BY test, position, metric",
+            "SELECT test, position, value, is_set, reach_low, reach_high, not_finite_s FROM repetition_values \
+             ORDER BY test, position, metric",
             [],
             |row| {
                 let at: (u32, u32) = (row.get(0)?, row.get(1)?);
-                Ok((at, MetricValue { value: row.get(2)?, set: row.get(3)? }))
+                Ok((at, super::repository::metric_value(row, 2)?))
             },
         )?;
         let mut of: BTreeMap<(u32, u32), Vec<MetricValue>> = BTreeMap::new();
@@ -152,7 +163,7 @@ mod tests {
     use crate::record::{DATABASE, sample};
 
     fn repetition(test: u32, position: u32, outcome: Outcome, collisions: Option<f64>) -> Repetition {
-        let value = |value: Option<f64>| MetricValue { value, set: value.is_some() };
+        let value = |value: Option<f64>| MetricValue::whole(value, value.is_some());
         let values = [collisions, Some(0.1 + f64::from(position)), Some(1.0), None, Some(-0.25)].map(value).to_vec();
         let seed = u64::MAX - u64::from(position);
         Repetition { test, position, simulator_seed: seed, outcome, end: 69.98, messages: 12, values }
@@ -203,13 +214,16 @@ mod tests {
         backwards.reverse();
         let whole = digest(&written);
         assert_eq!(digest(&backwards), whole);
-        let changes: [fn(&mut Repetition); 6] = [
+        let changes: [fn(&mut Repetition); 9] = [
             |it| it.simulator_seed -= 9,
             |it| it.outcome = Outcome::Completed,
             |it| it.end = it.end.next_up(),
             |it| it.messages += 1,
             |it| it.values[1].value = it.values[1].value.map(f64::next_up),
             |it| it.values[1].set = false,
+            |it| it.values[1].reach.low = None,
+            |it| it.values[1].reach.high = it.values[1].reach.high.map(f64::next_up),
+            |it| it.values[1].not_finite = Some(1.5),
         ];
         for (at, change) in changes.into_iter().enumerate() {
             let mut changed = written.clone();

@@ -8,7 +8,7 @@ use rusqlite::{Connection, Row, params};
 use sesame_plan::{Activation, CampaignPlan, Choice, KnownTestId, OperationId, Span, Test, TestOperation};
 
 use crate::condition;
-use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
+use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, Reach, WallTime};
 use crate::record::folder::{DATABASE, trace_file};
 use crate::record::{
     Event, EventKind, GenerationCoverage, MetricValue, Origin, RecordError, ResultSet, Session, Status, TestRecord,
@@ -165,7 +165,13 @@ impl Repository {
         let mut metrics: Vec<MetricObservation> = row
             .values
             .iter()
-            .map(|shown| MetricObservation { value: shown.value, set: shown.set, series: Vec::new() })
+            .map(|&MetricValue { value, set, reach, not_finite }| MetricObservation {
+                value,
+                set,
+                reach,
+                not_finite,
+                series: Vec::new(),
+            })
             .collect();
         let points = self.read(
             "SELECT metric, time_s, value FROM change_points WHERE test = ?1 ORDER BY metric, position",
@@ -316,9 +322,10 @@ impl Repository {
         let mut operations = self.operations(only)?;
         let mut values: BTreeMap<i64, Vec<MetricValue>> = BTreeMap::new();
         let read = self.read(
-            "SELECT test, value, is_set FROM metric_values WHERE ?1 IS NULL OR test = ?1 ORDER BY test, metric",
+            "SELECT test, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values \
+             WHERE ?1 IS NULL OR test = ?1 ORDER BY test, metric",
             params![only],
-            |row| Ok((row.get(0)?, MetricValue { value: row.get(1)?, set: row.get(2)? })),
+            |row| Ok((row.get(0)?, metric_value(row, 1)?)),
         )?;
         for (test, value) in read {
             values.entry(test).or_default().push(value);
@@ -520,6 +527,17 @@ pub(super) fn unsigned(row: &Row<'_>, column: usize) -> rusqlite::Result<u64> {
     let count = i64::column_result(value)
         .map_err(|e| rusqlite::Error::FromSqlConversionFailure(column, value.data_type(), Box::new(e)))?;
     u64::try_from(count).map_err(|_| rusqlite::Error::IntegralValueOutOfRange(column, count))
+}
+
+/// The five columns of a metric's value from `first` on: value, whether it was set, both ends of its reach, and when it read
+/// what was not finite.
+pub(super) fn metric_value(row: &Row<'_>, first: usize) -> rusqlite::Result<MetricValue> {
+    Ok(MetricValue {
+        value: row.get(first)?,
+        set: row.get(first + 1)?,
+        reach: Reach { low: row.get(first + 2)?, high: row.get(first + 3)? },
+        not_finite: row.get(first + 4)?,
+    })
 }
 
 /// A position in a list.

@@ -6,7 +6,7 @@ use std::path::Path;
 use sesame_plan::condition::{Comparison, Condition, ConditionEnd, ConditionSpace, Integers, Operand, Variable};
 use sesame_plan::*;
 
-use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
+use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, Reach, WallTime};
 use crate::record::{Event, EventKind, Origin, Recorder, Repository, ResultSet, Status, TestRecord};
 use crate::rng::Stream;
 use crate::search::{self, indicators::Indicators};
@@ -19,6 +19,8 @@ fn metric(name: &str, unit: Option<&str>, direction: Direction, default: Option<
         direction: Some(direction),
         default,
         initial: None,
+        trend: trends(name),
+        accepts_not_finite: false,
         source,
         line: 1,
     }
@@ -37,6 +39,23 @@ fn operation(name: &str, topic: u32, kind: OperationKind, parameters: Vec<Parame
         places: Vec::new(),
         timed: true,
         constraints: Vec::new(),
+    }
+}
+
+/// The metrics of this plan that go one way only; a cycle time is set once, to whatever it is.
+fn trends(name: &str) -> Option<Trend> {
+    match name {
+        "collision_occurrence" | "fuzzing_time" | "top_speed" => Some(Trend::Rising),
+        "arm_distance" => Some(Trend::Falling),
+        _ => None,
+    }
+}
+
+/// Makes a run one that broke off.
+fn break_off(plan: &CampaignPlan, observation: &mut Observation, outcome: Outcome) {
+    observation.outcome = outcome;
+    for (shown, metric) in observation.metrics.iter_mut().zip(&plan.metrics) {
+        shown.reach = Reach::onwards(metric.trend, shown.value.filter(|_| shown.set));
     }
 }
 
@@ -252,10 +271,9 @@ pub(crate) fn observe(plan: &CampaignPlan, test: &Test, seed: u64) -> Observatio
     }
     let cycle = libm::round((68.2 + fuzzing / 40.0) * 100.0) / 100.0;
     let cycle = if cycle < 70.0 { vec![(cycle, cycle)] } else { vec![] };
-    let shown = |series: Vec<(f64, f64)>, default: Option<f64>| MetricObservation {
-        value: series.last().map(|point| point.1).or(default),
-        set: !series.is_empty(),
-        series,
+    let shown = |series: Vec<(f64, f64)>, default: Option<f64>| {
+        let value = series.last().map(|point| point.1).or(default);
+        MetricObservation::whole(value, !series.is_empty(), series)
     };
     let disturbs = test.operations.is_empty() || effects.iter().any(|effect| effect.counters.any_effect());
     Observation {
@@ -264,7 +282,7 @@ pub(crate) fn observe(plan: &CampaignPlan, test: &Test, seed: u64) -> Observatio
         operations: effects,
         metrics: vec![
             shown(collisions, Some(0.0)),
-            MetricObservation { value: Some(fuzzing), set: true, series: vec![] },
+            MetricObservation::whole(Some(fuzzing), true, vec![]),
             shown(speeds, Some(0.0)),
             shown(cycle, Some(999.0)),
             shown(distances, None),
@@ -342,8 +360,8 @@ pub(crate) fn records(plan: &CampaignPlan, searched: u32) -> Vec<TestRecord> {
         }
         match number {
             17 => {
-                record.observation.outcome =
-                    Outcome::Crash { message: "the simulator panicked: index out of bounds".to_owned() };
+                let crash = Outcome::Crash { message: "the simulator panicked: index out of bounds".to_owned() };
+                break_off(plan, &mut record.observation, crash);
                 record.observation.end = 31.42;
                 record.observation.warnings = vec!["`top_speed` refused the value NaN at 12.000 s".to_owned()];
             }
@@ -358,7 +376,7 @@ pub(crate) fn records(plan: &CampaignPlan, searched: u32) -> Vec<TestRecord> {
                     wall: WallTime { run: 1.5 },
                 }
             }
-            31 => record.observation.outcome = Outcome::Timeout { limit: 30.0 },
+            31 => break_off(plan, &mut record.observation, Outcome::Timeout { limit: 30.0 }),
             44 => {
                 record.test = records_test(&records, 40);
                 record.observation = records.iter().find(|other| other.number == 40).unwrap().observation.clone();

@@ -7,7 +7,7 @@ use sesame_plan::{CampaignPlan, Choice, OperationId, Span};
 
 use crate::coverage;
 use crate::observation::Outcome;
-use crate::record::repository::{choice, position};
+use crate::record::repository::{choice, metric_value, position};
 use crate::record::{MetricValue, Origin, RecordError, Repository};
 use crate::sspr::{Convention, Disturbance, Point, disturbance};
 
@@ -127,7 +127,9 @@ impl Repository {
         )?;
         let mut intervals =
             prepare("SELECT test, operation, start_s, end_s FROM intervals ORDER BY test, operation, position")?;
-        let mut values = prepare("SELECT test, value, is_set FROM metric_values ORDER BY test, metric")?;
+        let mut values = prepare(
+            "SELECT test, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values ORDER BY test, metric",
+        )?;
         let mut tests = prepare(
             "SELECT number, origin, known_test, generation, outcome, outcome_detail, time_limit_s, duplicate_of \
              FROM tests ORDER BY number",
@@ -146,10 +148,7 @@ impl Repository {
             Ok((position(row, 1)?, Span { start: row.get(2)?, end: row.get(3)? }))
         })
         .map_err(failed)?;
-        let mut values = Cursor::over(values.query([]).map_err(failed)?, |row| {
-            Ok(MetricValue { value: row.get(1)?, set: row.get(2)? })
-        })
-        .map_err(failed)?;
+        let mut values = Cursor::over(values.query([]).map_err(failed)?, |row| metric_value(row, 1)).map_err(failed)?;
 
         let ids: BTreeMap<&str, OperationId> = (0u32..)
             .zip(&self.plan().operations)

@@ -11,7 +11,7 @@ use crate::record::RecordError;
 use crate::record::verdict::ends;
 
 /// The schema's version, in the file's `user_version`.
-pub const SCHEMA: i64 = 4;
+pub const SCHEMA: i64 = 5;
 
 /// Marks an SQLite file as ours, in its `application_id`: "SESM".
 pub(crate) const APPLICATION_ID: i64 = 0x5345_534D;

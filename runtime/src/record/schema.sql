@@ -125,6 +125,10 @@ CREATE TABLE metric_values (
     metric          INTEGER NOT NULL REFERENCES metrics,
     value           REAL,           -- NULL: neither set nor defaulted
     is_set          INTEGER NOT NULL, -- 0: the value is the default
+    reach_low       REAL,           -- the least value that it could have had at the end of the run, whatever the rest of a run
+                                    -- that broke off had brought; the value itself in a completed run. NULL: there is no least
+    reach_high      REAL,           -- the greatest; NULL: there is no greatest
+    not_finite_s    REAL,           -- when it first read a number that was not finite; NULL: never
     PRIMARY KEY (test, metric)
 ) STRICT, WITHOUT ROWID;
 
@@ -158,6 +162,10 @@ CREATE TABLE repetition_values (
     metric          INTEGER NOT NULL REFERENCES metrics,
     value           REAL,           -- NULL: neither set nor defaulted
     is_set          INTEGER NOT NULL, -- 0: the value is the default
+    reach_low       REAL,           -- the least value that it could have had at the end of the run, whatever the rest of a run
+                                    -- that broke off had brought; the value itself in a completed run. NULL: there is no least
+    reach_high      REAL,           -- the greatest; NULL: there is no greatest
+    not_finite_s    REAL,           -- when it first read a number that was not finite; NULL: never
     PRIMARY KEY (test, position, metric)
 ) STRICT, WITHOUT ROWID;
 
@@ -229,21 +237,24 @@ CREATE TABLE wall_times (
     run_s           REAL NOT NULL   -- wall time of the run as its worker saw it
 ) STRICT;
 
--- Per test and requirement: kept, violated, or unsaid. After a crash or timeout only a violation that was seen stands.
+-- Per test and requirement: violated if no value that the metric could have had is inside the bound, kept if the run came
+-- to its end, everything that the metric read was finite, and its value is inside the bound; otherwise unsaid.
 CREATE VIEW verdicts AS
     SELECT t.number AS test, t.name AS test_name, r.name AS requirement, r.text AS requirement_text, v.value AS value,
            CASE
-               WHEN v.value IS NULL THEN 'unsaid'
+               WHEN v.reach_high < r.low OR v.reach_low > r.high OR (r.low_excluded AND v.reach_high = r.low)
+                    OR (r.high_excluded AND v.reach_low = r.high) THEN 'violated'
+               WHEN v.value IS NULL OR v.not_finite_s IS NOT NULL OR t.outcome NOT IN ('completed', 'void', 'unknown')
+                    THEN 'unsaid'
                WHEN v.value < r.low OR v.value > r.high OR (r.low_excluded AND v.value = r.low)
-                    OR (r.high_excluded AND v.value = r.high)
-                    THEN CASE WHEN t.outcome IN ('completed', 'void', 'unknown') OR v.is_set THEN 'violated' ELSE 'unsaid' END
-               WHEN t.outcome IN ('completed', 'void', 'unknown') THEN 'kept'
-               ELSE 'unsaid'
+                    OR (r.high_excluded AND v.value = r.high) THEN 'unsaid'
+               ELSE 'kept'
            END AS verdict
       FROM tests t CROSS JOIN requirements r LEFT JOIN metric_values v ON v.test = t.number AND v.metric = r.metric
      ORDER BY t.number, r.id;
 
--- What a tester looks for: violated requirements, crashes, timeouts. Duplicates are left out.
+-- What a tester looks for: violated requirements, crashes, timeouts, and metrics that read numbers that are not finite (NaN,
+-- infinity), with the time of the first one as their value. Duplicates are left out.
 CREATE VIEW findings AS
     SELECT v.test, v.test_name, 'violation' AS finding, v.requirement, v.value, v.requirement_text AS detail
       FROM verdicts v JOIN tests t ON t.number = v.test
@@ -251,14 +262,17 @@ CREATE VIEW findings AS
     UNION ALL
     SELECT number, name, outcome, NULL, NULL, outcome_detail
       FROM tests WHERE outcome IN ('crash', 'timeout') AND duplicate_of IS NULL
+    UNION ALL
+    SELECT t.number, t.name, 'not_finite', NULL, v.not_finite_s, 'read by ' || m.name
+      FROM metric_values v JOIN tests t ON t.number = v.test JOIN metrics m ON m.id = v.metric
+     WHERE v.not_finite_s IS NOT NULL AND t.duplicate_of IS NULL
      ORDER BY 1, 3, 4;
 
 -- Violated requirements of tests that were repeated: how many of the repetitions violate the same requirement.
 CREATE VIEW confirmations AS
     SELECT f.test AS test, f.test_name AS test_name, f.requirement AS requirement,
-           count(*) FILTER (WHERE (v.value < r.low OR v.value > r.high OR (r.low_excluded AND v.value = r.low)
-                                   OR (r.high_excluded AND v.value = r.high))
-                              AND (n.outcome IN ('completed', 'void') OR v.is_set)) AS confirmed,
+           count(*) FILTER (WHERE v.reach_high < r.low OR v.reach_low > r.high OR (r.low_excluded AND v.reach_high = r.low)
+                                  OR (r.high_excluded AND v.reach_low = r.high)) AS confirmed,
            count(*) AS repetitions
       FROM findings f JOIN requirements r ON r.name = f.requirement JOIN repetitions n ON n.test = f.test
            LEFT JOIN repetition_values v ON v.test = n.test AND v.position = n.position AND v.metric = r.metric

@@ -9,7 +9,7 @@ use sesame_plan::{Activation, Bound, Choice, KnownTestId, MetricId, OperationId,
 use tempfile::TempDir;
 
 use super::*;
-use crate::observation::{MetricObservation, OperationEffect, WallTime};
+use crate::observation::{MetricObservation, OperationEffect, Reach, WallTime};
 use crate::search::nsga2::Variation as _;
 use crate::search::permitted::Permitted;
 use crate::search::vary::{Rates, TestVariation};
@@ -52,8 +52,7 @@ fn everything_that_is_recorded_is_read_back() {
         for (row, record) in rows.iter().zip(&records) {
             assert_eq!((row.number, row.origin, &row.test), (record.number, record.origin, &record.test));
             assert_eq!((&row.outcome, row.end), (&record.observation.outcome, record.observation.end));
-            let values: Vec<_> =
-                record.observation.metrics.iter().map(|m| MetricValue { value: m.value, set: m.set }).collect();
+            let values: Vec<_> = record.observation.metrics.iter().map(|m| MetricValue::from(m)).collect();
             assert_eq!(row.values, values);
         }
         let sets = repository.result_sets().unwrap();
@@ -430,6 +429,9 @@ fn change(record: &mut TestRecord, kind: usize) {
         9 => next_up(&mut observation.metrics[2].series[0].1),
         10 => observation.metrics[0].set = !observation.metrics[0].set,
         11 => observation.metrics[4].value = None,
+        22 => observation.metrics[4].reach.low = None,
+        23 => next_up(observation.metrics[4].reach.high.as_mut().expect("it has a value")),
+        24 => observation.metrics[4].not_finite = Some(1.5),
         12 => drop(observation.metrics[2].series.pop()),
         13 => record.test.operations[0].draw_seed ^= 1,
         14 => observation.operations[0].counters.seen += 1,
@@ -617,7 +619,7 @@ fn any_kind_of_change_to_a_test_changes_the_digest() {
     let before = digest_of(std::slice::from_ref(&record));
     assert_eq!(digest_of(std::slice::from_ref(&record)), before);
     let mut seen = std::collections::BTreeSet::from([before]);
-    for kind in 0..22 {
+    for kind in 0..25 {
         let mut changed = record.clone();
         change(&mut changed, kind);
         assert!(seen.insert(digest_of(&[changed])), "change {kind} goes unnoticed");
@@ -630,6 +632,9 @@ proptest! {
     #[test]
     fn any_finite_numbers_come_back_bit_for_bit(
         value in prop::option::of(finite()),
+        low in prop::option::of(finite()),
+        high in prop::option::of(finite()),
+        not_finite in prop::option::of(finite()),
         series in prop::collection::vec((finite(), finite()), 0..20),
         end in finite(),
     ) {
@@ -637,7 +642,7 @@ proptest! {
         let plan = sample::plan();
         let mut record = sample::record(&plan, 3, Origin::Search, Test::default());
         record.observation.end = end;
-        record.observation.metrics[0] = MetricObservation { value, set: true, series };
+        record.observation.metrics[0] = MetricObservation { value, set: true, reach: Reach { low, high }, not_finite, series };
         let recorder = commit_all(folder.path(), std::slice::from_ref(&record));
         let read = recorder.repository().test(3).unwrap();
         prop_assert_eq!(&read, &record);
@@ -651,6 +656,7 @@ proptest! {
     #[test]
     fn bounds_of_every_kind_mean_the_same_in_the_view(
         kind in 0usize..6, a in -3i32..4, width in 0i32..3, x in prop::option::of(-3i32..4), set in any::<bool>(), outcome in 0usize..4,
+        low in prop::option::of(-3i32..4), more in prop::option::of(0i32..4), whole in any::<bool>(), finite in any::<bool>(),
     ) {
         let value = f64::from(a);
         let bound = [
@@ -664,13 +670,34 @@ proptest! {
         record.observation.outcome = [
             Outcome::Completed, Outcome::Void, Outcome::Timeout { limit: 1.0 }, Outcome::Crash { message: String::new() },
         ][outcome].clone();
-        let shown = MetricValue { value: x.map(f64::from), set };
-        record.observation.metrics[0] = MetricObservation { value: shown.value, set, series: vec![] };
+        // Of a whole run and of one that broke off; also with values that do not fit their reach, which no run shows.
+        let shown = MetricValue {
+            reach: Reach { low: low.map(f64::from), high: more.map(|more| f64::from(low.unwrap_or(0) + more)) },
+            not_finite: (!finite).then_some(1.5),
+            ..MetricValue::whole(x.map(f64::from), set)
+        };
+        let shown = if whole { MetricValue::whole(shown.value, set) } else { shown };
+        let MetricValue { value: measured, reach, not_finite, .. } = shown;
+        record.observation.metrics[0] = MetricObservation { value: measured, set, reach, not_finite, series: vec![] };
         let folder = folder();
         let mut recorder = Recorder::create(folder.path(), &plan, 1, 1).unwrap();
         recorder.commit(&record).unwrap();
-        let view: String = recorder.repository().connection.query_row("SELECT verdict FROM verdicts", [], |row| row.get(0)).unwrap();
-        prop_assert_eq!(view, verdict(bound, &record.observation.outcome, shown).word());
+        let said = verdict(bound, &record.observation.outcome, shown);
+        let again = Repetition::of(3, 1, 7, &record.observation);
+        recorder.put_repetition(&again, &[]).unwrap();
+        let connection = &recorder.repository().connection;
+        let view: String = connection.query_row("SELECT verdict FROM verdicts", [], |row| row.get(0)).unwrap();
+        prop_assert_eq!(view, said.word());
+        let found = |finding: &str| -> i64 {
+            let sql = "SELECT count(*) FROM findings WHERE finding = ?1";
+            connection.query_row(sql, [finding], |row| row.get(0)).unwrap()
+        };
+        prop_assert_eq!(found("violation"), i64::from(said == Verdict::Violated));
+        prop_assert_eq!(found("not_finite"), i64::from(shown.not_finite.is_some()));
+        let confirmed: i64 = connection
+            .query_row("SELECT coalesce(sum(confirmed), 0) FROM confirmations", [], |row| row.get(0))
+            .unwrap();
+        prop_assert_eq!(confirmed, i64::from(said == Verdict::Violated));
         let row = &recorder.repository().tests().unwrap()[0];
         prop_assert_eq!(row.value(MetricId(0)), shown);
     }

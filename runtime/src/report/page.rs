@@ -553,7 +553,7 @@ fn test_heading(body: &mut Markup, summary: &Summary, report: &TestReport) {
         .iter()
         .filter_map(|objective| {
             let metric = report.metrics.iter().find(|metric| metric.metric == objective.metric)?;
-            let shown = MetricValue { value: metric.value, set: metric.set };
+            let shown = MetricValue::whole(metric.value, metric.set);
             Some(format!("{} {}", metric.metric, value_text(shown, metric.unit.as_deref())))
         })
         .collect();
@@ -587,7 +587,7 @@ fn figures(body: &mut Markup, report: &TestReport) {
     }
     table(body, &["Metric", "Value", "Changes"], |body| {
         for metric in &report.metrics {
-            let shown = MetricValue { value: metric.value, set: metric.set };
+            let shown = MetricValue::whole(metric.value, metric.set);
             row(body, &metric.metric, &[value_text(shown, metric.unit.as_deref()), metric.changes.to_string()]);
         }
     });

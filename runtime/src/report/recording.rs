@@ -60,8 +60,8 @@ pub fn recording_text(replay: &RecordingReplay, options: TextOptions) -> String 
     for FedMetric { metric, unit, now, recorded, sameness } in &replay.metrics {
         let value = |value: MetricValue| value_text(value, unit.as_deref());
         let (recorded, word) = match sameness {
-            Sameness::Equal => (value(MetricValue { value: *recorded, set: true }), "equal"),
-            Sameness::Differs => (value(MetricValue { value: *recorded, set: true }), "differs"),
+            Sameness::Equal => (value(MetricValue::whole(*recorded, true)), "equal"),
+            Sameness::Differs => (value(MetricValue::whole(*recorded, true)), "differs"),
             Sameness::NotRecorded => (String::new(), "not recorded"),
         };
         table.row([metric.clone(), value(*now), recorded, word.to_owned()]);
@@ -79,7 +79,7 @@ mod tests {
         let metric = |name: &str, now: Option<f64>, recorded, sameness| FedMetric {
             metric: name.to_owned(),
             unit: (name == "cycle_time").then(|| "s".to_owned()),
-            now: MetricValue { value: now, set: now.is_some() },
+            now: MetricValue::whole(now, now.is_some()),
             recorded,
             sameness,
         };

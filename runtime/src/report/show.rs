@@ -296,7 +296,7 @@ fn verdicts(plan: &CampaignPlan, record: &TestRecord) -> Vec<VerdictReport> {
     let reports = plan.requirements.iter().map(|requirement| {
         let metric = plan.metric(requirement.metric);
         let shown = observation.metrics.get(requirement.metric.index());
-        let value = shown.map_or(MetricValue::default(), |shown| MetricValue { value: shown.value, set: shown.set });
+        let value = observation.value(requirement.metric);
         VerdictReport {
             requirement: requirement.name.clone(),
             text: requirement.text.clone(),

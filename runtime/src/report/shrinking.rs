@@ -457,7 +457,7 @@ mod tests {
                 let record = TestRecord { parents: candidate.parents.clone(), observation, ..record };
                 let value = |id: MetricId| {
                     let shown = &record.observation.metrics[id.index()];
-                    MetricValue { value: shown.value, set: shown.set }
+                    MetricValue::from(shown)
                 };
                 let failing = fails(&plan, &failing, &record.observation.outcome, value);
                 recorder.commit(&record).unwrap();

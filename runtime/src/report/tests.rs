@@ -397,10 +397,10 @@ fn confirmed() -> (tempfile::TempDir, Repository) {
             match (at, position) {
                 (1, 2) => values.iter_mut().for_each(|it| *it = MetricValue::default()),
                 (2, _) => {
-                    values[0] = MetricValue { value: Some(0.0), set: false };
-                    values[2] = MetricValue { value: Some(1.0), set: true };
-                    values[3] = MetricValue { value: Some(60.0), set: true };
-                    values[4] = MetricValue { value: Some(200.0), set: true };
+                    values[0] = MetricValue::whole(Some(0.0), false);
+                    values[2] = MetricValue::whole(Some(1.0), true);
+                    values[3] = MetricValue::whole(Some(60.0), true);
+                    values[4] = MetricValue::whole(Some(200.0), true);
                 }
                 (at, 3) if at == crash => outcome = Outcome::Crash { message: "it fell over".to_owned() },
                 _ => {}

@@ -333,7 +333,7 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     }
     let mut table = Table::new([left("metric"), left("value"), right("changes")]);
     for metric in &test.metrics {
-        let shown = MetricValue { value: metric.value, set: metric.set };
+        let shown = MetricValue::whole(metric.value, metric.set);
         table.row([metric.metric.clone(), value_text(shown, metric.unit.as_deref()), metric.changes.to_string()]);
     }
     section(&mut text, "Metrics", &table, options);

@@ -101,6 +101,8 @@ impl Landscape {
             default: None,
             initial: None,
             source: MetricSource::FuzzingTime,
+            trend: None,
+            accepts_not_finite: false,
             line: 1,
         };
         CampaignPlan {
@@ -238,7 +240,7 @@ impl Landscape {
             outcome: Outcome::Completed,
             end: 70.0,
             operations: Vec::new(),
-            metrics: metrics.map(|id| MetricObservation { value: None, set: false, series: series(id) }).collect(),
+            metrics: metrics.map(|id| MetricObservation::whole(None, false, series(id))).collect(),
             messages: 0,
             warnings: Vec::new(),
             wall: WallTime::default(),

@@ -1,8 +1,9 @@
 //! Margins: how far the requirements of a space are from their violation in one run.
 
-use sesame_plan::{Bound, CampaignPlan};
+use sesame_plan::{Bound, CampaignPlan, Requirement};
 
-use crate::observation::{Observation, Outcome};
+use crate::observation::Observation;
+use crate::record::{Verdict, verdict};
 
 /// How far a requirement is from its violation in one test.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,23 +21,24 @@ impl Margin {
     }
 }
 
-/// The margin of each requirement of the plan, in its order.
+/// The margin of each requirement of the plan, in its order. One is violated exactly where the requirement's [`verdict`] is.
 ///
 /// A margin is in the unit of the requirement's metric: how far the metric may still move before it breaks the bound, and
-/// negative by how far it has moved beyond. A metric without a value has none. Of a run that crashed or hung a violation
-/// stands, and nothing else is known.
+/// negative by how far it has moved beyond. Where the verdict is unsaid there is none. Of a run that broke off, a violation is
+/// as large as it is at least, whatever the rest of the run had brought.
 pub fn margins(plan: &CampaignPlan, observation: &Observation) -> Vec<Margin> {
-    let whole = match observation.outcome {
-        Outcome::Completed | Outcome::Void | Outcome::Unknown => true,
-        Outcome::Crash { .. } | Outcome::Timeout { .. } => false,
-    };
-    let margin = |requirement: &sesame_plan::Requirement| {
-        let value = observation.metrics.get(requirement.metric.index()).and_then(|metric| metric.value);
-        let Some(value) = value.filter(|value| !value.is_nan()) else {
-            return Margin { value: None, violated: false };
+    let margin = |requirement: &Requirement| {
+        let shown = observation.value(requirement.metric);
+        let verdict = verdict(requirement.bound, &observation.outcome, shown);
+        let value = match verdict {
+            Verdict::Kept => shown.value.map(|value| to_bound(requirement.bound, value)),
+            Verdict::Violated => {
+                let ends = [shown.reach.low, shown.reach.high].into_iter().flatten();
+                ends.map(|end| to_bound(requirement.bound, end)).reduce(f64::max)
+            }
+            Verdict::Unsaid => None,
         };
-        let margin = Margin::of(requirement.bound, value);
-        if whole || margin.violated { margin } else { Margin { value: None, ..margin } }
+        Margin { value, violated: verdict == Verdict::Violated }
     };
     plan.requirements.iter().map(margin).collect()
 }
@@ -58,8 +60,51 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::observation::{MetricObservation, Outcome, Reach};
+
+    fn margin(outcome: Outcome, shown: MetricObservation) -> Margin {
+        let mut plan = crate::record::sample::plan();
+        plan.requirements.truncate(1);
+        plan.requirements[0].bound = Bound::AtMost { value: 70.0 };
+        let mut observation = crate::record::sample::observe(&plan, &plan.tests[0].test, 1);
+        observation.outcome = outcome;
+        observation.metrics[0] = shown;
+        margins(&plan, &observation).remove(0)
+    }
+
+    #[test]
+    fn a_crash_is_no_violation_by_the_default_of_a_metric_that_was_never_set() {
+        let crash = || Outcome::Crash { message: "gone".to_owned() };
+        let never_set = MetricObservation { value: Some(999.0), ..MetricObservation::default() };
+        assert_eq!(margin(crash(), never_set), Margin { value: None, violated: false });
+        let whole = MetricObservation::whole(Some(999.0), false, Vec::new());
+        assert_eq!(margin(Outcome::Completed, whole), Margin { value: Some(-929.0), violated: true });
+        let reach = Reach::onwards(Some(sesame_plan::Trend::Rising), Some(75.0));
+        let risen = MetricObservation { value: Some(75.0), set: true, reach, ..MetricObservation::default() };
+        assert_eq!(margin(crash(), risen), Margin { value: Some(-5.0), violated: true });
+    }
 
     proptest! {
+        #[test]
+        fn a_margin_is_violated_exactly_where_the_verdict_is(
+            x in prop::option::of(60i32..80), low in prop::option::of(60i32..80), more in prop::option::of(0i32..10),
+            whole in any::<bool>(), finite in any::<bool>(),
+        ) {
+            let outcome = if whole { Outcome::Completed } else { Outcome::Timeout { limit: 1.0 } };
+            let reach = if whole && finite {
+                Reach::of_whole_run(x.map(f64::from))
+            } else {
+                Reach { low: low.map(f64::from), high: more.map(|more| f64::from(low.unwrap_or(70) + more)) }
+            };
+            let not_finite = (!finite).then_some(1.0);
+            let shown = MetricObservation { value: x.map(f64::from), set: true, reach, not_finite, series: Vec::new() };
+            let verdict = verdict(Bound::AtMost { value: 70.0 }, &outcome, (&shown).into());
+            let margin = margin(outcome, shown);
+            prop_assert_eq!(margin.violated, verdict == Verdict::Violated);
+            prop_assert_eq!(margin.value.is_none(), verdict == Verdict::Unsaid);
+            prop_assert!(margin.value.is_none_or(|value| (value < 0.0) == margin.violated));
+        }
+
         #[test]
         fn margins_are_negative_where_a_bound_is_broken_and_positive_where_it_is_kept(
             x in -5i32..5, at in -5i32..5, width in 0i32..5,

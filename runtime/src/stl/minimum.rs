@@ -44,6 +44,19 @@ impl SlidingMinimum {
         self.tell(length, out);
     }
 
+    /// Whether the window has an end.
+    pub(super) fn is_bounded(&self) -> bool {
+        self.window.to.is_some()
+    }
+
+    /// Tells the rest of the times whose windows are not empty, of a signal that ends here. A window that has an end is whole, and
+    /// told, or does not count.
+    pub(super) fn finish_whole(&mut self, end: i64, out: &mut VecDeque<Piece>) {
+        if !self.is_bounded() {
+            self.tell(end.saturating_sub(self.window.from), out);
+        }
+    }
+
     /// Tells the minimum for the times before `end`, the windows of which are known.
     fn tell(&mut self, end: i64, out: &mut VecDeque<Piece>) {
         let end = end.min(self.asked.end);

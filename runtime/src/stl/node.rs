@@ -20,6 +20,29 @@ pub(super) struct Stretch {
     pub(super) end: i64,
     /// Whether the trace ends there too.
     pub(super) last: bool,
+    /// Where nothing is known of the signals: what stands for the robustness of their predicates, negative or positive
+    /// infinity.
+    pub(super) unknown: Option<f64>,
+    /// Whether only windows count that lie in the trace as a whole.
+    pub(super) whole: bool,
+}
+
+impl Stretch {
+    /// The same for what is negated.
+    fn negated(self) -> Self {
+        Stretch { unknown: self.unknown.map(|extreme| -extreme), ..self }
+    }
+
+    /// Whether windows are cut here. Where nothing is known the trace goes on for ever, and has no end to cut them.
+    fn cuts(self) -> bool {
+        self.last && !self.whole && self.unknown.is_none()
+    }
+
+    /// What stands for all that depends on where the trace will end, where only whole windows count and nothing is known: the
+    /// end decides what belongs to the formula at all.
+    fn undecided(self) -> Option<f64> {
+        self.unknown.filter(|_| self.whole)
+    }
 }
 
 /// An operator, and what of it is asked.
@@ -132,11 +155,12 @@ impl Node {
         match &mut self.operator {
             &mut Operator::Predicate { signal, comparison, constant } => {
                 if stretch.end > self.told {
-                    put(out, stretch.end, margin(values[signal], comparison, constant));
+                    let known = || margin(values[signal], comparison, constant);
+                    put(out, stretch.end, stretch.unknown.unwrap_or_else(known));
                 }
             }
             Operator::Not { of, input } => {
-                of.extend(stretch, values, input);
+                of.extend(stretch.negated(), values, input);
                 for piece in input.drain(..) {
                     put(out, piece.end, -piece.value);
                 }
@@ -144,17 +168,24 @@ impl Node {
             Operator::And { left, right, input } => {
                 left.extend(stretch, values, &mut input.left);
                 right.extend(stretch, values, &mut input.right);
+                let undecided = |value: &f64| Some(*value) == stretch.undecided();
                 while let Some((end, left, right)) = input.pop() {
-                    put(out, end, left.min(right));
+                    put(out, end, [left, right].into_iter().find(undecided).unwrap_or(left.min(right)));
                 }
             }
             Operator::Always { of, input, minimum } => {
-                of.extend(stretch, values, input);
-                for piece in input.drain(..) {
-                    minimum.push(piece, out);
-                }
-                if stretch.last {
-                    minimum.finish(stretch.end, out);
+                if let Some(extreme) = stretch.undecided().filter(|_| minimum.is_bounded()) {
+                    put(out, stretch.end, extreme);
+                } else {
+                    of.extend(stretch, values, input);
+                    for piece in input.drain(..) {
+                        minimum.push(piece, out);
+                    }
+                    if stretch.cuts() {
+                        minimum.finish(stretch.end, out);
+                    } else if stretch.last {
+                        minimum.finish_whole(of.told, out);
+                    }
                 }
             }
             Operator::Until(until) => until.extend(stretch, values, out),
@@ -184,6 +215,10 @@ impl Node {
 
 impl Until {
     fn extend(&mut self, stretch: Stretch, values: &[f64], out: &mut VecDeque<Piece>) {
+        // Even without an end of its window it has no robustness before something is known of both sides.
+        if let Some(extreme) = stretch.undecided() {
+            return put(out, stretch.end, extreme);
+        }
         self.left.extend(stretch, values, &mut self.lead);
         for piece in self.lead.drain(..) {
             self.before.push(piece, &mut self.parts.left);
@@ -195,9 +230,11 @@ impl Until {
         while let Some((end, left, right)) = self.input.pop() {
             self.within.push(end, left, right, &mut self.ahead);
         }
-        if stretch.last {
+        if stretch.cuts() {
             self.before.finish(stretch.end, &mut self.parts.left);
             self.within.finish(stretch.end.saturating_add(self.delay), &mut self.ahead);
+        } else if stretch.last && !self.within.is_bounded() {
+            self.within.finish(self.left.told.min(self.right.told), &mut self.ahead);
         }
         for piece in self.ahead.drain(..) {
             put(&mut self.parts.right, piece.end - self.delay, piece.value);

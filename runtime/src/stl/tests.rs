@@ -54,7 +54,15 @@ fn y() -> Formula {
 
 /// The robustness of a trace whose ticks have this many nanoseconds.
 fn robustness(formula: &Formula, trace: &Trace, tick: i64) -> Option<f64> {
-    let mut monitor = Monitor::new(formula, SIGNALS).unwrap();
+    robustness_by(Monitor::new(formula, SIGNALS).unwrap(), trace, tick)
+}
+
+/// The same over whole windows.
+fn robustness_over_whole(formula: &Formula, trace: &Trace, tick: i64) -> Option<f64> {
+    robustness_by(Monitor::new(formula, SIGNALS).unwrap().over_whole_windows(), trace, tick)
+}
+
+fn robustness_by(mut monitor: Monitor, trace: &Trace, tick: i64) -> Option<f64> {
     for &(time, signal, value) in &trace.samples {
         monitor.push(SimTime::from_nanos(time * tick), signal, value);
     }
@@ -91,16 +99,19 @@ fn signals_of(formula: &Formula) -> Vec<usize> {
 }
 
 /// The robustness at each instant from `start` to the end of the trace.
-fn by_definition(formula: &Formula, trace: &Trace, start: i64) -> Vec<f64> {
-    let length = usize::try_from(trace.end - start + 1).unwrap();
-    let of = |formula: &Formula| by_definition(formula, trace, start);
+fn by_definition(formula: &Formula, trace: &Trace, start: i64, whole: bool) -> Vec<f64> {
+    let of = |formula: &Formula| by_definition(formula, trace, start, whole);
     let both = |left, right, join: fn(f64, f64) -> f64| -> Vec<f64> {
         of(left).into_iter().zip(of(right)).map(|(l, r)| join(l, r)).collect()
     };
-    let window = |at: usize, interval: &Interval| {
-        let ticks = |seconds| usize::try_from(SimTime::from_seconds(seconds).nanos()).unwrap();
+    let ticks = |seconds| usize::try_from(SimTime::from_seconds(seconds).nanos()).unwrap();
+    let window = |at: usize, interval: &Interval, length: usize| {
         let end = interval.to.map_or(length, |to| length.min(at + ticks(to) + 1));
         (at + ticks(interval.from)).min(end)..end
+    };
+    // The instants at which there is a robustness, of an operator on what has this many.
+    let defined = |interval: &Interval, length: usize| {
+        if whole { length.saturating_sub(ticks(interval.to.unwrap_or(interval.from))) } else { length }
     };
     let least = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
     let greatest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -123,25 +134,56 @@ fn by_definition(formula: &Formula, trace: &Trace, start: i64) -> Vec<f64> {
         Formula::Implies { left, right } => both(left, right, |l, r| f64::max(-l, r)),
         Formula::Always { interval, of: inner } => {
             let inner = of(inner);
-            (0..length).map(|at| least(&inner[window(at, interval)])).collect()
+            let n = inner.len();
+            (0..defined(interval, n)).map(|at| least(&inner[window(at, interval, n)])).collect()
         }
         Formula::Eventually { interval, of: inner } => {
             let inner = of(inner);
-            (0..length).map(|at| greatest(&inner[window(at, interval)])).collect()
+            let n = inner.len();
+            (0..defined(interval, n)).map(|at| greatest(&inner[window(at, interval, n)])).collect()
         }
         Formula::Until { interval, left, right } => {
             let (left, right) = (of(left), of(right));
+            let n = left.len().min(right.len());
             let arrive = |at: usize, s: usize| right[s].min(least(&left[at..=s]));
-            (0..length).map(|at| greatest(&window(at, interval).map(|s| arrive(at, s)).collect::<Vec<f64>>())).collect()
+            let best = |at| greatest(&window(at, interval, n).map(|s| arrive(at, s)).collect::<Vec<f64>>());
+            (0..defined(interval, n)).map(best).collect()
         }
     }
 }
 
 /// The robustness by definition, where the trace is known.
 fn naive(formula: &Formula, trace: &Trace) -> Option<f64> {
+    naive_by(formula, trace, false)
+}
+
+/// The same, over cut windows or over whole ones only.
+fn naive_by(formula: &Formula, trace: &Trace, whole: bool) -> Option<f64> {
     let first = |signal| trace.samples.iter().find(|sample| sample.1 == signal).map(|sample| sample.0);
     let starts: Option<Vec<i64>> = signals_of(formula).into_iter().map(first).collect();
-    Some(by_definition(formula, trace, starts?.into_iter().max()?)[0])
+    let robustness = by_definition(formula, trace, starts?.into_iter().max()?, whole);
+    Some(robustness.first().copied().unwrap_or(f64::INFINITY))
+}
+
+#[test]
+fn a_trace_that_breaks_off_says_what_no_continuation_can_change() {
+    let reach = |formula: &Formula, trace: &Trace| {
+        let mut monitor = Monitor::new(formula, SIGNALS).unwrap();
+        for &(time, signal, value) in &trace.samples {
+            monitor.push(SimTime::from_nanos(time * SECOND), signal, value);
+        }
+        monitor.reach(SimTime::from_nanos(trace.end * SECOND))
+    };
+    let broken = Trace { end: 3, ..sampled(&[2.0, -1.0, 4.0], &[-3.0, -2.0, -3.0]) };
+    let (least, greatest) = (f64::NEG_INFINITY, f64::INFINITY);
+    assert_eq!(reach(&always(Interval::UNBOUNDED, x()), &broken), (least, -1.0));
+    assert_eq!(reach(&eventually(Interval::UNBOUNDED, y()), &broken), (-2.0, greatest));
+    assert_eq!(reach(&always(seconds(0, 2), x()), &broken), (-1.0, -1.0), "its window is over");
+    assert_eq!(reach(&always(seconds(5, 9), x()), &broken), (least, greatest));
+    // The request at 2 s was answered by -2 until now, and the answer has time until 4 s.
+    let answered = always(Interval::UNBOUNDED, implies(x(), eventually(seconds(0, 1), y())));
+    assert_eq!(reach(&answered, &broken), (least, -2.0));
+    assert_eq!(reach(&x(), &Trace { samples: vec![(0, 1, 1.0)], end: 5 }), (least, greatest), "it has not begun");
 }
 
 /// Small numbers, so that many are equal and many windows end where something jumps.
@@ -277,6 +319,63 @@ proptest! {
         prop_assert_eq!(robustness(&formula, &trace, 1), naive(&stretched(&formula, 3.0), &finer));
     }
 
+    // The trace is cut where any of its samples may be the last one heard, and the rest of it is one of many continuations.
+    #[test]
+    fn no_continuation_leaves_the_reach(formula in any_formula(), trace in any_trace(), cut in 0..60i64) {
+        let now = cut.min(trace.end);
+        for whole in [false, true] {
+            let monitor = Monitor::new(&formula, SIGNALS).unwrap();
+            let mut monitor = if whole { monitor.over_whole_windows() } else { monitor };
+            for &(time, signal, value) in trace.samples.iter().filter(|sample| sample.0 <= now) {
+                monitor.push(SimTime::from_nanos(time), signal, value);
+            }
+            let (least, greatest) = monitor.reach(SimTime::from_nanos(now));
+            // What is infinite is no value, but nothing was said.
+            if let Some(value) = naive_by(&formula, &trace, whole) {
+                prop_assert!((least..=greatest).contains(&value), "{value} of [{least}, {greatest}] at {now}, {whole}");
+            }
+        }
+    }
+
+    #[test]
+    fn nested_formulas_over_whole_windows_are_as_defined(formula in any_formula(), trace in any_trace()) {
+        prop_assert_eq!(robustness_over_whole(&formula, &trace, 1), naive_by(&formula, &trace, true));
+    }
+
+    #[test]
+    fn every_operator_over_whole_windows_is_as_defined_at_all_times(
+        outer in any_interval(), inner in any_interval(), left in any_predicate(), right in any_predicate(),
+        trace in any_trace(),
+    ) {
+        for inner in [always(inner, left.clone()), eventually(inner, left.clone()), until(inner, left, right)] {
+            for formula in [always(outer, inner.clone()), eventually(outer, inner)] {
+                prop_assert_eq!(robustness_over_whole(&formula, &trace, 1), naive_by(&formula, &trace, true));
+            }
+        }
+    }
+
+    // Of these the reach is exact: the worst and the best continuation come to its ends.
+    #[test]
+    fn the_reach_of_one_operator_is_no_wider_than_continuations_make_it(
+        interval in any_interval(), trace in any_trace(), finally in any::<bool>(),
+    ) {
+        let formula = if finally { eventually(interval, x()) } else { always(interval, x()) };
+        let mut monitor = Monitor::new(&formula, SIGNALS).unwrap();
+        for &(time, signal, value) in &trace.samples {
+            monitor.push(SimTime::from_nanos(time), signal, value);
+        }
+        let now = trace.end + 1;
+        let (least, greatest) = monitor.reach(SimTime::from_nanos(now));
+        for (extreme, expected) in [(f64::NEG_INFINITY, least), (f64::INFINITY, greatest)] {
+            let mut ahead = trace.clone();
+            ahead.samples.push((now, 0, extreme));
+            ahead.end = now + 200;
+            if trace.samples.iter().any(|sample| sample.1 == 0) {
+                prop_assert_eq!(robustness(&formula, &ahead, 1), Some(expected));
+            }
+        }
+    }
+
     #[test]
     fn a_formula_survives_the_plan_file(formula in any_formula()) {
         let written = serde_json::to_string(&formula).unwrap();
@@ -327,6 +426,18 @@ fn windows_are_cut_at_the_end_of_the_trace() {
     assert_eq!(robustness(&always(seconds(1, 100), x()), &trace, SECOND), Some(2.0));
     assert_eq!(robustness(&eventually(seconds(1, 100), x()), &trace, SECOND), Some(4.0));
     assert_eq!(robustness(&eventually(seconds(2, 100), not(x())), &trace, SECOND), Some(-4.0));
+}
+
+#[test]
+fn over_whole_windows_a_request_shortly_before_the_end_asks_for_nothing() {
+    let answered = always(Interval::UNBOUNDED, implies(x(), eventually(seconds(0, 2), y())));
+    let trace = sampled(&[3.0, -1.0, -1.0, -1.0, 2.0], &[-5.0, -5.0, 0.5, -5.0, -5.0]);
+    assert_eq!(robustness(&answered, &trace, SECOND), Some(-2.0));
+    assert_eq!(robustness_over_whole(&answered, &trace, SECOND), Some(0.5));
+    // Windows without end are never cut, and one that is whole to the last instant counts.
+    assert_eq!(robustness_over_whole(&eventually(Interval::UNBOUNDED, y()), &trace, SECOND), Some(0.5));
+    assert_eq!(robustness_over_whole(&always(seconds(0, 4), x()), &trace, SECOND), Some(-1.0));
+    assert_eq!(robustness_over_whole(&always(seconds(0, 5), x()), &trace, SECOND), Some(f64::INFINITY));
 }
 
 #[test]

@@ -58,6 +58,11 @@ impl SlidingUntil {
         SlidingUntil { length, asked, leaving: Vec::new(), entering: Vec::new(), entered: Passage::EMPTY }
     }
 
+    /// Whether the window has an end.
+    pub(super) fn is_bounded(&self) -> bool {
+        self.length.is_some()
+    }
+
     /// Whether a piece that ends there is in any window still to be told.
     pub(super) fn asks(&self, end: i64) -> bool {
         end > self.asked.start

@@ -373,6 +373,9 @@ impl Feeder<'_> {
                 // Hooks are not told of an end that a failure made.
                 _ => None,
             };
+            if let (None, Some(broken_off)) = (end, ending.get("end_s").and_then(|end| end.parse().ok())) {
+                self.metrics.follow_time(SimTime::from_seconds(broken_off));
+            }
             run = Some(RecordedRun {
                 space: text(subject, "space"),
                 campaign: text(subject, "campaign"),

@@ -93,8 +93,7 @@ impl Importer<'_> {
                 continue;
             }
             let default = self.original.metric(metric).and_then(|at| self.original.metrics[at].default);
-            metrics[id.index()] =
-                MetricObservation { value: Some(value), set: default != Some(value), series: Vec::new() };
+            metrics[id.index()] = MetricObservation::whole(Some(value), default != Some(value), Vec::new());
         }
         let mut parents = Vec::new();
         for &parent in &test.parents {

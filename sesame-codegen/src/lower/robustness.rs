@@ -12,6 +12,7 @@ pub(super) fn robustness(of: &model::Robustness) -> Robustness {
         signals: of.signals.iter().map(expression).collect(),
         formula: formula(&of.formula),
         side: side(of.outbound),
+        whole_windows: of.whole_windows,
     }
 }
 

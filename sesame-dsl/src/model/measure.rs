@@ -1,5 +1,7 @@
 //! What is measured, and what must hold of it.
 
+pub use sesame_plan::Trend;
+
 use super::{Declaration, Direction, FieldPath, Formula, MetricId, Robustness, TopicId};
 use crate::units::Unit;
 
@@ -16,6 +18,10 @@ pub struct Metric {
     pub default: Option<f64>,
     /// Its value for conditions before it is first set, in its unit; `None` when it is unknown then.
     pub initial: Option<f64>,
+    /// The only way in which its hook says that its value changes during a run; none of a formula, whose kind says it.
+    pub trend: Option<Trend>,
+    /// Whether infinity and NaN are ordinary values of what its hook reads.
+    pub accepts_not_finite: bool,
     /// Where its value comes from.
     pub source: MetricSource,
 }

@@ -14,6 +14,8 @@ pub struct Robustness {
     pub formula: Temporal,
     /// Whether it hears messages after operations, as they are delivered, and not as they were published.
     pub outbound: bool,
+    /// Whether what has a window that the end of the run would cut is left out.
+    pub whole_windows: bool,
 }
 
 /// What holds of signals over time, or does not.

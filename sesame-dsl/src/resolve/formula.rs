@@ -71,6 +71,11 @@ impl<'a> Resolver<'a> {
             Some(per) => Some(self.per(per, &inputs)?),
             None => None,
         };
+        if let Some(&span) = formula.whole.first() {
+            let title = "`whole windows` goes with `robustness(…)` only";
+            let note = "only temporal formulas look at windows of time that the end of a run could cut";
+            self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("leave it out").note(note));
+        }
         self.at_most_one(&formula.outbound, "outbound");
         let outbound = !formula.outbound.is_empty();
         if inputs.is_empty() {

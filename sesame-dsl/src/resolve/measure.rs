@@ -22,6 +22,14 @@ impl<'a> Resolver<'a> {
         });
         let default = self.single(&metric.defaults, "default");
         let initial = self.single(&metric.initials, "initial");
+        let trend = self.single(&metric.trends, "rising` or `falling").map(|trend| match trend {
+            ast::Trend::Rising => model::Trend::Rising,
+            ast::Trend::Falling => model::Trend::Falling,
+        });
+        self.at_most_one(&metric.accepts, "accepts non_finite");
+        if !matches!(metric.source, ast::MetricSource::Hook { .. }) {
+            self.only_of_hooks(metric);
+        }
         // Both are looked at, so that a mistake in one does not hide one in the other or in the default.
         let (source, ty): (Option<MetricSource>, Option<Type>) = match &metric.source {
             ast::MetricSource::Hook { hooks, damaged } => {
@@ -57,8 +65,27 @@ impl<'a> Resolver<'a> {
             direction,
             default: default?,
             initial: initial?,
+            trend,
+            accepts_not_finite: !metric.accepts.is_empty(),
             source: source?,
         })
+    }
+
+    /// What a hook has to declare follows from a formula by itself.
+    fn only_of_hooks(&mut self, metric: &ast::Metric) {
+        let trends = metric.trends.iter().map(|(span, trend)| {
+            let word = match trend {
+                ast::Trend::Rising => "rising",
+                ast::Trend::Falling => "falling",
+            };
+            (*span, word, "how the value of a formula changes follows from its kind: `max` rises, `min` falls")
+        });
+        let note = "a number that is not finite has no place in arithmetic; a hook can make sense of it";
+        let accepts = metric.accepts.iter().map(|span| (*span, "accepts non_finite", note));
+        for (span, word, note) in trends.chain(accepts).collect::<Vec<_>>() {
+            let title = format!("`{word}` is for metrics with a hook");
+            self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("leave it out").note(note));
+        }
     }
 
     fn hook(

@@ -43,6 +43,7 @@ impl<'a> Resolver<'a> {
     ) -> Option<(MetricSource, Option<Unit>)> {
         self.no_clauses(formula);
         self.at_most_one(&formula.outbound, "outbound");
+        self.at_most_one(&formula.whole, "whole windows");
         let mut parts = Signals::default();
         let resolved = self.temporal(&mut parts, of)?;
         let Signals { inputs, computed: mut signals, unit, truths } = parts;
@@ -66,7 +67,8 @@ impl<'a> Resolver<'a> {
             return None;
         }
         let outbound = !formula.outbound.is_empty();
-        let robustness = Robustness { inputs, signals, formula: resolved, outbound };
+        let whole_windows = !formula.whole.is_empty();
+        let robustness = Robustness { inputs, signals, formula: resolved, outbound, whole_windows };
         Some((MetricSource::Robustness(robustness), unit.and_then(|(unit, _)| unit)))
     }
 

@@ -151,6 +151,9 @@ pub(crate) struct Metric {
     pub(crate) directions: Vec<(Span, Direction)>,
     pub(crate) defaults: Vec<(Span, Quantity)>,
     pub(crate) initials: Vec<(Span, Quantity)>,
+    pub(crate) trends: Vec<(Span, Trend)>,
+    /// `accepts non_finite`.
+    pub(crate) accepts: Vec<Span>,
     pub(crate) source: MetricSource,
 }
 
@@ -158,6 +161,13 @@ pub(crate) struct Metric {
 pub(crate) enum Direction {
     Maximise,
     Minimise,
+}
+
+/// How the value of a hook's metric changes, as its author says.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Trend {
+    Rising,
+    Falling,
 }
 
 #[derive(Debug)]
@@ -175,6 +185,8 @@ pub(crate) struct Formula {
     pub(crate) every: Vec<(Span, Quantity)>,
     pub(crate) per: Vec<(Span, Path)>,
     pub(crate) outbound: Vec<Span>,
+    /// `whole windows`.
+    pub(crate) whole: Vec<Span>,
 }
 
 #[derive(Debug)]

@@ -515,6 +515,8 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::start_contains => "`start contains`",
         Rule::contained_integer => "`integer`",
         Rule::initial_value => "`initial`",
+        Rule::trend => "`rising` or `falling`",
+        Rule::accepts => "`accepts non_finite`",
         Rule::custom => "`custom`",
         Rule::custom_parameter => "a parameter such as `points: int [3, 20]`",
         Rule::domain | Rule::number_domain | Rule::point_domain | Rule::text_domain | Rule::file_domain => {
@@ -608,6 +610,7 @@ fn in_words(rule: Rule) -> Option<String> {
         Rule::formula_every => "`every`",
         Rule::formula_per => "`per`",
         Rule::formula_outbound => "`outbound`",
+        Rule::formula_whole => "`whole windows`",
         Rule::fuzzing_time => "`fuzzing_time()`",
         Rule::minus
         | Rule::k_not

@@ -27,7 +27,8 @@ impl Reader<'_> {
             .map(|per| (self.keyword_span(&per), self.path(&expect_child(&per, Rule::path))))
             .collect();
         let outbound = children(pair, Rule::formula_outbound).map(|outbound| self.span(&outbound)).collect();
-        Formula { kind, when, every, per, outbound }
+        let whole = children(pair, Rule::formula_whole).map(|whole| self.span(&whole)).collect();
+        Formula { kind, when, every, per, outbound, whole }
     }
 
     pub(super) fn expression(&mut self, pair: &Pair<'_>) -> Expression {

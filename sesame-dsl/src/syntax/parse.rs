@@ -7,7 +7,7 @@ use super::ast::{
     ActivationMode, Bound, Campaign, Comparison, Count, Coverage, CoverageAxis, Custom, CustomParameter, Direction,
     Domain, Expectation, Field, File, Head, InProcess, Inherited, Message, Metric, MetricSource, Moment, Name, Node,
     Operation, OperationBody, Operations, Passive, Process, Record, Repeat, Requirement, Search, Simulator, Strategy,
-    System, Test, Topic, Transport, Type, TypeKind,
+    System, Test, Topic, Transport, Trend, Type, TypeKind,
 };
 use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, parse_bounded, too_deep};
@@ -441,6 +441,12 @@ impl Reader<'_> {
         };
         let defaults = values(Rule::default_value);
         let initials = values(Rule::initial_value);
+        let trends = children(pair, Rule::trend).map(|trend| {
+            let value = if child(&trend, Rule::k_rising).is_some() { Trend::Rising } else { Trend::Falling };
+            (self.span(&trend), value)
+        });
+        let trends = trends.collect();
+        let accepts = children(pair, Rule::accepts).map(|accepts| self.span(&accepts)).collect();
         let sources = [Rule::hook_block, Rule::formula, Rule::fuzzing_time];
         let source = first_of(pair, &sources).expect("a metric has a source");
         let source = match source.as_rule() {
@@ -454,7 +460,7 @@ impl Reader<'_> {
             Rule::formula => MetricSource::Formula(Box::new(self.formula(&source))),
             _ => MetricSource::FuzzingTime,
         };
-        Metric { head, ty, directions, defaults, initials, source }
+        Metric { head, ty, directions, defaults, initials, trends, accepts, source }
     }
 
     pub(super) fn bound(&mut self, pair: &Pair<'_>) -> Bound {

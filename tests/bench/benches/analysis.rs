@@ -33,7 +33,7 @@ fn record(permitted: &Permitted, metrics: usize, number: u32) -> TestRecord {
     let metrics = (0..metrics)
         .map(|_| {
             let value = stream.uniform(0.0, 100.0);
-            MetricObservation { value: Some(value), set: true, series: vec![(1.0, value)] }
+            MetricObservation::whole(Some(value), true, vec![(1.0, value)])
         })
         .collect();
     TestRecord {

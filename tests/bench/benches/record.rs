@@ -8,7 +8,7 @@ use sesame_runtime::record::{Origin, Recorder, TestRecord};
 /// A test in which both metrics changed this often.
 fn test(number: u32, points: u32) -> TestRecord {
     let series: Vec<(f64, f64)> = (0..points).map(|n| (f64::from(n) * 0.02, f64::from(n).sqrt())).collect();
-    let metric = MetricObservation { value: series.last().map(|point| point.1), set: true, series };
+    let metric = MetricObservation::whole(series.last().map(|point| point.1), true, series);
     TestRecord {
         number,
         origin: Origin::Search,

@@ -80,8 +80,8 @@ fn observe(plan: &CampaignPlan, number: u32, operations: &[sesame_plan::TestOper
         end: plan.campaign.end_after,
         operations: effects,
         metrics: vec![
-            MetricObservation { value: Some(touched), set: true, series: Vec::new() },
-            MetricObservation { value: Some(-level), set: true, series },
+            MetricObservation::whole(Some(touched), true, Vec::new()),
+            MetricObservation::whole(Some(-level), true, series),
         ],
         messages: 10_000,
         warnings: Vec::new(),
