@@ -14,7 +14,7 @@ mod worker;
 
 pub use again::{Further, confirm_further};
 pub use alone::{AloneSettings, run_alone};
-pub use conduct::{CampaignError, Conducted, Progress, Settings, conduct, patience};
+pub use conduct::{CampaignError, Conducted, Progress, Settings, Unheard, conduct, patience};
 pub use pool::{Ended, Job, Pool, PoolError, PoolSettings};
 pub use traced::TraceOrder;
 pub use worker::serve;

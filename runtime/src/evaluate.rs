@@ -77,10 +77,13 @@ pub fn evaluate_tapped(
         None if test.operations.is_empty() || effect => Outcome::Completed,
         None => Outcome::Void,
     };
+    let ended = matches!(outcome, Outcome::Completed | Outcome::Void);
     Ok(Observation {
         outcome,
         end: end.seconds(),
         operations: finished.operations,
+        // A run that broke off may have been about to subscribe.
+        unheard: if ended { finished.unheard } else { Vec::new() },
         metrics: finished.metrics,
         messages: finished.messages,
         warnings: finished.warnings,
@@ -142,8 +145,9 @@ mod tests {
         fn capabilities(&self) -> Capabilities {
             Capabilities { lock_stepped: true, resets: true }
         }
-        fn reset(&mut self, _: u64, _: &mut dyn Exchange) -> Result<(), TransportError> {
+        fn reset(&mut self, _: u64, relay: &mut dyn Exchange) -> Result<(), TransportError> {
             self.now = SimTime::ZERO;
+            relay.subscribed(relay.wires().find("arm/command").unwrap());
             Ok(())
         }
         fn advance(&mut self, until: SimTime, relay: &mut dyn Exchange) -> Result<Progress, TransportError> {

@@ -62,6 +62,9 @@ pub struct Observation {
     pub end: f64,
     /// Per operation of the test, in its order; empty after a crash of the worker.
     pub operations: Vec<OperationEffect>,
+    /// Of a run that came to its end: names on the wire that operations of the campaign act on and that nobody heard, in
+    /// order of declaration. Neither did the simulator subscribe to them, nor reads them an outbound metric.
+    pub unheard: Vec<String>,
     /// Per metric of the plan, in its order; empty after a crash of the worker.
     pub metrics: Vec<MetricObservation>,
     /// Messages the relay handled.
@@ -84,6 +87,8 @@ pub struct WallTime {
 pub struct OperationEffect {
     /// Observed active intervals in seconds, clipped to the run, in order, none overlapping.
     pub intervals: Vec<Span>,
+    /// Intervals in which it was not active and still held messages back, likewise.
+    pub tails: Vec<Span>,
     /// What it counted.
     pub counters: Counters,
     /// Simulation time of its first effect, in seconds.
@@ -92,7 +97,14 @@ pub struct OperationEffect {
     pub last_touch: Option<f64>,
 }
 
-/// What an operation counted. An operation had an effect when any but `seen` is above zero.
+impl OperationEffect {
+    /// When it was active or held messages back, in no particular order: what `fuzzing_time()` adds up.
+    pub fn busy(&self) -> impl Iterator<Item = Span> + use<'_> {
+        self.intervals.iter().chain(&self.tails).copied()
+    }
+}
+
+/// What an operation counted. An operation had an effect when any but `seen` and `unheard` is above zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counters {
     /// Messages that reached it while it was active.
@@ -101,18 +113,23 @@ pub struct Counters {
     pub changed: u64,
     /// Messages it dropped.
     pub dropped: u64,
-    /// Messages it held back.
+    /// Messages it held back while it was active; never more than `seen`.
     pub delayed: u64,
+    /// Messages that came while it was not active and waited behind those it still held.
+    pub queued: u64,
     /// Messages it made up.
     pub injected: u64,
     /// Side effects it had beside messages.
     pub side_effects: u64,
+    /// Messages it changed, dropped, held back or made up on wires that nobody heard. They are in none of the others, and
+    /// no effect.
+    pub unheard: u64,
 }
 
 impl Counters {
     /// Whether the operation had any effect.
     pub fn any_effect(&self) -> bool {
-        self.changed + self.dropped + self.delayed + self.injected + self.side_effects > 0
+        self.changed + self.dropped + self.delayed + self.queued + self.injected + self.side_effects > 0
     }
 }
 

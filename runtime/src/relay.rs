@@ -4,14 +4,21 @@
 //! event the order is: due releases, inbound metrics, conditions, operations (the triggering message included), outbound
 //! metrics, then delivery. A message on a wire that no operation of the test touches is handed on as it came.
 //!
-//! Conditions are weighed once in every event, be it a message or a step of time, and at every edge and release between
-//! two events. So what an outbound metric shows of a message counts from the next event on, and no operation goes on and
-//! off in one event. A test without conditions pays nothing for them.
+//! Conditions are weighed when a metric that they read may have changed: after the inbound metrics of a message and
+//! before its operations, once a message is through, and when an instant is over, for what is known only then. They are
+//! weighed at edges too, and when the fuzzing time comes to a number that it is compared with. To weigh the same values
+//! again changes nothing, so no message that a condition does not read, and no step of time, switches an operation. A test
+//! without conditions pays nothing for them.
+//!
+//! What an operation does to a message has an effect only where somebody hears the message's wire: a subscriber, or an
+//! outbound metric. What it does on other wires is counted apart.
 
+mod fuzzing_time;
 mod release;
 mod tap;
 
-use sesame_plan::{CampaignPlan, Drain, Moment, Span, Test};
+use sesame_plan::condition::Operand;
+use sesame_plan::{CampaignPlan, Copies, Drain, Moment, OperationId, Side, Span, Test, TopicId};
 
 use crate::activation::{Activity, Edge};
 use crate::changed_files::ChangedFiles;
@@ -22,7 +29,7 @@ use crate::time::SimTime;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
-use release::{Held, ReleaseQueue};
+use release::{Held, ReleaseQueue, Why};
 pub use tap::{Deed, Tap, Touched};
 
 /// A message that is to reach its subscribers now.
@@ -40,6 +47,8 @@ pub trait Exchange {
     fn wires(&self) -> &WireTable;
     /// Whether messages of this wire must pass through it, because an operation may disturb them.
     fn intercepts(&self, wire: Wire) -> bool;
+    /// From now on the simulator subscribes to this wire, so that what is done to its messages has an effect.
+    fn subscribed(&mut self, wire: Wire);
     /// Time has come to `now`; it never goes back.
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>);
     /// A message was published at `now`.
@@ -64,13 +73,26 @@ pub struct Relay<'a> {
     published: Vec<u64>,
     queue: ReleaseQueue,
     metrics: Metrics<'a>,
+    /// Per wire: whether somebody hears it.
+    heard: Vec<bool>,
+    /// The topics that operations of the plan act on, whether this test has them or not.
+    acted_on: Vec<TopicId>,
     /// The operations that conditions switch.
     conditional: Vec<usize>,
-    /// Those of them that went off in the step at hand; here so that no step has to allocate.
+    /// Those of them that have just gone off; here so that weighing does not allocate.
     ended: Vec<usize>,
-    /// The number of the step: an event, or an edge or release between two.
-    step: u64,
+    /// Per wire: whether a condition reads a metric of its messages as they are published.
+    read: Vec<bool>,
+    /// Whether a condition reads a metric of messages as they are delivered.
+    reads_delivered: bool,
+    /// What conditions compare the fuzzing time with.
+    compared: Vec<Operand>,
+    /// Whether copies of one operation wait for each other.
+    apart: bool,
+    /// The instant at hand.
     now: SimTime,
+    /// Whether the run has begun: the edges at time zero are carried out.
+    begun: bool,
     messages: u64,
     overflowed: bool,
     /// Copies made in the event at hand.
@@ -83,6 +105,7 @@ pub struct Relay<'a> {
 
 /// One operation of the test.
 struct Stage {
+    operation: OperationId,
     name: String,
     disturbance: Disturbance,
     /// Whether it has to hear messages while it is off.
@@ -94,13 +117,26 @@ struct Stage {
     draw_seed: u64,
     /// Whether it counts in `fuzzing_time()`.
     timed: bool,
+    /// Since when it holds messages back without being active.
+    tail_since: Option<SimTime>,
+    /// When it did so before.
+    tails: Vec<(SimTime, SimTime)>,
     counters: Counters,
     first_touch: Option<SimTime>,
     last_touch: Option<SimTime>,
 }
 
 impl Stage {
-    fn touch(&mut self, now: SimTime) {
+    /// Counts what it did to so many messages on a wire that somebody hears, or nobody.
+    fn count(&mut self, heard: bool, now: SimTime, messages: u64, count: impl FnOnce(&mut Counters) -> &mut u64) {
+        if messages == 0 {
+            return;
+        }
+        if !heard {
+            self.counters.unheard += messages;
+            return;
+        }
+        *count(&mut self.counters) += messages;
         self.first_touch.get_or_insert(now);
         self.last_touch = Some(now);
     }
@@ -125,6 +161,7 @@ impl<'a> Relay<'a> {
             let operation = plan.operation(choice.operation);
             let disturbance = Disturbance::new(operation, choice, hooks)?;
             operations.push(Stage {
+                operation: choice.operation,
                 name: operation.name.clone(),
                 listens: disturbance.listens(),
                 holds_order: disturbance.holds_order(),
@@ -133,6 +170,8 @@ impl<'a> Relay<'a> {
                 since: SimTime::ZERO,
                 draw_seed: choice.draw_seed,
                 timed: operation.timed,
+                tail_since: None,
+                tails: Vec::new(),
                 counters: Counters::default(),
                 first_touch: None,
                 last_touch: None,
@@ -149,11 +188,19 @@ impl<'a> Relay<'a> {
             pipelines[wire.index()].extend(touched.map(|&at| (at, member)));
         }
         let conditional = (0..operations.len()).filter(|&at| operations[at].activity.is_conditional()).collect();
+        let (variables, compared) = fuzzing_time::read_by(plan, test);
+        let reads = |wire, side| variables.iter().any(|&metric| metrics.hears(metric, wire, side));
         Ok(Relay {
             wires,
+            heard: wires.iter().map(|wire| metrics.delivers(wire)).collect(),
+            acted_on: plan.operations.iter().filter_map(|operation| operation.topic).collect(),
             conditional,
             ended: Vec::with_capacity(operations.len()),
-            step: 0,
+            read: wires.iter().map(|wire| reads(wire, Side::Inbound)).collect(),
+            reads_delivered: wires.iter().any(|wire| reads(wire, Side::Outbound)),
+            compared,
+            apart: plan.campaign.copies != Copies::MayOverlap,
+            begun: false,
             operations,
             order,
             pipelines,
@@ -173,6 +220,13 @@ impl<'a> Relay<'a> {
     /// The same relay, telling this tap what happens.
     pub fn tapped(self, tap: &'a mut dyn Tap) -> Self {
         Relay { tap: Some(tap), ..self }
+    }
+
+    /// The same relay with a simulator that subscribes to everything.
+    #[cfg(test)]
+    pub(crate) fn heard_everywhere(mut self) -> Self {
+        self.heard.fill(true);
+        self
     }
 
     fn tell(&mut self, now: SimTime, operation: usize, deed: Deed) {
@@ -200,14 +254,15 @@ impl<'a> Relay<'a> {
             .iter()
             .map(|stage| OperationEffect {
                 intervals: stage.activity.intervals(end),
+                tails: stage.tails(end),
                 counters: stage.counters,
                 first_touch: stage.first_touch.map(SimTime::seconds),
                 last_touch: stage.last_touch.map(SimTime::seconds),
             })
             .collect();
         let timed = self.operations.iter().zip(&operations).filter(|(stage, _)| stage.timed);
-        let active: Vec<Span> = timed.flat_map(|(_, operation)| operation.intervals.clone()).collect();
-        let (metrics, mut warnings) = self.metrics.finish(&active);
+        let busy: Vec<Span> = timed.flat_map(|(_, operation)| operation.busy()).collect();
+        let (metrics, mut warnings) = self.metrics.finish(&busy);
         for stage in &self.operations {
             if let Disturbance::Custom(custom) = &stage.disturbance
                 && let Some(mismatch) = &custom.mismatch
@@ -222,77 +277,127 @@ impl<'a> Relay<'a> {
         if self.flooded {
             warnings.push(format!("copies of copies: more than {COPIES_LIMIT} in one event are not made"));
         }
-        Finished { operations, metrics, warnings, messages: self.messages }
+        let unheard = self
+            .wires
+            .iter()
+            .filter(|&wire| !self.heard[wire.index()] && self.acted_on.contains(&self.wires.topic(wire)))
+            .map(|wire| self.wires.path(wire).to_owned())
+            .collect();
+        Finished { operations, unheard, metrics, warnings, messages: self.messages }
     }
 
-    /// Carries out, in order of time, every activation edge and every release up to `now`; at one moment edges come
-    /// first, since an operation is active for `start <= t < end`. Conditions are weighed at each moment before `now`, for
-    /// which the event at hand does it.
+    /// Carries out, in order of time, every activation edge and every release up to `now`; at one instant edges come
+    /// first, since an operation is active for `start <= t < end`.
     fn follow_time(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
+        if !self.begun {
+            self.begun = true;
+            self.arrive(deliveries);
+        }
         loop {
-            let release = self.queue.next_release().filter(|&time| time <= now);
-            let edge = self.operations.iter().filter_map(|stage| stage.activity.next_edge()).min();
-            match (edge.filter(|&time| time <= now), release) {
-                (Some(edge), release) if release.is_none_or(|release| edge <= release) => {
-                    self.metrics.follow_time(edge);
-                    self.follow_activities(edge, deliveries);
-                    if edge < now {
-                        self.weigh_conditions(edge, deliveries);
-                    }
+            while self.queue.next_release().is_some_and(|release| release <= self.now) {
+                if let Some(held) = self.release() {
+                    self.pass(self.now, held, deliveries);
+                    self.weigh_delivered(deliveries);
                 }
-                (_, Some(release)) => {
-                    self.metrics.follow_time(release);
-                    if let Some(held) = self.queue.pop() {
-                        self.pass(release, held, deliveries);
-                    }
-                    if release < now {
-                        self.weigh_conditions(release, deliveries);
-                    }
-                }
-                (_, None) => return self.metrics.follow_time(now),
             }
+            if self.now >= now {
+                return;
+            }
+            self.leave(deliveries);
+            let edges = self.operations.iter().filter_map(|stage| stage.activity.next_edge());
+            let moments = edges.chain(self.queue.next_release()).chain(self.next_comparison());
+            let Some(moment) = moments.min().filter(|&moment| moment <= now) else {
+                self.now = now;
+                return;
+            };
+            self.now = moment;
+            self.arrive(deliveries);
         }
     }
 
-    /// Carries out the edges at one moment; messages let go by them are let go then.
-    fn follow_activities(&mut self, edge: SimTime, deliveries: &mut Vec<Delivery>) {
+    /// What an instant begins with, if something is due then: its edges.
+    fn arrive(&mut self, deliveries: &mut Vec<Delivery>) {
         for at in 0..self.operations.len() {
-            match self.operations[at].activity.follow(edge, self.step) {
+            match self.operations[at].activity.follow(self.now) {
                 Edge::None => {}
-                Edge::Started => self.begin_activity(at, edge),
-                Edge::Ended => self.end_activity(at, edge, deliveries),
+                Edge::Started => self.begin_activity(at, self.now),
+                Edge::Ended => self.end_activity(at, self.now, deliveries),
             }
+        }
+        self.weigh_conditions(deliveries);
+    }
+
+    /// What an instant ends with, once time moves on: values that are known only now.
+    fn leave(&mut self, deliveries: &mut Vec<Delivery>) {
+        self.metrics.follow_time(self.now + SimTime::from_nanos(1));
+        self.weigh_conditions(deliveries);
+    }
+
+    /// Weighs conditions after messages were delivered.
+    fn weigh_delivered(&mut self, deliveries: &mut Vec<Delivery>) {
+        if self.reads_delivered {
+            self.weigh_conditions(deliveries);
         }
     }
 
-    /// Weighs the conditions of all operations on the same values, and ends the step.
-    fn weigh_conditions(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
-        if self.conditional.is_empty() || self.over {
+    /// Weighs the conditions of all operations on the same values: first which go off, then which go on, so that one may
+    /// begin where its copy ends. What operations let go as they end may be delivered and change values again.
+    fn weigh_conditions(&mut self, deliveries: &mut Vec<Delivery>) {
+        if self.conditional.is_empty() {
             return;
         }
-        let timed = self.operations.iter().filter(|stage| stage.timed);
-        let active = |sum, stage: &Stage| sum + stage.activity.active_time(now);
-        let active_time = timed.fold(SimTime::ZERO, active).seconds();
-        for next in 0..self.conditional.len() {
-            let at = self.conditional[next];
-            let value = |metric| self.metrics.value(metric, active_time);
-            match self.operations[at].activity.weigh(now, self.step, &value) {
-                Edge::None => {}
-                Edge::Started => self.begin_activity(at, now),
-                Edge::Ended => self.ended.push(at),
+        let now = self.now;
+        loop {
+            let fuzzing_time = self.fuzzing_time().seconds();
+            let metrics = &self.metrics;
+            let value = |metric| metrics.value(metric, fuzzing_time);
+            for &at in &self.conditional {
+                if self.operations[at].activity.weigh_end(now, &value) == Edge::Ended {
+                    self.ended.push(at);
+                }
+            }
+            for next in 0..self.conditional.len() {
+                let at = self.conditional[next];
+                let free = !self.apart || !self.copy_is_active(at);
+                let value = |metric| self.metrics.value(metric, fuzzing_time);
+                if self.operations[at].activity.weigh_start(now, free, &value) == Edge::Started {
+                    self.begin_activity(at, now);
+                }
+            }
+            if self.ended.is_empty() {
+                return;
+            }
+            for next in 0..self.ended.len() {
+                self.end_activity(self.ended[next], now, deliveries);
+            }
+            self.ended.clear();
+            if !self.reads_delivered {
+                return;
             }
         }
-        self.step += 1;
-        for next in 0..self.ended.len() {
-            self.end_activity(self.ended[next], now, deliveries);
+    }
+
+    /// Whether another copy of this operation is active.
+    fn copy_is_active(&self, at: usize) -> bool {
+        let operation = self.operations[at].operation;
+        let others = self.operations.iter().enumerate().filter(|&(other, _)| other != at);
+        others.into_iter().any(|(_, stage)| stage.operation == operation && stage.activity.is_active())
+    }
+
+    /// The next message that is held back, due or not, taken out of the queue.
+    fn release(&mut self) -> Option<Held> {
+        let (operation, held) = self.queue.pop()?;
+        if self.queue.holds(operation) == 0 {
+            self.operations[operation].end_tail(self.now);
         }
-        self.ended.clear();
+        Some(held)
     }
 
     /// What happens when an operation goes on: it begins afresh.
     fn begin_activity(&mut self, at: usize, now: SimTime) {
         let stage = &mut self.operations[at];
         stage.since = now;
+        stage.end_tail(now);
         stage.disturbance.begin();
         self.tell(now, at, Deed::Started);
     }
@@ -303,19 +408,28 @@ impl<'a> Relay<'a> {
         match self.operations[at].disturbance.drain() {
             None | Some(Drain::Finish) => {}
             Some(Drain::Flush) => {
-                for held in self.queue.take_all(at) {
+                for (_, held) in self.queue.take_all(at) {
                     self.pass(now, held, deliveries);
                 }
             }
             Some(Drain::Drop) => {
                 let lost = self.queue.take_all(at);
                 let counters = &mut self.operations[at].counters;
-                counters.delayed -= lost.len() as u64;
-                counters.dropped += lost.len() as u64;
-                for held in lost {
+                for (why, _) in &lost {
+                    match why {
+                        Why::Delayed => counters.delayed -= 1,
+                        Why::Queued => counters.queued -= 1,
+                        Why::Unheard => continue,
+                    }
+                    counters.dropped += 1;
+                }
+                for (_, held) in lost {
                     self.tell(now, at, Deed::Dropped(held.touched()));
                 }
             }
+        }
+        if self.queue.holds(at) > 0 {
+            self.operations[at].tail_since = Some(now);
         }
     }
 
@@ -323,6 +437,7 @@ impl<'a> Relay<'a> {
     fn pass(&mut self, now: SimTime, mut message: Held, deliveries: &mut Vec<Delivery>) {
         while let Some(&(at, member)) = self.pipelines[message.wire.index()].get(message.next_stage) {
             message.next_stage += 1;
+            let heard = self.heard[message.wire.index()];
             let stage = &mut self.operations[at];
             let queued_until = if stage.holds_order { self.queue.last_release(at, message.wire) } else { None };
             let active = stage.activity.is_active();
@@ -350,25 +465,32 @@ impl<'a> Relay<'a> {
             }
             .max(queued_until.unwrap_or(now));
             if fate == Fate::Dropped {
-                stage.counters.dropped += 1;
-                stage.touch(now);
+                stage.count(heard, now, 1, |counters| &mut counters.dropped);
                 self.tell(now, at, Deed::Dropped(message.touched()));
                 return;
             }
             if fate == Fate::Changed {
-                stage.counters.changed += 1;
-                stage.touch(now);
+                stage.count(heard, now, 1, |counters| &mut counters.changed);
                 self.tell(now, at, Deed::Changed(message.touched()));
             }
             if release > now {
                 let stage = &mut self.operations[at];
-                stage.counters.delayed += 1;
-                stage.touch(now);
+                let why = match (heard, active) {
+                    (false, _) => Why::Unheard,
+                    (true, true) => Why::Delayed,
+                    (true, false) => Why::Queued,
+                };
+                stage.count(
+                    heard,
+                    now,
+                    1,
+                    |counters| if active { &mut counters.delayed } else { &mut counters.queued },
+                );
                 self.tell(now, at, Deed::Delayed(message.touched(), release));
-                self.queue.push(release, at, message);
+                self.queue.push(release, at, why, message);
                 if self.queue.len() > HELD_LIMIT {
                     self.overflowed = true;
-                    if let Some(oldest) = self.queue.pop() {
+                    if let Some(oldest) = self.release() {
                         self.pass(now, oldest, deliveries);
                     }
                 }
@@ -408,18 +530,16 @@ impl Relay<'_> {
 
     /// Takes a message through a custom operation and on, then what the operation made up.
     fn pass_custom(&mut self, now: SimTime, at: usize, member: u64, mut message: Held, deliveries: &mut Vec<Delivery>) {
+        let heard = self.heard[message.wire.index()];
         let stage = &mut self.operations[at];
         let Disturbance::Custom(custom) = &mut stage.disturbance else {
             unreachable!("only custom operations come here")
         };
         let draws = Draws::new(stage.draw_seed, member, message.index);
         let call = custom.on_message(now, self.wires.path(message.wire), draws, &mut message.value);
-        stage.counters.injected += call.injected.len() as u64;
-        stage.counters.changed += u64::from(call.changed && !call.dropped);
-        stage.counters.dropped += u64::from(call.dropped);
-        if call.changed || call.dropped || !call.injected.is_empty() {
-            stage.touch(now);
-        }
+        stage.count(heard, now, call.injected.len() as u64, |counters| &mut counters.injected);
+        stage.count(heard, now, u64::from(call.changed && !call.dropped), |counters| &mut counters.changed);
+        stage.count(heard, now, u64::from(call.dropped), |counters| &mut counters.dropped);
         if call.dropped {
             self.tell(now, at, Deed::Dropped(message.touched()));
         } else if call.changed {
@@ -447,11 +567,8 @@ impl Relay<'_> {
         self.flooded |= copies > room;
         let copies = copies.min(room);
         self.copies += copies;
-        if copies > 0 {
-            let stage = &mut self.operations[at];
-            stage.counters.injected += u64::from(copies);
-            stage.touch(now);
-        }
+        let heard = self.heard[message.wire.index()];
+        self.operations[at].count(heard, now, u64::from(copies), |counters| &mut counters.injected);
         let made: Vec<Held> =
             (0..u64::from(copies)).map(|number| message.beside(at, number, message.value.clone())).collect();
         for copy in &made {
@@ -473,17 +590,18 @@ impl Exchange for Relay<'_> {
         !self.pipelines[wire.index()].is_empty()
     }
 
+    fn subscribed(&mut self, wire: Wire) {
+        self.heard[wire.index()] = true;
+    }
+
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
-        self.now = self.now.max(now);
         self.copies = 0;
-        self.follow_time(self.now, deliveries);
-        self.weigh_conditions(self.now, deliveries);
+        self.follow_time(now, deliveries);
     }
 
     fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>) {
-        if now > self.now || self.messages == 0 {
-            self.now = self.now.max(now);
-            self.follow_time(self.now, deliveries);
+        if now > self.now || !self.begun {
+            self.follow_time(now, deliveries);
         }
         self.messages += 1;
         self.copies = 0;
@@ -493,8 +611,11 @@ impl Exchange for Relay<'_> {
             tap.published(self.now, wire, index, &value);
         }
         self.metrics.message(self.now, wire, &value);
-        self.weigh_conditions(self.now, deliveries);
+        if self.read[wire.index()] {
+            self.weigh_conditions(deliveries);
+        }
         self.pass(self.now, Held { wire, published: index, index, value, next_stage: 0 }, deliveries);
+        self.weigh_delivered(deliveries);
     }
 }
 
@@ -502,6 +623,8 @@ impl Exchange for Relay<'_> {
 pub struct Finished {
     /// Per operation of the test, in its order.
     pub operations: Vec<OperationEffect>,
+    /// Names on the wire that operations of the plan act on and nobody heard, in order of declaration.
+    pub unheard: Vec<String>,
     /// Per metric of the plan.
     pub metrics: Vec<crate::observation::MetricObservation>,
     /// What the user should know.
@@ -510,6 +633,8 @@ pub struct Finished {
     pub messages: u64,
 }
 
+#[cfg(test)]
+mod activations;
 #[cfg(test)]
 mod behaviour;
 #[cfg(test)]

@@ -346,6 +346,7 @@ mod tests {
             outcome,
             end: 70.0,
             operations: Vec::new(),
+            unheard: Vec::new(),
             metrics: values.iter().map(metric).collect(),
             messages: 0,
             warnings: Vec::new(),

@@ -166,6 +166,15 @@ fn known_tests_by_condition_are_held_to_what_they_expect_and_void_ones_said_to_b
     for span in &test("burst").observation.operations[0].intervals {
         assert!((span.length() - 2.0).abs() < 2e-9 || span.end >= 60.0, "{span:?}");
     }
+    // Undisturbed, the gripper is deep inside from 9.92 s to 13.1 s, and from 45.82 s to 49.96 s.
+    runner.run(&["known", "jitter_bursts", "--results", "example"]).expect(0);
+    let repository = Repository::open(&runner.folder.join("example/known")).unwrap();
+    let burst = repository.test(repository.find("jitter_bursts").unwrap()).unwrap().observation;
+    let starts: Vec<f64> = burst.operations[0].intervals.iter().map(|span| span.start).collect();
+    assert!(starts.first().is_some_and(|start| (9.0..11.0).contains(start)), "{starts:?}");
+    assert!(starts.iter().any(|start| (44.0..50.0).contains(start)), "the second place is disturbed too: {starts:?}");
+    assert!((2..=3).contains(&starts.len()), "{starts:?}");
+    assert!(burst.operations[0].last_touch > Some(44.0), "{starts:?}");
     assert_eq!(test("near").observation.operations[0].intervals.len(), 1);
 }
 

@@ -91,6 +91,7 @@ fn check(plan: &CampaignPlan, tests: &[(Test, f64)]) {
             outcome: Outcome::Completed,
             end: 70.0,
             operations: Vec::new(),
+            unheard: Vec::new(),
             metrics: vec![metric(*value); plan.metrics.len()],
             messages: 0,
             warnings: Vec::new(),

@@ -90,7 +90,7 @@ fn record(plan: &CampaignPlan, permitted: &Permitted, number: u32) -> TestRecord
         let Activation::Time { start, end } = *activation else { unreachable!("a campaign by time") };
         let counters = Counters { seen: 100, changed: 100, ..Counters::default() };
         let intervals = vec![Span { start, end }];
-        OperationEffect { intervals, counters, first_touch: Some(start), last_touch: Some(end) }
+        OperationEffect { intervals, tails: Vec::new(), counters, first_touch: Some(start), last_touch: Some(end) }
     };
     let objectives = u32::try_from(plan.campaign.objectives.len()).unwrap();
     let metric = |value: f64| {
@@ -108,6 +108,7 @@ fn record(plan: &CampaignPlan, permitted: &Permitted, number: u32) -> TestRecord
             outcome: if number % 50 == 7 { Outcome::Void } else { Outcome::Completed },
             end: 100.0,
             operations: test.operations.iter().map(|it| effect(&it.activation)).collect(),
+            unheard: Vec::new(),
             metrics: values(objectives, number, &mut stream).map(metric).to_vec(),
             messages: 10_000,
             warnings: Vec::new(),

@@ -25,4 +25,5 @@ mod stl;
 mod strategies;
 mod tampering;
 mod traces;
+mod unheard;
 mod vendored;

@@ -2,11 +2,12 @@
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use sesame_plan::{CampaignPlan, CoverageGoal, Recorded, Search, Test};
+use sesame_plan::{CampaignPlan, CoverageGoal, KnownTestId, OperationId, Recorded, Search, Test};
 
 use super::again::{Again, LIKE_BEFORE};
 use super::pool::{Ended, Job, Pool, PoolError, PoolSettings};
@@ -45,6 +46,8 @@ pub struct Settings {
     pub timeout: Option<Duration>,
     /// The runner's program, started again for each worker.
     pub program: PathBuf,
+    /// Whether to go on although nobody hears what an operation disturbs.
+    pub allow_unheard: bool,
 }
 
 /// How far a campaign is.
@@ -94,6 +97,14 @@ pub enum CampaignError {
         "the undisturbed reference run failed: {0}\nnothing was fuzzed: a campaign needs a system that works undisturbed"
     )]
     Reference(String),
+    /// Nobody hears what operations disturb, so that tests with them would show nothing.
+    #[error(
+        "{}\nnothing was fuzzed: such tests would pass without having disturbed anything. Disturb what the simulator \
+         subscribes to, let it subscribe to this, or read it by a metric with `outbound`; `--allow-unheard` goes on \
+         nevertheless",
+        .0.iter().map(Unheard::to_string).collect::<Vec<_>>().join("\n")
+    )]
+    Unheard(Vec<Unheard>),
     /// A trace could not be written. The test is not recorded, so that `resume` runs it again with its trace.
     #[error(
         "{reason}\nT{test} is not recorded without its trace, what was recorded before is kept: `resume` goes on once that is mended"
@@ -146,6 +157,16 @@ pub fn conduct(
         drop(desk);
         recorder.finish("the undisturbed reference run failed")?;
         return Err(CampaignError::Reference(reference.outcome.detail().unwrap_or_default()));
+    }
+    let unheard = unheard(plan, &reference);
+    if unheard.iter().any(Unheard::wholly) && !settings.allow_unheard {
+        // What is recorded stays unfinished, so that `resume --allow-unheard` can go on with it.
+        drop(desk);
+        recorder.interrupt()?;
+        return Err(CampaignError::Unheard(unheard.into_iter().filter(Unheard::wholly).collect()));
+    }
+    for unheard in unheard {
+        desk.recorder.put_event(&Event { kind: EventKind::Warning, test: Some(0), text: unheard.to_string() })?;
     }
     for text in reference_warnings(plan, &reference) {
         desk.recorder.put_event(&Event { kind: EventKind::Warning, test: Some(0), text })?;
@@ -529,6 +550,63 @@ impl Desk<'_> {
     }
 }
 
+/// An operation on a topic that nobody hears, or of whose members nobody hears some.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unheard {
+    operation: String,
+    topic: String,
+    /// The names on the wire that nobody hears.
+    paths: Vec<String>,
+    /// Of how many.
+    of: usize,
+}
+
+impl Unheard {
+    /// Whether nobody hears any of its topic.
+    fn wholly(&self) -> bool {
+        self.paths.len() == self.of
+    }
+}
+
+impl fmt::Display for Unheard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Unheard { operation, topic, paths, .. } = self;
+        let named = paths.iter().map(|path| format!("`{path}`")).collect::<Vec<_>>().join(", ");
+        if self.wholly() {
+            write!(
+                f,
+                "nobody hears operation `{operation}`: the simulator does not subscribe to its topic `{topic}` ({named}), and no outbound metric reads it"
+            )
+        } else {
+            write!(
+                f,
+                "nobody hears operation `{operation}` on {named} of `{topic}`: the simulator subscribes to other members only"
+            )
+        }
+    }
+}
+
+/// The operations that tests of this campaign may hold and that nobody heard, wholly or in part, in its undisturbed run.
+fn unheard(plan: &CampaignPlan, reference: &Observation) -> Vec<Unheard> {
+    let of_tests = |tests: &[KnownTestId]| -> BTreeSet<OperationId> {
+        tests.iter().flat_map(|&id| &plan.test(id).test.operations).map(|it| it.operation).collect()
+    };
+    let operations = match &plan.campaign.search {
+        Search::Known { tests } => of_tests(tests),
+        Search::Repeat { test, .. } | Search::Shrink { test, .. } => of_tests(&[*test]),
+        _ => plan.campaign.operations.iter().copied().collect(),
+    };
+    let found = operations.into_iter().filter_map(|id| {
+        let operation = plan.operation(id);
+        let topic = plan.topic(operation.topic?);
+        let paths: Vec<String> = topic.paths.iter().filter(|path| reference.unheard.contains(path)).cloned().collect();
+        let unheard =
+            Unheard { operation: operation.name.clone(), topic: topic.name.clone(), paths, of: topic.paths.len() };
+        (!unheard.paths.is_empty()).then_some(unheard)
+    });
+    found.collect()
+}
+
 /// What is wrong with a system before anything is fuzzed.
 fn reference_warnings(plan: &CampaignPlan, reference: &Observation) -> Vec<String> {
     let broken = plan.requirements.iter().filter_map(|requirement| {
@@ -560,6 +638,33 @@ mod tests {
         assert_eq!(tracking(0.8).out_of_reach(), None);
         let said = tracking(0.9).out_of_reach();
         assert_eq!(said.as_deref(), Some("the search cannot stop at 90 % of all cells: its tests can reach 96 of 108"));
+    }
+
+    #[test]
+    fn an_operation_that_nobody_hears_is_named_and_a_group_is_heard_if_a_member_is() {
+        let plan = sample::plan();
+        let heard = |unheard: &[&str]| {
+            let mut reference = sample::observe(&plan, &Test::default(), 1);
+            reference.unheard = unheard.iter().map(|&path| path.to_owned()).collect();
+            super::unheard(&plan, &reference)
+        };
+        assert_eq!(heard(&[]), []);
+        let operation = plan.operation(plan.campaign.operations[0]);
+        let topic = plan.topic(operation.topic.unwrap());
+        let paths: Vec<&str> = topic.paths.iter().map(String::as_str).collect();
+        let found = heard(&paths);
+        assert!(found[0].wholly());
+        let said = CampaignError::Unheard(found.clone()).to_string();
+        for part in [&operation.name, &topic.name, &topic.paths[0], "--allow-unheard"] {
+            assert!(said.contains(part), "{said}");
+        }
+        let partly = Unheard { of: paths.len() + 1, ..found[0].clone() };
+        assert!(!partly.wholly() && partly.to_string().contains("other members only"));
+        let mut known = plan.clone();
+        known.campaign.search = Search::Known { tests: Vec::new() };
+        let mut reference = sample::observe(&plan, &Test::default(), 1);
+        reference.unheard = topic.paths.clone();
+        assert_eq!(super::unheard(&known, &reference), [], "only what is to be run counts");
     }
 
     #[test]

@@ -74,6 +74,7 @@ pub(super) fn empty(outcome: Outcome) -> Observation {
         outcome,
         end: 0.0,
         operations: Vec::new(),
+        unheard: Vec::new(),
         metrics: Vec::new(),
         messages: 0,
         warnings: Vec::new(),

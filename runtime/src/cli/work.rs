@@ -30,6 +30,9 @@ pub(super) struct Work {
     /// Seconds of wall time after which a test is stopped; by default 20 times the undisturbed run, at least 60
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     timeout: Option<Duration>,
+    /// Go on although nobody hears what an operation disturbs: the simulator does not subscribe to its topic, and no outbound metric reads it
+    #[arg(long)]
+    allow_unheard: bool,
 }
 
 /// How a command says what was found.
@@ -68,7 +71,8 @@ impl Work {
         if self.workers.is_some_and(|asked| asked.get() > workers) {
             eprintln!("note: tests run one at a time, since operations may change files");
         }
-        Ok(Settings { seed, workers, timeout: self.timeout, program: std::env::current_exe()? })
+        let (timeout, allow_unheard) = (self.timeout, self.allow_unheard);
+        Ok(Settings { seed, workers, timeout, program: std::env::current_exe()?, allow_unheard })
     }
 
     fn processes(&self) -> usize {

@@ -234,14 +234,28 @@ impl Metrics<'_> {
         }
     }
 
-    /// The value that a metric has for conditions at this moment: its last one, or its initial one before that. The active
+    /// The value that a metric has for conditions at this moment: its last one, or its initial one before that. The fuzzing
     /// time so far, in seconds, is what the relay knows and a metric of it shows.
-    pub fn value(&self, metric: MetricId, active_time: f64) -> Option<f64> {
+    pub fn value(&self, metric: MetricId, fuzzing_time: f64) -> Option<f64> {
         let declared = self.table.plan.metric(metric);
         match declared.source {
-            MetricSource::FuzzingTime => Some(active_time),
+            MetricSource::FuzzingTime => Some(fuzzing_time),
             _ => self.states[metric.index()].context.value.or(declared.initial),
         }
+    }
+
+    /// Whether messages of this wire, as they are published or as they are delivered, may change this metric.
+    pub(crate) fn hears(&self, metric: MetricId, wire: Wire, side: Side) -> bool {
+        let at = metric.index();
+        match side {
+            Side::Inbound => self.table.taps[wire.index()].iter().any(|&(tapping, _)| tapping == at),
+            Side::Outbound => self.table.delivered[wire.index()].contains(&at),
+        }
+    }
+
+    /// Whether a metric hears this wire's messages as they are delivered.
+    pub(crate) fn delivers(&self, wire: Wire) -> bool {
+        !self.table.delivered[wire.index()].is_empty()
     }
 
     /// A message, as it is delivered.
@@ -267,8 +281,8 @@ impl Metrics<'_> {
     /// What the run showed, as far as it went: a metric never set takes its default, one whose hook is not filled in has
     /// no value. Also what the user should know, one line per metric. No hook is called any more.
     ///
-    /// `active` has the active intervals of all operations that count in `fuzzing_time()`.
-    pub fn finish(mut self, active: &[Span]) -> (Vec<MetricObservation>, Vec<String>) {
+    /// `busy` has the intervals in which each operation that counts in `fuzzing_time()` was active or held messages back.
+    pub fn finish(mut self, busy: &[Span]) -> (Vec<MetricObservation>, Vec<String>) {
         let mut warnings = Vec::new();
         let mut observations = Vec::with_capacity(self.states.len());
         for (state, metric) in self.states.iter_mut().zip(&self.table.plan.metrics) {
@@ -277,7 +291,7 @@ impl Metrics<'_> {
                 robustness.break_off(self.now, context);
             }
             if matches!(metric.source, MetricSource::FuzzingTime) {
-                for (time, total) in fuzzing_time(active) {
+                for (time, total) in fuzzing_time(busy) {
                     context.now = time;
                     context.set(total.seconds());
                 }
@@ -305,11 +319,11 @@ impl Metrics<'_> {
     }
 }
 
-/// Total active time so far, at the end of each observed interval. It is summed in whole nanoseconds, so that tests which
-/// were active equally long are equal, however their intervals lie.
-fn fuzzing_time(active: &[Span]) -> Vec<(SimTime, SimTime)> {
+/// The fuzzing time so far, at the end of each interval. It is summed in whole nanoseconds, so that tests which disturbed
+/// equally long are equal, however their intervals lie.
+fn fuzzing_time(busy: &[Span]) -> Vec<(SimTime, SimTime)> {
     let mut intervals: Vec<(SimTime, SimTime)> =
-        active.iter().map(|span| (SimTime::from_seconds(span.start), SimTime::from_seconds(span.end))).collect();
+        busy.iter().map(|span| (SimTime::from_seconds(span.start), SimTime::from_seconds(span.end))).collect();
     intervals.sort_by_key(|&(_, end)| end);
     let mut total = SimTime::ZERO;
     std::iter::once((SimTime::ZERO, total))

@@ -60,15 +60,17 @@ impl Differences {
     }
 
     fn operation(&mut self, name: &str, before: &OperationEffect, after: &OperationEffect) {
-        self.compare(&format!("the active time of {name}"), &before.intervals, &after.intervals, |spans| {
+        let words = |spans: &Vec<Span>| {
             let words: Vec<String> = spans.iter().map(|Span { start, end }| format!("{start} to {end} s")).collect();
             if words.is_empty() { "never".to_owned() } else { words.join(", ") }
-        });
+        };
+        self.compare(&format!("the active time of {name}"), &before.intervals, &after.intervals, words);
+        self.compare(&format!("the tail of {name}"), &before.tails, &after.tails, words);
         self.compare(&format!("the effect of {name}"), &before.counters, &after.counters, |counters| {
-            let Counters { seen, changed, dropped, delayed, injected, side_effects } = counters;
+            let Counters { seen, changed, dropped, delayed, queued, injected, side_effects, unheard } = counters;
             format!(
-                "{seen} seen, {changed} changed, {dropped} dropped, {delayed} delayed, {injected} injected, \
-                 {side_effects} side effects"
+                "{seen} seen, {changed} changed, {dropped} dropped, {delayed} delayed, {queued} queued, \
+                 {injected} injected, {side_effects} side effects, {unheard} unheard"
             )
         });
         let touches = |effect: &OperationEffect| (effect.first_touch, effect.last_touch);

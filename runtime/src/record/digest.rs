@@ -31,7 +31,7 @@ const CONTENT: &[(&str, &str)] = &[
     (
         "operations",
         "SELECT test, position, operation, start_s, end_s, start_condition, end_condition, length_s, times, draw_seed, \
-         seen, changed, dropped, delayed, injected, side_effects, first_touch_s, last_touch_s \
+         seen, changed, dropped, delayed, queued, injected, side_effects, unheard, first_touch_s, last_touch_s \
          FROM operations ORDER BY test, position",
     ),
     (
@@ -40,6 +40,8 @@ const CONTENT: &[(&str, &str)] = &[
          ORDER BY test, operation, position",
     ),
     ("intervals", "SELECT test, operation, position, start_s, end_s FROM intervals ORDER BY test, operation, position"),
+    ("tails", "SELECT test, operation, position, start_s, end_s FROM tails ORDER BY test, operation, position"),
+    ("unheard", "SELECT test, position, path FROM unheard ORDER BY test, position"),
     (
         "metric_values",
         "SELECT test, metric, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values ORDER BY test, metric",

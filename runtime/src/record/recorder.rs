@@ -280,7 +280,8 @@ fn host() -> Option<String> {
 
 /// What of a test SQLite could not give back as it is: numbers that are none, counts beyond 63 bits.
 fn unrecordable(record: &TestRecord) -> Option<String> {
-    let Observation { outcome, end, operations, metrics, messages, wall, warnings: _ } = &record.observation;
+    let Observation { outcome, end, operations, metrics, messages, wall, unheard: _, warnings: _ } =
+        &record.observation;
     let mut numbers = vec![("the end of the run", *end), ("the wall time", wall.run)];
     if let Outcome::Timeout { limit } = outcome {
         numbers.push(("the time limit", *limit));
@@ -311,8 +312,7 @@ fn unrecordable(record: &TestRecord) -> Option<String> {
         }
     }
     for effect in operations {
-        numbers
-            .extend(effect.intervals.iter().flat_map(|span| [("an interval", span.start), ("an interval", span.end)]));
+        numbers.extend(effect.busy().flat_map(|span| [("an interval", span.start), ("an interval", span.end)]));
         numbers.extend([effect.first_touch, effect.last_touch].into_iter().flatten().map(|time| ("a touch", time)));
     }
     for metric in metrics {
@@ -331,7 +331,7 @@ fn unrecordable(record: &TestRecord) -> Option<String> {
     }
     let counts = operations.iter().flat_map(|effect| {
         let c = &effect.counters;
-        [c.seen, c.changed, c.dropped, c.delayed, c.injected, c.side_effects]
+        [c.seen, c.changed, c.dropped, c.delayed, c.queued, c.injected, c.side_effects, c.unheard]
     });
     let count = counts.chain([*messages]).find(|&count| i64::try_from(count).is_err())?;
     Some(format!("the count {count}, which is beyond 63 bits,"))
@@ -410,6 +410,11 @@ fn write_test(transaction: &Transaction<'_>, plan: &CampaignPlan, record: &TestR
             .execute(params![number, index(position), parent])?;
     }
     write_operations(transaction, plan, record)?;
+    for (position, path) in observation.unheard.iter().enumerate() {
+        transaction
+            .prepare_cached("INSERT INTO unheard (test, position, path) VALUES (?1, ?2, ?3)")?
+            .execute(params![number, index(position), path])?;
+    }
     for (metric, shown) in observation.metrics.iter().enumerate() {
         transaction
             .prepare_cached(
@@ -457,9 +462,9 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
         transaction
             .prepare_cached(
                 "INSERT INTO operations (test, position, operation, start_s, end_s, start_condition, end_condition, \
-                 length_s, times, draw_seed, seen, changed, dropped, delayed, injected, side_effects, first_touch_s, \
-                 last_touch_s) \
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18)",
+                 length_s, times, draw_seed, seen, changed, dropped, delayed, queued, injected, side_effects, unheard, \
+                 first_touch_s, last_touch_s) \
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20)",
             )?
             .execute(params![
                 number,
@@ -476,8 +481,10 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
                 counters.map(|c| count(c.changed)),
                 counters.map(|c| count(c.dropped)),
                 counters.map(|c| count(c.delayed)),
+                counters.map(|c| count(c.queued)),
                 counters.map(|c| count(c.injected)),
                 counters.map(|c| count(c.side_effects)),
+                counters.map(|c| count(c.unheard)),
                 effect.and_then(|effect| effect.first_touch),
                 effect.and_then(|effect| effect.last_touch),
             ])?;
@@ -514,6 +521,13 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
             transaction
                 .prepare_cached(
                     "INSERT INTO intervals (test, operation, position, start_s, end_s) VALUES (?1, ?2, ?3, ?4, ?5)",
+                )?
+                .execute(params![number, index(position), index(at), span.start, span.end])?;
+        }
+        for (at, span) in effect.into_iter().flat_map(|effect| &effect.tails).enumerate() {
+            transaction
+                .prepare_cached(
+                    "INSERT INTO tails (test, operation, position, start_s, end_s) VALUES (?1, ?2, ?3, ?4, ?5)",
                 )?
                 .execute(params![number, index(position), index(at), span.start, span.end])?;
         }

@@ -194,6 +194,11 @@ impl Repository {
             duplicate_of: row.duplicate_of,
             observation: Observation {
                 operations: self.effects(number, &row.outcome)?,
+                unheard: self.read(
+                    "SELECT path FROM unheard WHERE test = ?1 ORDER BY position",
+                    params![number],
+                    |row| row.get(0),
+                )?,
                 outcome: row.outcome,
                 end: row.end,
                 metrics,
@@ -438,7 +443,7 @@ impl Repository {
 
     fn effects(&self, number: u32, outcome: &Outcome) -> Result<Vec<OperationEffect>, RecordError> {
         let mut effects: Vec<OperationEffect> = self.read(
-            "SELECT seen, changed, dropped, delayed, injected, side_effects, first_touch_s, last_touch_s \
+            "SELECT seen, changed, dropped, delayed, queued, injected, side_effects, unheard, first_touch_s, last_touch_s \
              FROM operations WHERE test = ?1 AND (seen IS NOT NULL OR ?2) ORDER BY position",
             params![number, *outcome == Outcome::Unknown],
             |row| {
@@ -447,29 +452,42 @@ impl Repository {
                 }
                 Ok(OperationEffect {
                     intervals: Vec::new(),
+                    tails: Vec::new(),
                     counters: Counters {
                         seen: unsigned(row, 0)?,
                         changed: unsigned(row, 1)?,
                         dropped: unsigned(row, 2)?,
                         delayed: unsigned(row, 3)?,
-                        injected: unsigned(row, 4)?,
-                        side_effects: unsigned(row, 5)?,
+                        queued: unsigned(row, 4)?,
+                        injected: unsigned(row, 5)?,
+                        side_effects: unsigned(row, 6)?,
+                        unheard: unsigned(row, 7)?,
                     },
-                    first_touch: row.get(6)?,
-                    last_touch: row.get(7)?,
+                    first_touch: row.get(8)?,
+                    last_touch: row.get(9)?,
                 })
             },
         )?;
-        let spans = self.read(
-            "SELECT operation, start_s, end_s FROM intervals WHERE test = ?1 ORDER BY operation, position",
-            params![number],
-            |row| Ok((position(row, 0)?, Span { start: row.get(1)?, end: row.get(2)? })),
-        )?;
-        for (operation, span) in spans {
-            let effect = effects.get_mut(operation).ok_or_else(|| {
-                RecordError::damaged(&self.path, format!("T{number} has an interval without an operation"))
+        type Spans = fn(&mut OperationEffect) -> &mut Vec<Span>;
+        let tables: [(&str, Spans); 2] = [
+            (
+                "SELECT operation, start_s, end_s FROM intervals WHERE test = ?1 ORDER BY operation, position",
+                |effect| &mut effect.intervals,
+            ),
+            ("SELECT operation, start_s, end_s FROM tails WHERE test = ?1 ORDER BY operation, position", |effect| {
+                &mut effect.tails
+            }),
+        ];
+        for (sql, spans_of) in tables {
+            let spans = self.read(sql, params![number], |row| {
+                Ok((position(row, 0)?, Span { start: row.get(1)?, end: row.get(2)? }))
             })?;
-            effect.intervals.push(span);
+            for (operation, span) in spans {
+                let effect = effects.get_mut(operation).ok_or_else(|| {
+                    RecordError::damaged(&self.path, format!("T{number} has an interval without an operation"))
+                })?;
+                spans_of(effect).push(span);
+            }
         }
         Ok(effects)
     }

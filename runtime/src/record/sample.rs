@@ -225,6 +225,7 @@ pub(crate) fn observe(plan: &CampaignPlan, test: &Test, seed: u64) -> Observatio
         };
         effects.push(OperationEffect {
             intervals: if start < end { vec![Span { start, end }] } else { Vec::new() },
+            tails: Vec::new(),
             counters,
             first_touch: counters.any_effect().then_some(start),
             last_touch: counters.any_effect().then_some(end - 0.02),
@@ -280,6 +281,7 @@ pub(crate) fn observe(plan: &CampaignPlan, test: &Test, seed: u64) -> Observatio
         outcome: if disturbs { Outcome::Completed } else { Outcome::Void },
         end: 70.0,
         operations: effects,
+        unheard: Vec::new(),
         metrics: vec![
             shown(collisions, Some(0.0)),
             MetricObservation::whole(Some(fuzzing), true, vec![]),
@@ -370,6 +372,7 @@ pub(crate) fn records(plan: &CampaignPlan, searched: u32) -> Vec<TestRecord> {
                     outcome: Outcome::Crash { message: "the worker process died (signal 9)".to_owned() },
                     end: 0.0,
                     operations: vec![],
+                    unheard: vec![],
                     metrics: vec![],
                     messages: 0,
                     warnings: vec![],

@@ -41,6 +41,8 @@ pub struct ScannedOperation {
     pub choices: Vec<Choice>,
     /// When it was seen to be active.
     pub intervals: Vec<Span>,
+    /// Whether it had an effect, or the run cannot tell (it was imported).
+    pub acted: bool,
 }
 
 impl ScannedTest {
@@ -49,12 +51,15 @@ impl ScannedTest {
         self.values.get(metric.index()).copied().unwrap_or_default()
     }
 
-    /// Where it lies in the reduced parameter space; `None` where no operation was active.
+    /// Where it lies in the reduced parameter space; `None` where no operation was active with an effect.
     pub fn point(&self, plan: &CampaignPlan, convention: Convention) -> Option<Point> {
         let disturbances: Vec<Disturbance> = self
             .operations
             .iter()
-            .map(|it| disturbance(plan, it.operation, &it.choices, it.intervals.clone()))
+            .map(|it| {
+                let intervals = if it.acted { it.intervals.clone() } else { Vec::new() };
+                disturbance(plan, it.operation, &it.choices, intervals)
+            })
             .collect();
         Point::of(&disturbances, convention)
     }
@@ -105,8 +110,8 @@ impl<'s, T> Cursor<'s, T> {
     }
 }
 
-/// A row of `operations`: the operation's name, and when it was to be active.
-type PlannedRow = (String, Option<Span>);
+/// A row of `operations`: the operation's name, when it was to be active, and whether it had an effect, or nobody counted.
+type PlannedRow = (String, Option<Span>, bool);
 
 /// A row of `choices`: the position of its operation, and the choice; `None` where it is none.
 type ChoiceRow = (usize, Option<Choice>);
@@ -121,7 +126,11 @@ impl Repository {
         // One read transaction, so that a run writing meanwhile is seen at one point.
         let _transaction = self.connection.unchecked_transaction().map_err(failed)?;
 
-        let mut operations = prepare("SELECT test, operation, start_s, end_s FROM operations ORDER BY test, position")?;
+        let mut operations = prepare(
+            "SELECT test, operation, start_s, end_s, \
+             coalesce(changed + dropped + delayed + queued + injected + side_effects > 0, TRUE) \
+             FROM operations ORDER BY test, position",
+        )?;
         let mut choices = prepare(
             "SELECT test, operation, value, low, high, x, y, z, text FROM choices ORDER BY test, operation, position",
         )?;
@@ -137,7 +146,7 @@ impl Repository {
         let mut operations =
             Cursor::over(operations.query([]).map_err(failed)?, |row| -> rusqlite::Result<PlannedRow> {
                 let (start, end): (Option<f64>, Option<f64>) = (row.get(2)?, row.get(3)?);
-                Ok((row.get(1)?, start.zip(end).map(|(start, end)| Span { start, end })))
+                Ok((row.get(1)?, start.zip(end).map(|(start, end)| Span { start, end }), row.get(4)?))
             })
             .map_err(failed)?;
         let mut choices = Cursor::over(choices.query([]).map_err(failed)?, |row| -> rusqlite::Result<ChoiceRow> {
@@ -172,7 +181,7 @@ impl Repository {
                 operations: Vec::new(),
                 values: values.of(number).map_err(failed)?,
             };
-            for (name, planned) in operations.of(number).map_err(failed)? {
+            for (name, planned, acted) in operations.of(number).map_err(failed)? {
                 let operation = *ids
                     .get(name.as_str())
                     .ok_or_else(|| damaged(format!("T{number} has an operation `{name}` that the plan lacks")))?;
@@ -181,6 +190,7 @@ impl Repository {
                     planned,
                     choices: Vec::new(),
                     intervals: Vec::new(),
+                    acted,
                 });
             }
             let stray = |what: &str| damaged(format!("T{number} has {what} without an operation"));
@@ -231,6 +241,7 @@ mod tests {
                     },
                     choices: it.parameters.clone(),
                     intervals: record.observation.operations.get(at).map_or(Vec::new(), |it| it.intervals.clone()),
+                    acted: record.observation.operations.get(at).is_none_or(|it| it.counters.any_effect()),
                 })
                 .collect();
             assert_eq!(test.operations, operations);

@@ -85,9 +85,11 @@ CREATE TABLE operations (
     seen            INTEGER,        -- messages that reached it while it was active
     changed         INTEGER,
     dropped         INTEGER,
-    delayed         INTEGER,
+    delayed         INTEGER,        -- held back while it was active
+    queued          INTEGER,        -- came while it was not active, and waited behind those it still held
     injected        INTEGER,
     side_effects    INTEGER,
+    unheard         INTEGER,        -- changed, dropped, held back or made up where nobody listens: no effect, and in no other count
     first_touch_s   REAL,           -- its first effect
     last_touch_s    REAL,           -- its last effect
     PRIMARY KEY (test, position)
@@ -118,6 +120,26 @@ CREATE TABLE intervals (
     start_s         REAL NOT NULL,
     end_s           REAL NOT NULL,  -- excluded
     PRIMARY KEY (test, operation, position)
+) STRICT, WITHOUT ROWID;
+
+-- When an operation was not active and still held messages back, clipped to the run. With its intervals this is what
+-- fuzzing_time() adds up.
+CREATE TABLE tails (
+    test            INTEGER NOT NULL REFERENCES tests,
+    operation       INTEGER NOT NULL, -- position of the operation in the test
+    position        INTEGER NOT NULL,
+    start_s         REAL NOT NULL,
+    end_s           REAL NOT NULL,  -- excluded
+    PRIMARY KEY (test, operation, position)
+) STRICT, WITHOUT ROWID;
+
+-- Names on the wire that operations of the campaign act on and that nobody heard in a run: the simulator did not subscribe
+-- to them, and no outbound metric reads them.
+CREATE TABLE unheard (
+    test            INTEGER NOT NULL REFERENCES tests,
+    position        INTEGER NOT NULL, -- in the order of declaration
+    path            TEXT NOT NULL,
+    PRIMARY KEY (test, position)
 ) STRICT, WITHOUT ROWID;
 
 CREATE TABLE metric_values (

@@ -32,7 +32,7 @@ fn relayed(
     let plan = plan(operations);
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-    let mut relay = Relay::new(&plan, &wires, &test_of(test), metrics.start(), &[]).unwrap();
+    let mut relay = Relay::new(&plan, &wires, &test_of(test), metrics.start(), &[]).unwrap().heard_everywhere();
     let mut delivered = Vec::new();
     for tenth in 0..=100 {
         let now = SimTime::from_nanos(i64::from(tenth) * 100_000_000);

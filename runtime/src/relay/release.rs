@@ -36,10 +36,22 @@ impl Held {
     }
 }
 
+/// Why a message is held back, as far as it is counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Why {
+    /// The operation delays it.
+    Delayed,
+    /// The operation is off, and it waits behind messages that are held.
+    Queued,
+    /// Either, on a wire that nobody hears.
+    Unheard,
+}
+
 struct Entry {
     release: SimTime,
     sequence: u64,
     operation: usize,
+    why: Why,
     message: Held,
 }
 
@@ -72,6 +84,8 @@ pub(super) struct ReleaseQueue {
     sequence: u64,
     /// Per operation and wire: how many are held, and when the last of them goes.
     tails: Vec<Vec<Tail>>,
+    /// Per operation: how many are held on all wires.
+    held: Vec<usize>,
 }
 
 #[derive(Clone, Copy, Default)]
@@ -82,11 +96,20 @@ struct Tail {
 
 impl ReleaseQueue {
     pub(super) fn new(operations: usize, wires: usize) -> Self {
-        ReleaseQueue { tails: vec![vec![Tail::default(); wires]; operations], ..ReleaseQueue::default() }
+        ReleaseQueue {
+            tails: vec![vec![Tail::default(); wires]; operations],
+            held: vec![0; operations],
+            ..ReleaseQueue::default()
+        }
     }
 
     pub(super) fn len(&self) -> usize {
         self.heap.len()
+    }
+
+    /// How many messages an operation holds.
+    pub(super) fn holds(&self, operation: usize) -> usize {
+        self.held[operation]
     }
 
     /// When the last message that an operation holds on a wire goes; `None` when it holds none.
@@ -95,12 +118,13 @@ impl ReleaseQueue {
         (tail.held > 0).then_some(tail.last)
     }
 
-    pub(super) fn push(&mut self, release: SimTime, operation: usize, message: Held) {
+    pub(super) fn push(&mut self, release: SimTime, operation: usize, why: Why, message: Held) {
+        self.held[operation] += 1;
         let tail = &mut self.tails[operation][message.wire.index()];
         tail.held += 1;
         tail.last = release;
         self.sequence += 1;
-        self.heap.push(Reverse(Entry { release, sequence: self.sequence, operation, message }));
+        self.heap.push(Reverse(Entry { release, sequence: self.sequence, operation, why, message }));
     }
 
     /// When the next message is due.
@@ -108,20 +132,22 @@ impl ReleaseQueue {
         self.heap.peek().map(|entry| entry.0.release)
     }
 
-    /// The next message, due or not.
-    pub(super) fn pop(&mut self) -> Option<Held> {
+    /// The next message, due or not, with the operation that held it.
+    pub(super) fn pop(&mut self) -> Option<(usize, Held)> {
         let Reverse(entry) = self.heap.pop()?;
         self.tails[entry.operation][entry.message.wire.index()].held -= 1;
-        Some(entry.message)
+        self.held[entry.operation] -= 1;
+        Some((entry.operation, entry.message))
     }
 
     /// Everything an operation holds, in the order it would have gone.
-    pub(super) fn take_all(&mut self, operation: usize) -> Vec<Held> {
+    pub(super) fn take_all(&mut self, operation: usize) -> Vec<(Why, Held)> {
         let (mut taken, kept): (Vec<_>, Vec<_>) =
             std::mem::take(&mut self.heap).into_vec().into_iter().partition(|entry| entry.0.operation == operation);
         self.heap = kept.into();
         self.tails[operation].fill(Tail::default());
+        self.held[operation] = 0;
         taken.sort_unstable_by_key(|entry| entry.0.key());
-        taken.into_iter().map(|Reverse(entry)| entry.message).collect()
+        taken.into_iter().map(|Reverse(entry)| (entry.why, entry.message)).collect()
     }
 }

@@ -450,14 +450,16 @@ pub(crate) fn choices_text(operation: &OperationReport) -> String {
 /// What an operation did, in words, as in `2450 seen, 2450 changed from 8.00 to 56.98 s`.
 pub(crate) fn effect_text(operation: &OperationReport) -> String {
     let Some(counters) = operation.counters else { return "unknown".to_owned() };
-    let Counters { seen, changed, dropped, delayed, injected, side_effects } = counters;
+    let Counters { seen, changed, dropped, delayed, queued, injected, side_effects, unheard } = counters;
     let mut words = vec![format!("{seen} seen")];
     let named = [
         (changed, "changed"),
         (dropped, "dropped"),
         (delayed, "delayed"),
+        (queued, "queued behind them"),
         (injected, "injected"),
         (side_effects, "side effects"),
+        (unheard, "disturbed where nobody listens"),
     ];
     words.extend(named.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}")));
     if !counters.any_effect() {

@@ -187,11 +187,11 @@ impl Landscape {
         let mut activity = Activity::new(&operation.activation, Span { start: 0.0, end: 65.0 });
         for slot in 0u32..350 {
             let now = SimTime::from_seconds(f64::from(slot) * 0.2);
-            let step = u64::from(slot);
             while let Some(edge) = activity.next_edge().filter(|&edge| edge <= now) {
-                activity.follow(edge, step);
+                activity.follow(edge);
+                activity.weigh(edge, &|metric| Some(Self::signal(metric, edge.seconds())));
             }
-            activity.weigh(now, step, &|metric| Some(Self::signal(metric, now.seconds())));
+            activity.weigh(now, &|metric| Some(Self::signal(metric, now.seconds())));
         }
         activity.intervals(SimTime::from_seconds(65.0)).into_iter().map(|span| (span.start, span.end)).collect()
     }
@@ -240,6 +240,7 @@ impl Landscape {
             outcome: Outcome::Completed,
             end: 70.0,
             operations: Vec::new(),
+            unheard: Vec::new(),
             metrics: metrics.map(|id| MetricObservation::whole(None, false, series(id))).collect(),
             messages: 0,
             warnings: Vec::new(),

@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 
 use sesame_plan::{ActivationMode, CampaignPlan, MetricId, Span, Test, TestOperation};
 
-use crate::activation::{Activity, Edge};
+use crate::activation::Activity;
 use crate::observation::Observation;
 use crate::rng::Stream;
 use crate::search::cells::Cells;
@@ -67,22 +67,19 @@ impl Course {
         let within = plan.operation(operation.operation).within;
         let end = within.end.min(plan.campaign.end_after);
         let mut activity = Activity::new(&operation.activation, Span { start: within.start, end });
-        // Whether weighing once more would change nothing as long as no variable does.
-        let mut settled = false;
+        let value_in = |values: &[Option<f64>], metric| {
+            self.variables.iter().position(|it| *it == metric).and_then(|at| values[at])
+        };
         let mut before: Option<&Vec<Option<f64>>> = None;
         for (moment, values) in (0u32..).zip(&self.values) {
-            let (now, step) = (SimTime::from_seconds(time_of(plan, moment)), u64::from(moment));
-            let mut edge = false;
-            while let Some(at) = activity.next_edge().filter(|&at| at <= now) {
-                activity.follow(at, step);
-                edge = true;
+            let now = SimTime::from_seconds(time_of(plan, moment));
+            while let Some(edge) = activity.next_edge().filter(|&edge| edge <= now) {
+                activity.follow(edge);
+                activity.weigh(edge, &|metric| value_in(before.unwrap_or(values), metric));
             }
-            let still = before.replace(values) == Some(values);
-            if settled && still && !edge {
-                continue;
+            if before.replace(values) != Some(values) {
+                activity.weigh(now, &|metric| value_in(values, metric));
             }
-            let value = |metric| self.variables.iter().position(|it| *it == metric).and_then(|at| values[at]);
-            settled = activity.weigh(now, step, &value) == Edge::None && !edge;
         }
         activity.intervals(SimTime::from_seconds(end))
     }

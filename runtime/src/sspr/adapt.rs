@@ -2,7 +2,7 @@
 
 use sesame_plan::{Activation, CampaignPlan, Choice, Domain, OperationId, OperationKind, Parameter, Shape, Span, Test};
 
-use crate::observation::Observation;
+use crate::observation::{Observation, Outcome};
 use crate::sspr::{Class, Convention, Disturbance, Intensity, Point};
 
 /// The class of a kind of operation.
@@ -83,13 +83,19 @@ pub fn planned(plan: &CampaignPlan, test: &Test) -> Option<Vec<Disturbance>> {
     operations.collect()
 }
 
-/// A test as its run was observed.
+/// A test as its run was observed. An operation without effect was as good as never active, and has no interval; of an
+/// imported run nobody knows the effects, and what was active counts.
 pub fn observed(plan: &CampaignPlan, test: &Test, observation: &Observation) -> Vec<Disturbance> {
     let operations = test.operations.iter().zip(&observation.operations);
-    operations.map(|(it, effect)| disturbance(plan, it.operation, &it.parameters, effect.intervals.clone())).collect()
+    let disturbances = operations.map(|(it, effect)| {
+        let acted = effect.counters.any_effect() || observation.outcome == Outcome::Unknown;
+        let intervals = if acted { effect.intervals.clone() } else { Vec::new() };
+        disturbance(plan, it.operation, &it.parameters, intervals)
+    });
+    disturbances.collect()
 }
 
-/// Where a run lies in the reduced parameter space; `None` where no operation was active.
+/// Where a run lies in the reduced parameter space; `None` where no operation was active with an effect.
 pub fn observed_point(plan: &CampaignPlan, test: &Test, observation: &Observation) -> Option<Point> {
     Point::of(&observed(plan, test, observation), Convention::Ours)
 }

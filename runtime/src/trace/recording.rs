@@ -349,7 +349,7 @@ impl Feeder<'_> {
         }
         let damaged =
             |problem: &str| RecordingError::Damaged { problem: problem.to_owned(), path: self.path.to_owned() };
-        let mut active: Option<Vec<Span>> = None;
+        let mut busy: Option<Vec<Span>> = None;
         let mut end = Some(self.now);
         let mut run = None;
         if let (Some(subject), Some(ending)) = (&self.subject, &self.ending) {
@@ -358,7 +358,7 @@ impl Feeder<'_> {
                 Some(metrics) => serde_json::from_str(metrics).map_err(|_| damaged("its metrics cannot be read"))?,
                 None => Vec::new(),
             };
-            active = match ending.get("operations") {
+            busy = match ending.get("operations") {
                 Some(effects) => {
                     Some(timed(subject, effects).map_err(|_| damaged("what operations did cannot be read"))?)
                 }
@@ -389,9 +389,9 @@ impl Feeder<'_> {
         if let Some(end) = end {
             self.metrics.end(end);
         }
-        let (mut metrics, mut warnings) = self.metrics.finish(active.as_deref().unwrap_or_default());
+        let (mut metrics, mut warnings) = self.metrics.finish(busy.as_deref().unwrap_or_default());
         for (observed, metric) in metrics.iter_mut().zip(&self.plan.metrics) {
-            if matches!(metric.source, MetricSource::FuzzingTime) && active.is_none() {
+            if matches!(metric.source, MetricSource::FuzzingTime) && busy.is_none() {
                 *observed = MetricObservation::default();
             }
         }
@@ -401,7 +401,8 @@ impl Feeder<'_> {
     }
 }
 
-/// When operations were active that count in `fuzzing_time()`, of what a trace says of its test and of its operations.
+/// When operations were active or held messages back that count in `fuzzing_time()`, of what a trace says of its test and
+/// of its operations.
 fn timed(subject: &BTreeMap<String, String>, effects: &str) -> serde_json::Result<Vec<Span>> {
     #[derive(Deserialize)]
     struct Recorded<T> {
@@ -422,7 +423,7 @@ fn timed(subject: &BTreeMap<String, String>, effects: &str) -> serde_json::Resul
     let effects: Vec<OperationEffect> = serde_json::from_str(effects)?;
     let counts = |id: OperationId| declared.operations.get(id.index()).is_none_or(|it| it.timed != Some(false));
     let counted = test.operations.iter().zip(effects).filter(|(used, _)| counts(used.operation));
-    Ok(counted.flat_map(|(_, effect)| effect.intervals).collect())
+    Ok(counted.flat_map(|(_, effect)| effect.busy().collect::<Vec<_>>()).collect())
 }
 
 /// Reads a payload. One that is no object by itself may also stand alone, without the object around it.

@@ -29,8 +29,11 @@ impl Transport for Awkward {
     fn capabilities(&self) -> Capabilities {
         Capabilities { lock_stepped: true, resets: true }
     }
-    fn reset(&mut self, _: u64, _: &mut dyn Exchange) -> Result<(), TransportError> {
+    fn reset(&mut self, _: u64, relay: &mut dyn Exchange) -> Result<(), TransportError> {
         self.0 = SimTime::ZERO;
+        for wire in relay.wires().iter() {
+            relay.subscribed(wire);
+        }
         Ok(())
     }
     fn advance(&mut self, until: SimTime, relay: &mut dyn Exchange) -> Result<Progress, TransportError> {

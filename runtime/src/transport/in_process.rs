@@ -160,7 +160,11 @@ impl Wires for Linked<'_> {
     }
 
     fn subscribe(&mut self, port: Port) {
-        self.board.lines[port.0].inbox.get_or_insert_default();
+        let line = &mut self.board.lines[port.0];
+        line.inbox.get_or_insert_default();
+        if let Some(wire) = line.wire {
+            self.relay.subscribed(wire);
+        }
     }
 
     fn publish(&mut self, now: SimTime, port: Port, value: Value) {

@@ -114,6 +114,7 @@ impl Importer<'_> {
                 outcome: Outcome::Unknown,
                 end: self.plan.campaign.end_after,
                 operations: effects,
+                unheard: Vec::new(),
                 metrics,
                 messages: 0,
                 warnings: Vec::new(),

@@ -17,6 +17,7 @@ pub(crate) fn check(space: &Space, root: FileId) -> Vec<Diagnostic> {
     unused::evidence(space, &mut diagnostics);
     system::misnamed_operations(space, &mut diagnostics);
     system::two_publishers(space, &mut diagnostics);
+    system::unheard_operations(space, &mut diagnostics);
     objectives_without_default(space, &mut diagnostics);
     if space.campaigns.is_empty() {
         let title = format!("space `{}` has no campaign", space.declaration.name);

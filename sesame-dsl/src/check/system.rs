@@ -1,9 +1,9 @@
 //! Nodes, topics and operations that probably do not fit together.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{Declaration, NodeId, Space, TopicId};
+use crate::model::{Declaration, MetricSource, NodeId, Space, TopicId};
 
 /// Operations whose name ends in the name of a topic that they do not disturb.
 pub(super) fn misnamed_operations(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
@@ -24,6 +24,40 @@ pub(super) fn misnamed_operations(space: &Space, diagnostics: &mut Vec<Diagnosti
             .label(format!("it acts on `{}`", own.name))
             .also(meant.span, "its name ends in that of this topic");
         diagnostics.push(diagnostic);
+    }
+}
+
+/// Operations on topics that nobody hears, where nodes say what they subscribe to: no node does, no monitor needs the
+/// topic, and no outbound metric reads it.
+pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
+    let mut heard: BTreeSet<TopicId> = space.nodes.values().flat_map(|node| &node.subscribes).copied().collect();
+    if heard.is_empty() {
+        return;
+    }
+    for metric in space.metrics.values() {
+        match &metric.source {
+            MetricSource::Robustness(robustness) if robustness.outbound => {
+                heard.extend(robustness.inputs.iter().map(|input| input.field.topic));
+            }
+            MetricSource::Formula(formula) if formula.outbound => {
+                heard.extend(formula.inputs.iter().map(|input| input.field.topic));
+            }
+            _ => {}
+        }
+    }
+    for eddi in space.eddis.values() {
+        heard.extend(eddi.evidence.iter().flat_map(|evidence| &evidence.inputs).map(|input| input.field.topic));
+    }
+    for operation in space.operations.values() {
+        let Some(topic) = operation.topic().filter(|topic| !heard.contains(topic)) else { continue };
+        let topic = &space.topics[topic].declaration;
+        let title = format!("nobody hears what `{}` does to `{}`", operation.declaration.name, topic.name);
+        diagnostics.push(
+            Diagnostic::new(Code::NOBODY_HEARS, operation.declaration.span, title)
+                .label("no node subscribes to its topic, and no outbound metric reads it")
+                .also(topic.span, "the topic")
+                .note("a run in which nobody hears it ends with an error after the undisturbed run"),
+        );
     }
 }
 

@@ -103,6 +103,7 @@ codes! {
     UNUSED_TOPIC = "W0014": "A topic has no node and no use.",
     UNUSED_EVIDENCE = "W0015": "No guarantee of a monitor needs the evidence or demand.",
     ONE_OUTCOME = "W0016": "A comparison in a formula goes one way whatever is heard.",
+    NOBODY_HEARS = "W0020": "Nobody hears what an operation disturbs.",
 }
 
 /// The page of a code, found by its text in any case, for example `e0203`.

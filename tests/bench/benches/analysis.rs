@@ -24,6 +24,7 @@ fn record(permitted: &Permitted, metrics: usize, number: u32) -> TestRecord {
         let touches = (Some(start), Some(end));
         OperationEffect {
             intervals: vec![Span { start, end }],
+            tails: Vec::new(),
             counters,
             first_touch: touches.0,
             last_touch: touches.1,
@@ -48,6 +49,7 @@ fn record(permitted: &Permitted, metrics: usize, number: u32) -> TestRecord {
             outcome: Outcome::Completed,
             end: 1000.0,
             operations,
+            unheard: Vec::new(),
             metrics,
             messages: 10_000,
             warnings: Vec::new(),

@@ -21,6 +21,7 @@ fn test(number: u32, points: u32) -> TestRecord {
             outcome: Outcome::Completed,
             end: 70.0,
             operations: Vec::new(),
+            unheard: Vec::new(),
             metrics: vec![metric.clone(), metric],
             messages: 10_000,
             warnings: Vec::new(),

@@ -88,6 +88,7 @@ fn relay(criterion: &mut Criterion) {
         group.bench_function(BenchmarkId::new("relay", name), |bencher| {
             bencher.iter(|| {
                 let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).expect("the test fits");
+                relay.subscribed(wire);
                 let mut deliveries = Vec::new();
                 for step in 0..MESSAGES {
                     let now = SimTime::from_nanos(i64::from(step) * 1_000_000);

@@ -67,6 +67,7 @@ fn observe(plan: &CampaignPlan, number: u32, operations: &[sesame_plan::TestOper
             touched += interval.end - interval.start;
             OperationEffect {
                 intervals: vec![interval],
+                tails: Vec::new(),
                 counters: Counters { seen: 100, changed: 100, ..Counters::default() },
                 first_touch: Some(interval.start),
                 last_touch: Some(interval.end),
@@ -79,6 +80,7 @@ fn observe(plan: &CampaignPlan, number: u32, operations: &[sesame_plan::TestOper
         outcome: Outcome::Completed,
         end: plan.campaign.end_after,
         operations: effects,
+        unheard: Vec::new(),
         metrics: vec![
             MetricObservation::whole(Some(touched), true, Vec::new()),
             MetricObservation::whole(Some(-level), true, series),

@@ -35,6 +35,7 @@ fn trace(criterion: &mut Criterion) {
                 if let Some(writer) = &mut writer {
                     relay = relay.tapped(writer);
                 }
+                relay.subscribed(wire);
                 let mut deliveries = Vec::new();
                 for step in 0..MESSAGES {
                     let now = SimTime::from_nanos(i64::from(step) * 1_000_000);

@@ -154,8 +154,8 @@ impl<R: BufRead, W: Write> Session<R, W> {
 }
 
 impl Board {
-    /// Takes up the simulator's topics; all of the space's must be among them.
-    fn open(&mut self, ready: &Ready<'_>, relay: &dyn Exchange) -> Result<(), TransportError> {
+    /// Takes up the simulator's topics; all of the space's must be among them. The relay learns which are subscribed to.
+    fn open(&mut self, ready: &Ready<'_>, relay: &mut dyn Exchange) -> Result<(), TransportError> {
         let wires = relay.wires();
         for path in ready.publishes.iter().chain(&ready.subscribes) {
             let topic = Topic { wire: wires.find(path), publishes: false, subscribes: false };
@@ -171,10 +171,13 @@ impl Board {
                 self.subscribed[wire.index()] = true;
             }
         }
-        match wires.iter().find(|&wire| !self.topics.contains_key(wires.path(wire))) {
-            Some(missing) => Err(unknown_topic(wires.path(missing), self.topics.keys())),
-            None => Ok(()),
+        if let Some(missing) = wires.iter().find(|&wire| !self.topics.contains_key(wires.path(wire))) {
+            return Err(unknown_topic(wires.path(missing), self.topics.keys()));
         }
+        for wire in wires.iter().filter(|wire| self.subscribed[wire.index()]) {
+            relay.subscribed(wire);
+        }
+        Ok(())
     }
 
     /// Takes messages through the relay; what reaches subscribers is put into the outbox.

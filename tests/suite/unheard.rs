@@ -1,0 +1,52 @@
+//! Campaigns whose operations nobody hears: they end before they fuzz, and say why.
+
+use sesame_runtime::observation::Outcome;
+use sesame_runtime::record::{EventKind, Repository};
+use sesame_tests::Project;
+
+/// Hides what only metrics listen to: in the cell, no robot subscribes to its zones and its speed.
+const HIDDEN: &str = "
+    operation hide_zones on zones = blackhole within [0s, 65s]
+    operation hide_speed on speed = blackhole within [0s, 65s]
+    campaign hidden {
+      observes   top_speed
+      operations hide_zones, hide_speed 1..3 per test
+      activate   by time
+      search     falsification { evaluations 10  seed 1 }
+      coverage   { T1 [0, 1] cells 6  T2 [0, 0.5] cells 6 }
+      end        after 70s
+    }
+";
+
+#[test]
+fn a_campaign_that_nobody_hears_ends_before_it_fuzzes_and_names_its_operations() {
+    let project = Project::kuka_cell_with("kuka_cell_unheard", HIDDEN);
+    let checked = project.sesamec("generate", &["--campaign", "hidden"]).expect(0);
+    assert!(checked.err.contains("nobody hears what `hide_zones` does to `zones`"), "{}", checked.err);
+    let runner = project.build("hidden");
+    for command in [&["run", "--results", "r"][..], &["resume", "r/1"]] {
+        let refused = runner.run(command).expect(1);
+        for part in ["`hide_zones`", "`zones`", "`hide_speed`", "`speed`", "nothing was fuzzed", "--allow-unheard"] {
+            assert!(refused.err.contains(part), "{command:?}, {part}: {}", refused.err);
+        }
+    }
+    let refused = Repository::open(&runner.folder.join("r/1")).unwrap();
+    assert_eq!(refused.tests().unwrap().len(), 1, "only the undisturbed run");
+    drop(refused);
+
+    runner.run(&["resume", "r/1", "--allow-unheard"]).expect(0);
+    let repository = Repository::open(&runner.folder.join("r/1")).unwrap();
+    let rows = repository.tests().unwrap();
+    assert_eq!(rows.len(), 12);
+    assert!(rows[1..11].iter().all(|row| row.outcome == Outcome::Void), "nothing was disturbed: {rows:?}");
+    let mut unheard = 0;
+    for row in &rows {
+        let record = repository.test(row.number).unwrap();
+        unheard += record.observation.operations.iter().map(|effect| effect.counters.unheard).sum::<u64>();
+        assert!(record.observation.operations.iter().all(|effect| effect.first_touch.is_none()), "T{}", row.number);
+    }
+    assert!(unheard > 0, "what they did is counted apart");
+    let warnings = repository.events().unwrap().into_iter().filter(|event| event.kind == EventKind::Warning);
+    let warnings: Vec<String> = warnings.map(|event| event.text).collect();
+    assert!(warnings.iter().any(|text| text.contains("nobody hears operation `hide_speed`")), "{warnings:?}");
+}
