@@ -249,6 +249,8 @@ impl<'a> Relay<'a> {
     pub fn finish(mut self, end: SimTime) -> Finished {
         self.over = true;
         self.follow_time(end, &mut Vec::new());
+        // Whether a message came at the end or not: what a metric may still come to is asked for this time.
+        self.metrics.follow_time(end);
         let operations: Vec<OperationEffect> = self
             .operations
             .iter()
