@@ -302,8 +302,8 @@ impl Metrics<'_> {
             let set = set && value.is_some();
             let reach = match (&state.robustness, &state.formula) {
                 _ if context.unimplemented => Reach::ANY,
-                (Some(robustness), _) => robustness.reach(),
                 _ if state.ended && context.not_finite.is_none() => Reach::of_whole_run(value),
+                (Some(robustness), _) => robustness.reach(metric.default),
                 (_, Some(formula)) => context.onwards(formula.certain(context)),
                 _ => context.onwards(context.not_finite.map_or(context.value, |(_, before)| before)),
             };

@@ -7,7 +7,7 @@ use sesame_plan::{Activation, Copies, MetricId, MetricSource};
 use sesame_runtime::observation::Observation;
 
 use crate::case::{Case, topics_of, variables};
-use crate::formulas::{Judged, hears_deliveries, judged};
+use crate::formulas::{Judged, first_blank, hears_deliveries, judged};
 use crate::ledger::Ledger;
 
 /// Something that changes what a condition says: the values of all its variables from then on.
@@ -27,7 +27,8 @@ pub(crate) fn contradictions(case: &Case, observed: &Observation, ledger: &Ledge
             let mut topics = topics_of(metric);
             topics.sort_unstable();
             topics.dedup();
-            topics.len() == 1 && !matches!(metric.source, MetricSource::Robustness { .. })
+            let open = first_blank(&case.plan, metric, ledger).is_some();
+            topics.len() == 1 && !open && !matches!(metric.source, MetricSource::Robustness { .. })
         };
         let copies = case.test.operations.iter().filter(|other| other.operation == used.operation).count();
         let apart = copies == 1 || case.plan.campaign.copies == Copies::MayOverlap;

@@ -1,13 +1,17 @@
 //! All that these properties know of how the runtime is called and what it reports: what changes there, changes here.
 
+use sesame_plan::stl::{self, Robustness};
+use sesame_plan::{Expression, Input};
 use sesame_plan::{
-    ActivationMode, Campaign, CampaignPlan, Copies, Count, Field, MessageId, MessageType, Metric, MetricSource,
-    Operation, Requirement, SCHEMA, Search, Simulator, Test, Topic, Transport, Type,
+    ActivationMode, Aggregate, Campaign, CampaignPlan, Copies, Count, Drain, Field, MessageId, MessageType, Metric,
+    MetricSource, Operation, OperationKind, Requirement, SCHEMA, Search, Side, Simulator, Test, Topic, Transport,
+    Trend, Type,
 };
 use sesame_runtime::evaluate::{Custom, Run, evaluate_tapped};
 use sesame_runtime::metric::MetricTable;
 use sesame_runtime::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome};
 use sesame_runtime::record::{MetricValue, Verdict, verdict};
+use sesame_runtime::relay::Deed;
 use sesame_runtime::transport::in_process;
 use sesame_runtime::wire::WireTable;
 
@@ -20,12 +24,56 @@ pub(crate) const STEP: i64 = 100_000_000;
 
 /// A metric; of a hook with its trend declared.
 pub(crate) fn metric(name: &str, default: Option<f64>, initial: Option<f64>, source: MetricSource) -> Metric {
-    Metric { name: name.to_owned(), doc: String::new(), unit: None, direction: None, default, initial, source, line: 1 }
+    Metric {
+        name: name.to_owned(),
+        doc: String::new(),
+        unit: None,
+        direction: None,
+        default,
+        initial,
+        trend: match &source {
+            MetricSource::Hook { .. } => trend(HookKind::named(name)),
+            MetricSource::FuzzingTime => Some(Trend::Rising),
+            MetricSource::Formula { formula } => match formula.aggregate {
+                Aggregate::Max { .. } | Aggregate::Count { .. } | Aggregate::Duration { .. } => Some(Trend::Rising),
+                Aggregate::Min { .. } => Some(Trend::Falling),
+                Aggregate::Last { .. } | Aggregate::Mean { .. } => None,
+            },
+            MetricSource::Last { .. } | MetricSource::Robustness { .. } => None,
+        },
+        source,
+        accepts_not_finite: false,
+        line: 1,
+    }
+}
+
+fn trend(kind: HookKind) -> Option<Trend> {
+    match kind {
+        HookKind::Counting => Some(Trend::Rising),
+        HookKind::Least => Some(Trend::Falling),
+        HookKind::Latest => None,
+    }
 }
 
 /// Whether the runtime is told which way the values of this hook go.
-pub(crate) fn declares_trend(_: HookKind) -> bool {
-    false
+pub(crate) fn declares_trend(kind: HookKind) -> bool {
+    trend(kind).is_some()
+}
+
+/// A temporal formula as a metric.
+pub(crate) fn robustness(
+    inputs: Vec<Input>,
+    signals: Vec<Expression>,
+    formula: stl::Formula,
+    side: Side,
+    whole_windows: bool,
+) -> Robustness {
+    Robustness { inputs, signals, formula, side, whole_windows }
+}
+
+/// Whether the end of a run leaves out the windows that it would cut.
+pub(crate) fn over_whole_windows(robustness: &Robustness) -> bool {
+    robustness.whole_windows
 }
 
 /// What a topic carries, as a plan has it.
@@ -121,6 +169,7 @@ pub(crate) fn lost(outcome: Outcome) -> Observation {
         outcome,
         end: 0.0,
         operations: Vec::new(),
+        unheard: Vec::new(),
         metrics: Vec::new(),
         messages: 0,
         warnings: Vec::new(),
@@ -130,24 +179,23 @@ pub(crate) fn lost(outcome: Outcome) -> Observation {
 
 /// What the runtime says of a requirement.
 pub(crate) fn said(requirement: &Requirement, observation: &Observation) -> Verdict {
-    let metric = observation.metrics.get(requirement.metric.index());
-    let value = metric
-        .map_or(MetricValue { value: None, set: false }, |metric| MetricValue { value: metric.value, set: metric.set });
+    let value =
+        observation.metrics.get(requirement.metric.index()).map_or_else(MetricValue::default, MetricValue::from);
     verdict(requirement.bound, &observation.outcome, value)
 }
 
 /// The values that the runtime takes a metric to have had at the end of the run, had nothing broken it off.
-pub(crate) fn reach(_: &MetricObservation) -> Option<(f64, f64)> {
-    None
+pub(crate) fn reach(shown: &MetricObservation) -> Option<(f64, f64)> {
+    Some((shown.reach.low.unwrap_or(f64::NEG_INFINITY), shown.reach.high.unwrap_or(f64::INFINITY)))
 }
 
 /// Whether the runtime noticed that a metric heard what is no number.
-pub(crate) fn heard_no_number(_: &MetricObservation) -> Option<bool> {
-    None
+pub(crate) fn heard_no_number(shown: &MetricObservation) -> Option<bool> {
+    Some(shown.not_finite.is_some())
 }
 
 /// Whether copies of an operation wait for each other, where a campaign keeps them apart.
-pub(crate) const KEEPS_COPIES_APART: bool = false;
+pub(crate) const KEEPS_COPIES_APART: bool = true;
 
 /// Whether an operation had an effect.
 pub(crate) fn has_effect(effect: &OperationEffect) -> bool {
@@ -155,14 +203,39 @@ pub(crate) fn has_effect(effect: &OperationEffect) -> bool {
 }
 
 /// Messages that an operation held back after it had ended, behind others.
-pub(crate) fn queued(_: &Counters) -> u64 {
-    0
+pub(crate) fn queued(counters: &Counters) -> u64 {
+    counters.queued
 }
 
-/// The time in which operations that count are active, in nanoseconds.
-pub(crate) fn busy(plan: &CampaignPlan, test: &Test, observation: &Observation, _: &Ledger) -> i64 {
-    let timed =
-        test.operations.iter().zip(&observation.operations).filter(|(used, _)| plan.operation(used.operation).timed);
+/// The time in which operations that count are active or hold messages back, in nanoseconds.
+pub(crate) fn busy(plan: &CampaignPlan, test: &Test, observation: &Observation, ledger: &Ledger) -> i64 {
     let nanos = |seconds: f64| (seconds * 1e9).round() as i64;
-    timed.flat_map(|(_, effect)| &effect.intervals).map(|span| nanos(span.end) - nanos(span.start)).sum()
+    let mut sum = 0;
+    for (at, (used, effect)) in test.operations.iter().zip(&observation.operations).enumerate() {
+        let operation = plan.operation(used.operation);
+        if !operation.timed {
+            continue;
+        }
+        let own = || ledger.deeds.iter().filter(|(_, of, _)| *of == at);
+        let mut spans: Vec<(i64, i64)> =
+            effect.intervals.iter().map(|span| (nanos(span.start), nanos(span.end))).collect();
+        for (held, _, deed) in own() {
+            let Deed::Delayed(_, release) = deed else { continue };
+            // What it does not let run its time goes when the activity ends.
+            let stays = matches!(
+                operation.kind,
+                OperationKind::Latency { drain: Drain::Finish, .. } | OperationKind::Reorder { drain: Drain::Finish }
+            );
+            let ended = own().find(|(time, _, deed)| *deed == Deed::Ended && time >= held).map(|(time, ..)| *time);
+            let until = if stays { release.nanos() } else { ended.unwrap_or(i64::MAX).min(release.nanos()) };
+            spans.push((*held, until.min(ledger.end)));
+        }
+        spans.sort_unstable();
+        let mut covered = i64::MIN;
+        for (start, end) in spans {
+            sum += (end - start.max(covered)).max(0);
+            covered = covered.max(end);
+        }
+    }
+    sum
 }

@@ -469,7 +469,8 @@ impl Maker {
         let count = self.between(1, 2);
         let signals: Vec<Expression> = (0..count).map(|_| self.expression(numbers, 1)).collect();
         let formula = self.temporal(signals.len(), 3);
-        Some(Robustness { inputs, signals, formula, side: self.side() })
+        let (side, whole_windows) = (self.side(), self.stream.clone().chance(0.3));
+        Some(adapter::robustness(inputs, signals, formula, side, whole_windows))
     }
 
     fn metrics(&mut self) -> (Vec<Metric>, usize) {
@@ -549,11 +550,12 @@ impl Maker {
             let at = self.stream.below(operations.len());
             let id = OperationId(u32::try_from(at).unwrap());
             // By time, copies that stay apart are given disjoint windows by whoever makes a test.
-            if !by_condition && copies == Copies::Apart && instances.iter().any(|it| it.operation == id) {
-                continue;
-            }
             let instance = self.instance(id, &operations[at], end, by_condition, metrics);
-            instances.push(instance);
+            let timed = |it: &TestOperation| matches!(it.activation, Activation::Time { .. });
+            let stacked = timed(&instance) && instances.iter().any(|it| it.operation == id);
+            if copies == Copies::MayOverlap || !stacked {
+                instances.push(instance);
+            }
         }
         (operations, instances, copies)
     }

@@ -161,10 +161,29 @@ fn moments(
         if by_instant && !instant_is_over || at < first && !(by_instant && heard[first].time == message.time) {
             continue;
         }
-        let values: Option<Vec<f64>> = inputs
-            .iter()
-            .enumerate()
-            .map(|(of, input)| {
+        // Of `each of` a group, every member with a message in the instant counts once, the latest last.
+        let of_each = |topic| inputs.iter().any(|it| it.members == Members::Each && it.field.topic == topic);
+        let mut turns: Vec<(TopicId, usize)> = Vec::new();
+        if by_instant && each.is_none() {
+            for message in heard[..=at].iter().filter(|other| other.time == message.time) {
+                for topic in topics.iter().copied().filter(|&topic| of_each(topic)) {
+                    let Some(member) = member(plan, topic, &message.path) else { continue };
+                    turns.retain(|&turn| turn != (topic, member));
+                    turns.push((topic, member));
+                }
+            }
+        }
+        let mut turns: Vec<Option<(TopicId, usize)>> = turns.into_iter().map(Some).collect();
+        if turns.is_empty() {
+            turns.push(None);
+        }
+        for turn in turns {
+            for (of, input) in inputs.iter().enumerate() {
+                if let Some((_, member)) = turn.filter(|turn| turn.0 == input.field.topic) {
+                    latest[of] = last[of][member];
+                }
+            }
+            let value = |(of, input): (usize, &Input)| {
                 let known = last[of].iter().flatten().copied();
                 match input.members {
                     Members::Each => latest[of],
@@ -172,9 +191,10 @@ fn moments(
                     Members::Max => known.reduce(f64::max),
                     Members::Sum => known.reduce(|a, b| a + b),
                 }
-            })
-            .collect();
-        moments.extend(values.map(|values| (message.time, values)));
+            };
+            let values: Option<Vec<f64>> = inputs.iter().enumerate().map(value).collect();
+            moments.extend(values.map(|values| (message.time, values)));
+        }
     }
     moments
 }
@@ -251,7 +271,7 @@ fn of_robustness(plan: &CampaignPlan, of: &Robustness, messages: &[Message], end
         let moments = moments(plan, &of.inputs, messages, |_| true, |_| true, *own, true);
         let signals = |moment: &Moment| of.signals.iter().map(|signal| value(signal, &moment.1)).collect();
         let samples: Vec<Moment> = moments.iter().map(|moment| (moment.0, signals(moment))).collect();
-        temporal::robustness(&of.formula, &samples, end)
+        temporal::robustness(&of.formula, &samples, end, crate::adapter::over_whole_windows(of))
     };
     instances.iter().filter_map(of_instance).reduce(f64::min).filter(|robustness| robustness.is_finite())
 }
