@@ -1,12 +1,12 @@
 //! All that these properties know of how the runtime is called and what it reports: what changes there, changes here.
 
 use sesame_plan::stl::{self, Robustness};
-use sesame_plan::{Expression, Input};
 use sesame_plan::{
     ActivationMode, Aggregate, Campaign, CampaignPlan, Copies, Count, Drain, Field, MessageId, MessageType, Metric,
     MetricSource, Operation, OperationKind, Requirement, SCHEMA, Search, Side, Simulator, Test, Topic, Transport,
     Trend, Type,
 };
+use sesame_plan::{Expression, Input};
 use sesame_runtime::evaluate::{Custom, Run, evaluate_tapped};
 use sesame_runtime::metric::MetricTable;
 use sesame_runtime::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome};

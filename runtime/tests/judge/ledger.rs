@@ -16,7 +16,7 @@ pub(crate) struct Message {
 }
 
 impl Message {
-    /// Whether two are the same, bit by bit.
+    /// Whether two are the same; numbers that are none are so where their bits are.
     pub(crate) fn is(&self, other: &Message) -> bool {
         self.time == other.time && self.path == other.path && same(&self.value, &other.value)
     }
@@ -24,7 +24,7 @@ impl Message {
 
 fn same(a: &Value, b: &Value) -> bool {
     match (a, b) {
-        (Value::Real(a), Value::Real(b)) => a.to_bits() == b.to_bits(),
+        (Value::Real(a), Value::Real(b)) => a == b || a.to_bits() == b.to_bits(),
         (Value::Record(a), Value::Record(b)) => a.iter().zip(b.iter()).all(|((_, a), (_, b))| same(a, b)),
         _ => a == b,
     }
