@@ -91,7 +91,7 @@ pub(crate) fn plan(
     topics: Vec<Topic>,
     metrics: Vec<Metric>,
     requirements: Vec<Requirement>,
-    operations: Vec<Operation>,
+    operations: &[Operation],
     copies: Copies,
     end_after: f64,
 ) -> CampaignPlan {
@@ -120,7 +120,7 @@ pub(crate) fn plan(
         nodes: Vec::new(),
         metrics,
         requirements,
-        operations: operations.clone(),
+        operations: operations.to_vec(),
         tests: Vec::new(),
         campaign: Campaign {
             name: "made_up".to_owned(),
@@ -185,13 +185,13 @@ pub(crate) fn said(requirement: &Requirement, observation: &Observation) -> Verd
 }
 
 /// The values that the runtime takes a metric to have had at the end of the run, had nothing broken it off.
-pub(crate) fn reach(shown: &MetricObservation) -> Option<(f64, f64)> {
-    Some((shown.reach.low.unwrap_or(f64::NEG_INFINITY), shown.reach.high.unwrap_or(f64::INFINITY)))
+pub(crate) fn reach(shown: &MetricObservation) -> (f64, f64) {
+    (shown.reach.low.unwrap_or(f64::NEG_INFINITY), shown.reach.high.unwrap_or(f64::INFINITY))
 }
 
 /// Whether the runtime noticed that a metric heard what is no number.
-pub(crate) fn heard_no_number(shown: &MetricObservation) -> Option<bool> {
-    Some(shown.not_finite.is_some())
+pub(crate) fn heard_no_number(shown: &MetricObservation) -> bool {
+    shown.not_finite.is_some()
 }
 
 /// Whether copies of an operation wait for each other, where a campaign keeps them apart.

@@ -252,7 +252,7 @@ impl Maker {
             }
         }
         let _ = hooked;
-        let plan = adapter::plan(self.topics.clone(), metrics, requirements, operations, copies, end_after);
+        let plan = adapter::plan(self.topics.clone(), metrics, requirements, &operations, copies, end_after);
         Case { number, plan, test: Test { operations: instances }, script, carries: self.carries.clone() }
     }
 
@@ -292,7 +292,9 @@ impl Maker {
     fn blanks(&mut self, script: &mut Script, steps: i32, metrics: &[Metric], test: &[TestOperation]) {
         let mut read = vec![false; self.topics.len()];
         for metric in test.iter().flat_map(|operation| variables(&operation.activation)) {
-            topics_of(&metrics[metric.index()]).iter().for_each(|topic| read[topic.index()] = true);
+            for topic in topics_of(&metrics[metric.index()]) {
+                read[topic.index()] = true;
+            }
         }
         let member = |topic: &Topic, path: &str| topic.paths.iter().any(|of| of == path);
         let free: Vec<usize> = (0..script.lines.len())

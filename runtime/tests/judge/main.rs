@@ -8,6 +8,11 @@
 //! A case is a function of its number: a failure prints the number and the whole case, and `JUDGE_CASE=NUMBER` runs it
 //! alone.
 #![cfg(test)]
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "times are a few seconds, and draws are made from numbers in 0..1"
+)]
 
 mod activations;
 mod adapter;

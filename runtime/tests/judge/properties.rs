@@ -175,7 +175,7 @@ pub(crate) fn contradictions(case: &Case) -> Vec<String> {
             let seen = truth.metrics[at].value;
             wrong.push(format!("metric {}: {seen:?}, while the judge has {value:?}", words::metric(metric)));
         }
-        if adapter::heard_no_number(&truth.metrics[at]).is_some_and(|heard| heard != value.is_err()) {
+        if adapter::heard_no_number(&truth.metrics[at]) != value.is_err() {
             wrong.push(format!("metric {}: whether it heard what is no number is wrong", metric.name));
         }
     }
@@ -241,11 +241,11 @@ fn faulty(
     }
     for (at, metric) in case.plan.metrics.iter().enumerate() {
         let blank = first_blank(&case.plan, metric, &ledger);
-        if adapter::heard_no_number(&observed.metrics[at]).is_some_and(|heard| heard != blank.is_some()) {
+        if adapter::heard_no_number(&observed.metrics[at]) != blank.is_some() {
             wrong.push(format!("metric {}: whether it heard what is no number is wrong", metric.name));
         }
-        if let Some((low, high)) = adapter::reach(&observed.metrics[at])
-            && let Ok(Some(value)) = value_of(case, metric, told, busy(case, truth, told))
+        let (low, high) = adapter::reach(&observed.metrics[at]);
+        if let Ok(Some(value)) = value_of(case, metric, told, busy(case, truth, told))
             && !(low..=high).contains(&value)
         {
             wrong.push(format!("metric {}: {value} in truth, beyond its reach {low} to {high}", metric.name));
@@ -298,8 +298,7 @@ fn unfounded(case: &Case, observed: &Observation, ledger: &Ledger, broke_off: bo
     let active = busy(case, observed, ledger);
     let violated = |requirement: &&Requirement| said(requirement, observed) == Verdict::Violated;
     let suspects: Vec<&Requirement> = case.plan.requirements.iter().filter(violated).collect();
-    let reaches = broke_off && observed.metrics.iter().any(|metric| adapter::reach(metric).is_some());
-    if suspects.is_empty() && !reaches {
+    if suspects.is_empty() && !broke_off {
         return wrong;
     }
     for (number, future) in futures(case, ledger, broke_off).iter().enumerate() {
@@ -324,8 +323,8 @@ fn unfounded(case: &Case, observed: &Observation, ledger: &Ledger, broke_off: bo
             if matches!(metric.source, MetricSource::FuzzingTime) {
                 continue;
             }
-            if let Some((low, high)) = adapter::reach(seen)
-                && let Ok(Some(value)) = value_of(case, metric, future, active)
+            let (low, high) = adapter::reach(seen);
+            if let Ok(Some(value)) = value_of(case, metric, future, active)
                 && !(low..=high).contains(&value)
             {
                 wrong.push(format!(
