@@ -451,7 +451,7 @@ fn all_hold(numbers: std::ops::Range<u64>, check: fn(&Case) -> Vec<String>) {
         wrong.join("\n"),
         words::case(case),
         words::ledger(&ledger),
-        all[..all.len().min(100000)].join("\n"),
+        all[..all.len().min(100)].join("\n"),
     );
 }
 
