@@ -16,7 +16,7 @@ use crate::condition::holds;
 use crate::time::SimTime;
 
 /// The resolution of simulation time: when an instant is over.
-const TICK: SimTime = SimTime::from_nanos(1);
+pub(crate) const TICK: SimTime = SimTime::from_nanos(1);
 
 /// The activity of one operation in one run: whether it is on now, and when it was.
 ///

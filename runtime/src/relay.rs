@@ -20,7 +20,7 @@ mod tap;
 use sesame_plan::condition::Operand;
 use sesame_plan::{CampaignPlan, Copies, Drain, Moment, OperationId, Side, Span, Test, TopicId};
 
-use crate::activation::{Activity, Edge};
+use crate::activation::{Activity, Edge, TICK};
 use crate::changed_files::ChangedFiles;
 use crate::fuzz::{ChoiceError, Disturbance, Draws, Encounter, Fate, OperationEntry, RunContext};
 use crate::metric::Metrics;
@@ -263,6 +263,8 @@ impl<'a> Relay<'a> {
         self.begin_time(&mut Vec::new());
         self.phase = Phase::Over;
         self.follow_time(end, &mut Vec::new());
+        // Whether a message came at the end or not: what a metric may still come to is asked for this time.
+        self.metrics.follow_time(end);
         let operations: Vec<OperationEffect> = self
             .operations
             .iter()
@@ -348,9 +350,13 @@ impl<'a> Relay<'a> {
         self.weigh_conditions(deliveries);
     }
 
-    /// What an instant ends with, once time moves on: values that are known only now.
+    /// What an instant ends with, once time moves on: values that are known only now. What they switch on or off, they do a
+    /// nanosecond later, since the instant they are of is over.
     fn leave(&mut self, deliveries: &mut Vec<Delivery>) {
-        self.metrics.settle();
+        if self.metrics.settle() {
+            self.now = self.now + TICK;
+            self.metrics.follow_time(self.now);
+        }
         self.weigh_conditions(deliveries);
     }
 

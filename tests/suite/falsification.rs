@@ -2,6 +2,9 @@
 
 use std::fmt::Write as _;
 
+use sesame_dsl::analyse;
+use sesame_dsl::source::SourceMap;
+use sesame_plan::{Activation, CampaignPlan, Choice, Test, TestOperation};
 use sesame_runtime::record::Repository;
 use sesame_runtime::rng::{Stream, keyed_unit};
 use sesame_runtime::search::falsify::{Falsifier, Settings as FalsifierSettings, UnitBox};
@@ -9,7 +12,7 @@ use sesame_runtime::search::nsga2::{Nsga2, Settings, Survival, Told};
 use sesame_runtime::search::published::FalsificationProblem;
 use sesame_runtime::search::real::RealVariation;
 use sesame_runtime::search::sobol_points::SobolPoints;
-use sesame_runtime::search::{Fitness, Margin};
+use sesame_runtime::search::{Evaluated, Fitness, Margin};
 use sesame_tests::Project;
 
 const BUDGET: u32 = 80;
@@ -41,6 +44,38 @@ campaign falsifying {
 campaign even      from falsifying { search sobol { evaluations 24  seed 3 } }
 campaign wandering from falsifying { search nsga2 { population 6  evaluations 24  seed 3 }  novelty { over T1, T2, O0 } }
 "#;
+
+/// A published problem as a campaign: what is left open in capitals.
+const PROBLEM: &str = r#"
+space published
+system {
+  simulator model = in_process "model_sim::Model" { crate "simulator"  step 100ms }
+  topic a = "signal/a" : real
+  topic b = "signal/b" : real
+  topic c = "signal/c" : real
+  topic first  = "margin/first"  : real
+  topic second = "margin/second" : real
+  topic third  = "margin/third"  : real
+}
+metric fuzzing_time minimise = fuzzing_time()
+metric m1 minimise = min(first)
+metric m2 minimise = min(second)
+metric m3 minimise = min(third)
+requirement R1 "The first margin is kept"  = m1 > 0
+requirement R2 "The second margin is kept" = m2 > 0
+requirement R3 "The third margin is kept"  = m3 > 0
+OPERATIONS
+campaign look { objectives OBJECTIVES  operations CHOICE per test  search SEARCH  end after 30s }
+"#;
+
+/// How a problem becomes a campaign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Posed {
+    /// Signals are stuck in windows of time; where none is, mo3d has 0, and the car half throttle and no brake.
+    Windows,
+    /// One operation before the start chooses all numbers: a test is a vector.
+    Setup,
+}
 
 type Attempt = fn(FalsificationProblem, u64) -> Option<usize>;
 
@@ -162,6 +197,167 @@ fn table(problem: FalsificationProblem, strategies: &[(&str, Attempt)]) -> (Stri
     );
     let found = strategies.iter().map(|(name, attempt)| row(&mut table, problem, name, *attempt)).collect();
     (table, found)
+}
+
+/// What a campaign searches by, in its own words, and its objectives.
+const SEARCHES: [(&str, &str, &str); 6] = [
+    ("falsification", "falsification { evaluations 80 }", "m1, m2, m3"),
+    ("nsga2, objectives the margins", "nsga2 { population 10  evaluations 80 }", "m1, m2, m3"),
+    ("nsga2, and the disturbance", "nsga2 { population 10  evaluations 80 }", "fuzzing_time, m1, m2, m3"),
+    ("random", "random { evaluations 80 }", "m1, m2, m3"),
+    ("latin_hypercube", "latin_hypercube { evaluations 80 }", "m1, m2, m3"),
+    ("sobol", "sobol { evaluations 80 }", "m1, m2, m3"),
+];
+
+/// The plan of a problem that is a campaign.
+fn posed(problem: FalsificationProblem, posed: Posed, search: &str, objectives: &str) -> CampaignPlan {
+    let pieces = |names: [&str; 2]| -> String {
+        names.iter().flat_map(|name| (1..=6).map(move |piece| format!("{name}{piece}: real [0, 1]  "))).collect()
+    };
+    let (operations, choice) = match (problem, posed) {
+        (FalsificationProblem::Mo3d, Posed::Windows) => (
+            ["a", "b", "c"].map(|name| format!("operation on_{name} on {name} = stuck at [-15, 15]\n")).concat(),
+            "on_a, on_b, on_c 3",
+        ),
+        (FalsificationProblem::Transmission, Posed::Windows) => (
+            "operation throttle on a = stuck at [0, 1]\noperation brake on b = stuck at [0, 1]".to_owned(),
+            "throttle, brake 2..12",
+        ),
+        (FalsificationProblem::Mo3d, Posed::Setup) => (
+            "operation setup = custom before start { a: real [-15, 15]  b: real [-15, 15]  c: real [-15, 15] }"
+                .to_owned(),
+            "setup 1",
+        ),
+        (FalsificationProblem::Transmission, Posed::Setup) => {
+            (format!("operation setup = custom before start {{ {} }}", pieces(["throttle", "brake"])), "setup 1")
+        }
+    };
+    let text = PROBLEM
+        .replace("OPERATIONS", &operations)
+        .replace("OBJECTIVES", objectives)
+        .replace("CHOICE", choice)
+        .replace("SEARCH", search);
+    let mut sources = SourceMap::new();
+    let file = sources.add("published.sesame", text.as_str());
+    let analysis = analyse(&sources, file);
+    let space = analysis.model.unwrap_or_else(|| panic!("{text}\n{:#?}", analysis.diagnostics));
+    sesame_codegen::lower::lower(&space, space.campaign("look").unwrap(), "published.sesame", "sesamec").plan
+}
+
+/// Active time, and the least margins of a run of 30 s.
+fn run(problem: FalsificationProblem, plan: &CampaignPlan, test: &Test) -> (f64, Vec<f64>) {
+    let chosen = |operation: &TestOperation| -> Vec<f64> {
+        let value = |choice: &Choice| if let Choice::Value { value } = choice { *value } else { panic!("{choice:?}") };
+        operation.parameters.iter().map(value).collect()
+    };
+    let unit = |value: f64| if problem == FalsificationProblem::Mo3d { (value + 15.0) / 30.0 } else { value };
+    if test.operations[0].activation == Activation::Offline {
+        let vector: Vec<f64> = chosen(&test.operations[0]).into_iter().map(unit).collect();
+        return (0.0, problem.margins(&vector));
+    }
+    // What a signal is at a time: of several operations on it the last one decides.
+    let signal = |topic: usize, undisturbed: f64, time: f64| {
+        let on = |operation: &&TestOperation| {
+            let Activation::Time { start, end } = operation.activation else { panic!("by time") };
+            let of = plan.operation(operation.operation).topic.unwrap().index();
+            of == topic && start <= time && time < end
+        };
+        test.operations.iter().rfind(on).map_or(undisturbed, |operation| unit(chosen(operation)[0]))
+    };
+    let length = |operation: &TestOperation| match operation.activation {
+        Activation::Time { start, end } => end - start,
+        _ => 0.0,
+    };
+    let active = test.operations.iter().map(length).sum();
+    let margins = if problem == FalsificationProblem::Mo3d {
+        let at = |step: u32| problem.margins(&[0, 1, 2].map(|topic| signal(topic, 0.5, f64::from(step) / 10.0)));
+        (0..300).map(at).reduce(|a, b| a.iter().zip(b).map(|(a, b)| a.min(b)).collect()).unwrap()
+    } else {
+        let pieces = |topic, undisturbed| (0..6).map(move |piece| (topic, undisturbed, 5.0 * f64::from(piece) + 2.5));
+        let all =
+            pieces(0, 0.5).chain(pieces(1, 0.0)).map(|(topic, undisturbed, time)| signal(topic, undisturbed, time));
+        problem.margins(&all.collect::<Vec<f64>>())
+    };
+    (active, margins)
+}
+
+/// Tests until the first violation of a requirement, of a campaign with this seed.
+fn tests_until_violated(problem: FalsificationProblem, plan: &CampaignPlan, seed: u64) -> Option<usize> {
+    let mut strategy = sesame_runtime::search::strategy(plan, seed).unwrap();
+    let mut number = 0;
+    loop {
+        let batch = strategy.ask();
+        if batch.is_empty() {
+            return None;
+        }
+        let mut results = Vec::new();
+        for candidate in batch {
+            number += 1;
+            let (active, margins) = run(problem, plan, &candidate.test);
+            let value = |metric| match plan.metric(metric).name.as_str() {
+                "m1" => margins[0],
+                "m2" => margins[1],
+                "m3" => margins[2],
+                _ => active,
+            };
+            let margins: Vec<Margin> = plan
+                .requirements
+                .iter()
+                .map(|requirement| Margin::of(requirement.bound, value(requirement.metric)))
+                .collect();
+            if margins.iter().any(|margin| margin.violated) {
+                return Some(number);
+            }
+            let objectives = plan.campaign.objectives.iter().map(|&metric| value(metric)).collect();
+            results.push(Evaluated {
+                number: u32::try_from(number).unwrap(),
+                test: candidate.test,
+                fitness: Fitness::Measured(objectives),
+                point: None,
+                course: None,
+                margins,
+                failing: false,
+            });
+        }
+        strategy.tell(&results);
+    }
+}
+
+fn row_of_campaigns(table: &mut String, problem: FalsificationProblem, how: Posed, search: usize) -> usize {
+    let (name, text, objectives) = SEARCHES[search];
+    let plan = posed(problem, how, text, objectives);
+    let found: Vec<usize> = SEEDS.filter_map(|seed| tests_until_violated(problem, &plan, seed)).collect();
+    let [low, high] = wilson(found.len(), 50);
+    let mean = found.iter().sum::<usize>() as f64 / found.len() as f64;
+    let most = found.iter().max().map_or("–".to_owned(), ToString::to_string);
+    writeln!(table, "| `{name}` | {} of 50 | {low:.0} to {high:.0} % | {mean:.1} | {most} |", found.len()).unwrap();
+    found.len()
+}
+
+#[test]
+fn campaigns_of_vectors_find_violations_as_the_vectors_themselves_do() {
+    let problem = FalsificationProblem::Mo3d;
+    let plan = posed(problem, Posed::Setup, SEARCHES[0].1, SEARCHES[0].2);
+    for seed in 1..=5 {
+        assert_eq!(tests_until_violated(problem, &plan, seed), falsification(problem, seed), "seed {seed}");
+    }
+}
+
+/// Prints the tables of docs/falsification.md. Nothing is asserted of the car disturbed in windows: there falsification does
+/// no better than chance.
+#[test]
+#[ignore = "long: 1,200 searches, half of them of a simulated car"]
+fn strategies_on_published_falsification_problems_as_campaigns() {
+    for problem in FalsificationProblem::ALL {
+        for how in [Posed::Windows, Posed::Setup] {
+            let mut table = format!("{}, {how:?}\n", problem.name());
+            let found: Vec<usize> =
+                (0..SEARCHES.len()).map(|search| row_of_campaigns(&mut table, problem, how, search)).collect();
+            println!("{table}");
+            let chance_is_as_good = problem == FalsificationProblem::Transmission && how == Posed::Windows;
+            assert!(chance_is_as_good || found[1..].iter().all(|&other| other <= found[0]), "{table}");
+        }
+    }
 }
 
 #[test]

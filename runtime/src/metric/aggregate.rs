@@ -87,6 +87,10 @@ impl<'p> FormulaState<'p> {
             }
             Some(_) => {
                 self.common.held.hold(&self.formula.inputs, &self.heard, member);
+                if self.several {
+                    // A key that begins in this instant counts what came before it in the same.
+                    self.common.take(self.formula, wire, true, context);
+                }
                 for stream in self.keys.values_mut() {
                     stream.held.hold(&self.formula.inputs, &self.heard, member);
                     stream.take(self.formula, wire, self.several, context);
@@ -101,7 +105,11 @@ impl<'p> FormulaState<'p> {
 
     /// All messages of the instant at the context's time are known.
     pub(super) fn settle(&mut self, context: &mut Context) {
-        for stream in std::iter::once(&mut self.common).chain(self.keys.values_mut()) {
+        if self.formula.per.is_none() {
+            self.common.settle(self.formula, context);
+        }
+        self.common.forget();
+        for stream in self.keys.values_mut() {
             stream.settle(self.formula, context);
         }
         self.set(context);
@@ -173,6 +181,12 @@ impl Stream {
             self.members.retain(|&member| member != wire);
             self.members.push(wire);
         }
+    }
+
+    /// The instant is over, and nothing of it is to be taken into account any more.
+    fn forget(&mut self) {
+        self.heard = false;
+        self.members.clear();
     }
 
     /// The instant is over: each member of a group that had a message counts, or what is held, where none had.

@@ -161,8 +161,9 @@ impl Metrics<'_> {
         }
     }
 
-    /// The instant at hand is over: all its messages are known.
-    pub fn settle(&mut self) {
+    /// The instant at hand is over: all its messages are known. Whether a formula waited for that.
+    pub fn settle(&mut self) -> bool {
+        let waited = !self.waiting.is_empty();
         for at in self.waiting.drain(..) {
             let State { formula, context, waits, .. } = &mut self.states[at];
             *waits = false;
@@ -171,6 +172,7 @@ impl Metrics<'_> {
                 formula.settle(context);
             }
         }
+        waited
     }
 
     /// Tells hooks and formulas that the run has come to its end. After a failure nobody does.
@@ -303,8 +305,8 @@ impl Metrics<'_> {
             let set = set && value.is_some();
             let reach = match (&state.robustness, &state.formula) {
                 _ if context.unimplemented => Reach::ANY,
-                (Some(robustness), _) => robustness.reach(),
                 _ if state.ended && context.not_finite.is_none() => Reach::of_whole_run(value),
+                (Some(robustness), _) => robustness.reach(metric.default),
                 (_, Some(formula)) => context.onwards(formula.certain(context)),
                 _ => context.onwards(context.not_finite.map_or(context.value, |(_, before)| before)),
             };

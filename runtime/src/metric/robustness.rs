@@ -1,7 +1,7 @@
 //! Metrics that are the robustness of a temporal formula: the values of its signals, held, go to a monitor, and the run's
 //! end tells what comes of them.
 
-use sesame_plan::stl::Robustness;
+use sesame_plan::stl::{Formula, Interval, Robustness};
 use sesame_plan::{CampaignPlan, Members, TopicId};
 
 use super::Context;
@@ -137,13 +137,37 @@ impl<'p> RobustnessState<'p> {
         }
     }
 
-    /// The values that it may have at the end of the run, once that is over: of all instances the least counts.
-    pub(super) fn reach(&self) -> Reach {
+    /// The values that it may have at the end of the run, once that is over: of all instances the least counts. Where
+    /// nothing may be left to judge, its default is one of them.
+    pub(super) fn reach(&self, default: Option<f64>) -> Reach {
+        let unset = default.filter(|_| looks_ahead(&self.robustness.formula, self.robustness.whole_windows));
         let ends = |end: fn((f64, f64)) -> f64| {
             let ends = self.instances.iter().filter_map(|instance| instance.said).map(|said| end(said.reach));
             ends.reduce(least).filter(|end| end.is_finite())
         };
-        Reach { low: ends(|reach| reach.0), high: ends(|reach| reach.1) }
+        let (low, high) = (ends(|reach| reach.0), ends(|reach| reach.1));
+        let with_unset =
+            |end: Option<f64>, join: fn(f64, f64) -> f64| end.map(|end| unset.map_or(end, |it| join(end, it)));
+        Reach { low: with_unset(low, f64::min), high: with_unset(high, f64::max) }
+    }
+}
+
+/// Whether a formula has an interval that may lie behind the end of a run altogether, or where only whole windows count, may be
+/// cut by it, so that nothing is left to judge.
+fn looks_ahead(formula: &Formula, whole: bool) -> bool {
+    let ahead = |interval: &Interval| interval.from > 0.0 || (whole && interval.to.is_some());
+    match formula {
+        Formula::Predicate { .. } => false,
+        Formula::Not { of } => looks_ahead(of, whole),
+        Formula::And { left, right } | Formula::Or { left, right } | Formula::Implies { left, right } => {
+            looks_ahead(left, whole) || looks_ahead(right, whole)
+        }
+        Formula::Always { interval, of } | Formula::Eventually { interval, of } => {
+            ahead(interval) || looks_ahead(of, whole)
+        }
+        Formula::Until { interval, left, right } => {
+            ahead(interval) || looks_ahead(left, whole) || looks_ahead(right, whole)
+        }
     }
 }
 
@@ -151,7 +175,6 @@ impl<'p> RobustnessState<'p> {
 mod tests {
     use proptest::prelude::*;
     use sesame_plan::Comparison;
-    use sesame_plan::stl::{Formula, Interval};
     use sesame_plan::{Expression, FieldRef, Input, MetricSource, Side};
 
     use super::*;

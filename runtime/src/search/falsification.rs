@@ -5,12 +5,17 @@
 //! of that kind, over where its window lies, how long it is, and its parameters. So a test is near another when it disturbs
 //! the same at about the same time about as strongly, and adding, dropping or exchanging an operation is a step of a certain
 //! length. Candidates come from the best tests by mutation.
+//!
+//! Where every test holds the same operations, each once and without a window, and chooses nothing but numbers, tests are
+//! vectors ([vectors]): these are searched as such, and the process alone decides what is tried.
+
+mod vectors;
 
 use sesame_plan::{Activation, Choice, Test};
 
 use crate::rng::Stream;
 use crate::search::choice::PermittedChoice;
-use crate::search::falsify::{Falsifier, Ground, Settings};
+use crate::search::falsify::{Falsifier, Ground, Settings, UnitBox};
 use crate::search::in_turn::Sampling;
 use crate::search::initial::fresh_test;
 use crate::search::permitted::PermittedActivation;
@@ -18,6 +23,7 @@ use crate::search::range::{Range, StepSizes};
 use crate::search::sobol::Sobol;
 use crate::search::vary::{Rates, crossover, mutate};
 use crate::search::{Candidate, Evaluated, Permitted, Strategy};
+use vectors::Vectors;
 
 /// Width of the bump of an operation, as a share of what is permitted; times the root of how many coordinates it has.
 const WIDTH: f64 = 0.3;
@@ -27,47 +33,73 @@ const APART: f64 = 8.0;
 /// A focused falsification of the requirements of a campaign by time.
 #[derive(Debug, Clone)]
 pub struct Falsification {
-    search: Falsifier<Tests>,
+    over: Over,
     generation: u32,
-    asked: Vec<Placed>,
+    /// How many tests were asked for.
+    number: u64,
+}
+
+/// What is searched.
+#[derive(Debug, Clone)]
+enum Over {
+    Tests { search: Box<Falsifier<Tests>>, asked: Vec<Placed> },
+    Vectors { search: Box<Falsifier<UnitBox>>, vectors: Vectors, asked: Vec<Vec<f64>> },
 }
 
 impl Falsification {
     /// A search before its first test. `settings` say how many requirements there are: what
     /// [`margins`](crate::search::margins) are told of.
     pub fn new(permitted: Permitted, settings: Settings) -> Self {
-        let spread = Sobol::new(permitted.clone(), settings.seed);
-        Falsification {
-            search: Falsifier::new(Tests { permitted, spread }, settings),
-            generation: 0,
-            asked: Vec::new(),
-        }
+        let over = if let Some(vectors) = Vectors::of(&permitted, settings.seed) {
+            let search = Falsifier::new(UnitBox::new(vectors.variables(), settings.seed), settings);
+            Over::Vectors { search: Box::new(search), vectors, asked: Vec::new() }
+        } else {
+            let spread = Sobol::new(permitted.clone(), settings.seed);
+            let search = Falsifier::new(Tests { permitted, spread }, settings);
+            Over::Tests { search: Box::new(search), asked: Vec::new() }
+        };
+        Falsification { over, generation: 0, number: 0 }
     }
 }
 
 impl Strategy for Falsification {
     fn ask(&mut self) -> Vec<Candidate> {
-        self.asked = self.search.ask();
         let generation = self.generation;
         self.generation += 1;
-        let candidate = |placed: &Placed| Candidate {
-            test: placed.test.clone(),
-            parents: placed.parents.clone(),
-            generation,
-            known: None,
-            simulator_seed: None,
-        };
-        self.asked.iter().map(candidate).collect()
+        let candidate =
+            |test: Test, parents| Candidate { test, parents, generation, known: None, simulator_seed: None };
+        match &mut self.over {
+            Over::Tests { search, asked } => {
+                *asked = search.ask();
+                asked.iter().map(|placed| candidate(placed.test.clone(), placed.parents.clone())).collect()
+            }
+            Over::Vectors { search, vectors, asked } => {
+                *asked = search.ask();
+                let tests = (self.number..).zip(&*asked).map(|(number, vector)| vectors.test(vector, number));
+                let candidates: Vec<Candidate> = tests.map(|test| candidate(test, Vec::new())).collect();
+                self.number += asked.len() as u64;
+                candidates
+            }
+        }
     }
 
     fn tell(&mut self, results: &[Evaluated]) {
-        assert!(results.len() == self.asked.len(), "exactly the generation asked last is told");
-        let asked = std::mem::take(&mut self.asked);
-        let placed = asked.into_iter().zip(results).map(|(mut placed, result)| {
-            placed.number = Some(result.number);
-            (placed, result.margins.clone())
-        });
-        self.search.tell(placed.collect());
+        let told = "exactly the generation asked last is told";
+        match &mut self.over {
+            Over::Tests { search, asked } => {
+                assert!(results.len() == asked.len(), "{told}");
+                let placed = std::mem::take(asked).into_iter().zip(results).map(|(mut placed, result)| {
+                    placed.number = Some(result.number);
+                    (placed, result.margins.clone())
+                });
+                search.tell(placed.collect());
+            }
+            Over::Vectors { search, asked, .. } => {
+                assert!(results.len() == asked.len(), "{told}");
+                let placed = std::mem::take(asked).into_iter().zip(results);
+                search.tell(placed.map(|(vector, result)| (vector, result.margins.clone())).collect());
+            }
+        }
     }
 }
 

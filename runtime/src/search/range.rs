@@ -62,6 +62,15 @@ impl Range {
         }
     }
 
+    /// The number at a share of the range in `0..=1`; shares that are uniform give numbers that are.
+    pub fn at(self, share: f64) -> f64 {
+        if self.integer {
+            (self.low + libm::floor(share * (self.high - self.low + 1.0))).min(self.high)
+        } else {
+            (self.low * (1.0 - share) + self.high * share).clamp(self.low, self.high)
+        }
+    }
+
     /// An interval `low <= high`, uniform over all that fit (the triangle of feasible pairs).
     pub fn interval(self, stream: &mut Stream) -> (f64, f64) {
         if self.integer {

@@ -1,0 +1,241 @@
+//! All that these properties know of how the runtime is called and what it reports: what changes there, changes here.
+
+use sesame_plan::stl::{self, Robustness};
+use sesame_plan::{
+    ActivationMode, Aggregate, Campaign, CampaignPlan, Copies, Count, Drain, Field, MessageId, MessageType, Metric,
+    MetricSource, Operation, OperationKind, Requirement, SCHEMA, Search, Side, Simulator, Test, Topic, Transport,
+    Trend, Type,
+};
+use sesame_plan::{Expression, Input};
+use sesame_runtime::evaluate::{Custom, Run, evaluate_tapped};
+use sesame_runtime::metric::MetricTable;
+use sesame_runtime::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome};
+use sesame_runtime::record::{MetricValue, Verdict, verdict};
+use sesame_runtime::relay::Deed;
+use sesame_runtime::transport::in_process;
+use sesame_runtime::wire::WireTable;
+
+use crate::hooks::{HookKind, entries};
+use crate::ledger::Ledger;
+use crate::robot::{Carries, Robot, Script, set_script};
+
+/// The length of a step of every simulator here, in nanoseconds.
+pub(crate) const STEP: i64 = 100_000_000;
+
+/// A metric; of a hook with its trend declared.
+pub(crate) fn metric(name: &str, default: Option<f64>, initial: Option<f64>, source: MetricSource) -> Metric {
+    Metric {
+        name: name.to_owned(),
+        doc: String::new(),
+        unit: None,
+        direction: None,
+        default,
+        initial,
+        trend: match &source {
+            MetricSource::Hook { .. } => trend(HookKind::named(name)),
+            MetricSource::FuzzingTime => Some(Trend::Rising),
+            MetricSource::Formula { formula } => match formula.aggregate {
+                Aggregate::Max { .. } | Aggregate::Count { .. } | Aggregate::Duration { .. } => Some(Trend::Rising),
+                Aggregate::Min { .. } => Some(Trend::Falling),
+                Aggregate::Last { .. } | Aggregate::Mean { .. } => None,
+            },
+            MetricSource::Last { .. } | MetricSource::Robustness { .. } => None,
+        },
+        source,
+        accepts_not_finite: false,
+        line: 1,
+    }
+}
+
+fn trend(kind: HookKind) -> Option<Trend> {
+    match kind {
+        HookKind::Counting => Some(Trend::Rising),
+        HookKind::Least => Some(Trend::Falling),
+        HookKind::Latest => None,
+    }
+}
+
+/// Whether the runtime is told which way the values of this hook go.
+pub(crate) fn declares_trend(kind: HookKind) -> bool {
+    trend(kind).is_some()
+}
+
+/// A temporal formula as a metric.
+pub(crate) fn robustness(
+    inputs: Vec<Input>,
+    signals: Vec<Expression>,
+    formula: stl::Formula,
+    side: Side,
+    whole_windows: bool,
+) -> Robustness {
+    Robustness { inputs, signals, formula, side, whole_windows }
+}
+
+/// Whether the end of a run leaves out the windows that it would cut.
+pub(crate) fn over_whole_windows(robustness: &Robustness) -> bool {
+    robustness.whole_windows
+}
+
+/// What a topic carries, as a plan has it.
+pub(crate) fn ty(carries: Carries) -> Type {
+    match carries {
+        Carries::Real => Type::Real { unit: None },
+        Carries::Int => Type::Int { unit: None },
+        Carries::Bool => Type::Bool,
+        Carries::Zone => Type::Message { id: MessageId(0) },
+    }
+}
+
+/// A plan around what a case made up.
+pub(crate) fn plan(
+    topics: Vec<Topic>,
+    metrics: Vec<Metric>,
+    requirements: Vec<Requirement>,
+    operations: &[Operation],
+    copies: Copies,
+    end_after: f64,
+) -> CampaignPlan {
+    let field = |name: &str, ty| Field { name: name.to_owned(), doc: String::new(), ty };
+    CampaignPlan {
+        schema: SCHEMA,
+        generator: "test".to_owned(),
+        source: "made_up.sesame".to_owned(),
+        space: "made_up".to_owned(),
+        doc: String::new(),
+        simulator: Simulator {
+            name: "robot".to_owned(),
+            transport: Transport::InProcess { path: "robot::Robot".to_owned(), step_ns: STEP.unsigned_abs() },
+        },
+        messages: vec![MessageType {
+            name: "Zone".to_owned(),
+            doc: String::new(),
+            fields: vec![
+                field("level", Type::Real { unit: None }),
+                field("count", Type::Int { unit: None }),
+                field("inside", Type::Bool),
+                field("name", Type::Text),
+            ],
+        }],
+        topics,
+        nodes: Vec::new(),
+        metrics,
+        requirements,
+        operations: operations.to_vec(),
+        tests: Vec::new(),
+        campaign: Campaign {
+            name: "made_up".to_owned(),
+            doc: String::new(),
+            objectives: Vec::new(),
+            operations: (0u32..).take(operations.len()).map(sesame_plan::OperationId).collect(),
+            count: Count { min: 1, max: 5 },
+            copies,
+            activation: ActivationMode::Time,
+            search: Search::Random { evaluations: 1 },
+            coverage: None,
+            exploration: None,
+            confirm: None,
+            neighbours: None,
+            stop: Vec::new(),
+            seed: 1,
+            end_after,
+            record: None,
+        },
+    }
+}
+
+/// What a run of a robot showed, and all its messages.
+pub(crate) fn run(plan: &CampaignPlan, test: &Test, script: &Script) -> (Observation, Ledger) {
+    let wires = WireTable::new(plan);
+    let metrics = MetricTable::new(plan, &wires, &entries()).expect("made-up metrics are sound");
+    let mut transport = in_process::<Robot>().transport(plan);
+    let mut ledger = Ledger::new(&wires);
+    set_script(script.clone());
+    let run = Run { test, simulator_seed: 1 };
+    let observation =
+        evaluate_tapped(plan, &wires, &metrics, transport.as_mut(), &run, &mut Custom::none(), Some(&mut ledger));
+    let observation = observation.expect("made-up tests fit their plans");
+    ledger.end = sesame_runtime::time::SimTime::from_seconds(observation.end).nanos();
+    (observation, ledger)
+}
+
+/// The same run, had its worker been stopped where it crashed.
+pub(crate) fn hung(observation: &Observation) -> Observation {
+    Observation { outcome: Outcome::Timeout { limit: 1.0 }, ..observation.clone() }
+}
+
+/// What a supervisor records of a worker that had to be stopped, or died.
+pub(crate) fn lost(outcome: Outcome) -> Observation {
+    Observation {
+        outcome,
+        end: 0.0,
+        operations: Vec::new(),
+        unheard: Vec::new(),
+        metrics: Vec::new(),
+        messages: 0,
+        warnings: Vec::new(),
+        wall: sesame_runtime::observation::WallTime::default(),
+    }
+}
+
+/// What the runtime says of a requirement.
+pub(crate) fn said(requirement: &Requirement, observation: &Observation) -> Verdict {
+    let value =
+        observation.metrics.get(requirement.metric.index()).map_or_else(MetricValue::default, MetricValue::from);
+    verdict(requirement.bound, &observation.outcome, value)
+}
+
+/// The values that the runtime takes a metric to have had at the end of the run, had nothing broken it off.
+pub(crate) fn reach(shown: &MetricObservation) -> (f64, f64) {
+    (shown.reach.low.unwrap_or(f64::NEG_INFINITY), shown.reach.high.unwrap_or(f64::INFINITY))
+}
+
+/// Whether the runtime noticed that a metric heard what is no number.
+pub(crate) fn heard_no_number(shown: &MetricObservation) -> bool {
+    shown.not_finite.is_some()
+}
+
+/// Whether copies of an operation wait for each other, where a campaign keeps them apart.
+pub(crate) const KEEPS_COPIES_APART: bool = true;
+
+/// Whether an operation had an effect.
+pub(crate) fn has_effect(effect: &OperationEffect) -> bool {
+    effect.counters.any_effect()
+}
+
+/// Messages that an operation held back after it had ended, behind others.
+pub(crate) fn queued(counters: &Counters) -> u64 {
+    counters.queued
+}
+
+/// The time in which operations that count are active or hold messages back, in nanoseconds.
+pub(crate) fn busy(plan: &CampaignPlan, test: &Test, observation: &Observation, ledger: &Ledger) -> i64 {
+    let nanos = |seconds: f64| (seconds * 1e9).round() as i64;
+    let mut sum = 0;
+    for (at, (used, effect)) in test.operations.iter().zip(&observation.operations).enumerate() {
+        let operation = plan.operation(used.operation);
+        if !operation.timed {
+            continue;
+        }
+        let own = || ledger.deeds.iter().filter(|(_, of, _)| *of == at);
+        let mut spans: Vec<(i64, i64)> =
+            effect.intervals.iter().map(|span| (nanos(span.start), nanos(span.end))).collect();
+        for (held, _, deed) in own() {
+            let Deed::Delayed(_, release) = deed else { continue };
+            // What it does not let run its time goes when the activity ends.
+            let stays = matches!(
+                operation.kind,
+                OperationKind::Latency { drain: Drain::Finish, .. } | OperationKind::Reorder { drain: Drain::Finish }
+            );
+            let ended = own().find(|(time, _, deed)| *deed == Deed::Ended && time >= held).map(|(time, ..)| *time);
+            let until = if stays { release.nanos() } else { ended.unwrap_or(i64::MAX).min(release.nanos()) };
+            spans.push((*held, until.min(ledger.end)));
+        }
+        spans.sort_unstable();
+        let mut covered = i64::MIN;
+        for (start, end) in spans {
+            sum += (end - start.max(covered)).max(0);
+            covered = covered.max(end);
+        }
+    }
+    sum
+}
