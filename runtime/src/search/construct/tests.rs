@@ -78,6 +78,7 @@ fn twelve_operations() -> CampaignPlan {
         .collect();
     plan.campaign.operations = (0u32..12).map(OperationId).collect();
     plan.campaign.count = Count { min: 1, max: 5 };
+    plan.campaign.copies = Copies::Apart;
     plan
 }
 
@@ -172,6 +173,7 @@ fn copies_of_one_operation_are_built_apart_or_not_at_all() {
     let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
     plan.campaign.operations.truncate(1);
     plan.campaign.count = Count { min: 1, max: 4 };
+    plan.campaign.copies = Copies::Apart;
     let grid = Grid::parse("T1:0:1:6,T2:0:0.6:6,O0:0.5:4.5:4").unwrap();
     let (failed, feasible) = not_reached(&plan, &grid, 1);
     // Of four copies in one window none can be longer than a quarter of it on average.
