@@ -42,6 +42,7 @@ pub mod time;
 pub mod trace;
 pub mod transport;
 pub mod value;
+pub mod verdict;
 pub mod wire;
 
 #[cfg(feature = "campaign")]

@@ -189,3 +189,37 @@ impl Reach {
         }
     }
 }
+
+/// The value of a metric in one run.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct MetricValue {
+    /// The last value set, or the default; `None` where there is neither.
+    pub value: Option<f64>,
+    /// Whether the value is one that was set, not the default.
+    pub set: bool,
+    /// The values that it could have had at the end of the run.
+    pub reach: Reach,
+    /// Simulation time, in seconds, of the first number that was not finite in what it reads.
+    pub not_finite: Option<f64>,
+}
+
+impl MetricValue {
+    /// Of a run that came to its end, with nothing in it that was not finite.
+    pub fn whole(value: Option<f64>, set: bool) -> Self {
+        MetricValue { value, set, reach: Reach::of_whole_run(value), not_finite: None }
+    }
+}
+
+impl From<&MetricObservation> for MetricValue {
+    fn from(shown: &MetricObservation) -> Self {
+        let MetricObservation { value, set, reach, not_finite, series: _ } = *shown;
+        MetricValue { value, set, reach, not_finite }
+    }
+}
+
+impl Observation {
+    /// The value of the plan's metric at this position; unmeasured when the run reported none.
+    pub fn value(&self, metric: sesame_plan::MetricId) -> MetricValue {
+        self.metrics.get(metric.index()).map(MetricValue::from).unwrap_or_default()
+    }
+}

@@ -21,13 +21,15 @@ mod scan;
 mod schema;
 #[cfg(test)]
 mod tests;
-mod verdict;
 
 use serde::Serialize;
 use sesame_plan::{KnownTestId, Requirement, Test};
 
-use crate::observation::{MetricObservation, Observation, Outcome, Reach};
+use crate::observation::{Observation, Outcome};
 
+#[cfg(feature = "report")]
+pub use crate::observation::MetricValue;
+pub use crate::verdict::{Verdict, fails, verdict, violation_spans};
 pub use difference::{Difference, differences};
 pub use digest::digest;
 pub use error::RecordError;
@@ -38,9 +40,6 @@ pub use repetitions::{Judge, confirmed_fitness, confirmed_margins};
 pub use repository::{CampaignFacts, Repository};
 pub use scan::{ScannedOperation, ScannedTest};
 pub use schema::SCHEMA;
-#[cfg(feature = "report")]
-pub(crate) use verdict::ends;
-pub use verdict::{Verdict, fails, verdict, violation_spans};
 
 /// One test with everything that is known of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,40 +127,6 @@ impl Origin {
             Origin::Known(_) => "known",
             Origin::Search => "search",
         }
-    }
-}
-
-/// The value of a metric in one run.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct MetricValue {
-    /// The last value set, or the default; `None` where there is neither.
-    pub value: Option<f64>,
-    /// Whether the value is one that was set, not the default.
-    pub set: bool,
-    /// The values that it could have had at the end of the run.
-    pub reach: Reach,
-    /// Simulation time, in seconds, of the first number that was not finite in what it reads.
-    pub not_finite: Option<f64>,
-}
-
-impl MetricValue {
-    /// Of a run that came to its end, with nothing in it that was not finite.
-    pub fn whole(value: Option<f64>, set: bool) -> Self {
-        MetricValue { value, set, reach: Reach::of_whole_run(value), not_finite: None }
-    }
-}
-
-impl From<&MetricObservation> for MetricValue {
-    fn from(shown: &MetricObservation) -> Self {
-        let MetricObservation { value, set, reach, not_finite, series: _ } = *shown;
-        MetricValue { value, set, reach, not_finite }
-    }
-}
-
-impl Observation {
-    /// The value of the plan's metric at this position; unmeasured when the run reported none.
-    pub fn value(&self, metric: sesame_plan::MetricId) -> MetricValue {
-        self.metrics.get(metric.index()).map(MetricValue::from).unwrap_or_default()
     }
 }
 

@@ -56,7 +56,7 @@ impl ScannedTest {
         super::verdict(requirement.bound, &self.outcome, self.value(requirement.metric))
     }
 
-        /// Where it lies in the reduced parameter space; `None` where no operation was active with an effect.
+    /// Where it lies in the reduced parameter space; `None` where no operation was active with an effect.
     pub fn point(&self, plan: &CampaignPlan, convention: Convention) -> Option<Point> {
         let disturbances: Vec<Disturbance> = self
             .operations

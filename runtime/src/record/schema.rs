@@ -8,7 +8,7 @@ use rusqlite::{Connection, OpenFlags};
 use sesame_plan::{CampaignPlan, Direction};
 
 use crate::record::RecordError;
-use crate::record::verdict::ends;
+use crate::verdict::ends;
 
 /// The schema's version, in the file's `user_version`.
 pub const SCHEMA: i64 = 5;

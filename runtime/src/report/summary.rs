@@ -475,7 +475,7 @@ pub(crate) fn value_text(shown: MetricValue, unit: Option<&str>) -> String {
 
 /// How far a value lies outside a bound, in the metric's unit; zero inside and on its edge.
 fn distance_outside(bound: Bound, value: f64) -> f64 {
-    let (low, _, high, _) = crate::record::ends(bound);
+    let (low, _, high, _) = crate::verdict::ends(bound);
     let below = low.map_or(0.0, |low| low - value);
     let above = high.map_or(0.0, |high| value - high);
     below.max(above).max(0.0)

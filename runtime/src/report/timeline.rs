@@ -7,12 +7,13 @@ use std::fmt::Write as _;
 use sesame_plan::{Bound, CampaignPlan, Metric, MetricSource, Span};
 
 use crate::observation::{MetricObservation, Outcome};
-use crate::record::{TestRecord, ends, violation_spans};
+use crate::record::{TestRecord, violation_spans};
 use crate::report::axis::Axis;
 use crate::report::markup::{Markup, coordinate, percent};
 use crate::report::number;
 use crate::report::show::{OperationReport, TestReport};
 use crate::report::text::{choices_text, effect_text, planned_text, spans_text};
+use crate::verdict::ends;
 
 /// Height of a lane of an operation, in pixels.
 const LANE: f64 = 30.0;

@@ -3,7 +3,7 @@
 use sesame_plan::{Bound, CampaignPlan, Requirement};
 
 use crate::observation::Observation;
-use crate::record::{Verdict, verdict};
+use crate::verdict::{Verdict, verdict};
 
 /// How far a requirement is from its violation in one test.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,8 +3,7 @@
 use serde::Serialize;
 use sesame_plan::{Bound, CampaignPlan, Failing, MetricId, Span};
 
-use crate::observation::{Outcome, Reach};
-use crate::record::MetricValue;
+use crate::observation::{MetricValue, Outcome, Reach};
 
 /// What a run says about a requirement. Three values, never two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -106,7 +105,7 @@ pub(crate) fn ends(bound: Bound) -> (Option<f64>, bool, Option<f64>, bool) {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use sesame_plan::{RequirementId, Trend};
+    use sesame_plan::{Requirement, RequirementId, Trend};
 
     use super::*;
 
@@ -165,16 +164,23 @@ mod tests {
 
     #[test]
     fn a_run_fails_alike_if_it_violates_all_of_it_and_was_disturbed() {
-        let plan = crate::record::sample::plan();
+        let mut plan = crate::fixture::plan(Vec::new());
+        plan.requirements = [(0, 0.0), (1, 70.0)]
+            .map(|(metric, value)| Requirement {
+                name: format!("R{metric}"),
+                text: String::new(),
+                metric: MetricId(metric),
+                bound: Bound::AtMost { value },
+            })
+            .to_vec();
         let violation =
             |ids: &[u32]| Failing::Violation { requirements: ids.iter().copied().map(RequirementId).collect() };
-        // R1: at most 0 of metric 0; R4: at most 70 of metric 3.
         let with = |outcome: &Outcome, failing: &Failing, collisions: f64, cycle: f64| {
             fails(&plan, failing, outcome, |id| {
-                cut_off(if id.0 == 3 { cycle } else { collisions }, Some(Trend::Rising))
+                cut_off(if id.0 == 1 { cycle } else { collisions }, Some(Trend::Rising))
             })
         };
-        let both = violation(&[0, 3]);
+        let both = violation(&[0, 1]);
         assert!(with(&Outcome::Completed, &both, 1.0, 71.0));
         assert!(!with(&Outcome::Completed, &both, 1.0, 69.0) && with(&Outcome::Completed, &violation(&[0]), 1.0, 69.0));
         assert!(!with(&Outcome::Void, &both, 1.0, 71.0), "nothing was disturbed");
