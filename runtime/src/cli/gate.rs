@@ -136,7 +136,7 @@ fn says_too_little(summary: &Summary, search: &Search) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::record::{Standing, sample};
-    use crate::report::{Failure, FindingAgain, summary};
+    use crate::report::{Failure, FindingAgain, NotFinite, summary};
 
     fn found() -> (Summary, CampaignPlan) {
         let folder = tempfile::tempdir().unwrap();
@@ -158,14 +158,20 @@ mod tests {
         Failure { test: format!("T{number}"), outcome: "crash".to_owned(), at: 1.0, detail, again: None }
     }
 
+    /// A finding, and what brings it into a summary.
+    type Change = (Finding, fn(&mut Summary));
+
     #[test]
     fn each_finding_closes_its_own_gate_and_that_of_any_finding() {
         let (clean, plan) = found();
         assert_eq!(objections(&[Finding::Any], &clean, &plan), [""; 0]);
-        let changes: [(Finding, fn(&mut Summary)); 4] = [
+        let changes: [Change; 5] = [
             (Finding::Violation, |it| it.requirements[0].violated = 2),
             (Finding::Crash, |it| it.failures.push(crash(2))),
             (Finding::Timeout, |it| it.failures.push(Failure { outcome: "timeout".to_owned(), ..crash(3) })),
+            (Finding::NotFinite, |it| {
+                it.not_finite.push(NotFinite { test: "T4".to_owned(), at: 1.0, metrics: vec!["speed".to_owned()] });
+            }),
             (Finding::Inconclusive, |it| it.requirements[1].unsaid = 1),
         ];
         for (at, (finding, change)) in changes.iter().enumerate() {
