@@ -260,7 +260,7 @@ impl<'a> Relay<'a> {
 
     /// Closes the books at `end`, where the run ended or broke off: what is still held is lost, open intervals are closed.
     pub fn finish(mut self, end: SimTime) -> Finished {
-        self.begin_time(&mut Vec::new());
+        self.begin_time();
         self.phase = Phase::Over;
         self.follow_time(end, &mut Vec::new());
         // Whether a message came at the end or not: what a metric may still come to is asked for this time.
@@ -305,18 +305,13 @@ impl<'a> Relay<'a> {
     /// Carries out, in order of time, every activation edge and every release up to `now`; at one instant edges come
     /// first, since an operation is active for `start <= t < end`.
     fn follow_time(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
-        self.begin_time(deliveries);
+        self.begin_time();
         loop {
-            while self.queue.next_release().is_some_and(|release| release <= self.now) {
-                if let Some(held) = self.release() {
-                    self.pass(self.now, held, deliveries);
-                    self.weigh_delivered(deliveries);
-                }
-            }
+            self.release_due(deliveries);
             if self.now >= now {
                 return;
             }
-            self.leave(deliveries);
+            self.leave();
             let edges = self.operations.iter().filter_map(|stage| stage.activity.next_edge());
             let moments = edges.chain(self.queue.next_release()).chain(self.next_comparison());
             let Some(moment) = moments.min().filter(|&moment| moment <= now) else {
@@ -326,50 +321,43 @@ impl<'a> Relay<'a> {
             };
             self.now = moment;
             self.metrics.follow_time(moment);
-            self.arrive(deliveries);
+            self.arrive();
         }
     }
 
     /// Carries out the edges at time zero, once.
-    fn begin_time(&mut self, deliveries: &mut Vec<Delivery>) {
+    fn begin_time(&mut self) {
         if self.phase == Phase::New {
             self.phase = Phase::Running;
-            self.arrive(deliveries);
+            self.arrive();
         }
     }
 
     /// What an instant begins with, if something is due then: its edges.
-    fn arrive(&mut self, deliveries: &mut Vec<Delivery>) {
+    fn arrive(&mut self) {
         for at in 0..self.operations.len() {
             match self.operations[at].activity.follow(self.now) {
                 Edge::None => {}
                 Edge::Started => self.begin_activity(at, self.now),
-                Edge::Ended => self.end_activity(at, self.now, deliveries),
+                Edge::Ended => self.end_activity(at, self.now),
             }
         }
-        self.weigh_conditions(deliveries);
+        self.weigh_conditions();
     }
 
     /// What an instant ends with, once time moves on: values that are known only now. What they switch on or off, they do a
     /// nanosecond later, since the instant they are of is over.
-    fn leave(&mut self, deliveries: &mut Vec<Delivery>) {
+    fn leave(&mut self) {
         if self.metrics.settle() {
             self.now = self.now + TICK;
             self.metrics.follow_time(self.now);
         }
-        self.weigh_conditions(deliveries);
-    }
-
-    /// Weighs conditions after messages were delivered.
-    fn weigh_delivered(&mut self, deliveries: &mut Vec<Delivery>) {
-        if self.conditions.reads_delivered {
-            self.weigh_conditions(deliveries);
-        }
+        self.weigh_conditions();
     }
 
     /// Weighs the conditions of all operations on the same values: first which go off, then which go on, so that one may
-    /// begin where its copy ends. What operations let go as they end may be delivered and change values again.
-    fn weigh_conditions(&mut self, deliveries: &mut Vec<Delivery>) {
+    /// begin where its copy ends.
+    fn weigh_conditions(&mut self) {
         if self.conditions.operations.is_empty() {
             return;
         }
@@ -395,11 +383,20 @@ impl<'a> Relay<'a> {
                 return;
             }
             for next in 0..self.conditions.ended.len() {
-                self.end_activity(self.conditions.ended[next], now, deliveries);
+                self.end_activity(self.conditions.ended[next], now);
             }
             self.conditions.ended.clear();
-            if !self.conditions.reads_delivered {
-                return;
+        }
+    }
+
+    /// Lets go of what is due: each message by itself, since conditions may read what is delivered.
+    fn release_due(&mut self, deliveries: &mut Vec<Delivery>) {
+        while self.queue.next_release().is_some_and(|release| release <= self.now) {
+            if let Some(held) = self.release() {
+                self.pass(self.now, held, deliveries);
+                if self.conditions.reads_delivered {
+                    self.weigh_conditions();
+                }
             }
         }
     }
@@ -430,15 +427,11 @@ impl<'a> Relay<'a> {
     }
 
     /// What happens when an operation goes off: it is told, and the messages it holds become what they are to become.
-    fn end_activity(&mut self, at: usize, now: SimTime, deliveries: &mut Vec<Delivery>) {
+    fn end_activity(&mut self, at: usize, now: SimTime) {
         self.tell(now, at, Deed::Ended);
         match self.operations[at].disturbance.drain() {
             None | Some(Drain::Finish) => {}
-            Some(Drain::Flush) => {
-                for (_, held) in self.queue.take_all(at) {
-                    self.pass(now, held, deliveries);
-                }
-            }
+            Some(Drain::Flush) => return self.queue.release_all(at, now),
             Some(Drain::Drop) => {
                 let lost = self.queue.take_all(at);
                 let counters = &mut self.operations[at].counters;
@@ -639,10 +632,14 @@ impl Exchange for Relay<'_> {
         }
         self.metrics.message(self.now, wire, &value);
         if self.conditions.read[wire.index()] {
-            self.weigh_conditions(deliveries);
+            self.weigh_conditions();
+            self.release_due(deliveries);
         }
         self.pass(self.now, Held { wire, published: index, index, value, next_stage: 0 }, deliveries);
-        self.weigh_delivered(deliveries);
+        if self.conditions.reads_delivered {
+            self.weigh_conditions();
+            self.release_due(deliveries);
+        }
     }
 }
 

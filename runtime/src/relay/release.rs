@@ -140,6 +140,13 @@ impl ReleaseQueue {
         Some((entry.operation, entry.message))
     }
 
+    /// Makes everything that an operation holds due now, in the order in which it would have gone.
+    pub(super) fn release_all(&mut self, operation: usize, now: SimTime) {
+        for (why, message) in self.take_all(operation) {
+            self.push(now, operation, why, message);
+        }
+    }
+
     /// Everything an operation holds, in the order it would have gone.
     pub(super) fn take_all(&mut self, operation: usize) -> Vec<(Why, Held)> {
         let (mut taken, kept): (Vec<_>, Vec<_>) =
