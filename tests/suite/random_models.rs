@@ -182,7 +182,8 @@ fn compile_and_run(name: &str, seeds: Range<u64>) {
 fn runs(program: &Path, seed: u64, home: &Path, runner: &Path) {
     let Done { code, out, err } = done(
         command(program)
-            .args(["run", "--workers", "1"])
+            // Random spaces often disturb nothing, or break off.
+            .args(["run", "--workers", "1", "--fail-on", "nothing"])
             .env("RUNNER", seed.to_string())
             .env("PLAN", runner.join("campaign.plan.json"))
             .current_dir(home),

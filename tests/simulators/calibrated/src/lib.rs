@@ -19,11 +19,14 @@ impl Simulator for Calibrated {
         let gain = text.trim().parse().map_err(|_| SimulatorError(format!("`{text}` is no gain")))?;
         let path = bus.open("path");
         bus.subscribe(path);
-        Ok(Calibrated { gain, gains: bus.open("gain"), path, heard: bus.open("heard") })
+        let gains = bus.open("gain");
+        bus.subscribe(gains);
+        Ok(Calibrated { gain, gains, path, heard: bus.open("heard") })
     }
 
     fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError> {
         bus.publish(self.gains, self.gain);
+        while bus.receive(self.gains).is_some() {}
         let joint = [
             ("name", Value::Text("elbow".into())),
             ("position", Value::Real(0.0)),

@@ -22,6 +22,7 @@ impl Simulator for Faulty {
             bus.subscribe(port);
         }
         let level = bus.open(if fault == "missing topic" { "faulty/lvel" } else { "faulty/level" });
+        bus.subscribe(level);
         Ok(Faulty { faults, heard: bus.open("faulty/heard"), level, fault })
     }
 
@@ -38,6 +39,7 @@ impl Simulator for Faulty {
             "broken requirement" => bus.publish(self.level, 5.0),
             _ => bus.publish(self.level, 1.0),
         }
+        while bus.receive(self.level).is_some() {}
         if let Ok(pause) = std::env::var("PAUSE_US") {
             std::thread::sleep(std::time::Duration::from_micros(pause.parse().expect("microseconds")));
         }
