@@ -33,7 +33,7 @@ pub(crate) fn recording(name: &str, campaign: &str, clause: &str) -> Runner {
 #[test]
 fn every_fault_is_the_outcome_of_its_test_and_the_campaign_goes_on() {
     let runner = faulty("breaking", "all_faults");
-    let said = runner.run(&["--results", "all", "--timeout", "1"]).expect(0);
+    let said = runner.run(&["--results", "all", "--timeout", "1", "--fail-on", "nothing"]).expect(0);
     let repository = Repository::open(&runner.folder.join("all/3")).unwrap();
     let plan = repository.plan().clone();
     let mut by_fault: BTreeMap<String, Vec<(u32, Outcome)>> = BTreeMap::new();
@@ -83,7 +83,7 @@ fn every_fault_is_the_outcome_of_its_test_and_the_campaign_goes_on() {
     assert!(shown.contains("the worker's last words:\nabout to abort"), "{shown}");
 
     // Nothing of this depends on workers, on what a worker had printed before, or on the clock.
-    let one = runner.run(&["--results", "one", "--timeout", "1.5", "--workers", "1"]).expect(0);
+    let one = runner.run(&["--results", "one", "--timeout", "1.5", "--workers", "1", "--fail-on", "nothing"]).expect(0);
     assert_eq!(one.digest(), said.digest());
 }
 

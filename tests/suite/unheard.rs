@@ -34,7 +34,8 @@ fn a_campaign_that_nobody_hears_ends_before_it_fuzzes_and_names_its_operations()
     assert_eq!(refused.tests().unwrap().len(), 1, "only the undisturbed run");
     drop(refused);
 
-    runner.run(&["resume", "r/1", "--allow-unheard"]).expect(0);
+    let vain = runner.run(&["resume", "r/1", "--allow-unheard"]).expect(3);
+    assert!(vain.err.contains("in none of 10 tests an operation had an effect"), "{}", vain.err);
     let repository = Repository::open(&runner.folder.join("r/1")).unwrap();
     let rows = repository.tests().unwrap();
     assert_eq!(rows.len(), 12);
