@@ -424,7 +424,10 @@ impl Sectors {
                     spread::midpoints(&members, n * room, low, high)
                 };
                 reached.exact &= spread.exact;
-                let t3 = self.between(Dimension::T3, spread.least, spread.greatest);
+                // Copies that were moved apart touch: then the very ends are reached too.
+                let touching = self.one_interval_each && longest < n * width - MARGIN;
+                let beyond = if touching { 2.0 * self.margin } else { 0.0 };
+                let t3 = self.between(Dimension::T3, spread.least - beyond, spread.greatest + beyond);
                 reached.cells.extend(t3.into_iter().map(|offset| base + offset));
             }
         }
