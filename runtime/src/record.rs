@@ -27,7 +27,6 @@ use sesame_plan::{KnownTestId, Requirement, Test};
 
 use crate::observation::{Observation, Outcome};
 
-#[cfg(feature = "report")]
 pub use crate::observation::MetricValue;
 pub use crate::verdict::{Verdict, fails, verdict, violation_spans};
 pub use difference::{Difference, differences};

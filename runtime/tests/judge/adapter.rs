@@ -1,5 +1,9 @@
 //! All that these properties know of how the runtime is called and what it reports: what changes there, changes here.
 
+use std::fmt::Write as _;
+use std::path::Path;
+
+use rusqlite::Connection;
 use sesame_plan::stl::{self, Robustness};
 use sesame_plan::{
     ActivationMode, Aggregate, Campaign, CampaignPlan, Copies, Count, Drain, Field, MessageId, MessageType, Metric,
@@ -10,7 +14,7 @@ use sesame_plan::{Expression, Input};
 use sesame_runtime::evaluate::{Custom, Run, evaluate_tapped};
 use sesame_runtime::metric::MetricTable;
 use sesame_runtime::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome};
-use sesame_runtime::record::{MetricValue, Verdict, verdict};
+use sesame_runtime::record::{DATABASE, MetricValue, Origin, Recorder, TestRecord, Verdict, verdict};
 use sesame_runtime::relay::Deed;
 use sesame_runtime::transport::in_process;
 use sesame_runtime::wire::WireTable;
@@ -238,4 +242,52 @@ pub(crate) fn busy(plan: &CampaignPlan, test: &Test, observation: &Observation, 
         }
     }
     sum
+}
+
+/// Records the run of a test in a folder, as a campaign would.
+pub(crate) fn record(folder: &Path, plan: &CampaignPlan, test: &Test, observation: &Observation) {
+    let mut recorder = Recorder::create(folder, plan, 1, 1).expect("the folder is new");
+    let record = TestRecord {
+        number: 0,
+        origin: Origin::Search,
+        generation: Some(0),
+        parents: Vec::new(),
+        test: test.clone(),
+        simulator_seed: 1,
+        duplicate_of: None,
+        observation: observation.clone(),
+    };
+    recorder.commit(&record).expect("a run can be recorded");
+    recorder.finish("the test was run").expect("a run can be recorded");
+}
+
+/// The digest of the results in a folder.
+pub(crate) fn digest(folder: &Path) -> String {
+    sesame_runtime::record::digest(&folder.join(DATABASE)).expect("what was recorded can be read")
+}
+
+/// Takes all that a wider plan added out of the results in a folder, row by row: what is left is to be what the plan
+/// without it leaves. `metrics` has for each metric of that plan its place in the wider one, and `unread` is the number
+/// of messages on topics that were added.
+pub(crate) fn leave_out_additions(folder: &Path, plan: &CampaignPlan, metrics: &[usize], unread: usize) {
+    let database = Connection::open(folder.join(DATABASE)).expect("the results are there");
+    let mut sql = String::from("PRAGMA foreign_keys = OFF; BEGIN;");
+    for (table, column) in
+        [("metrics", "id"), ("requirements", "metric"), ("metric_values", "metric"), ("change_points", "metric")]
+    {
+        // Twice, so that no number is taken before it is free.
+        for (place, wider) in metrics.iter().enumerate() {
+            write!(sql, "UPDATE {table} SET {column} = -1 - {place} WHERE {column} = {wider};").unwrap();
+        }
+        write!(sql, "DELETE FROM {table} WHERE {column} >= 0; UPDATE {table} SET {column} = -1 - {column};").unwrap();
+    }
+    // What is said of a metric that was added belongs to it.
+    write!(
+        sql,
+        "DELETE FROM events WHERE text LIKE 'metric `unread%'; UPDATE tests SET messages = messages - {unread}; COMMIT;"
+    )
+    .unwrap();
+    database.execute_batch(&sql).expect("these tables and columns are there");
+    let plan = serde_json::to_string(plan).unwrap();
+    database.execute("UPDATE campaign SET plan = ?1", [plan]).expect("there is a campaign");
 }
