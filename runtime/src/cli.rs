@@ -15,9 +15,9 @@ mod replay_recording;
 mod report_anew;
 mod run;
 mod shrink;
+mod terminal;
 mod work;
 
-use std::io::Write as _;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -26,8 +26,9 @@ use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, V
 use sesame_plan::{CampaignPlan, SCHEMA};
 
 use crate::campaign;
-use crate::report::{self, TextOptions};
+use crate::report;
 use crate::runner::Runner;
+use terminal::{print, print_json, say, text_options};
 
 /// Exit code of a command that did its work and found that something is not as required: what `--fail-on` names was found, a
 /// campaign says too little, or a test came out different.
@@ -134,7 +135,7 @@ pub(crate) fn main(runner: &Runner) -> ExitCode {
     match dispatch(runner) {
         Ok(code) => code,
         Err(Failure(words)) => {
-            eprintln!("error: {words}");
+            say(format_args!("error: {words}"));
             ExitCode::FAILURE
         }
     }
@@ -209,24 +210,4 @@ fn digest(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
         Format::Text => print(&format!("{digest}\n")),
         Format::Json => print_json(&serde_json::json!({ "digest": digest })),
     }
-}
-
-/// Prints for people or programs. A reader that has gone away, as `| head` does, is no failure.
-fn print(text: &str) -> Result<ExitCode, Failure> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
-        _ => Ok(ExitCode::SUCCESS),
-    }
-}
-
-/// On a terminal as wide as it is, with colour unless `NO_COLOR` says no; elsewhere plain and as wide as it comes.
-fn text_options() -> TextOptions {
-    let terminal = console::Term::stdout();
-    let width = terminal.size_checked().map(|(_, columns)| usize::from(columns));
-    TextOptions { width, colour: terminal.is_term() && console::colors_enabled() }
-}
-
-fn print_json(value: &impl serde::Serialize) -> Result<ExitCode, Failure> {
-    let text = serde_json::to_string_pretty(value)?;
-    print(&format!("{text}\n"))
 }

@@ -8,7 +8,8 @@ static LAST: Mutex<Option<String>> = Mutex::new(None);
 #[cfg(feature = "campaign")]
 pub(crate) fn listen() {
     std::panic::set_hook(Box::new(|panic| {
-        eprintln!("{panic}");
+        // A log that cannot be written must not turn a panic into an abort.
+        std::io::Write::write_all(&mut std::io::stderr(), format!("{panic}\n").as_bytes()).ok();
         if let Ok(mut last) = LAST.lock() {
             *last = Some(panic.to_string());
         }

@@ -4,6 +4,9 @@
 //! Processes, sockets, files and clocks live in the rooms around it. Nothing here knows the `.sesame` language: a
 //! runner gets its campaign as a [`sesame_plan::CampaignPlan`].
 
+// These macros panic where nothing can be written: on a full disk, or after the reader has gone.
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 pub mod activation;
 #[cfg(feature = "report")]
 pub mod analysis;

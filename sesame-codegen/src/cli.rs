@@ -279,8 +279,9 @@ pub fn run(
         Command::Explain { what, file: Some(file) } => commands::explain_campaign(shell, language, &what, &file),
         Command::Explain { what, file: None } => commands::explain_code(language, &what),
         Command::Completions { shell } => {
-            clap_complete::generate(shell, &mut Arguments::command(), "sesamec", &mut std::io::stdout());
-            Ok(ExitCode::SUCCESS)
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Arguments::command(), "sesamec", &mut script);
+            shell::asked_for(&String::from_utf8_lossy(&script)).map(|()| ExitCode::SUCCESS)
         }
     };
     result.unwrap_or_else(|failure| {

@@ -3,6 +3,9 @@
 //! Model → plan ([`lower`], [`plan`]) → files in memory ([`emit`]) → disk ([`output`], the only module that writes). Each
 //! arrow but the last is a pure function: the same model and version give the same bytes.
 
+// These macros panic where nothing can be written: on a full disk, or after the reader has gone.
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod emit;

@@ -26,4 +26,5 @@ mod strategies;
 mod tampering;
 mod traces;
 mod unheard;
+mod unwritable_output;
 mod vendored;

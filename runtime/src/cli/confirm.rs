@@ -10,8 +10,9 @@ use sesame_plan::CampaignPlan;
 
 use super::gate::Gate;
 use super::recorded::{open, refuse_changed};
+use super::terminal::{print, print_json, say, text_options};
 use super::work::{Work, claim_files, interruptible, refuse_unfilled, shown};
-use super::{Failure, Format, STOPPED, print, print_json, text_options};
+use super::{Failure, Format, STOPPED};
 use crate::campaign::{Further, confirm_further};
 use crate::record::{Origin, Recorder, Repository, TestRow, Verdict};
 use crate::report;
@@ -57,8 +58,8 @@ pub(super) fn confirm(
         names => names.iter().map(|name| repository.find(name)).collect::<Result<_, _>>()?,
     };
     if tests.is_empty() && options.violations {
-        eprintln!("there is no test that violates a requirement and was run once only");
-        return say(&repository, &tests, options);
+        say(format_args!("there is no test that violates a requirement and was run once only"));
+        return conclude(&repository, &tests, options);
     }
     if tests.is_empty() {
         return Err(Failure(format!(
@@ -94,7 +95,7 @@ pub(super) fn confirm(
         &mut |runs, total| {
             if said.elapsed() >= LINE_EVERY {
                 said = Instant::now();
-                eprintln!("{runs}/{total} runs");
+                say(format_args!("{runs}/{total} runs"));
             }
         },
     );
@@ -102,11 +103,11 @@ pub(super) fn confirm(
     // What is recorded stays, however it ended.
     let repository = recorder.finish(&stop)?;
     if !complete? {
-        eprintln!("stopped; the runs that had ended are kept");
+        say(format_args!("stopped; the runs that had ended are kept"));
         return Ok(ExitCode::from(STOPPED));
     }
     report::write_page(&repository, &folder.join("report.html"))?;
-    say(&repository, &further.tests, options)
+    conclude(&repository, &further.tests, options)
 }
 
 /// The tests that violate a requirement and were run once only, by number; none of a duplicate.
@@ -120,7 +121,7 @@ fn run_once(repository: &Repository) -> Result<Vec<u32>, Failure> {
 }
 
 /// Prints what fresh runs say of these tests. The exit code is for all that is recorded.
-fn say(repository: &Repository, tests: &[u32], options: &Options) -> Result<ExitCode, Failure> {
+fn conclude(repository: &Repository, tests: &[u32], options: &Options) -> Result<ExitCode, Failure> {
     let summary = report::summary(repository)?;
     let code = options.gate.code(&summary, repository.plan());
     let confirmed: Vec<_> = summary.confirmed.into_iter().filter(|test| tests.contains(&test.number)).collect();

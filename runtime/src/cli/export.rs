@@ -6,7 +6,8 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::recorded::open;
-use super::{Failure, Format, Which, print, print_json};
+use super::terminal::{print, print_json};
+use super::{Failure, Format, Which};
 use crate::report;
 
 /// Which test is written, and under which name.

@@ -10,6 +10,7 @@ use clap::{Args, ValueEnum};
 use sesame_plan::{CampaignPlan, Search};
 
 use super::NOT_AS_REQUIRED;
+use super::terminal::say;
 use crate::record::Verdict;
 use crate::report::Summary;
 
@@ -45,7 +46,7 @@ impl Gate {
     pub(super) fn code(&self, summary: &Summary, plan: &CampaignPlan) -> ExitCode {
         let objections = self.objections(summary, plan);
         for objection in &objections {
-            eprintln!("not as required: {objection}");
+            say(format_args!("not as required: {objection}"));
         }
         if objections.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(NOT_AS_REQUIRED) }
     }

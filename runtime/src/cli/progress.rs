@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sesame_plan::{CampaignPlan, Direction, MetricSource};
 
+use super::terminal::say;
 use crate::campaign::Progress;
 
 /// How often a line is printed where there is no terminal.
@@ -45,7 +46,7 @@ impl<'a> Display<'a> {
             }
             None if self.last_line.elapsed() >= LINE_EVERY => {
                 self.last_line = Instant::now();
-                eprintln!("{} {}/{}  {rest}", self.plan.campaign.name, progress.done, progress.total);
+                say(format_args!("{} {}/{}  {rest}", self.plan.campaign.name, progress.done, progress.total));
             }
             None => {}
         }

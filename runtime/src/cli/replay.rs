@@ -8,8 +8,9 @@ use clap::Args;
 use sesame_plan::CampaignPlan;
 
 use super::recorded::{open, refuse_changed};
+use super::terminal::{print, print_json, say, text_options};
 use super::work::{claim_files, interruptible, refuse_unfilled, seconds};
-use super::{Failure, Format, NOT_AS_REQUIRED, STOPPED, Which, print, print_json, text_options};
+use super::{Failure, Format, NOT_AS_REQUIRED, STOPPED, Which};
 use crate::campaign::{AloneSettings, Ended, Job, patience, run_alone};
 use crate::observation::Outcome;
 use crate::record::{TestRecord, differences};
@@ -51,11 +52,11 @@ pub(super) fn replay(
     let ended = run_alone(job, &settings, &interrupted);
     files.finish()?;
     let Some(Ended { observation: again, notes, .. }) = ended? else {
-        eprintln!("stopped; a replay leaves nothing behind");
+        say(format_args!("stopped; a replay leaves nothing behind"));
         return Ok(ExitCode::from(STOPPED));
     };
     for note in notes {
-        eprintln!("{note}");
+        say(format_args!("{note}"));
     }
     let differences = differences(repository.plan(), &record.test, &record.observation, &again);
     let replay = Replay {

@@ -35,8 +35,9 @@ pub(super) fn replay_recording(_: &Runner, plan: &CampaignPlan, options: &Option
 pub(super) fn replay_recording(runner: &Runner, plan: &CampaignPlan, options: &Options) -> Result<ExitCode, Failure> {
     use std::panic::{self, AssertUnwindSafe};
 
+    use super::NOT_AS_REQUIRED;
+    use super::terminal::{print, print_json, say, text_options};
     use super::work::refuse_unfilled;
-    use super::{NOT_AS_REQUIRED, print, print_json, text_options};
     use crate::last_panic;
     use crate::metric::MetricTable;
     use crate::report::recording_text;
@@ -52,7 +53,7 @@ pub(super) fn replay_recording(runner: &Runner, plan: &CampaignPlan, options: &O
         .map_err(|_| Failure(format!("a hook cannot take this recording: {}", last_panic::take())))??;
     let replay = compared(plan, options, fed);
     for warning in &replay.warnings {
-        eprintln!("warning: {warning}");
+        say(format_args!("warning: {warning}"));
     }
     match options.format {
         Format::Text => print(&recording_text(&replay, text_options()))?,

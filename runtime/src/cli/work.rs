@@ -13,7 +13,8 @@ use sesame_plan::{CampaignPlan, Domain};
 
 use super::gate::Gate;
 use super::progress::{Display, wait};
-use super::{Failure, Format, STOPPED, print, print_json, text_options};
+use super::terminal::{print, print_json, say, text_options};
+use super::{Failure, Format, STOPPED};
 use crate::campaign::{Conducted, Settings, conduct};
 use crate::changed_files::ChangedFiles;
 use crate::fuzz::unimplemented_operations;
@@ -69,7 +70,7 @@ impl Work {
         // A file that is changed is changed for every simulator.
         let workers = if files.may_change { 1 } else { self.processes() };
         if self.workers.is_some_and(|asked| asked.get() > workers) {
-            eprintln!("note: tests run one at a time, since operations may change files");
+            say(format_args!("note: tests run one at a time, since operations may change files"));
         }
         let (timeout, allow_unheard) = (self.timeout, self.allow_unheard);
         Ok(Settings { seed, workers, timeout, program: std::env::current_exe()?, allow_unheard })
@@ -90,14 +91,14 @@ pub(super) fn refuse_unfilled(runner: &Runner, plan: &CampaignPlan, allowed: boo
         if plan.campaign.objectives.contains(&id) && !allowed {
             objectives.push(format!("`{name}`"));
         } else {
-            eprintln!("warning: the hook of metric `{name}` is not filled in yet");
+            say(format_args!("warning: the hook of metric `{name}` is not filled in yet"));
         }
     }
     for id in unimplemented_operations(plan, runner.operations) {
-        eprintln!(
+        say(format_args!(
             "warning: the hook of operation `{}` is not filled in yet: it disturbs nothing",
             plan.operation(id).name
-        );
+        ));
     }
     if objectives.is_empty() {
         return Ok(());
@@ -119,7 +120,7 @@ pub(super) fn claim_files(runner: &Runner, plan: &CampaignPlan) -> Result<Files,
     let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
     let (files, put_back) = ChangedFiles::for_supervisor(&space, may_change)?;
     for path in put_back {
-        eprintln!("note: an earlier run was ended while {} was changed; it is put back", path.display());
+        say(format_args!("note: an earlier run was ended while {} was changed; it is put back", path.display()));
     }
     for operation in &plan.operations {
         for parameter in &operation.parameters {
@@ -165,7 +166,7 @@ pub(super) fn begin(
 ) -> Result<(Recorder, PathBuf), Failure> {
     let Claim { folder, unfinished } = record::claim_folder(results, name)?;
     if let Some(unfinished) = unfinished {
-        eprintln!("note: an earlier run is unfinished: `resume {}` goes on with it", shown(&unfinished));
+        say(format_args!("note: an earlier run is unfinished: `resume {}` goes on with it", shown(&unfinished)));
     }
     Ok((Recorder::create(&folder, plan, seed, work.workers())?, folder))
 }
@@ -196,11 +197,14 @@ pub(super) fn carry_out(
             let (took, tests) = (started.elapsed(), repository.tests()?.len() + repetitions);
             let took =
                 if took.as_secs() < 90 { format!("{:.1} s", took.as_secs_f64()) } else { wait(took.as_secs_f64()) };
-            eprintln!("      Took {took} for {tests} runs");
+            say(format_args!("      Took {took} for {tests} runs"));
             Ok(code)
         }
         Conducted::Interrupted => {
-            eprintln!("stopped; what was measured is kept. `resume {}` goes on to the same results", shown(folder));
+            say(format_args!(
+                "stopped; what was measured is kept. `resume {}` goes on to the same results",
+                shown(folder)
+            ));
             Ok(ExitCode::from(STOPPED))
         }
     }

@@ -63,7 +63,7 @@ pub(super) fn check_only(
 pub(super) fn check(shell: Shell, language: &Language, file: &Path, format: Format) -> anyhow::Result<Checked> {
     let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
     let checked = (language.check)(&file.display().to_string(), &text, shell.look(format));
-    shell.diagnostics(&checked.diagnostics, format);
+    shell.diagnostics(&checked.diagnostics, format)?;
     if checked.errors > 0 {
         return Err(has_errors(file, checked.errors));
     }
@@ -102,7 +102,7 @@ pub(super) fn generate(
     };
     let (out, report) = write(shell, generation, options, &checked, &chosen, mode)?;
     if purpose == Purpose::DryRun {
-        shell::asked_for(&preview(&out, &report));
+        shell::asked_for(&preview(&out, &report))?;
     }
     if purpose == Purpose::Check && report.out_of_date() {
         let files = report.files.iter().filter(|file| file.owner != Owner::Seed);
@@ -172,7 +172,7 @@ fn start(mut runner: Command) -> std::io::Result<ExitCode> {
 /// `sesamec explain CODE`
 pub(super) fn explain_code(language: &Language, code: &str) -> anyhow::Result<ExitCode> {
     if let Some(page) = (language.explain)(code) {
-        println!("{}", page.trim_end());
+        shell::asked_for(&format!("{}\n", page.trim_end()))?;
         return Ok(ExitCode::SUCCESS);
     }
     let shown = code.escape_debug();
@@ -196,7 +196,7 @@ pub(super) fn explain_campaign(
     let checked = check(shell, language, file, Format::Human)?;
     let chosen = choose(&checked, file, Some(campaign))?;
     let plan = &checked.plans[chosen].plan;
-    print!("{}\n{}", crate::explain::campaign(plan), super::search_space::described(plan));
+    shell::asked_for(&format!("{}\n{}", crate::explain::campaign(plan), super::search_space::described(plan)))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -28,8 +28,10 @@ pub(super) fn fmt(
         let formatted = read(file).and_then(|text| {
             let formatted = (language.format)(&file.display().to_string(), &text, shell.look(format));
             let formatted = formatted.map_err(|found| {
-                shell.diagnostics(&found.diagnostics, format);
-                commands::has_errors(file, found.errors)
+                shell
+                    .diagnostics(&found.diagnostics, format)
+                    .err()
+                    .unwrap_or_else(|| commands::has_errors(file, found.errors))
             })?;
             Ok((text, formatted))
         });
@@ -37,10 +39,10 @@ pub(super) fn fmt(
             Ok((text, formatted)) if check => {
                 if text != formatted {
                     unformatted += 1;
-                    shell::asked_for(&shown(file, &text, &formatted, format));
+                    shell::asked_for(&shown(file, &text, &formatted, format))?;
                 }
             }
-            Ok((_, formatted)) if file.as_os_str() == STANDARD_INPUT => shell::asked_for(&formatted),
+            Ok((_, formatted)) if file.as_os_str() == STANDARD_INPUT => shell::asked_for(&formatted)?,
             Ok((text, formatted)) if text == formatted => {}
             Ok((_, formatted)) => match output::replace(file, &formatted) {
                 Ok(()) => shell.did("Formatted", file.display()),

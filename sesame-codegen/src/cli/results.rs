@@ -1,6 +1,6 @@
 //! `sesamec results`: analyses of results files.
 
-use std::io::{IsTerminal as _, Write as _};
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -13,7 +13,7 @@ use sesame_runtime::record::{DATABASE, Repository};
 use sesame_runtime::report::TextOptions;
 use sesame_runtime::sspr::Convention;
 
-use super::shell::Shell;
+use super::shell::{self, Shell};
 
 /// What is asked of results files.
 #[derive(Debug, Subcommand)]
@@ -352,7 +352,7 @@ fn gather(path: &Path, found: &mut Vec<PathBuf>) -> anyhow::Result<()> {
     }
 }
 
-/// Prints for people or programs. A reader that has gone away, as `| head` does, is no failure.
+/// Prints for people or programs.
 fn print(dataset: &Dataset, output: &Output) -> anyhow::Result<ExitCode> {
     let terminal = std::io::stdout().is_terminal();
     let colour = terminal && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
@@ -361,8 +361,6 @@ fn print(dataset: &Dataset, output: &Output) -> anyhow::Result<ExitCode> {
         Format::Csv => dataset.csv(),
         Format::Json => dataset.json(),
     };
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
-        _ => Ok(ExitCode::SUCCESS),
-    }
+    shell::asked_for(&text)?;
+    Ok(ExitCode::SUCCESS)
 }

@@ -72,12 +72,13 @@ impl Shell {
     }
 
     /// Diagnostics: those for programs on standard output.
-    pub(super) fn diagnostics(self, text: &str, format: Format) {
+    pub(super) fn diagnostics(self, text: &str, format: Format) -> anyhow::Result<()> {
         match format {
             _ if text.is_empty() => {}
             Format::Human | Format::Short => self.text(text),
-            Format::Json | Format::Github => asked_for(text),
+            Format::Json | Format::Github => asked_for(text)?,
         }
+        Ok(())
     }
 
     /// Text as it is.
@@ -95,10 +96,15 @@ impl Shell {
     }
 }
 
-/// What was asked for, on standard output.
-pub(super) fn asked_for(text: &str) {
-    // A reader that has seen enough, such as `head`, is no failure.
-    let _ = io::stdout().write_all(text.as_bytes());
+/// What was asked for, on standard output. A reader that has seen enough, such as `head`, is not a failure; a full disk is.
+pub(super) fn asked_for(text: &str) -> anyhow::Result<()> {
+    let mut output = io::stdout().lock();
+    match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(anyhow::Error::new(error).context("cannot write to standard output"))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// How the user called this command, for hints that can be copied.
