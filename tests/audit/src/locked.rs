@@ -1,0 +1,40 @@
+//! Packages as `Cargo.lock` names them, and where they come from.
+
+use semver::Version;
+use serde::Deserialize;
+
+use crate::{AuditError, Problem};
+
+/// One locked package.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+pub struct Package {
+    /// Its name.
+    pub name: String,
+    /// Its version.
+    pub version: Version,
+    /// Where it comes from; a package of the workspace has none.
+    pub source: Option<String>,
+}
+
+/// All packages of a lock file, in its order.
+///
+/// # Errors
+///
+/// When the text is no lock file.
+pub fn packages(lock: &str) -> Result<Vec<Package>, AuditError> {
+    #[derive(Deserialize)]
+    struct Lock {
+        package: Vec<Package>,
+    }
+    let lock: Lock = toml::from_str(lock).map_err(|error| AuditError::malformed("Cargo.lock", error))?;
+    Ok(lock.package)
+}
+
+/// The packages that come from elsewhere than `sources`.
+pub fn problems(packages: &[Package], sources: &[String]) -> Vec<Problem> {
+    packages
+        .iter()
+        .filter(|package| package.source.as_ref().is_some_and(|source| !sources.contains(source)))
+        .map(|package| Problem::Source { package: package.clone() })
+        .collect()
+}
