@@ -1,6 +1,6 @@
 //! Source files in memory, and where their lines begin.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use crate::import::normal;
@@ -10,6 +10,8 @@ use crate::span::{FileId, Span};
 #[derive(Debug, Clone, Default)]
 pub struct SourceMap {
     files: Vec<SourceFile>,
+    /// The first file of each name, `.` and `..` in it worked out.
+    by_name: HashMap<String, FileId>,
     /// Why files that are imported could not be read, by name.
     unreadable: BTreeMap<String, String>,
 }
@@ -41,7 +43,9 @@ impl SourceMap {
     /// Adds a file under the name that diagnostics show.
     pub fn add(&mut self, name: impl Into<String>, text: impl Into<String>) -> FileId {
         let id = FileId(u32::try_from(self.files.len()).expect("fewer than 2^32 files"));
-        self.files.push(SourceFile::new(name.into(), text.into()));
+        let name = name.into();
+        self.by_name.entry(normal(Path::new(&name))).or_insert(id);
+        self.files.push(SourceFile::new(name, text.into()));
         id
     }
 
@@ -57,8 +61,7 @@ impl SourceMap {
 
     /// The file of a name, `.` and `..` in it worked out.
     pub fn find(&self, name: &str) -> Option<FileId> {
-        let at = self.files.iter().position(|file| normal(Path::new(&file.name)) == normal(Path::new(name)))?;
-        Some(FileId(u32::try_from(at).expect("fewer than 2^32 files")))
+        self.by_name.get(&normal(Path::new(name))).copied()
     }
 
     /// The file of an id of this map.
