@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context as _, anyhow, bail};
+use sesame_dsl::diagnostic::visible;
 use sesame_plan::Transport;
 
 use super::shell::{self, Shell};
@@ -12,6 +13,7 @@ use super::{Checked, Deny, Format, Generation, Language, Purpose, build};
 use crate::emit::Templates;
 use crate::environment::{self, Options, RuntimeChoice, environment};
 use crate::files::{Owner, Tree};
+use crate::input;
 use crate::output::{self, Change, Mode, Orphan, Report};
 use crate::plan::RunnerPlan;
 use crate::{emit, names, project};
@@ -61,7 +63,7 @@ pub(super) fn check_only(
 
 /// Reads and checks a space, and says what is wrong with it.
 pub(super) fn check(shell: Shell, language: &Language, file: &Path, format: Format) -> anyhow::Result<Checked> {
-    let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let text = input::text(file).with_context(|| format!("cannot read {}", file.display()))?;
     let checked = (language.check)(&file.display().to_string(), &text, shell.look(format));
     shell.diagnostics(&checked.diagnostics, format);
     if checked.errors > 0 {
@@ -102,7 +104,7 @@ pub(super) fn generate(
     };
     let (out, report) = write(shell, generation, options, &checked, &chosen, mode)?;
     if purpose == Purpose::DryRun {
-        shell::asked_for(&preview(&out, &report));
+        shell::asked_for(&visible(&preview(&out, &report)));
     }
     if purpose == Purpose::Check && report.out_of_date() {
         let files = report.files.iter().filter(|file| file.owner != Owner::Seed);
@@ -112,7 +114,7 @@ pub(super) fn generate(
                 Change::Removed => "is generated no longer",
                 _ => "is out of date",
             };
-            shell.text(&format!("{} {what}", out.join(&file.path).display()));
+            shell.text(&visible(&format!("{} {what}", out.join(&file.path).display())));
         }
         bail!("out of date: run `{} generate {}`", shell::command(), generation.file.display());
     }
@@ -196,7 +198,8 @@ pub(super) fn explain_campaign(
     let checked = check(shell, language, file, Format::Human)?;
     let chosen = choose(&checked, file, Some(campaign))?;
     let plan = &checked.plans[chosen].plan;
-    print!("{}\n{}", crate::explain::campaign(plan), super::search_space::described(plan));
+    let text = format!("{}\n{}", crate::explain::campaign(plan), super::search_space::described(plan));
+    shell::asked_for(&visible(&text));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -234,7 +237,14 @@ fn write(
 ) -> anyhow::Result<(PathBuf, Report)> {
     let out = match &generation.out {
         Some(out) => out.clone(),
-        None => generation.file.with_file_name(environment::RUNNERS),
+        None => {
+            let out = generation.file.with_file_name(environment::RUNNERS);
+            // Nobody named the folder that it leads to.
+            if out.is_symlink() {
+                bail!("{} is a link: say with `-o` which folder the runners belong into", out.display());
+            }
+            out
+        }
     };
     let environment = environment(&generation.file, &out, &checked.plans, options).map_err(|errors| all(&errors))?;
     let trees = emit::emit(&checked.plans, &environment).map_err(|problems| all(&problems))?;

@@ -4,6 +4,7 @@
 mod command;
 mod emission;
 mod emitted;
+mod hostile_checkout;
 mod options;
 mod plans;
 mod regeneration;
