@@ -270,6 +270,22 @@ pub fn create(folder: &Path, files: &std::collections::BTreeMap<String, String>)
     files.iter().try_for_each(|(path, contents)| Place { root: folder, below: path }.write(contents.as_bytes()))
 }
 
+/// The folder for results in a project.
+pub const RESULTS: &str = "results";
+
+/// Takes back what [`create`] wrote into a folder that was empty or, if it was not there before, that came with it: a file
+/// and the results beside it.
+pub fn withdraw(folder: &Path, file: &str, was_there: bool) -> Result<(), Error> {
+    let gone = |path: PathBuf, done: io::Result<()>| match done {
+        Err(cause) if cause.kind() != io::ErrorKind::NotFound => Err(Error::Io { action: "remove", path, cause }),
+        _ => Ok(()),
+    };
+    Place { root: folder, below: file }.remove()?;
+    let results = folder.join(RESULTS);
+    gone(results.clone(), fs::remove_dir_all(&results))?;
+    if was_there { Ok(()) } else { gone(folder.to_owned(), fs::remove_dir(folder)) }
+}
+
 /// Gives a file that is there another text. Who may read and write it stays as it is, and a link stays a link.
 pub fn replace(path: &Path, contents: &str) -> Result<(), Error> {
     let failed = |cause| Error::Io { action: "write", path: path.to_owned(), cause };

@@ -64,12 +64,24 @@ pub(super) fn check_only(
 /// Reads and checks a space, and says what is wrong with it.
 pub(super) fn check(shell: Shell, language: &Language, file: &Path, format: Format) -> anyhow::Result<Checked> {
     let text = input::text(file).with_context(|| format!("cannot read {}", file.display()))?;
-    let checked = (language.check)(&file.display().to_string(), &text, shell.look(format));
+    let checked = check_text(shell, language, file, &text, format)?;
+    shell.did("Checked", format!("{}: {}", file.display(), checked.summary));
+    Ok(checked)
+}
+
+/// Checks the text of a space that is, or will be, in a file, and says what is wrong with it.
+pub(super) fn check_text(
+    shell: Shell,
+    language: &Language,
+    file: &Path,
+    text: &str,
+    format: Format,
+) -> anyhow::Result<Checked> {
+    let checked = (language.check)(&file.display().to_string(), text, shell.look(format));
     shell.diagnostics(&checked.diagnostics, format);
     if checked.errors > 0 {
         return Err(has_errors(file, checked.errors));
     }
-    shell.did("Checked", format!("{}: {}", file.display(), checked.summary));
     Ok(checked)
 }
 
@@ -235,17 +247,11 @@ fn write(
     chosen: &[usize],
     mode: Mode,
 ) -> anyhow::Result<(PathBuf, Report)> {
-    let out = match &generation.out {
-        Some(out) => out.clone(),
-        None => {
-            let out = generation.file.with_file_name(environment::RUNNERS);
-            // Nobody named the folder that it leads to.
-            if out.is_symlink() {
-                bail!("{} is a link: say with `-o` which folder the runners belong into", out.display());
-            }
-            out
-        }
-    };
+    let out = generation.out.clone().unwrap_or_else(|| generation.file.with_file_name(environment::RUNNERS));
+    // Nobody named the folder that it leads to.
+    if generation.out.is_none() && out.is_symlink() {
+        bail!("{} is a link: say with `-o` which folder the runners belong into", out.display());
+    }
     let environment = environment(&generation.file, &out, &checked.plans, options).map_err(|errors| all(&errors))?;
     let trees = emit::emit(&checked.plans, &environment).map_err(|problems| all(&problems))?;
     let (shared, runners) = trees.split_first().expect("there is a tree for what runners share");

@@ -12,6 +12,7 @@ use super::{Format, Look};
 pub struct Shell {
     colour: bool,
     terminal: bool,
+    silent: bool,
 }
 
 impl Shell {
@@ -19,12 +20,17 @@ impl Shell {
     pub fn of_the_process() -> Self {
         let terminal = io::stderr().is_terminal();
         let colour = terminal && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-        Shell { colour, terminal }
+        Shell { colour, terminal, silent: false }
     }
 
     /// A shell without colours and without lines that change.
     pub fn plain() -> Self {
-        Shell { colour: false, terminal: false }
+        Shell { colour: false, terminal: false, silent: false }
+    }
+
+    /// A shell that says nothing on standard error: the exit code tells all.
+    pub fn silent() -> Self {
+        Shell { silent: true, ..Shell::plain() }
     }
 
     /// Whether messages are coloured.
@@ -95,6 +101,9 @@ impl Shell {
     }
 
     fn line(self, text: &str) {
+        if self.silent {
+            return;
+        }
         let clear = if self.terminal { "\r\x1b[K" } else { "" };
         let _ = writeln!(io::stderr(), "{clear}{text}");
     }

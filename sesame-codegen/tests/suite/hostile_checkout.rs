@@ -14,7 +14,6 @@ use proptest::prelude::*;
 use sesame_codegen::emit::emit;
 use sesame_codegen::files::Tree;
 use sesame_codegen::output::{Error, Mode, apply};
-use sha2::{Digest as _, Sha256};
 
 use crate::command::{project, sesamec};
 use crate::plans::{environment, small};
@@ -94,6 +93,9 @@ const CLAIMS: &[&str] = &[
     "..",
     "a\\b",
 ];
+
+/// The SHA-256 of `mine`, which is what files outside hold.
+const SHA_OF_MINE: &str = "3fd30542fe3f61b14bd4a4b2dc0b6fb30fa6f63ebce52dd1778aaa8c4dc02cff";
 
 fn trap() -> impl Strategy<Value = Trap> {
     let kinds = prop::sample::select(&[Place::File, Place::Folder, Place::Temporary]);
@@ -175,11 +177,7 @@ fn set(trap: &Trap, all: &Path, out: &Path, generated: &[String]) {
             // Another trap may have taken its place.
             let text = fs::read(&path_of_manifest).unwrap();
             let Ok(mut manifest) = serde_json::from_slice::<serde_json::Value>(&text) else { return };
-            let hash = if *right {
-                Sha256::digest(b"mine").iter().map(|byte| format!("{byte:02x}")).collect()
-            } else {
-                "0".to_owned()
-            };
+            let hash = if *right { SHA_OF_MINE } else { "0" };
             manifest["files"][path] = serde_json::json!({ "owner": "machine", "hash": hash });
             if *runner {
                 manifest["runners"] = serde_json::json!([path, "trap", "day"]);
@@ -270,8 +268,7 @@ fn links_and_manifests_that_lead_outside_are_refused_or_replaced_and_never_follo
     symlink("../../outside", out.join("link")).unwrap();
     let manifest = out.join(".sesame/manifest.json");
     let mut claimed: serde_json::Value = serde_json::from_slice(&fs::read(&manifest).unwrap()).unwrap();
-    let hash: String = Sha256::digest(b"mine").iter().map(|byte| format!("{byte:02x}")).collect();
-    claimed["files"]["link/victim"] = serde_json::json!({ "owner": "machine", "hash": hash });
+    claimed["files"]["link/victim"] = serde_json::json!({ "owner": "machine", "hash": SHA_OF_MINE });
     fs::write(&manifest, claimed.to_string()).unwrap();
     generate(Mode::Write).unwrap();
     assert_eq!(fs::read_to_string(&victim).unwrap(), "mine");
