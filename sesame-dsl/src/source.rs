@@ -1,6 +1,7 @@
 //! Source files in memory, and where their lines begin.
 
 use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 use std::path::Path;
 
 use crate::import::normal;
@@ -100,6 +101,15 @@ impl SourceFile {
         &self.text
     }
 
+    /// The whole lines that hold some bytes, without the last line's end, and the number of the first, from 1.
+    pub(crate) fn lines_of(&self, lo: u32, hi: u32) -> (Range<usize>, u32) {
+        let first = self.line_starts.partition_point(|&start| start <= lo);
+        let after = self.line_starts.partition_point(|&start| start <= hi);
+        let start = self.line_starts[first - 1] as usize;
+        let end = self.line_starts.get(after).map_or(self.text.len(), |&next| next as usize - 1);
+        (start..end, u32::try_from(first).unwrap_or(u32::MAX))
+    }
+
     /// Line and column of a byte offset, which is at most the text's length.
     pub fn position(&self, offset: u32) -> LineColumn {
         let line = self.line_starts.partition_point(|&start| start <= offset);
@@ -128,5 +138,14 @@ mod tests {
         assert_eq!(at(5), (2, 2));
         assert_eq!(at(7), (3, 1));
         assert_eq!(at(8), (4, 1));
+        let lines = |lo, hi| {
+            let (range, first) = sources.file(file).lines_of(lo, hi);
+            (&sources.file(file).text()[range], first)
+        };
+        assert_eq!(lines(0, 1), ("ab", 1));
+        assert_eq!(lines(1, 2), ("ab", 1), "its line end is the line's");
+        assert_eq!(lines(1, 5), ("ab\nµx", 1));
+        assert_eq!(lines(7, 7), ("", 3));
+        assert_eq!(lines(8, 8), ("", 4));
     }
 }

@@ -111,9 +111,16 @@ fn nothing_in_a_file_becomes_a_command_of_a_terminal() {
 #[test]
 fn what_quotes_a_token_of_megabytes_is_short() {
     let long = "a".repeat(2 << 20);
-    for text in [format!("space {long}\x01"), format!("space s {long}"), format!("space s metric {long} = {long}x")] {
-        let (_, analysis) = analyse_text("long", &text);
+    for text in [
+        format!("space {long}\x01"),
+        format!("space s {long}"),
+        format!("space s metric {long} = {long}x"),
+        format!("space s metric {long} = 5 5"),
+    ] {
+        let (sources, analysis) = analyse_text("long", &text);
         assert!(analysis.has_errors());
+        let shown = render::human(&analysis.diagnostics, &sources, false);
+        assert!(shown.len() < 10_000 * analysis.diagnostics.len(), "{} bytes", shown.len());
         for found in &analysis.diagnostics {
             let quoted = [&found.title, &found.label].into_iter().chain(&found.notes);
             assert!(quoted.map(String::len).sum::<usize>() < 10_000, "{}", found.code);

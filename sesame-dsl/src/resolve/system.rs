@@ -322,7 +322,8 @@ impl<'a> Resolver<'a> {
         if self.file.incomplete {
             return None;
         }
-        let messages = self.names_of(Kind::Message);
+        let comparable = self.compared.more(self.names.len());
+        let messages = if comparable { self.names_of(Kind::Message) } else { Vec::new() };
         let similar = ELSEWHERE
             .iter()
             .find(|(word, _)| *word == name.text)
@@ -433,10 +434,12 @@ impl<'a> Resolver<'a> {
             )
             .label("no such field")
             .also(message.declaration.span, "the message is declared here");
-            diagnostic = match most_similar(&name.text, known.iter().copied()) {
-                Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
-                None => diagnostic.note(format!("its fields are {}", super::list(&known))),
-            };
+            if self.compared.more(known.len()) {
+                diagnostic = match most_similar(&name.text, known.iter().copied()) {
+                    Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
+                    None => diagnostic.note(format!("its fields are {}", super::list(&known))),
+                };
+            }
             self.report(diagnostic);
             return None;
         };
