@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::io::{self, IsTerminal as _, Write as _};
 
-use sesame_dsl::diagnostic::visible;
+use sesame_dsl::diagnostic::{shortened, visible};
 
 use super::{Format, Look};
 
@@ -90,9 +90,10 @@ impl Shell {
     }
 
     /// A line that begins with a painted word. What is said may quote anything, so no sign of it reaches a terminal as a
-    /// command.
+    /// command, and no line of it fills the screen.
     fn say(self, style: &str, word: &str, what: impl Display) {
-        self.line(&format!("{} {}", self.painted(style, word), visible(&what.to_string())));
+        let text: Vec<String> = what.to_string().split('\n').map(|line| shortened(line.to_owned())).collect();
+        self.line(&format!("{} {}", self.painted(style, word), visible(&text.join("\n"))));
     }
 
     /// Text as it is: of this program, or of one that cleans what it quotes.

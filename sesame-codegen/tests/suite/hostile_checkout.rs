@@ -441,3 +441,29 @@ fn no_message_of_the_command_holds_what_a_terminal_obeys() {
     assert!(!done && text.contains("README.md") && text.contains("\u{fffd}]0;owned"), "{text:?}");
     assert!(!text.contains('\u{1b}') && !text.contains('\r'), "{text:?}");
 }
+
+#[test]
+fn an_error_that_quotes_megabytes_is_short() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let long = "a".repeat(2 << 20);
+    fs::write(at("s.sesame"), SPACE).unwrap();
+    fs::write(at("sim.py"), "").unwrap();
+    fs::write(at("bad.sesame"), format!("{SPACE}metric {long} = {long}(a) {long}")).unwrap();
+    fs::write(at("sesame.toml"), format!("{long} = {long}")).unwrap();
+    fs::write(at("tag.model"), format!("<TestingSpace><{long}></b></TestingSpace>")).unwrap();
+    fs::write(at("value.model"), format!("<TestingSpace><metrics dir=\"{long}\" {long}></TestingSpace>")).unwrap();
+    let commands: [&[&str]; 7] = [
+        &["check", "bad.sesame"],
+        &["check", "bad.sesame", "--format", "short"],
+        &["check", "bad.sesame", "--format", "github"],
+        &["fmt", "bad.sesame"],
+        &["generate", "s.sesame"],
+        &["import", "tag.model", "-o", "out"],
+        &["import", "value.model", "-o", "out"],
+    ];
+    for arguments in commands {
+        let (done, text) = said(folder.path(), arguments);
+        assert!(!done && text.len() < 50_000, "{arguments:?}: {} bytes", text.len());
+    }
+}

@@ -93,8 +93,9 @@ fn one_line(text: &str) -> String {
 /// The most characters of one sentence.
 const LONGEST: usize = 1000;
 
-/// A sentence of a length that can be read, whatever it quotes: its beginning and its end.
-fn shortened(text: String) -> String {
+/// A sentence of a length that can be read, whatever it quotes: one of more than a thousand characters is its beginning
+/// and its end.
+pub fn shortened(text: String) -> String {
     if text.len() <= LONGEST {
         return text;
     }
