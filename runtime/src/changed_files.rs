@@ -5,13 +5,17 @@
 //! the worker, by the worker that takes its place or by the supervisor when it ends; and after the death of all, by the
 //! next runner of the space, which does that before anything else.
 //!
+//! The folder of originals may have come with the space from somebody else. So nothing in it is believed that leads out
+//! of the space's folder: no link in it or on the way to a file that is put back is followed, nothing that lay there
+//! before is written to, and a path that leads elsewhere is an error, before anything is put back.
+//!
 //! Two locks keep runners apart. A supervisor whose campaign may change files holds the first from its start to its end;
 //! every other runner of the space refuses to run tests meanwhile, since its simulator would see changed files. A worker
 //! holds the second for its life: a runner that starts after a supervisor died waits for that supervisor's last worker.
 //! While files may change, tests run one at a time, as every simulator of the space would see them.
 
 use std::fs::{self, File, TryLockError};
-use std::io;
+use std::io::{self, Read as _, Write as _};
 use std::path::{Component, Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -33,6 +37,39 @@ pub enum FileError {
         path: PathBuf,
         /// The space's folder.
         folder: PathBuf,
+    },
+    /// The folder of originals names a file to be put back that is elsewhere.
+    #[error(
+        "{} says that `{}` was changed, which is no file below {} or is reached by a link, so nothing was put back: if a \
+         runner of yours wrote that, put the file back from beside it; then delete {}",
+        entry.display(), path.display(), folder.display(), entry.display()
+    )]
+    EntryOutside {
+        /// The entry in the folder of originals.
+        entry: PathBuf,
+        /// What it names.
+        path: PathBuf,
+        /// The space's folder.
+        folder: PathBuf,
+    },
+    /// The copy of what a changed file held is not there.
+    #[error(
+        "{} is missing, of which {} says that it holds what `{}` was: put that file right by hand, then delete {}",
+        copy.display(), entry.display(), path.display(), entry.display()
+    )]
+    NoOriginal {
+        /// The copy.
+        copy: PathBuf,
+        /// The entry in the folder of originals.
+        entry: PathBuf,
+        /// The file that was changed.
+        path: PathBuf,
+    },
+    /// Something else in the place of the folder of originals, or of a file in it.
+    #[error("{} is a link or something else that no runner made: look what it is, and remove it", path.display())]
+    NotOurs {
+        /// What.
+        path: PathBuf,
     },
     /// It holds no text.
     #[error("{} does not hold UTF-8 text, so it cannot be edited as text: replace it whole", path.display())]
@@ -105,7 +142,7 @@ impl ChangedFiles {
     /// is put back. If the campaign `may_change` files, other runners of the space are kept out as long as this lives.
     pub fn for_supervisor(folder: &Path, may_change: bool) -> Result<(Self, Vec<PathBuf>), FileError> {
         let mut files = ChangedFiles::unlocked(folder);
-        if !may_change && !files.originals().exists() {
+        if !may_change && !files.has_originals()? {
             return Ok((files, Vec::new()));
         }
         let lock = files.lock_file("supervisor.lock")?;
@@ -130,19 +167,47 @@ impl ChangedFiles {
         self.folder.join(FOLDER)
     }
 
+    /// Whether there is a folder of originals; what is no folder of its own in that place is refused.
+    fn has_originals(&self) -> Result<bool, FileError> {
+        let path = self.originals();
+        match fs::symlink_metadata(&path) {
+            Ok(metadata) if metadata.is_dir() => Ok(true),
+            Ok(_) => Err(FileError::NotOurs { path }),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+            Err(error) => Err(FileError::io("look at", &path)(error)),
+        }
+    }
+
+    /// The folder of originals, made if it is not there.
+    fn made_originals(&self) -> Result<PathBuf, FileError> {
+        let folder = self.originals();
+        if !self.has_originals()? {
+            fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+        }
+        Ok(folder)
+    }
+
     /// Opens a lock file; the folder it lies in tells version control to look away.
     fn lock_file(&self, name: &str) -> Result<File, FileError> {
-        let folder = self.originals();
-        fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+        let folder = self.made_originals()?;
         let ignore = folder.join(".gitignore");
-        fs::write(&ignore, "*\n").map_err(FileError::io("write", &ignore))?;
+        match File::create_new(&ignore) {
+            Ok(mut file) => file.write_all(b"*\n").map_err(FileError::io("write", &ignore))?,
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(FileError::io("write", &ignore)(error)),
+        }
         let path = folder.join(name);
-        File::options()
-            .create(true)
-            .write(true)
-            .truncate(false)
-            .open(&path)
-            .map_err(FileError::io("open the lock file", &path))
+        let failed = || FileError::io("open the lock file", &path);
+        if own_file(&path)? {
+            return File::options().write(true).open(&path).map_err(failed());
+        }
+        match File::create_new(&path) {
+            // Another runner made it meanwhile.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && own_file(&path)? => {
+                File::options().write(true).open(&path).map_err(failed())
+            }
+            made => made.map_err(failed()),
+        }
     }
 
     fn wait_for_worker(&self) -> Result<File, FileError> {
@@ -165,7 +230,8 @@ impl ChangedFiles {
             let parent = whole.parent().unwrap_or(&self.folder);
             parent.canonicalize().map_err(FileError::io("find", parent))?.join(name)
         };
-        if !real.starts_with(&self.folder) || real.starts_with(self.originals()) || real.is_dir() {
+        let file = real.is_file() || !real.exists();
+        if !real.starts_with(&self.folder) || real.starts_with(self.originals()) || !file {
             return Err(outside());
         }
         Ok(real)
@@ -196,19 +262,20 @@ impl ChangedFiles {
         if entries.iter().any(|(_, entry)| entry.path == path) {
             return Ok(());
         }
-        let folder = self.originals();
-        fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+        let folder = self.made_originals()?;
         let number = entries.last().map_or(1, |(number, _)| number + 1);
         let existed = real.exists();
         if existed {
             let copy = folder.join(format!("{number}.original"));
+            discard(&copy)?;
             fs::copy(real, &copy).map_err(FileError::io("keep the original of", real))?;
             sync(&copy)?;
         }
         // The entry appears whole, after what it speaks of.
         let fresh = folder.join(format!("{number}.fresh"));
+        discard(&fresh)?;
         let text = serde_json::to_vec(&Entry { path, existed }).map_err(io::Error::from);
-        text.and_then(|text| fs::write(&fresh, text)).map_err(FileError::io("write", &fresh))?;
+        text.and_then(|text| File::create_new(&fresh)?.write_all(&text)).map_err(FileError::io("write", &fresh))?;
         sync(&fresh)?;
         let entry = folder.join(format!("{number}.json"));
         fs::rename(&fresh, &entry).map_err(FileError::io("write", &entry))?;
@@ -218,18 +285,21 @@ impl ChangedFiles {
     /// The changes to be undone, by number, rising.
     fn entries(&self) -> Result<Vec<(u64, Entry)>, FileError> {
         let folder = self.originals();
-        let listed = match fs::read_dir(&folder) {
-            Ok(listed) => listed,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-            Err(error) => return Err(FileError::io("list", &folder)(error)),
-        };
+        if !self.has_originals()? {
+            return Ok(Vec::new());
+        }
+        let listed = fs::read_dir(&folder).map_err(FileError::io("list", &folder))?;
         let mut entries = Vec::new();
         for file in listed {
             let name = file.map_err(FileError::io("list", &folder))?.file_name();
             let number = name.to_str().and_then(|name| name.strip_suffix(".json")).and_then(|n| n.parse().ok());
             let Some(number) = number else { continue };
             let path = folder.join(&name);
-            let text = fs::read(&path).map_err(FileError::io("read", &path))?;
+            own_file(&path)?;
+            let mut text = Vec::new();
+            File::open(&path)
+                .and_then(|file| file.take(LONGEST_ENTRY).read_to_end(&mut text))
+                .map_err(FileError::io("read", &path))?;
             let entry =
                 serde_json::from_slice(&text).map_err(|error| FileError::io("understand", &path)(error.into()))?;
             entries.push((number, entry));
@@ -238,16 +308,49 @@ impl ChangedFiles {
         Ok(entries)
     }
 
+    /// A file that may be put back, as a path of the system: it is below the space's folder, or is not there, and no link
+    /// is on the way. `None` for all else.
+    fn own_place(&self, path: &Path) -> Option<PathBuf> {
+        if path.starts_with(FOLDER) || path.as_os_str().is_empty() {
+            return None;
+        }
+        let mut here = self.folder.clone();
+        let mut parts = path.components().peekable();
+        while let Some(part) = parts.next() {
+            let Component::Normal(name) = part else { return None };
+            here.push(name);
+            match fs::symlink_metadata(&here) {
+                Ok(metadata) if parts.peek().is_some() && metadata.is_dir() => {}
+                Ok(metadata) if parts.peek().is_none() && metadata.is_file() => {}
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                _ => return None,
+            }
+        }
+        Some(here)
+    }
+
     /// Puts everything back that was changed, and says what, relative to the folder. Stopped at any point, it can be
     /// done again.
+    ///
+    /// All entries are looked at before the first is put back, so that one that leads elsewhere stops all.
     pub fn put_back(&mut self) -> Result<Vec<PathBuf>, FileError> {
         let folder = self.originals();
-        let mut done = Vec::new();
+        let mut changes = Vec::new();
         for (number, Entry { path, existed }) in self.entries()? {
-            let real = self.folder.join(&path);
+            let entry = folder.join(format!("{number}.json"));
             let copy = folder.join(format!("{number}.original"));
-            if existed {
-                fs::copy(&copy, &real).map_err(FileError::io("put back", &real))?;
+            let Some(real) = self.own_place(&path) else {
+                return Err(FileError::EntryOutside { entry, path, folder: self.folder.clone() });
+            };
+            if existed && !own_file(&copy)? {
+                return Err(FileError::NoOriginal { copy, entry, path });
+            }
+            changes.push((path, real, entry, existed.then_some(copy)));
+        }
+        let mut done = Vec::new();
+        for (path, real, entry, copy) in changes {
+            if let Some(copy) = &copy {
+                fs::copy(copy, &real).map_err(FileError::io("put back", &real))?;
                 sync(&real)?;
             } else if let Err(error) = fs::remove_file(&real)
                 && error.kind() != io::ErrorKind::NotFound
@@ -255,16 +358,33 @@ impl ChangedFiles {
                 return Err(FileError::io("remove", &real)(error));
             }
             // Without its entry nobody asks for the copy.
-            let entry = folder.join(format!("{number}.json"));
             fs::remove_file(&entry).map_err(FileError::io("remove", &entry))?;
             sync_folder(&folder)?;
-            if existed {
-                fs::remove_file(&copy).map_err(FileError::io("remove", &copy))?;
+            if let Some(copy) = &copy {
+                fs::remove_file(copy).map_err(FileError::io("remove", copy))?;
             }
             done.push(path);
         }
         Ok(done)
     }
+}
+
+/// The most that is read of an entry: a path and a word.
+const LONGEST_ENTRY: u64 = 1 << 16;
+
+/// Whether a regular file is in a place of the folder of originals; anything but a file there is refused.
+fn own_file(path: &Path) -> Result<bool, FileError> {
+    match fs::symlink_metadata(path) {
+        Ok(metadata) if metadata.is_file() => Ok(true),
+        Ok(_) => Err(FileError::NotOurs { path: path.to_owned() }),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(FileError::io("look at", path)(error)),
+    }
+}
+
+/// Makes room for a file: removes what a runner that was killed left there.
+fn discard(path: &Path) -> Result<(), FileError> {
+    if own_file(path)? { fs::remove_file(path).map_err(FileError::io("remove", path)) } else { Ok(()) }
 }
 
 /// Waits until a file is on disk.
@@ -345,5 +465,176 @@ mod tests {
             assert!(matches!(refused, FileError::Outside { .. }), "{path}: {refused}");
         }
         assert_eq!(fs::read_to_string(&secret).unwrap(), "mine");
+    }
+
+    /// What a hostile space has in its folder of originals, or beside it.
+    #[cfg(unix)]
+    #[derive(Debug, Clone)]
+    enum Trap {
+        /// A link at a place.
+        Link { at: &'static str, to: &'static str },
+        /// A file at a place.
+        File { at: &'static str },
+        /// An entry with a path to be put back.
+        Entry { number: u8, path: &'static str, existed: bool, original: bool },
+    }
+
+    #[cfg(unix)]
+    fn trap() -> impl proptest::strategy::Strategy<Value = Trap> {
+        const PLACES: &[&str] = &[
+            ".sesame-originals",
+            ".sesame-originals/.gitignore",
+            ".sesame-originals/1.json",
+            ".sesame-originals/1.original",
+            ".sesame-originals/2.json",
+            ".sesame-originals/2.original",
+            ".sesame-originals/2.fresh",
+            ".sesame-originals/3.fresh",
+            ".sesame-originals/3.original",
+            ".sesame-originals/supervisor.lock",
+            ".sesame-originals/worker.lock",
+            "config",
+            "config/a.yaml",
+            "config/b.yaml",
+            "deep/er",
+        ];
+        const TARGETS: &[&str] =
+            &["../outside", "../outside/victim", "../outside/folder", "../outside/new", "config", "ABSOLUTE", ".."];
+        const PATHS: &[&str] = &[
+            "config/a.yaml",
+            "config/new.yaml",
+            "config",
+            "deep/er/victim",
+            "../outside/victim",
+            "ABSOLUTE",
+            "config/../../outside/victim",
+            ".sesame-originals/1.original",
+            "",
+            "/",
+        ];
+        use proptest::prelude::*;
+        prop_oneof![
+            3 => (prop::sample::select(PLACES), prop::sample::select(TARGETS))
+                .prop_map(|(at, to)| Trap::Link { at, to }),
+            1 => prop::sample::select(PLACES).prop_map(|at| Trap::File { at }),
+            4 => (1..3u8, prop::sample::select(PATHS), any::<bool>(), any::<bool>())
+                .prop_map(|(number, path, existed, original)| Trap::Entry { number, path, existed, original }),
+        ]
+    }
+
+    /// Every name below a folder, with what it holds or leads to.
+    #[cfg(unix)]
+    fn snapshot(folder: &Path) -> std::collections::BTreeMap<PathBuf, Vec<u8>> {
+        use std::os::unix::fs::PermissionsExt as _;
+        let mut all = std::collections::BTreeMap::new();
+        let mut folders = vec![folder.to_owned()];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(&folder).unwrap() {
+                let path = entry.unwrap().path();
+                let metadata = fs::symlink_metadata(&path).unwrap();
+                let mut what = format!("{:o} ", metadata.permissions().mode()).into_bytes();
+                if metadata.is_symlink() {
+                    what.extend(fs::read_link(&path).unwrap().as_os_str().as_encoded_bytes());
+                } else if metadata.is_file() {
+                    what.extend(fs::read(&path).unwrap());
+                } else {
+                    folders.push(path.clone());
+                }
+                all.insert(path, what);
+            }
+        }
+        all
+    }
+
+    #[cfg(unix)]
+    proptest::proptest! {
+        #![proptest_config(proptest::prelude::ProptestConfig { cases: 100, failure_persistence: None, ..Default::default() })]
+
+        #[test]
+        fn whatever_lies_in_a_space_nothing_outside_is_touched_by_putting_back(
+            traps in proptest::collection::vec(trap(), 1..8),
+            may_change: bool,
+        ) {
+            let all = tempfile::tempdir().unwrap();
+            let (space, outside) = (all.path().join("space"), all.path().join("outside"));
+            for folder in [space.join("config"), space.join(FOLDER), space.join("deep"), outside.join("folder")] {
+                fs::create_dir_all(folder).unwrap();
+            }
+            fs::write(space.join("config/a.yaml"), "gain: 1\n").unwrap();
+            fs::write(outside.join("victim"), "mine").unwrap();
+            fs::write(outside.join("folder/a.yaml"), "mine").unwrap();
+            let absolute = outside.join("victim");
+            let absolute = absolute.to_str().unwrap();
+            for trap in traps {
+                match trap {
+                    Trap::Link { at, to } => {
+                        let (at, to) = (space.join(at), to.replace("ABSOLUTE", absolute));
+                        // Only what the trap itself made may be in its way.
+                        if fs::symlink_metadata(&at).is_ok_and(|it| it.is_dir()) && at.starts_with(&space) {
+                            fs::remove_dir_all(&at).unwrap();
+                        }
+                        drop(std::os::unix::fs::symlink(to, at));
+                    }
+                    Trap::File { at } => {
+                        if snapshot(&space).contains_key(space.join(at).parent().unwrap()) {
+                            drop(File::create_new(space.join(at)));
+                        }
+                    }
+                    Trap::Entry { number, path, existed, original } => {
+                        let folder = space.join(FOLDER);
+                        if fs::symlink_metadata(&folder).is_ok_and(|it| it.is_dir()) {
+                            let entry = Entry { path: path.replace("ABSOLUTE", absolute).into(), existed };
+                            let entry = serde_json::to_vec(&entry).unwrap();
+                            let made = File::create_new(folder.join(format!("{number}.json")));
+                            drop(made.and_then(|mut file| file.write_all(&entry)));
+                            if original {
+                                let made = File::create_new(folder.join(format!("{number}.original")));
+                                drop(made.and_then(|mut file| file.write_all(b"yours")));
+                            }
+                        }
+                    }
+                }
+            }
+            let before = snapshot(&outside);
+            let done = ChangedFiles::for_supervisor(&space, may_change);
+            let done = done.map(|(files, _)| drop(files));
+            let worked = ChangedFiles::for_worker(&space).and_then(|mut files| {
+                for path in ["config/a.yaml", "config/new.yaml", "deep/er/victim"] {
+                    drop(files.replace(Path::new(path), b"yours"));
+                }
+                files.put_back()
+            });
+            proptest::prop_assert_eq!(snapshot(&outside), before, "{:?} {:?}", done, worked);
+            for error in done.err().into_iter().chain(worked.err()) {
+                proptest::prop_assert!(error.to_string().contains(space.to_str().unwrap()), "{}", error);
+            }
+        }
+    }
+
+    #[test]
+    fn an_entry_that_names_what_is_elsewhere_stops_all_and_is_named() {
+        let (folder, mut files) = space();
+        files.replace(Path::new("config/a.yaml"), b"gain: 2\n").unwrap();
+        let entry = folder.path().join(FOLDER).join("2.json");
+        for path in ["../x", "/etc/passwd", "config/../../x", "config", "", ".sesame-originals/1.original"] {
+            fs::write(&entry, serde_json::to_vec(&Entry { path: path.into(), existed: false }).unwrap()).unwrap();
+            let refused = files.put_back().unwrap_err();
+            assert!(matches!(refused, FileError::EntryOutside { .. }), "{path}: {refused}");
+            assert!(refused.to_string().contains("2.json"), "{refused}");
+            assert_eq!(fs::read_to_string(folder.path().join("config/a.yaml")).unwrap(), "gain: 2\n", "nothing is");
+        }
+        fs::remove_file(&entry).unwrap();
+        assert_eq!(files.put_back().unwrap(), [Path::new("config/a.yaml")]);
+    }
+
+    #[test]
+    fn an_original_that_is_missing_is_named() {
+        let (folder, mut files) = space();
+        files.replace(Path::new("config/a.yaml"), b"gain: 2\n").unwrap();
+        fs::remove_file(folder.path().join(FOLDER).join("1.original")).unwrap();
+        let refused = files.put_back().unwrap_err().to_string();
+        for part in ["1.original is missing", "1.json", "config/a.yaml"] {
+            assert!(refused.contains(part), "{refused}");
+        }
     }
 }

@@ -16,6 +16,7 @@ use sesame_plan::Transport;
 use toml::{Table, Value};
 
 use crate::emit::{Environment, HooksFolder, Problem, Templates, simulator_path};
+use crate::input::{self, Unreadable};
 use crate::plan::RunnerPlan;
 
 /// The name of the file beside a `.sesame` file that says what its runners need.
@@ -34,8 +35,8 @@ pub enum Error {
     Read {
         /// Which.
         path: PathBuf,
-        /// What the system says.
-        cause: io::Error,
+        /// Why.
+        cause: Unreadable,
     },
     /// A file is not what it should be.
     #[error("{}: {problem}", path.display())]
@@ -303,7 +304,7 @@ pub fn runtime_for(folder: &Path, runtime: Option<&RuntimeChoice>) -> Result<Val
 pub fn templates(folder: &Path) -> Result<Templates, Vec<Error>> {
     let read = |path: &String| {
         let path = folder.join(path);
-        fs::read_to_string(&path).map_err(|cause| Error::Read { path, cause })
+        input::text(&path).map_err(|cause| Error::Read { path, cause })
     };
     let mut errors = Vec::new();
     let mut replaced = BTreeMap::new();
@@ -328,7 +329,7 @@ fn shared_hooks(folder: Option<&PathBuf>) -> Result<BTreeMap<String, String>, Er
         .into_iter()
         .filter(|path| Path::new(path).extension().is_some_and(|extension| extension == "rs"));
     files
-        .map(|path| match fs::read_to_string(folder.join(&path)) {
+        .map(|path| match input::text(&folder.join(&path)) {
             Ok(text) => Ok((path, text)),
             Err(cause) => Err(Error::Read { path: folder.join(path), cause }),
         })
@@ -342,7 +343,7 @@ fn files_below(folder: &Path) -> Result<Vec<String>, Error> {
     let mut folders = vec![String::new()];
     while let Some(inside) = folders.pop() {
         let here = folder.join(&inside);
-        let failed = |cause| Error::Read { path: here.clone(), cause };
+        let failed = |cause: io::Error| Error::Read { path: here.clone(), cause: cause.into() };
         for entry in fs::read_dir(&here).map_err(failed)? {
             let entry = entry.map_err(failed)?;
             let name = entry.file_name();
@@ -364,12 +365,12 @@ fn files_below(folder: &Path) -> Result<Vec<String>, Error> {
 }
 
 fn settings(path: &Path) -> Result<Settings, Error> {
-    match fs::read_to_string(path) {
+    match input::text(path) {
         Ok(text) => toml::from_str(&text).map_err(|error| Error::Settings {
             path: path.to_owned(),
             problem: error.to_string().trim_end().to_owned(),
         }),
-        Err(cause) if cause.kind() == io::ErrorKind::NotFound => Ok(Settings::default()),
+        Err(Unreadable::Missing) => Ok(Settings::default()),
         Err(cause) => Err(Error::Read { path: path.to_owned(), cause }),
     }
 }
@@ -457,7 +458,7 @@ fn simulator_dependency(
 
 fn package_name(manifest: &Path) -> Result<String, Error> {
     let failed = |problem: String| Error::Settings { path: manifest.to_owned(), problem };
-    let text = fs::read_to_string(manifest).map_err(|cause| Error::Read { path: manifest.to_owned(), cause })?;
+    let text = input::text(manifest).map_err(|cause| Error::Read { path: manifest.to_owned(), cause })?;
     let table: Table = toml::from_str(&text).map_err(|error| failed(error.to_string()))?;
     let name = table.get("package").and_then(|package| package.get("name")).and_then(Value::as_str);
     name.map(str::to_owned).ok_or_else(|| failed("it names no package".to_owned()))
@@ -480,20 +481,22 @@ fn first_lock(out: &Path) -> Option<String> {
     let mut locks: Vec<PathBuf> =
         fs::read_dir(out).ok()?.filter_map(Result::ok).map(|entry| entry.path().join("Cargo.lock")).collect();
     locks.sort();
-    locks.iter().find_map(|lock| fs::read_to_string(lock).ok())
+    locks.iter().find_map(|lock| input::text(lock).ok())
 }
 
 /// The lock file of the workspace that the runtime is of: its versions are those that were tested together, and cargo
 /// leaves out what a runner does not use.
 fn workspace_lock(runtime: &Path) -> Option<String> {
-    runtime.ancestors().take(3).find_map(|folder| fs::read_to_string(folder.join("Cargo.lock")).ok())
+    runtime.ancestors().take(3).find_map(|folder| input::text(&folder.join("Cargo.lock")).ok())
 }
 
 /// An absolute path without links and `..`; its last parts need not exist.
 fn settled(path: &Path) -> Result<PathBuf, Error> {
-    let absolute = std::path::absolute(path).map_err(|cause| Error::Read { path: path.to_owned(), cause })?;
+    let absolute =
+        std::path::absolute(path).map_err(|cause| Error::Read { path: path.to_owned(), cause: cause.into() })?;
     let existing = absolute.ancestors().find(|ancestor| ancestor.exists()).unwrap_or(Path::new("/"));
-    let mut settled = existing.canonicalize().map_err(|cause| Error::Read { path: existing.to_owned(), cause })?;
+    let mut settled =
+        existing.canonicalize().map_err(|cause| Error::Read { path: existing.to_owned(), cause: cause.into() })?;
     for part in absolute.strip_prefix(existing).unwrap_or(Path::new("")).components() {
         match part {
             Component::ParentDir => {

@@ -1,6 +1,5 @@
 //! The Sesame language, as the command uses it: text → diagnostics, and a plan for each campaign.
 
-use std::io;
 use std::path::Path;
 
 use sesame_dsl::diagnostic::{Diagnostic, Severity, page, render};
@@ -9,6 +8,7 @@ use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 
 use crate::cli::{Checked, Diagnosed, Language, Look};
+use crate::input::{self, Unreadable};
 use crate::lower::lower;
 
 /// The language of this version.
@@ -38,20 +38,10 @@ fn check(file: &str, text: &str, look: Look) -> Checked {
 
 /// An imported file, or why there is none.
 fn read(name: &str) -> Result<String, String> {
-    let path = Path::new(name);
-    let metadata = std::fs::metadata(path).map_err(|error| in_words(&error))?;
-    if !metadata.is_file() {
-        return Err("it is not a file".to_owned());
-    }
-    std::fs::read_to_string(path).map_err(|error| in_words(&error))
-}
-
-fn in_words(error: &io::Error) -> String {
-    match error.kind() {
-        io::ErrorKind::NotFound => "there is no such file".to_owned(),
-        io::ErrorKind::InvalidData => "it is not text in UTF-8".to_owned(),
-        _ => format!("it cannot be read: {error}"),
-    }
+    input::text(Path::new(name)).map_err(|unreadable| match unreadable {
+        Unreadable::System(error) => format!("it cannot be read: {error}"),
+        other => other.to_string(),
+    })
 }
 
 /// What a space says and no runner uses yet, with its places.
@@ -160,8 +150,10 @@ mod tests {
         assert_eq!((runner.hooks[0].source.as_str(), runner.hooks[0].line), ("../cell.sesame", 4));
         assert_eq!(runner.system_folder(), Path::new(".."), "the simulator's crate is beside the file that names it");
         assert_eq!(runner.plan.source, "demo.sesame");
-        let missing = check(file.to_str().unwrap(), "space demo import \"..\" import \"gone.sesame\"", PLAIN);
-        assert!(missing.diagnostics.contains("it is not a file"), "{}", missing.diagnostics);
+        std::fs::create_dir(spaces.join("folder.sesame")).unwrap();
+        let missing =
+            check(file.to_str().unwrap(), "space demo import \"folder.sesame\" import \"gone.sesame\"", PLAIN);
+        assert!(missing.diagnostics.contains("it is a folder, not a regular file"), "{}", missing.diagnostics);
         assert!(missing.diagnostics.contains("there is no such file"), "{}", missing.diagnostics);
     }
 

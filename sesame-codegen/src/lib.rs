@@ -14,6 +14,7 @@ pub mod explain;
 pub mod files;
 #[cfg(feature = "cli")]
 pub mod import;
+pub mod input;
 #[cfg(feature = "cli")]
 pub mod language;
 pub mod lower;

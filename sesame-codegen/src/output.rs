@@ -3,8 +3,11 @@
 //! Nothing is written before everything has been looked at: if one machine file was edited by hand, nothing changes.
 //! Files that would come out the same are not touched, others are written beside their place and renamed into it, and
 //! a tree's manifest comes last. A user's file is never written twice and never deleted.
+//!
+//! Nothing outside the output folder is read, written or removed, whatever lies in it: no link in it is followed.
 
 mod manifest;
+mod place;
 
 use std::fs;
 use std::io;
@@ -13,7 +16,9 @@ use std::path::{Component, Path, PathBuf};
 use similar::TextDiff;
 
 use self::manifest::{Entry, Manifest};
+use self::place::{Found, Place};
 use crate::files::{Owner, Tree};
+use crate::input::Unreadable;
 
 /// What to do about the difference between generated files and those on disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -183,6 +188,32 @@ pub enum Error {
         /// What is wrong with it.
         problem: String,
     },
+    /// A link where generated files have a folder, or where their manifest is.
+    #[error(
+        "{} is a link, and what is generated stays in its folder: remove the link, or generate into the folder that it \
+         leads to with `-o`",
+        path.display()
+    )]
+    Link {
+        /// The link.
+        path: PathBuf,
+    },
+    /// Something else where a generated file or folder belongs.
+    #[error("{} is in the way: {what} belongs there; move it elsewhere", path.display())]
+    InTheWay {
+        /// What is there.
+        path: PathBuf,
+        /// What belongs there, with its article.
+        what: &'static str,
+    },
+    /// A file there that cannot be read.
+    #[error("cannot read {}: {cause}", path.display())]
+    Unreadable {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        cause: Unreadable,
+    },
     /// The file system refused.
     #[error("cannot {action} {}: {cause}", path.display())]
     Io {
@@ -219,7 +250,7 @@ pub fn apply(out: &Path, trees: &[Tree], mode: Mode) -> Result<Report, Error> {
     }
     report.orphans.sort();
     if matches!(mode, Mode::Write | Mode::Force) {
-        steps.iter().try_for_each(Step::take)?;
+        steps.iter().try_for_each(|step| step.take(out))?;
     }
     Ok(report)
 }
@@ -236,10 +267,23 @@ pub fn create(folder: &Path, files: &std::collections::BTreeMap<String, String>)
         Err(cause) if cause.kind() == io::ErrorKind::NotFound => {}
         Err(cause) => return Err(failed(cause)),
     }
-    files.iter().try_for_each(|(path, contents)| {
-        assert!(is_inside(path), "a project's path stays in its folder: {path}");
-        write(&folder.join(path), contents.as_bytes())
-    })
+    files.iter().try_for_each(|(path, contents)| Place { root: folder, below: path }.write(contents.as_bytes()))
+}
+
+/// The folder for results in a project.
+pub const RESULTS: &str = "results";
+
+/// Takes back what [`create`] wrote into a folder that was empty or, if it was not there before, that came with it: a file
+/// and the results beside it.
+pub fn withdraw(folder: &Path, file: &str, was_there: bool) -> Result<(), Error> {
+    let gone = |path: PathBuf, done: io::Result<()>| match done {
+        Err(cause) if cause.kind() != io::ErrorKind::NotFound => Err(Error::Io { action: "remove", path, cause }),
+        _ => Ok(()),
+    };
+    Place { root: folder, below: file }.remove()?;
+    let results = folder.join(RESULTS);
+    gone(results.clone(), fs::remove_dir_all(&results))?;
+    if was_there { Ok(()) } else { gone(folder.to_owned(), fs::remove_dir(folder)) }
 }
 
 /// Gives a file that is there another text. Who may read and write it stays as it is, and a link stays a link.
@@ -247,51 +291,21 @@ pub fn replace(path: &Path, contents: &str) -> Result<(), Error> {
     let failed = |cause| Error::Io { action: "write", path: path.to_owned(), cause };
     let file = path.canonicalize().map_err(failed)?;
     let permissions = fs::metadata(&file).map_err(failed)?.permissions();
-    write(&file, contents.as_bytes())?;
-    fs::set_permissions(&file, permissions).map_err(failed)
+    place::put(&file, contents.as_bytes(), Some(permissions))
 }
 
-/// Something to be done on disk.
+/// Something to be done in the output folder.
 enum Step {
-    Write { path: PathBuf, contents: Vec<u8> },
-    Remove { path: PathBuf },
+    Write { path: String, contents: Vec<u8> },
+    Remove { path: String },
 }
 
 impl Step {
-    fn take(&self) -> Result<(), Error> {
+    fn take(&self, out: &Path) -> Result<(), Error> {
         match self {
-            Step::Write { path, contents } => write(path, contents),
-            Step::Remove { path } => match fs::remove_file(path) {
-                Err(cause) if cause.kind() != io::ErrorKind::NotFound => {
-                    Err(Error::Io { action: "remove", path: path.clone(), cause })
-                }
-                _ => Ok(()),
-            },
+            Step::Write { path, contents } => Place { root: out, below: path }.write(contents),
+            Step::Remove { path } => Place { root: out, below: path }.remove(),
         }
-    }
-}
-
-/// Writes beside the file's place and renames, so that a reader sees the old file or the new one, never half of it.
-fn write(path: &Path, contents: &[u8]) -> Result<(), Error> {
-    let failed = |action, path: &Path| {
-        let path = path.to_owned();
-        move |cause| Error::Io { action, path, cause }
-    };
-    let parent = path.parent().expect("a generated file is in a folder");
-    fs::create_dir_all(parent).map_err(failed("create the folder", parent))?;
-    let mut name = path.file_name().expect("a generated file has a name").to_owned();
-    name.push(".sesame-new");
-    let temporary = path.with_file_name(name);
-    fs::write(&temporary, contents).map_err(failed("write", &temporary))?;
-    fs::rename(&temporary, path).map_err(failed("write", path))
-}
-
-/// What a file holds; `None` when there is no file.
-fn read(path: &Path) -> Result<Option<Vec<u8>>, Error> {
-    match fs::read(path) {
-        Ok(bytes) => Ok(Some(bytes)),
-        Err(cause) if cause.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(cause) => Err(Error::Io { action: "read", path: path.to_owned(), cause }),
     }
 }
 
@@ -307,8 +321,10 @@ fn survey(
     let root = if tree.folder.is_empty() { out.to_owned() } else { out.join(&tree.folder) };
     let shown = |path: &str| if tree.folder.is_empty() { path.to_owned() } else { format!("{}/{path}", tree.folder) };
     let manifest_path = root.join(manifest::PATH);
+    let manifest_shown = shown(manifest::PATH);
     // What is not UTF-8 was not generated, and is no JSON either.
-    let old_text = read(&manifest_path)?.map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    let at_manifest = Place { root: out, below: &manifest_shown };
+    let old_text = at_manifest.read()?.map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     let old = old_text
         .as_deref()
         .map(Manifest::parse)
@@ -330,32 +346,46 @@ fn survey(
     let mut new = Manifest::of(tree);
 
     for (path, file) in &tree.files {
-        assert!(is_inside(path), "a generated path stays in its folder: {path}");
-        let on_disk = root.join(path);
+        let shown = shown(path);
+        let at = Place { root: out, below: &shown };
+        let found = at.look()?;
         let mut changed = None;
-        let change = match (file.owner, read(&on_disk)?) {
-            (_, None) => Change::Created,
-            (Owner::User | Owner::Seed, Some(_)) => Change::Kept,
-            (Owner::Machine, Some(found)) if found == file.contents => Change::Unchanged,
-            (Owner::Machine, Some(found)) => {
-                let generated = old.as_ref().and_then(|old| old.files.get(path)).and_then(|entry| entry.hash.as_ref());
-                if !mode.forces() && generated != Some(&crate::emit::hash(&found)) {
-                    let diff = diff(("generated", &file.contents), ("found", &found)).unwrap_or_default();
-                    edited.push(EditedFile { path: shown(path), diff });
+        let change = match (file.owner, found) {
+            (_, Found::Nothing) => Change::Created,
+            // What a user put there is the user's, a link too.
+            (Owner::User | Owner::Seed, Found::File | Found::Link) => Change::Kept,
+            (_, Found::Other) => return Err(Error::InTheWay { path: at.path(), what: "a file" }),
+            (Owner::Machine, Found::Link) => {
+                if !mode.forces() {
+                    let diff = "it is a link now, and generated files are none\n".to_owned();
+                    edited.push(EditedFile { path: shown.clone(), diff });
                 }
-                changed = diff(("there", &found), ("generated", &file.contents));
                 Change::Updated
             }
+            (Owner::Machine, Found::File) => match at.read()? {
+                None => Change::Created,
+                Some(found) if found == file.contents => Change::Unchanged,
+                Some(found) => {
+                    let generated = old.as_ref().and_then(|old| old.files.get(path));
+                    let generated = generated.and_then(|entry| entry.hash.as_ref());
+                    if !mode.forces() && generated != Some(&crate::emit::hash(&found)) {
+                        let diff = diff(("generated", &file.contents), ("found", &found)).unwrap_or_default();
+                        edited.push(EditedFile { path: shown.clone(), diff });
+                    }
+                    changed = diff(("there", &found), ("generated", &file.contents));
+                    Change::Updated
+                }
+            },
         };
         if matches!(change, Change::Created | Change::Updated) {
-            steps.push(Step::Write { path: on_disk, contents: file.contents.clone() });
+            steps.push(Step::Write { path: shown.clone(), contents: file.contents.clone() });
         }
-        report.files.push(FileReport { path: shown(path), owner: file.owner, change, diff: changed });
+        report.files.push(FileReport { path: shown, owner: file.owner, change, diff: changed });
     }
 
     if let Some(old) = &old {
-        compare_hooks(old, &new, &shown, &root, report);
-        leftovers(old, &mut new, &shown, &root, out, report, steps)?;
+        compare_hooks(old, &new, &shown, out, report)?;
+        leftovers(old, &mut new, &shown, out, report, steps)?;
     }
     let text = new.text();
     let change = match &old_text {
@@ -364,27 +394,36 @@ fn survey(
         Some(_) => Change::Updated,
     };
     if change != Change::Unchanged {
-        steps.push(Step::Write { path: manifest_path, contents: text.into_bytes() });
+        steps.push(Step::Write { path: manifest_shown.clone(), contents: text.into_bytes() });
     }
-    report.files.push(FileReport { path: shown(manifest::PATH), owner: Owner::Machine, change, diff: None });
+    report.files.push(FileReport { path: manifest_shown, owner: Owner::Machine, change, diff: None });
     Ok(())
 }
 
 /// Hooks on disk whose metric or operation is now given something else.
-fn compare_hooks(old: &Manifest, new: &Manifest, shown: &dyn Fn(&str) -> String, root: &Path, report: &mut Report) {
+fn compare_hooks(
+    old: &Manifest,
+    new: &Manifest,
+    shown: &dyn Fn(&str) -> String,
+    out: &Path,
+    report: &mut Report,
+) -> Result<(), Error> {
     for (path, hook) in &new.hooks {
         let Some(before) = old.hooks.get(path) else { continue };
-        if before.inputs == hook.inputs || !root.join(path).exists() {
+        let shown = shown(path);
+        let at = Place { root: out, below: &shown };
+        if before.inputs == hook.inputs || at.look()? == Found::Nothing {
             continue;
         }
         let missing = |from: &[String], of: &[String]| of.iter().filter(|line| !from.contains(line)).cloned().collect();
         report.changed_hooks.push(ChangedHook {
-            path: shown(path),
+            path: shown,
             of: hook.of.clone(),
             gone: missing(&hook.inputs, &before.inputs),
             new: missing(&before.inputs, &hook.inputs),
         });
     }
+    Ok(())
 }
 
 /// What an earlier generation left and this one has no use for. What the user may want to keep stays in the manifest,
@@ -393,7 +432,6 @@ fn leftovers(
     old: &Manifest,
     new: &mut Manifest,
     shown: &dyn Fn(&str) -> String,
-    root: &Path,
     out: &Path,
     report: &mut Report,
     steps: &mut Vec<Step>,
@@ -402,28 +440,33 @@ fn leftovers(
         if new.files.contains_key(path) || !is_inside(path) {
             continue;
         }
-        let on_disk = root.join(path);
-        let Some(text) = read(&on_disk)? else { continue };
+        let shown = shown(path);
+        let place = Place { root: out, below: &shown };
+        // A manifest may name anything. What is not a file in this folder was not generated, and does not matter here.
+        if !matches!(place.look(), Ok(Found::File)) {
+            continue;
+        }
         match (entry.owner, &entry.hash) {
-            (Owner::Machine, Some(hash)) if *hash == crate::emit::hash(&text) => {
-                steps.push(Step::Remove { path: on_disk });
+            (Owner::Machine, Some(hash)) if place.read()?.is_some_and(|found| *hash == crate::emit::hash(&found)) => {
+                steps.push(Step::Remove { path: shown.clone() });
                 let (owner, change) = (Owner::Machine, Change::Removed);
-                report.files.push(FileReport { path: shown(path), owner, change, diff: None });
+                report.files.push(FileReport { path: shown, owner, change, diff: None });
                 continue;
             }
             (Owner::User, _) => {
                 let hook = old.hooks.get(path);
                 let of = hook.map(|hook| hook.of.clone()).unwrap_or_default();
                 new.hooks.extend(hook.map(|hook| (path.clone(), hook.clone())));
-                report.orphans.push(Orphan::Hook { path: shown(path), of });
+                report.orphans.push(Orphan::Hook { path: shown, of });
             }
-            _ => report.orphans.push(Orphan::Edited { path: shown(path) }),
+            _ => report.orphans.push(Orphan::Edited { path: shown }),
         }
         new.files.insert(path.clone(), Entry { owner: entry.owner, hash: entry.hash.clone() });
     }
     for folder in &old.runners {
         let gone = !new.runners.contains(folder);
-        if gone && is_inside(folder) && out.join(folder).join(manifest::PATH).exists() {
+        let manifest = format!("{folder}/{}", manifest::PATH);
+        if gone && is_inside(folder) && matches!((Place { root: out, below: &manifest }).look(), Ok(Found::File)) {
             report.orphans.push(Orphan::Runner { folder: folder.clone() });
             new.runners.push(folder.clone());
         }

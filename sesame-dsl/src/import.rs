@@ -16,7 +16,8 @@ const MAX_DEPTH: usize = 64;
 
 /// Adds to `sources` what the file `root` imports, and what that imports in turn: each file once, by what `read` says to
 /// its name. A name is relative to the importing file's folder, with `.` and `..` worked out; an absolute one stays. Why
-/// a file cannot be read is kept, and said by [`crate::analyse`] at the import.
+/// a file cannot be read is kept, and said by [`crate::analyse`] at the import. A name that does not end in `.sesame` is
+/// never asked for: what is read is quoted in diagnostics, so nothing but spaces is.
 pub fn load_imports(sources: &mut SourceMap, root: FileId, mut read: impl FnMut(&str) -> Result<String, String>) {
     let mut waiting = vec![root];
     while let Some(id) = waiting.pop() {
@@ -28,6 +29,10 @@ pub fn load_imports(sources: &mut SourceMap, root: FileId, mut read: impl FnMut(
         let imports = syntax::parse(id, file.text(), &mut Vec::new()).imports;
         let names: Vec<String> = imports.iter().map(|import| imported_name(file.name(), &import.text)).collect();
         for name in names {
+            // Its text would be shown where it has mistakes, and it may be anything.
+            if !is_space(&name) {
+                continue;
+            }
             if sources.find(&name).is_some() || sources.unreadable(&name).is_some() {
                 continue;
             }
@@ -37,6 +42,11 @@ pub fn load_imports(sources: &mut SourceMap, root: FileId, mut read: impl FnMut(
             }
         }
     }
+}
+
+/// Whether a name is that of a `.sesame` file.
+fn is_space(name: &str) -> bool {
+    Path::new(name).extension().is_some_and(|extension| extension == "sesame")
 }
 
 /// The name of what a file imports: relative to what the importing file's name is relative to.
@@ -110,6 +120,14 @@ impl Merger<'_> {
     /// Reads an imported file unless it has been; false if that cannot be.
     fn import(&mut self, importing: FileId, importing_name: &str, import: &ast::Text) -> bool {
         let name = imported_name(self.sources.file(importing).name(), &import.text);
+        if !is_space(&name) {
+            let title = format!("cannot import \"{}\"", import.text);
+            let diagnostic = Diagnostic::new(Code::NOT_IMPORTED, import.span, title)
+                .label("the name of an imported file ends in `.sesame`")
+                .note("files of other names are not even looked at, so that no message can show what is in them");
+            self.diagnostics.push(diagnostic);
+            return false;
+        }
         let Some(id) = self.sources.find(&name) else {
             let title = format!("cannot import \"{}\"", import.text);
             let why = self.sources.unreadable(&name).unwrap_or("this file was not handed in");
@@ -178,6 +196,17 @@ mod tests {
         assert_eq!(imported_name("a/demo.sesame", "../../cell.sesame"), "../cell.sesame");
         assert_eq!(imported_name("../demo.sesame", "../cell.sesame"), "../../cell.sesame");
         assert_eq!(imported_name("a/demo.sesame", "/lib/../cell.sesame"), "/cell.sesame");
+    }
+
+    #[test]
+    fn what_is_not_called_a_space_is_not_read() {
+        let mut sources = SourceMap::new();
+        let root = sources.add("demo.sesame", "import \"/etc/passwd\" import \"a.sesame/..\" import \".sesame\"");
+        load_imports(&mut sources, root, |name| panic!("{name} was asked for"));
+        let mut diagnostics = Vec::new();
+        merge(&sources, root, &mut diagnostics);
+        assert_eq!(diagnostics.len(), 3, "{diagnostics:?}");
+        assert!(diagnostics.iter().all(|found| found.label.contains("ends in `.sesame`")), "{diagnostics:?}");
     }
 
     #[test]

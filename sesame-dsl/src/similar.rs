@@ -1,14 +1,21 @@
 //! "Did you mean": the nearest of some names.
 
+/// Bytes of the longest words that are compared.
+const LONGEST: usize = 200;
+
 /// The candidate that looks most like a word, if any is near enough to be meant; the first of equally near ones.
 ///
 /// Near enough is a third of the longer one's letters (at least one, at most three) by insertions, deletions,
 /// replacements and swaps, letters of different case counting as equal.
 pub(crate) fn most_similar<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
+    // Comparing takes as long as both lengths multiplied, and nobody misspells a name of this length.
+    if word.len() > LONGEST {
+        return None;
+    }
     let lower = word.to_lowercase();
     let mut best: Option<(usize, &str)> = None;
     for candidate in candidates {
-        if candidate == word {
+        if candidate == word || candidate.len() > LONGEST {
             continue;
         }
         let distance = strsim::osa_distance(&lower, &candidate.to_lowercase());
@@ -33,5 +40,12 @@ mod tests {
         assert_eq!(most_similar("speed", names), None);
         assert_eq!(most_similar("x", ["y", "ab"]), Some("y"));
         assert_eq!(most_similar("link0", ["link0"]), None);
+    }
+
+    #[test]
+    fn names_of_megabytes_are_not_compared() {
+        let long = "a".repeat(4 << 20);
+        assert_eq!(most_similar(&long, [&long[1..], "a"]), None);
+        assert_eq!(most_similar("a", [long.as_str(), "b"]), Some("b"));
     }
 }

@@ -1,6 +1,7 @@
 //! Source files in memory, and where their lines begin.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 use std::path::Path;
 
 use crate::import::normal;
@@ -10,6 +11,8 @@ use crate::span::{FileId, Span};
 #[derive(Debug, Clone, Default)]
 pub struct SourceMap {
     files: Vec<SourceFile>,
+    /// The first file of each name, `.` and `..` in it worked out.
+    by_name: HashMap<String, FileId>,
     /// Why files that are imported could not be read, by name.
     unreadable: BTreeMap<String, String>,
 }
@@ -41,7 +44,9 @@ impl SourceMap {
     /// Adds a file under the name that diagnostics show.
     pub fn add(&mut self, name: impl Into<String>, text: impl Into<String>) -> FileId {
         let id = FileId(u32::try_from(self.files.len()).expect("fewer than 2^32 files"));
-        self.files.push(SourceFile::new(name.into(), text.into()));
+        let name = name.into();
+        self.by_name.entry(normal(Path::new(&name))).or_insert(id);
+        self.files.push(SourceFile::new(name, text.into()));
         id
     }
 
@@ -57,8 +62,7 @@ impl SourceMap {
 
     /// The file of a name, `.` and `..` in it worked out.
     pub fn find(&self, name: &str) -> Option<FileId> {
-        let at = self.files.iter().position(|file| normal(Path::new(&file.name)) == normal(Path::new(name)))?;
-        Some(FileId(u32::try_from(at).expect("fewer than 2^32 files")))
+        self.by_name.get(&normal(Path::new(name))).copied()
     }
 
     /// The file of an id of this map.
@@ -97,6 +101,15 @@ impl SourceFile {
         &self.text
     }
 
+    /// The whole lines that hold some bytes, without the last line's end, and the number of the first, from 1.
+    pub(crate) fn lines_of(&self, lo: u32, hi: u32) -> (Range<usize>, u32) {
+        let first = self.line_starts.partition_point(|&start| start <= lo);
+        let after = self.line_starts.partition_point(|&start| start <= hi);
+        let start = self.line_starts[first - 1] as usize;
+        let end = self.line_starts.get(after).map_or(self.text.len(), |&next| next as usize - 1);
+        (start..end, u32::try_from(first).unwrap_or(u32::MAX))
+    }
+
     /// Line and column of a byte offset, which is at most the text's length.
     pub fn position(&self, offset: u32) -> LineColumn {
         let line = self.line_starts.partition_point(|&start| start <= offset);
@@ -125,5 +138,14 @@ mod tests {
         assert_eq!(at(5), (2, 2));
         assert_eq!(at(7), (3, 1));
         assert_eq!(at(8), (4, 1));
+        let lines = |lo, hi| {
+            let (range, first) = sources.file(file).lines_of(lo, hi);
+            (&sources.file(file).text()[range], first)
+        };
+        assert_eq!(lines(0, 1), ("ab", 1));
+        assert_eq!(lines(1, 2), ("ab", 1), "its line end is the line's");
+        assert_eq!(lines(1, 5), ("ab\nµx", 1));
+        assert_eq!(lines(7, 7), ("", 3));
+        assert_eq!(lines(8, 8), ("", 4));
     }
 }

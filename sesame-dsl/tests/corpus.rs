@@ -79,6 +79,56 @@ fn nothing_in_a_file_becomes_a_command_of_github() {
 }
 
 #[test]
+fn nothing_in_a_file_becomes_a_command_of_a_terminal() {
+    let obeyed = |c: char| {
+        (c.is_control() && c != '\n')
+            || matches!(c, '\u{61c}' | '\u{200e}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    let hostile = "\x1b]0;owned\x07\u{9b}31m\x08\u{7f}\u{202e}\u{2066}\r\u{200f}";
+    // In texts, and in the place of words.
+    for sign in ["\"", " "] {
+        for (name, text) in corpus("bad") {
+            let text = text.replace(sign, &format!("{sign}{hostile}"));
+            let (sources, analysis) = analyse_text(&format!("{name}\x1b[31m\u{202e}"), &text);
+            assert!(analysis.has_errors() || !analysis.diagnostics.is_empty(), "{name}");
+            for said in [
+                render::human(&analysis.diagnostics, &sources, false),
+                render::short(&analysis.diagnostics, &sources),
+                render::github(&analysis.diagnostics, &sources),
+                render::json(&analysis.diagnostics, &sources),
+            ] {
+                assert_eq!(said.chars().find(|&c| obeyed(c)), None, "{name}: {said:?}");
+            }
+            let json = render::json(&analysis.diagnostics, &sources);
+            for (line, found) in json.lines().zip(&analysis.diagnostics) {
+                let value: serde_json::Value = serde_json::from_str(line).unwrap();
+                assert_eq!(value["title"], found.title.as_str(), "JSON loses nothing");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_quotes_a_token_of_megabytes_is_short() {
+    let long = "a".repeat(2 << 20);
+    for text in [
+        format!("space {long}\x01"),
+        format!("space s {long}"),
+        format!("space s metric {long} = {long}x"),
+        format!("space s metric {long} = 5 5"),
+    ] {
+        let (sources, analysis) = analyse_text("long", &text);
+        assert!(analysis.has_errors());
+        let shown = render::human(&analysis.diagnostics, &sources, false);
+        assert!(shown.len() < 10_000 * analysis.diagnostics.len(), "{} bytes", shown.len());
+        for found in &analysis.diagnostics {
+            let quoted = [&found.title, &found.label].into_iter().chain(&found.notes);
+            assert!(quoted.map(String::len).sum::<usize>() < 10_000, "{}", found.code);
+        }
+    }
+}
+
+#[test]
 fn every_code_occurs_in_the_corpus_file_named_after_it() {
     let files = corpus("bad");
     for (code, page) in CODES {

@@ -157,6 +157,16 @@ fn names_and_units_need_not_be_right() {
 }
 
 #[test]
+fn a_byte_order_mark_is_a_blank_between_words_and_stays_in_texts_and_comments() {
+    let joined = "\u{FEFF}space a \u{FEFF} // b\u{FEFF}c\n\u{FEFF}import \"d\u{FEFF}.sesame\"\n";
+    assert_eq!(
+        formatted(joined).unwrap(),
+        "space a  // b\u{FEFF}c\nimport \"d\u{FEFF}.sesame\"\n",
+        "a byte order mark is a blank between words, and a sign in texts and comments"
+    );
+}
+
+#[test]
 fn an_empty_file_stays_empty() {
     assert_eq!(formatted("").unwrap(), "");
     assert_eq!(formatted("\u{FEFF} \r\n\n").unwrap(), "");

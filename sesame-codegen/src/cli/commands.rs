@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context as _, anyhow, bail};
+use sesame_dsl::diagnostic::visible;
 use sesame_plan::Transport;
 
 use super::shell::{self, Shell};
@@ -12,6 +13,7 @@ use super::{Checked, Deny, Format, Generation, Language, Purpose, build};
 use crate::emit::Templates;
 use crate::environment::{self, Options, RuntimeChoice, environment};
 use crate::files::{Owner, Tree};
+use crate::input;
 use crate::output::{self, Change, Mode, Orphan, Report};
 use crate::plan::RunnerPlan;
 use crate::{emit, names, project};
@@ -61,13 +63,25 @@ pub(super) fn check_only(
 
 /// Reads and checks a space, and says what is wrong with it.
 pub(super) fn check(shell: Shell, language: &Language, file: &Path, format: Format) -> anyhow::Result<Checked> {
-    let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
-    let checked = (language.check)(&file.display().to_string(), &text, shell.look(format));
+    let text = input::text(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let checked = check_text(shell, language, file, &text, format)?;
+    shell.did("Checked", format!("{}: {}", file.display(), checked.summary));
+    Ok(checked)
+}
+
+/// Checks the text of a space that is, or will be, in a file, and says what is wrong with it.
+pub(super) fn check_text(
+    shell: Shell,
+    language: &Language,
+    file: &Path,
+    text: &str,
+    format: Format,
+) -> anyhow::Result<Checked> {
+    let checked = (language.check)(&file.display().to_string(), text, shell.look(format));
     shell.diagnostics(&checked.diagnostics, format)?;
     if checked.errors > 0 {
         return Err(has_errors(file, checked.errors));
     }
-    shell.did("Checked", format!("{}: {}", file.display(), checked.summary));
     Ok(checked)
 }
 
@@ -102,7 +116,7 @@ pub(super) fn generate(
     };
     let (out, report) = write(shell, generation, options, &checked, &chosen, mode)?;
     if purpose == Purpose::DryRun {
-        shell::asked_for(&preview(&out, &report))?;
+        shell::asked_for(&visible(&preview(&out, &report)))?;
     }
     if purpose == Purpose::Check && report.out_of_date() {
         let files = report.files.iter().filter(|file| file.owner != Owner::Seed);
@@ -112,7 +126,7 @@ pub(super) fn generate(
                 Change::Removed => "is generated no longer",
                 _ => "is out of date",
             };
-            shell.text(&format!("{} {what}", out.join(&file.path).display()));
+            shell.text(&visible(&format!("{} {what}", out.join(&file.path).display())));
         }
         bail!("out of date: run `{} generate {}`", shell::command(), generation.file.display());
     }
@@ -196,7 +210,8 @@ pub(super) fn explain_campaign(
     let checked = check(shell, language, file, Format::Human)?;
     let chosen = choose(&checked, file, Some(campaign))?;
     let plan = &checked.plans[chosen].plan;
-    shell::asked_for(&format!("{}\n{}", crate::explain::campaign(plan), super::search_space::described(plan)))?;
+    let text = format!("{}\n{}", crate::explain::campaign(plan), super::search_space::described(plan));
+    shell::asked_for(&visible(&text))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -232,10 +247,11 @@ fn write(
     chosen: &[usize],
     mode: Mode,
 ) -> anyhow::Result<(PathBuf, Report)> {
-    let out = match &generation.out {
-        Some(out) => out.clone(),
-        None => generation.file.with_file_name(environment::RUNNERS),
-    };
+    let out = generation.out.clone().unwrap_or_else(|| generation.file.with_file_name(environment::RUNNERS));
+    // Nobody named the folder that it leads to.
+    if generation.out.is_none() && out.is_symlink() {
+        bail!("{} is a link: say with `-o` which folder the runners belong into", out.display());
+    }
     let environment = environment(&generation.file, &out, &checked.plans, options).map_err(|errors| all(&errors))?;
     let trees = emit::emit(&checked.plans, &environment).map_err(|problems| all(&problems))?;
     let (shared, runners) = trees.split_first().expect("there is a tree for what runners share");

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail};
+use sesame_dsl::diagnostic::visible;
 
 use super::shell::{self, Shell};
 use super::{Format, Language, commands};
-use crate::output;
+use crate::{input, output};
 
 /// Standard input, among files.
 const STANDARD_INPUT: &str = "-";
@@ -39,7 +40,7 @@ pub(super) fn fmt(
             Ok((text, formatted)) if check => {
                 if text != formatted {
                     unformatted += 1;
-                    shell::asked_for(&shown(file, &text, &formatted, format))?;
+                    shell::asked_for(&visible(&shown(file, &text, &formatted, format)))?;
                 }
             }
             Ok((_, formatted)) if file.as_os_str() == STANDARD_INPUT => shell::asked_for(&formatted)?,
@@ -69,10 +70,14 @@ pub(super) fn fmt(
 fn read(file: &Path) -> anyhow::Result<String> {
     if file.as_os_str() == STANDARD_INPUT {
         let mut text = String::new();
-        std::io::stdin().read_to_string(&mut text).context("cannot read standard input")?;
+        let mut bounded = std::io::stdin().take(input::MOST_OF_A_TEXT + 1);
+        bounded.read_to_string(&mut text).context("cannot read standard input")?;
+        if text.len() as u64 > input::MOST_OF_A_TEXT {
+            bail!("standard input holds more than {} MiB, the most that is read", input::MOST_OF_A_TEXT >> 20);
+        }
         return Ok(text);
     }
-    std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))
+    input::text(file).with_context(|| format!("cannot read {}", file.display()))
 }
 
 /// Files as they are, and for each folder the spaces in it.
@@ -88,13 +93,17 @@ fn all_of(files: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     Ok(all)
 }
 
-/// The `.sesame` files in a folder, sorted.
+/// The `.sesame` files in a folder, sorted; without links.
 fn spaces_in(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let failed = || format!("cannot look into {}", folder.display());
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).with_context(failed)? {
-        let path = entry.with_context(failed)?.path();
-        if path.is_file() && path.extension().is_some_and(|extension| extension == "sesame") {
+        let entry = entry.with_context(failed)?;
+        let path = entry.path();
+        // Links are left alone: nobody named the file that they lead to, which may lie elsewhere.
+        if entry.file_type().with_context(failed)?.is_file()
+            && path.extension().is_some_and(|extension| extension == "sesame")
+        {
             files.push(path.strip_prefix(".").map(Path::to_owned).unwrap_or(path));
         }
     }

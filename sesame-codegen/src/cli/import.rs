@@ -1,14 +1,14 @@
 //! `sesamec import`: a testing space of the original platform becomes a space and results.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail};
 
 use super::shell::{self, Shell};
-use super::{Format, Language, commands};
-use crate::import::{Imported, Kind};
+use super::{Checked, Format, Language, commands};
+use crate::import::{Imported, Kind, Recorded};
 use crate::output;
 
 /// Notes of one kind that are shown at most; files repeat themselves.
@@ -26,29 +26,27 @@ pub(super) fn import(shell: Shell, language: &Language, file: &Path, out: &Path)
         .map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' })
         .collect();
     let name = format!("{}.sesame", if stem.is_empty() { "space" } else { &stem });
-    output::create(out, &BTreeMap::from([(name.clone(), imported.text().to_owned())]))?;
     let space = out.join(&name);
-    shell.did("Imported", format!("{}: into {}", file.display(), space.display()));
-    let checked = commands::check(shell, language, &space, Format::Human).with_context(|| {
-        format!("{} was written, but is not right yet; its results were not imported", space.display())
+    // Whatever is wrong is found before anything is written.
+    let nothing = || format!("{} cannot be said in the language as it is, so nothing was written", file.display());
+    let shown_as = space.display().to_string();
+    let text = (language.format)(&shown_as, imported.text(), shell.look(Format::Human)).map_err(|found| {
+        let written = shell.diagnostics(&found.diagnostics, Format::Human).err();
+        written.unwrap_or_else(|| commands::has_errors(&space, found.errors).context(nothing()))
     })?;
-    let performed: Vec<(usize, String)> = imported.performed().map(|(at, name)| (at, name.to_owned())).collect();
-    for (at, campaign) in performed {
-        let plan = checked.plans.iter().find(|runner| runner.plan.campaign.name == campaign);
-        let Some(plan) = plan else { bail!("the space that was written has no campaign `{campaign}`") };
-        let folder = out.join("results").join(crate::names::campaign_folder(&campaign));
-        let recorded = imported
-            .record(at, &plan.plan, &folder)
-            .map_err(|error| anyhow!(error))
-            .with_context(|| format!("cannot import the results of `{campaign}`"))?;
+    let checked = commands::check_text(shell, language, &space, &text, Format::Human).with_context(nothing)?;
+    let was_there = out.exists();
+    output::create(out, &BTreeMap::from([(name.clone(), text)]))?;
+    let recorded = record(&mut imported, &checked, out).inspect_err(|_| {
+        // The first error is the one to hear of.
+        drop(output::withdraw(out, &name, was_there));
+    })?;
+    shell.did("Imported", format!("{}: into {}", file.display(), space.display()));
+    shell.did("Checked", format!("{}: {}", space.display(), checked.summary));
+    for (folder, Recorded { tests, sets }) in recorded {
         shell.did(
             "Recorded",
-            format!(
-                "{}: {}, {}",
-                folder.display(),
-                counted(recorded.tests, "test"),
-                counted(recorded.sets, "result set")
-            ),
+            format!("{}: {}, {}", folder.display(), counted(tests, "test"), counted(sets, "result set")),
         );
     }
     let mut shown: BTreeMap<Kind, usize> = BTreeMap::new();
@@ -64,7 +62,7 @@ pub(super) fn import(shell: Shell, language: &Language, file: &Path, out: &Path)
             shell.did(kind.word(), format!("{} more", count - MOST_NOTES));
         }
     }
-    let (sesamec, results) = (shell::command(), out.join("results"));
+    let (sesamec, results) = (shell::command(), out.join(output::RESULTS));
     let look = if results.exists() {
         format!("\n  look at the results    {sesamec} results campaigns {}", results.display())
     } else {
@@ -75,6 +73,23 @@ pub(super) fn import(shell: Shell, language: &Language, file: &Path, out: &Path)
         space = space.display()
     ));
     Ok(ExitCode::SUCCESS)
+}
+
+/// Records the tests of every campaign that performed some: the folder of each, and what is in it.
+fn record(imported: &mut Imported, checked: &Checked, out: &Path) -> anyhow::Result<Vec<(PathBuf, Recorded)>> {
+    let performed: Vec<(usize, String)> = imported.performed().map(|(at, name)| (at, name.to_owned())).collect();
+    let mut all = Vec::new();
+    for (at, campaign) in performed {
+        let plan = checked.plans.iter().find(|runner| runner.plan.campaign.name == campaign);
+        let Some(plan) = plan else { bail!("the space has no campaign `{campaign}`") };
+        let folder = out.join(output::RESULTS).join(crate::names::campaign_folder(&campaign));
+        let recorded = imported
+            .record(at, &plan.plan, &folder)
+            .map_err(|error| anyhow!(error))
+            .with_context(|| format!("cannot import the results of `{campaign}`, so nothing was written"))?;
+        all.push((folder, recorded));
+    }
+    Ok(all)
 }
 
 fn counted(n: usize, what: &str) -> String {

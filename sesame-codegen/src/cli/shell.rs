@@ -3,6 +3,8 @@
 use std::fmt::Display;
 use std::io::{self, IsTerminal as _, Write as _};
 
+use sesame_dsl::diagnostic::{shortened, visible};
+
 use super::{Format, Look};
 
 /// Where messages go: standard error, so that standard output is free for what is asked for.
@@ -10,6 +12,7 @@ use super::{Format, Look};
 pub struct Shell {
     colour: bool,
     terminal: bool,
+    silent: bool,
 }
 
 impl Shell {
@@ -17,12 +20,17 @@ impl Shell {
     pub fn of_the_process() -> Self {
         let terminal = io::stderr().is_terminal();
         let colour = terminal && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-        Shell { colour, terminal }
+        Shell { colour, terminal, silent: false }
     }
 
     /// A shell without colours and without lines that change.
     pub fn plain() -> Self {
-        Shell { colour: false, terminal: false }
+        Shell { colour: false, terminal: false, silent: false }
+    }
+
+    /// A shell that says nothing on standard error: the exit code tells all.
+    pub fn silent() -> Self {
+        Shell { silent: true, ..Shell::plain() }
     }
 
     /// Whether messages are coloured.
@@ -32,13 +40,14 @@ impl Shell {
 
     /// Something was done.
     pub(super) fn did(self, verb: &str, what: impl Display) {
-        self.line(&format!("{} {what}", self.painted("1;32", &format!("{verb:>10}"))));
+        self.say("1;32", &format!("{verb:>10}"), what);
     }
 
     /// Something is being done; the next line replaces this one. Only on a terminal.
     pub(super) fn doing(self, verb: &str, what: impl Display) {
         if self.terminal {
-            let text = format!("\r\x1b[K{} {what}", self.painted("1;36", &format!("{verb:>10}")));
+            let what = what.to_string();
+            let text = format!("\r\x1b[K{} {}", self.painted("1;36", &format!("{verb:>10}")), visible(&what));
             // A terminal that is gone is no reason to stop.
             let _ = io::stderr().write_all(text.as_bytes());
         }
@@ -46,18 +55,18 @@ impl Shell {
 
     /// Something the user should know.
     pub(super) fn warning(self, what: impl Display) {
-        self.line(&format!("{} {what}", self.painted("1;33", "warning:")));
+        self.say("1;33", "warning:", what);
     }
 
     /// Something that is good to know and needs nothing done.
     pub(super) fn note(self, what: impl Display) {
-        self.line(&format!("{} {what}", self.painted("1;36", "note:")));
+        self.say("1;36", "note:", what);
     }
 
     /// What went wrong, with its causes.
     pub(super) fn failure(self, failure: &anyhow::Error) {
         for error in format!("{failure:#}").split('\u{1e}') {
-            self.line(&format!("{} {error}", self.painted("1;31", "error:")));
+            self.say("1;31", "error:", error);
         }
     }
 
@@ -81,12 +90,22 @@ impl Shell {
         Ok(())
     }
 
-    /// Text as it is.
+    /// A line that begins with a painted word. What is said may quote anything, so no sign of it reaches a terminal as a
+    /// command, and no line of it fills the screen.
+    fn say(self, style: &str, word: &str, what: impl Display) {
+        let text: Vec<String> = what.to_string().split('\n').map(|line| shortened(line.to_owned())).collect();
+        self.line(&format!("{} {}", self.painted(style, word), visible(&text.join("\n"))));
+    }
+
+    /// Text as it is: of this program, or of one that cleans what it quotes.
     pub(super) fn text(self, text: &str) {
         self.line(text.trim_end());
     }
 
     fn line(self, text: &str) {
+        if self.silent {
+            return;
+        }
         let clear = if self.terminal { "\r\x1b[K" } else { "" };
         let _ = writeln!(io::stderr(), "{clear}{text}");
     }

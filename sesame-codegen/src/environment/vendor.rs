@@ -6,12 +6,12 @@
 //! what they are.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
 use super::{Error, RUNTIME, files_below, package_name, settled};
+use crate::input;
 
 /// Where copies are, inside a runner.
 const FOLDER: &str = "vendor";
@@ -102,7 +102,8 @@ impl Crates {
                 let problem = "its name has a sign in it that not every system allows".to_owned();
                 return Err(Error::Vendor { path: source, problem });
             }
-            let contents = fs::read(&source).map_err(|cause| Error::Read { path: source, cause })?;
+            let contents =
+                input::bytes(&source, input::MOST_OF_A_COPY).map_err(|cause| Error::Read { path: source, cause })?;
             files.insert(format!("{FOLDER}/{package}/{path}"), contents);
         }
         let manifest = self.manifest(&folder)?;
@@ -245,7 +246,7 @@ fn lead_to(value: &mut Value, path: &str) {
 }
 
 fn table(path: &Path) -> Result<Table, Error> {
-    let text = fs::read_to_string(path).map_err(|cause| Error::Read { path: path.to_owned(), cause })?;
+    let text = input::text(path).map_err(|cause| Error::Read { path: path.to_owned(), cause })?;
     toml::from_str(&text)
         .map_err(|error| Error::Settings { path: path.to_owned(), problem: error.to_string().trim_end().to_owned() })
 }

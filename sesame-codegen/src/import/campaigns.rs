@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::mem::discriminant;
 
 use super::notes::Kind;
 use super::original::{
@@ -28,6 +29,22 @@ pub(super) fn end_of(original: &Original, campaign: &Campaign) -> f64 {
         _ => 0.0,
     });
     last.fold(100.0, f64::max)
+}
+
+/// The test that a campaign repeats, as the positions of its campaign and its own, and whether the campaign names it.
+fn repeated(original: &Original, at: usize) -> Option<((usize, usize), bool)> {
+    let campaign = &original.campaigns[at];
+    let Approach::Repeat { test, .. } = campaign.approach else { return None };
+    // What it performed are copies of the test it repeated.
+    let first = || (!campaign.tests.is_empty()).then_some(((at, 0), false));
+    test.and_then(|it| original.test(it)).map(|place| (place, true)).or_else(first)
+}
+
+/// When a test is over in the first of the campaigns that repeat it, in seconds.
+fn first_end(original: &Original, place: (usize, usize)) -> f64 {
+    let repeating = (0..original.campaigns.len())
+        .filter(|&at| repeated(original, at).is_some_and(|(repeated, _)| repeated == place));
+    repeating.map(|at| end_of(original, &original.campaigns[at])).fold(f64::INFINITY, f64::min)
 }
 
 /// Whether the tests of a campaign switch operations by conditions: as it says, or as those that it performed do.
@@ -97,14 +114,11 @@ fn campaign_text(
         writer.notes.say(Kind::Changed, text);
     }
 
-    if let Approach::Repeat { test, times } = campaign.approach {
-        let named = test.and_then(|it| original.test(it));
-        // What it performed are copies of the test it repeated.
-        let first = (!campaign.tests.is_empty()).then_some((writer.mapped.campaigns.len(), 0));
-        let Some(place) = named.or(first) else {
+    if let Approach::Repeat { times, .. } = campaign.approach {
+        let Some((place, named)) = repeated(original, writer.mapped.campaigns.len()) else {
             return leave_out(writer, "the test that it repeats is not in the file");
         };
-        if named.is_none() {
+        if !named {
             let text =
                 format!("campaign `{shown}`: the test that it repeats is not in the file; it repeats its first copy");
             writer.notes.say(Kind::Changed, text);
@@ -113,7 +127,8 @@ fn campaign_text(
             name.clone()
         } else {
             let repeated = &original.campaigns[place.0].tests[place.1];
-            let Some(lines) = held_by(writer, repeated).or_else(|| undisturbed(writer, repeated, end)) else {
+            let over = first_end(original, place);
+            let Some(lines) = held_by(writer, repeated, over).or_else(|| undisturbed(writer, repeated, end)) else {
                 return leave_out(writer, "nothing of the test that it repeats can be said");
             };
             let name = known_test(writer, repeated, &lines, tests);
@@ -338,8 +353,9 @@ fn undisturbed(writer: &mut Writer<'_>, test: &Test, end: f64) -> Option<String>
     Some(format!("  {harmless} from {}s to {}s\n", number(from), number(to)))
 }
 
-/// The operations of a known test, a line for each; `None` if there is none that can be said.
-fn held_by(writer: &mut Writer<'_>, test: &Test) -> Option<String> {
+/// The operations of a known test, a line for each; `None` if there is none that can be said. The test is over after so
+/// many seconds.
+fn held_by(writer: &mut Writer<'_>, test: &Test, over: f64) -> Option<String> {
     let shown = printable(&test.name);
     let mut lines = String::new();
     for operation in &test.operations {
@@ -347,7 +363,8 @@ fn held_by(writer: &mut Writer<'_>, test: &Test) -> Option<String> {
         let template = writer.mapped.holders.operations[at].clone();
         for part in writer.mapped.parts[at].clone() {
             let offline = matches!(part.effect, Effect::Custom { offline: true, .. });
-            let window = if offline { Ok("before start".to_owned()) } else { window(writer, operation, &template) };
+            let window =
+                if offline { Ok("before start".to_owned()) } else { window(writer, operation, &template, over) };
             match window.and_then(|window| Ok((window, choices(operation, &template, &part.effect)?))) {
                 Ok((window, choices)) => {
                     let seed = if operation.seed == 0 || offline {
@@ -427,7 +444,11 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
         (Effect::Custom { parameters, .. }, _) => {
             let mut text = String::new();
             for (name, at) in parameters {
-                let chosen = match domain(*at)? {
+                let chosen = domain(*at)?;
+                if permitted.get(*at).is_some_and(|set| discriminant(&set.domain) != discriminant(chosen)) {
+                    return Err(format!("what it chooses for `{name}` is of another kind than its template permits"));
+                }
+                let chosen = match chosen {
                     Domain::Reals(low, high) => number(within(low.min(*high), *high, *at).0),
                     Domain::Integers(low, high) => {
                         let low = *low.min(high);
@@ -467,7 +488,7 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
 }
 
 /// When an operation of a known test is active, in words.
-fn window(writer: &Writer<'_>, operation: &Operation, template: &Operation) -> Result<String, String> {
+fn window(writer: &Writer<'_>, operation: &Operation, template: &Operation, over: f64) -> Result<String, String> {
     let forever = "1000000s";
     let never = || Err("it is never active".to_owned());
     match &operation.activation {
@@ -477,6 +498,9 @@ fn window(writer: &Writer<'_>, operation: &Operation, template: &Operation) -> R
                 && from.max(0.0) < to
             {
                 (start, end) = (start.max(from), end.min(to));
+            }
+            if start >= over {
+                return Err(format!("its window begins when the test is over, after {}s", number(over)));
             }
             if start < end { Ok(format!("from {}s to {}s", number(start), number(end))) } else { never() }
         }

@@ -466,8 +466,16 @@ impl Writer<'_> {
         if (0.0..1.0).contains(&operation.inclusion) {
             let _ = write!(clauses, "   inclusion {}", percent(operation.inclusion));
         }
-        let constraints: Vec<String> = operation.constraints.iter().filter_map(|it| self.constraint(at, it)).collect();
-        if constraints.len() < operation.constraints.len() {
+        let mut constraints: Vec<String> = Vec::new();
+        let mut left_out = 0;
+        for constraint in &operation.constraints {
+            match self.constraint(at, constraint) {
+                Some(text) if constraints.contains(&text) => {}
+                Some(text) => constraints.push(text),
+                None => left_out += 1,
+            }
+        }
+        if left_out > 0 {
             self.notes.say(
                 Kind::LeftOut,
                 format!(

@@ -250,6 +250,17 @@ fn a_broken_file_gives_one_diagnostic_with_its_place() {
 }
 
 #[test]
+fn an_element_without_an_end_is_refused() {
+    let (_folder, path) = written("<TestingSpace name=\"a\">\n  <mrs name=\"");
+    // What follows are zeros, which no disk has to hold.
+    let file = std::fs::File::options().append(true).open(&path).unwrap();
+    file.set_len(64 << 20).unwrap();
+    let refused = Imported::read(&path).unwrap_err();
+    assert_eq!(refused.place, Some((2, 3)));
+    assert!(refused.what.starts_with("what begins here has more than 32 MiB"), "{refused}");
+}
+
+#[test]
 fn whatever_bytes_are_in_a_file_it_is_imported_or_refused() {
     use proptest::prelude::*;
     let words = whole().into_bytes();

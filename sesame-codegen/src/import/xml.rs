@@ -2,15 +2,20 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read as _};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use quick_xml::XmlVersion;
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
 
+use crate::input;
+
 /// Levels of elements at most: conditions nest, but nobody nests them this deep.
 const DEEPEST: usize = 200;
+
+/// Bytes of one element at most: of one that is read with all that is in it, else of its first tag alone.
+const LARGEST: u64 = 32 << 20;
 
 /// An element; of names only the part without their namespace, which differs between files that mean the same.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -67,10 +72,42 @@ pub(super) enum Step {
     End,
 }
 
+/// A file of which only so many bytes are read before somebody says otherwise.
+struct Bounded {
+    file: BufReader<File>,
+    left: u64,
+}
+
+impl BufRead for Bounded {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        let available = self.file.fill_buf()?;
+        if self.left == 0 && !available.is_empty() {
+            return Err(io::ErrorKind::FileTooLarge.into());
+        }
+        let most = usize::try_from(self.left).unwrap_or(usize::MAX);
+        Ok(&available[..available.len().min(most)])
+    }
+
+    fn consume(&mut self, used: usize) {
+        self.left -= used as u64;
+        self.file.consume(used);
+    }
+}
+
+impl Read for Bounded {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let available = self.fill_buf()?;
+        let count = available.len().min(into.len());
+        into[..count].copy_from_slice(&available[..count]);
+        self.consume(count);
+        Ok(count)
+    }
+}
+
 /// A file that is being read.
 pub(super) struct Source {
     path: PathBuf,
-    reader: Reader<BufReader<File>>,
+    reader: Reader<Bounded>,
     buffer: Vec<u8>,
     /// Names of the elements that are open.
     open: Vec<String>,
@@ -82,14 +119,14 @@ pub(super) struct Source {
 
 impl Source {
     pub(super) fn open(path: &Path) -> Result<Source, Broken> {
-        let file = File::open(path).map_err(|error| Broken {
+        let file = input::open(path).map_err(|error| Broken {
             file: path.to_owned(),
             place: None,
             what: format!("cannot be read: {error}"),
         })?;
         Ok(Source {
             path: path.to_owned(),
-            reader: Reader::from_reader(BufReader::new(file)),
+            reader: Reader::from_reader(Bounded { file: BufReader::new(file), left: LARGEST }),
             buffer: Vec::new(),
             open: Vec::new(),
             closing: false,
@@ -99,6 +136,7 @@ impl Source {
 
     /// The next step; texts between elements are passed over.
     pub(super) fn next(&mut self) -> Result<Step, Broken> {
+        self.reader.get_mut().left = LARGEST;
         self.step().map(|(step, _)| step)
     }
 
@@ -139,6 +177,13 @@ impl Source {
             self.at = self.reader.buffer_position();
             let event = match self.reader.read_event_into(&mut self.buffer) {
                 Ok(event) => event,
+                Err(_) if self.reader.get_ref().left == 0 => {
+                    let what = format!(
+                        "what begins here has more than {} MiB, which is no part of a testing space; leave it out of the file",
+                        LARGEST >> 20
+                    );
+                    return Err(self.broken(what));
+                }
                 Err(error) => {
                     let (at, what) = (self.reader.error_position(), error.to_string());
                     return Err(broken_xml(&self.path, at, &what));
@@ -271,7 +316,7 @@ pub(super) fn cleaned(text: &str) -> String {
 /// The first line of a file that is a marker of a merge conflict. The file is read line by line, and no further than
 /// 64 bytes into each.
 fn merge_marker(path: &Path) -> Option<usize> {
-    let mut reader = BufReader::new(File::open(path).ok()?);
+    let mut reader = BufReader::new(input::open(path).ok()?);
     let mut line = Vec::new();
     for number in 1.. {
         line.clear();
@@ -306,7 +351,7 @@ fn skip_line(reader: &mut impl BufRead) -> Option<()> {
 
 /// Line and column of a byte of a file, both from 1.
 fn place_of(path: &Path, offset: u64) -> Option<(usize, usize)> {
-    let mut reader = BufReader::new(File::open(path).ok()?).take(offset);
+    let mut reader = BufReader::new(input::open(path).ok()?).take(offset);
     let (mut line, mut column) = (1, 1);
     loop {
         let used = {

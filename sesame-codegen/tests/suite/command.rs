@@ -26,13 +26,13 @@ fn format(_file: &str, text: &str, _look: Look) -> Result<String, Diagnosed> {
 
 const LANGUAGE: Language = Language { check, format, explain: |code| (code == "E0203").then_some("# E0203") };
 
-fn sesamec(arguments: &[&str]) -> bool {
+pub(crate) fn sesamec(arguments: &[&str]) -> bool {
     let arguments = ["sesamec"].iter().chain(arguments);
     run(Shell::plain(), &LANGUAGE, arguments) == ExitCode::SUCCESS
 }
 
 /// A project whose space is read by the language above.
-fn project(folder: &Path, text: &str) -> String {
+pub(crate) fn project(folder: &Path, text: &str) -> String {
     fs::create_dir_all(folder.join("simulator")).unwrap();
     fs::write(folder.join("simulator/Cargo.toml"), "[package]\nname = \"kuka_cell_sim\"\n").unwrap();
     let file = folder.join("kuka_cell.sesame");

@@ -4,6 +4,8 @@
 mod command;
 mod emission;
 mod emitted;
+mod hostile_checkout;
+mod mutated_imports;
 mod options;
 mod plans;
 mod regeneration;

@@ -70,6 +70,7 @@ codes! {
     NOT_IMPORTED = "E0212": "An imported file cannot be read.",
     CIRCLE = "E0213": "Files, campaigns or monitors go back to themselves.",
     WHICH_NODES = "E0214": "An operation cannot be limited to these nodes.",
+    LARGE_MESSAGE = "E0215": "A message holds more values than a runner can.",
     UNKNOWN_UNIT = "E0301": "No such unit.",
     WRONG_UNIT = "E0302": "A quantity measures something else, or lacks its unit.",
     WRONG_TYPE = "E0303": "A value of this type cannot be used here.",

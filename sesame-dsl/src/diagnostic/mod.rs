@@ -6,6 +6,8 @@
 mod code;
 pub mod render;
 
+use std::borrow::Cow;
+
 pub use code::{CODES, Code, Severity, page};
 
 use crate::span::Span;
@@ -43,7 +45,7 @@ impl Diagnostic {
     pub fn new(code: Code, span: Span, title: impl Into<String>) -> Self {
         Diagnostic {
             code,
-            title: one_line(&title.into()),
+            title: shortened(one_line(&title.into())),
             span,
             label: String::new(),
             secondary: Vec::new(),
@@ -54,25 +56,26 @@ impl Diagnostic {
 
     /// With this label at the primary span.
     pub fn label(mut self, label: impl Into<String>) -> Self {
-        self.label = one_line(&label.into());
+        self.label = shortened(one_line(&label.into()));
         self
     }
 
     /// With another place and what it has to do with the mistake.
     pub fn also(mut self, span: Span, label: impl Into<String>) -> Self {
-        self.secondary.push((span, one_line(&label.into())));
+        self.secondary.push((span, shortened(one_line(&label.into()))));
         self
     }
 
     /// With a note.
     pub fn note(mut self, note: impl Into<String>) -> Self {
-        self.notes.push(note.into());
+        self.notes.push(shortened(note.into()));
         self
     }
 
     /// With a suggestion that replaces one span.
     pub fn suggest(mut self, message: impl Into<String>, span: Span, replacement: impl Into<String>) -> Self {
-        self.suggestions.push(Suggestion { message: message.into(), edits: vec![(span, replacement.into())] });
+        self.suggestions
+            .push(Suggestion { message: shortened(message.into()), edits: vec![(span, replacement.into())] });
         self
     }
 
@@ -85,4 +88,55 @@ impl Diagnostic {
 /// A text that quotes source text may hold its line ends; what is said of a place is one line.
 fn one_line(text: &str) -> String {
     if text.contains(['\n', '\r']) { text.split_whitespace().collect::<Vec<_>>().join(" ") } else { text.to_owned() }
+}
+
+/// The most characters of one sentence.
+const LONGEST: usize = 1000;
+
+/// A sentence of a length that can be read, whatever it quotes: one of more than a thousand characters is its beginning
+/// and its end.
+pub fn shortened(text: String) -> String {
+    if text.len() <= LONGEST {
+        return text;
+    }
+    let nth = |n| text.char_indices().nth(n).map_or(text.len(), |(at, _)| at);
+    let nth_last = |n| text.char_indices().rev().nth(n).map_or(0, |(at, _)| at);
+    let (from, to) = (nth(LONGEST * 2 / 3), nth_last(LONGEST / 3));
+    if from < to { format!("{} … {}", &text[..from], &text[to..]) } else { text }
+}
+
+/// A text without what a terminal takes for a command, or what turns the direction of what follows: control characters
+/// other than line ends and tabs, and marks of direction. Each is replaced by a sign that says that something was there.
+pub fn visible(text: &str) -> Cow<'_, str> {
+    if !text.contains(hidden) {
+        return Cow::Borrowed(text);
+    }
+    Cow::Owned(text.chars().map(|c| if hidden(c) { '\u{fffd}' } else { c }).collect())
+}
+
+/// Whether a sign is a command to a terminal, or turns the direction of what follows.
+fn hidden(c: char) -> bool {
+    (c.is_control() && !matches!(c, '\n' | '\t'))
+        || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sentence_that_quotes_a_megabyte_is_short_and_keeps_both_ends() {
+        let text = format!("`{}` is no unit", "µ".repeat(1 << 20));
+        let short = shortened(text);
+        assert_eq!(short.chars().count(), 666 + 3 + 334);
+        assert!(short.starts_with("`µµ") && short.contains("µ … µ") && short.ends_with("µ` is no unit"));
+        let long = "µ".repeat(600);
+        assert_eq!(shortened(long.clone()), long, "it is not so long, only its letters are");
+    }
+
+    #[test]
+    fn what_commands_a_terminal_is_replaced_and_all_else_stays() {
+        assert_eq!(visible("a\x1b[31mb\r\u{9b}\u{7f}\u{0}\u{202e}c\n\td µ🤖"), "a�[31mb�����c\n\td µ🤖");
+        assert!(matches!(visible("space a\n"), Cow::Borrowed(_)));
+    }
 }

@@ -65,6 +65,7 @@ pub(crate) fn resolve(
         metrics: Vec::new(),
         operations: Vec::new(),
         tests: Vec::new(),
+        compared: Compared::default(),
     };
     resolver.collect();
     let simulator = resolver.system();
@@ -188,6 +189,23 @@ struct Resolver<'a> {
     metrics: Vec<Option<model::Metric>>,
     operations: Vec<Option<model::Operation>>,
     tests: Vec<Option<model::Test>>,
+    compared: Compared,
+}
+
+/// The most names that are compared with unknown ones in all.
+const MOST_COMPARED: usize = 500_000;
+
+/// How many names were compared with unknown ones, to say what was meant.
+#[derive(Default)]
+struct Compared(usize);
+
+impl Compared {
+    /// Whether another unknown name may be compared with so many. Where there are many of both, the time would grow with
+    /// their product, and after so many suggestions nobody waits for one more.
+    fn more(&mut self, with: usize) -> bool {
+        self.0 = self.0.saturating_add(with);
+        self.0 <= MOST_COMPARED
+    }
 }
 
 impl<'a> Resolver<'a> {
@@ -225,9 +243,13 @@ impl<'a> Resolver<'a> {
         if self.file.incomplete {
             return None;
         }
-        let known = self.names_of(kind);
         let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, format!("no {word} named `{}`", name.text))
             .label(format!("not {} of this space", kind.with_article()));
+        if !self.compared.more(self.names.len()) {
+            self.report(diagnostic);
+            return None;
+        }
+        let known = self.names_of(kind);
         if let Some(similar) = most_similar(&name.text, known.iter().copied()) {
             diagnostic = diagnostic.suggest(format!("`{similar}` is"), name.span, similar);
         } else if known.is_empty() {
@@ -311,5 +333,25 @@ fn list(names: &[&str]) -> String {
         Some((last, [])) => last.clone(),
         Some((last, others)) => format!("{} and {last}", others.join(", ")),
         None => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unknown_names_are_compared_with_known_ones_only_so_often() {
+        let count = 3000;
+        let topics: String = (0..count).map(|n| format!("topic known{n} = \"k{n}\" : int ")).collect();
+        let operations: String = (0..count).map(|n| format!("operation o{n} on knwn{n} = blackhole ")).collect();
+        let mut sources = SourceMap::new();
+        let root = sources.add("a.sesame", format!("space s system {{ {topics} }} {operations}"));
+        let analysis = crate::analyse(&sources, root);
+        let unknown = analysis.diagnostics.iter().filter(|found| found.code == Code::UNKNOWN_NAME);
+        let suggested = unknown.clone().filter(|found| !found.suggestions.is_empty()).count();
+        assert_eq!(unknown.count(), count, "all are reported");
+        // Among 6000 names.
+        assert_eq!(suggested, MOST_COMPARED / (2 * count));
     }
 }

@@ -1,6 +1,7 @@
 //! Message types, topics, nodes, the simulator.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
+use std::hash::Hash;
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
@@ -132,10 +133,45 @@ impl<'a> Resolver<'a> {
         for (id, &index) in order.iter().enumerate() {
             self.system.message_ids[index] = MessageId::from_index(id);
         }
+        // Of each message by its id, how many values it holds.
+        let mut values: Vec<u64> = Vec::new();
         for &index in &order {
-            let message = self.message(messages[index]);
-            self.system.messages.push(message.filter(|_| !cyclic[index]));
+            let message = self.message(messages[index]).filter(|_| !cyclic[index]);
+            let held = message.iter().flat_map(|message| &message.fields);
+            let count = held.map(|field| values_in(&field.ty, &values)).fold(0, u64::saturating_add);
+            values.push(count);
+            if count > MAX_VALUES {
+                self.too_many_values(messages[index], message.as_ref(), count, &values);
+            }
+            self.system.messages.push(message.filter(|_| count <= MAX_VALUES));
         }
+    }
+
+    /// Says that a message is too large, unless one in it is, of which that was said.
+    fn too_many_values(
+        &mut self,
+        message: &ast::Message,
+        resolved: Option<&model::Message>,
+        count: u64,
+        values: &[u64],
+    ) {
+        let fields = resolved.map_or(&[][..], |message| &message.fields);
+        if fields.iter().any(|field| values_in(&field.ty, values) > MAX_VALUES) {
+            return;
+        }
+        let name = &message.head.name;
+        let title = format!("message `{}` holds {count} values, more than {MAX_VALUES}", name.text);
+        let mut diagnostic = Diagnostic::new(Code::LARGE_MESSAGE, name.span, title)
+            .label("counting those of the messages in it")
+            .note("a `list of` messages counts as one of them");
+        let largest = fields.iter().max_by_key(|field| values_in(&field.ty, values));
+        if let Some(field) = largest
+            && values_in(&field.ty, values) > 1
+        {
+            let of = values_in(&field.ty, values);
+            diagnostic = diagnostic.also(field.declaration.span, format!("this field alone holds {of}"));
+        }
+        self.report(diagnostic);
     }
 
     /// Positions of messages such that each comes after those it contains, and which of them contain themselves.
@@ -286,7 +322,8 @@ impl<'a> Resolver<'a> {
         if self.file.incomplete {
             return None;
         }
-        let messages = self.names_of(Kind::Message);
+        let comparable = self.compared.more(self.names.len());
+        let messages = if comparable { self.names_of(Kind::Message) } else { Vec::new() };
         let similar = ELSEWHERE
             .iter()
             .find(|(word, _)| *word == name.text)
@@ -397,10 +434,12 @@ impl<'a> Resolver<'a> {
             )
             .label("no such field")
             .also(message.declaration.span, "the message is declared here");
-            diagnostic = match most_similar(&name.text, known.iter().copied()) {
-                Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
-                None => diagnostic.note(format!("its fields are {}", super::list(&known))),
-            };
+            if self.compared.more(known.len()) {
+                diagnostic = match most_similar(&name.text, known.iter().copied()) {
+                    Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
+                    None => diagnostic.note(format!("its fields are {}", super::list(&known))),
+                };
+            }
             self.report(diagnostic);
             return None;
         };
@@ -438,6 +477,20 @@ impl<'a> Resolver<'a> {
                 None
             }
         }
+    }
+}
+
+/// The most values that a message may hold: a runner has each message as one value of Rust.
+const MAX_VALUES: u64 = 10_000;
+
+/// How many values a type holds, given those of messages by their ids.
+fn values_in(ty: &Type, messages: &[u64]) -> u64 {
+    match ty {
+        Type::Bool | Type::Int(_) | Type::Real(_) | Type::Text => 1,
+        Type::Point(_) => 3,
+        Type::List(of) => values_in(of, messages),
+        // Those that contain themselves have no order, and were reported.
+        Type::Message(id) => messages.get(id.index()).copied().unwrap_or(0),
     }
 }
 
@@ -485,17 +538,53 @@ fn expand_group(path: &str) -> Result<Vec<String>, String> {
     if members.contains(&"") {
         return Err("a member of its group is empty".to_owned());
     }
-    for (position, member) in members.iter().enumerate() {
-        if members[..position].contains(member) {
-            return Err(format!("its group has `{member}` twice"));
-        }
+    if let Some(member) = first_twice(&members) {
+        return Err(format!("its group has `{member}` twice"));
     }
     Ok(members.into_iter().map(|member| format!("{before}{member}{after}")).collect())
 }
 
+/// The first that stands a second time.
+fn first_twice<T: Hash + Eq>(members: &[T]) -> Option<&T> {
+    let mut known = HashSet::with_capacity(members.len());
+    members.iter().find(|&member| !known.insert(member))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::expand_group;
+    use std::cell::Cell;
+    use std::hash::{Hash, Hasher};
+
+    use super::{expand_group, first_twice};
+
+    /// A member that counts how often it is compared.
+    struct Counted<'a>(usize, &'a Cell<usize>);
+
+    impl PartialEq for Counted<'_> {
+        fn eq(&self, other: &Self) -> bool {
+            self.1.set(self.1.get() + 1);
+            self.0 == other.0
+        }
+    }
+
+    impl Eq for Counted<'_> {}
+
+    impl Hash for Counted<'_> {
+        fn hash<H: Hasher>(&self, state: &mut H) {
+            self.0.hash(state);
+        }
+    }
+
+    #[test]
+    fn work_on_a_group_grows_with_its_members_and_not_with_their_square() {
+        let compared = Cell::new(0);
+        let count = 100_000;
+        let mut members: Vec<Counted<'_>> = (0..count).map(|n| Counted(n, &compared)).collect();
+        assert!(first_twice(&members).is_none());
+        members.push(Counted(7, &compared));
+        assert_eq!(first_twice(&members).map(|member| member.0), Some(7));
+        assert!(compared.get() < count, "{} comparisons", compared.get());
+    }
 
     #[test]
     fn a_group_is_written_out_in_order() {

@@ -11,7 +11,7 @@ use sesame_grammar::{Rule, SesameParser};
 use super::token::text_end;
 
 /// Largest file, in bytes: more than a hundred thousand lines.
-pub(super) const MAX_BYTES: usize = 8 << 20;
+pub const MAX_BYTES: usize = 8 << 20;
 /// Deepest nesting of braces.
 const MAX_BRACES: usize = 64;
 /// Deepest nesting of parentheses.

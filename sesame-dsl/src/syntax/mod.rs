@@ -14,6 +14,7 @@ pub(crate) mod surroundings;
 mod token;
 mod words;
 
+pub use limits::MAX_BYTES;
 pub(crate) use limits::parse_bounded;
 pub(crate) use parse::parse;
 pub(crate) use token::{is_keyword, token_at};

@@ -2,20 +2,21 @@
 
 use std::fmt::Write as _;
 
-use crate::diagnostic::{Diagnostic, Severity};
+use super::for_terminals;
+use crate::diagnostic::{Diagnostic, Severity, visible};
 use crate::source::SourceMap;
 
 /// One workflow command per diagnostic and line.
 pub fn github(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
     let mut out = String::new();
-    for diagnostic in diagnostics {
+    for diagnostic in diagnostics.iter().map(for_terminals) {
         let file = sources.file(diagnostic.span.file);
         let (start, end) = (file.position(diagnostic.span.lo), file.position(diagnostic.span.hi));
         let severity = match diagnostic.severity() {
             Severity::Error => "error",
             Severity::Warning => "warning",
         };
-        write!(out, "::{severity} file={},line={},col={}", property(file.name()), start.line, start.column)
+        write!(out, "::{severity} file={},line={},col={}", property(&visible(file.name())), start.line, start.column)
             .expect("a string takes everything");
         // Columns say where a stretch ends only if it ends on its line; the last is inclusive.
         if start.line == end.line && start.column < end.column {

@@ -1,16 +1,55 @@
 //! For people: with the lines of the source.
 
+use std::ops::Range;
+
 use annotate_snippets::{AnnotationKind, Group, Level, Patch, Renderer, Snippet};
 
-use crate::diagnostic::{Diagnostic, Severity};
-use crate::source::SourceMap;
+use super::for_terminals;
+use crate::diagnostic::{Diagnostic, Severity, hidden, visible};
+use crate::source::{SourceFile, SourceMap};
 use crate::span::Span;
+
+/// The most bytes of lines that a suggestion is shown in; of longer ones its words have to do.
+const LONGEST_PATCH: usize = 4096;
 
 /// Diagnostics with the source lines they speak of, an empty line between two; ends with a newline if there is any.
 pub fn human(diagnostics: &[Diagnostic], sources: &SourceMap, colour: bool) -> String {
     let renderer = if colour { Renderer::styled() } else { Renderer::plain() };
-    let rendered: Vec<String> = diagnostics.iter().map(|diagnostic| one(diagnostic, sources, &renderer)).collect();
-    rendered.join("\n")
+    let rendered: Vec<String> =
+        diagnostics.iter().map(|diagnostic| one(&for_terminals(diagnostic), sources, &renderer)).collect();
+    // The renderer replaces most of what a terminal obeys in source lines, but not all. Colours are its own.
+    rendered.join("\n").chars().map(|c| if hidden(c) && !(colour && c == '\x1b') { '\u{fffd}' } else { c }).collect()
+}
+
+/// The lines of a file that hold some spans. The renderer looks at all that it is given, and there may be many
+/// diagnostics of a large file.
+struct Excerpt<'a> {
+    file: &'a SourceFile,
+    lines: Range<usize>,
+    first: u32,
+}
+
+impl<'a> Excerpt<'a> {
+    fn of(file: &'a SourceFile, spans: impl Iterator<Item = Span> + Clone) -> Self {
+        let lo = spans.clone().map(|span| span.lo).min().unwrap_or(0);
+        let hi = spans.map(|span| span.hi).max().unwrap_or(lo);
+        let (lines, first) = file.lines_of(lo, hi);
+        Excerpt { file, lines, first }
+    }
+
+    fn text(&self) -> &'a str {
+        &self.file.text()[self.lines.clone()]
+    }
+
+    /// Where in these lines a span is.
+    fn range(&self, span: Span) -> Range<usize> {
+        let range = span.range();
+        range.start - self.lines.start..range.end - self.lines.start
+    }
+
+    fn snippet<T: Clone>(&self) -> Snippet<'a, T> {
+        Snippet::source(self.text()).path(visible(self.file.name())).line_start(self.first as usize)
+    }
 }
 
 fn one(diagnostic: &Diagnostic, sources: &SourceMap, renderer: &Renderer) -> String {
@@ -18,33 +57,40 @@ fn one(diagnostic: &Diagnostic, sources: &SourceMap, renderer: &Renderer) -> Str
         Severity::Error => Level::ERROR,
         Severity::Warning => Level::WARNING,
     };
-    let file = sources.file(diagnostic.span.file);
     let within = |span: Span| span.file == diagnostic.span.file;
-    let mut snippet = Snippet::source(file.text()).path(file.name()).line_start(1);
-    let primary = AnnotationKind::Primary.span(diagnostic.span.range());
-    snippet = snippet.annotation(primary.label(diagnostic.label.as_str()));
-    for (span, label) in diagnostic.secondary.iter().filter(|(span, _)| within(*span)) {
-        snippet = snippet.annotation(AnnotationKind::Context.span(span.range()).label(label.as_str()));
+    let secondary = diagnostic.secondary.iter().filter(|(span, _)| within(*span));
+    let spans = std::iter::once(diagnostic.span).chain(secondary.clone().map(|(span, _)| *span));
+    let excerpt = Excerpt::of(sources.file(diagnostic.span.file), spans);
+    let primary = AnnotationKind::Primary.span(excerpt.range(diagnostic.span));
+    let mut snippet = excerpt.snippet().annotation(primary.label(diagnostic.label.as_str()));
+    for (span, label) in secondary {
+        snippet = snippet.annotation(AnnotationKind::Context.span(excerpt.range(*span)).label(label.as_str()));
     }
     let mut main = Group::with_title(level.primary_title(diagnostic.title.as_str()).id(diagnostic.code.text()));
     main = main.element(snippet);
     for (span, label) in diagnostic.secondary.iter().filter(|(span, _)| !within(*span)) {
-        let other = sources.file(span.file);
-        let annotation = AnnotationKind::Context.span(span.range()).label(label.as_str());
-        main = main.element(Snippet::source(other.text()).path(other.name()).line_start(1).annotation(annotation));
+        let other = Excerpt::of(sources.file(span.file), std::iter::once(*span));
+        let annotation = AnnotationKind::Context.span(other.range(*span)).label(label.as_str());
+        main = main.element(other.snippet().annotation(annotation));
     }
     for note in &diagnostic.notes {
         main = main.element(Level::NOTE.message(note.as_str()));
     }
-    let mut report = vec![main];
+    let mut patched = Vec::new();
     for suggestion in &diagnostic.suggestions {
         let Some((first, _)) = suggestion.edits.first() else { continue };
-        let target = sources.file(first.file);
-        let mut patches = Snippet::source(target.text()).path(target.name()).line_start(1);
-        for (span, replacement) in &suggestion.edits {
-            patches = patches.patch(Patch::new(span.range(), replacement.as_str()));
+        let excerpt = Excerpt::of(sources.file(first.file), suggestion.edits.iter().map(|(span, _)| *span));
+        let written: usize = suggestion.edits.iter().map(|(_, replacement)| replacement.len()).sum();
+        if excerpt.text().len() + written > LONGEST_PATCH {
+            main = main.element(Level::HELP.message(suggestion.message.as_str()));
+            continue;
         }
-        report.push(Level::HELP.secondary_title(suggestion.message.as_str()).element(patches));
+        let mut patches = excerpt.snippet();
+        for (span, replacement) in &suggestion.edits {
+            patches = patches.patch(Patch::new(excerpt.range(*span), replacement.as_str()));
+        }
+        patched.push(Level::HELP.secondary_title(suggestion.message.as_str()).element(patches));
     }
+    let report: Vec<Group<'_>> = std::iter::once(main).chain(patched).collect();
     format!("{}\n", renderer.render(&report))
 }

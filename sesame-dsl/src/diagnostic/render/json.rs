@@ -1,8 +1,10 @@
 //! For programs: one JSON object per line.
 
+use std::fmt::Write as _;
+
 use serde::Serialize;
 
-use crate::diagnostic::{Diagnostic, Severity};
+use crate::diagnostic::{Diagnostic, Severity, hidden};
 use crate::source::SourceMap;
 use crate::span::Span;
 
@@ -85,7 +87,14 @@ pub fn json(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
                 })
                 .collect(),
         };
-        out.push_str(&serde_json::to_string(&line).expect("strings and numbers serialise"));
+        // JSON's own escapes leave some signs as they are that a terminal obeys. They are nowhere but in texts.
+        for c in serde_json::to_string(&line).expect("strings and numbers serialise").chars() {
+            if hidden(c) {
+                write!(out, "\\u{:04x}", u32::from(c)).expect("a string takes everything");
+            } else {
+                out.push(c);
+            }
+        }
         out.push('\n');
     }
     out

@@ -1,14 +1,15 @@
 //! For one-line tools: `file:line:column: error[E0203]: title: label`.
 
-use crate::diagnostic::{Diagnostic, Severity};
+use super::for_terminals;
+use crate::diagnostic::{Diagnostic, Severity, visible};
 use crate::source::SourceMap;
 
 /// One line per diagnostic.
 pub fn short(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
     use std::fmt::Write as _;
     let mut out = String::new();
-    for diagnostic in diagnostics {
-        let file = sources.file(diagnostic.span.file).name();
+    for diagnostic in diagnostics.iter().map(for_terminals) {
+        let file = visible(sources.file(diagnostic.span.file).name());
         let position = sources.position(diagnostic.span);
         let severity = match diagnostic.severity() {
             Severity::Error => "error",
