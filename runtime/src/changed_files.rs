@@ -498,8 +498,7 @@ mod tests {
             "config/b.yaml",
             "deep/er",
         ];
-        const TARGETS: &[&str] =
-            &["../outside", "../outside/victim", "../outside/folder", "../outside/new", "config", "ABSOLUTE", ".."];
+        const TARGETS: &[&str] = &["outside", "outside/victim", "outside/folder", "outside/new", "space/config", ""];
         const PATHS: &[&str] = &[
             "config/a.yaml",
             "config/new.yaml",
@@ -548,7 +547,7 @@ mod tests {
 
     #[cfg(unix)]
     proptest::proptest! {
-        #![proptest_config(proptest::prelude::ProptestConfig { cases: 100, failure_persistence: None, ..Default::default() })]
+        #![proptest_config(proptest::prelude::ProptestConfig { cases: 200, failure_persistence: None, ..Default::default() })]
 
         #[test]
         fn whatever_lies_in_a_space_nothing_outside_is_touched_by_putting_back(
@@ -568,7 +567,7 @@ mod tests {
             for trap in traps {
                 match trap {
                     Trap::Link { at, to } => {
-                        let (at, to) = (space.join(at), to.replace("ABSOLUTE", absolute));
+                        let (at, to) = (space.join(at), all.path().join(to));
                         // Only what the trap itself made may be in its way.
                         if fs::symlink_metadata(&at).is_ok_and(|it| it.is_dir()) && at.starts_with(&space) {
                             fs::remove_dir_all(&at).unwrap();

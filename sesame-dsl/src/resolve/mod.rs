@@ -343,8 +343,9 @@ mod tests {
     #[test]
     fn unknown_names_are_compared_with_known_ones_only_so_often() {
         let count = 3000;
-        let topics: String = (0..count).map(|n| format!("topic known{n} = \"k{n}\" : int ")).collect();
-        let operations: String = (0..count).map(|n| format!("operation o{n} on knwn{n} = blackhole ")).collect();
+        let topics: Vec<String> = (0..count).map(|n| format!("topic known{n} = \"k{n}\" : int ")).collect();
+        let operations: Vec<String> = (0..count).map(|n| format!("operation o{n} on knwn{n} = blackhole ")).collect();
+        let (topics, operations) = (topics.concat(), operations.concat());
         let mut sources = SourceMap::new();
         let root = sources.add("a.sesame", format!("space s system {{ {topics} }} {operations}"));
         let analysis = crate::analyse(&sources, root);
