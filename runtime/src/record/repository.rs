@@ -21,6 +21,8 @@ use crate::search::indicators::GenerationIndicators;
 pub struct Repository {
     pub(super) connection: Connection,
     pub(super) path: PathBuf,
+    /// The schema of the file, which may be an earlier one.
+    pub(super) schema: i64,
     pub(super) facts: CampaignFacts,
 }
 
@@ -36,6 +38,9 @@ pub struct CampaignFacts {
     /// Why the run ended; `None` while it is unfinished.
     pub stop: Option<String>,
 }
+
+/// How many statements are kept ready: more than reading and writing a test take together.
+const STATEMENTS: usize = 64;
 
 /// One observed number: test, position of its operation or metric, and the value.
 type At = (i64, i64);
@@ -69,7 +74,11 @@ impl Repository {
         let plan = serde_json::from_str(&plan)
             .map_err(|e| RecordError::damaged(&path, format!("its plan cannot be read: {e}")))?;
         let seed = seed.parse().map_err(|_| RecordError::damaged(&path, format!("`{seed}` is no seed")))?;
-        Ok(Repository { connection, path, facts: CampaignFacts { plan, seed, runtime, stop } })
+        connection.set_prepared_statement_cache_capacity(STATEMENTS);
+        let schema = connection
+            .pragma_query_value(None, "user_version", |row| row.get(0))
+            .map_err(|e| RecordError::database("read the campaign", &path, e))?;
+        Ok(Repository { connection, path, schema, facts: CampaignFacts { plan, seed, runtime, stop } })
     }
 
     /// The database's file.
@@ -107,7 +116,8 @@ impl Repository {
 
     /// Hash of the canonical content, see [`digest()`].
     pub fn digest(&self) -> Result<String, RecordError> {
-        digest::of_connection(&self.connection).map_err(|e| RecordError::database("read the results", &self.path, e))
+        digest::of_connection(&self.connection, self.schema)
+            .map_err(|e| RecordError::database("read the results", &self.path, e))
     }
 
     /// How many tests there are, the undisturbed runs left aside.
@@ -119,6 +129,11 @@ impl Repository {
     /// All tests, by number.
     pub fn tests(&self) -> Result<Vec<TestRow>, RecordError> {
         self.rows(None)
+    }
+
+    /// The numbers of all tests, ascending.
+    pub fn numbers(&self) -> Result<Vec<u32>, RecordError> {
+        self.read("SELECT number FROM tests ORDER BY number", [], |row| row.get(0))
     }
 
     /// One test without its time series and effects.
@@ -146,6 +161,15 @@ impl Repository {
 
     /// One test, whole.
     pub fn test(&self, number: u32) -> Result<TestRecord, RecordError> {
+        self.record(number, true)
+    }
+
+    /// One test without its time series, which are most of what there is of it.
+    pub fn test_without_series(&self, number: u32) -> Result<TestRecord, RecordError> {
+        self.record(number, false)
+    }
+
+    fn record(&self, number: u32, series: bool) -> Result<TestRecord, RecordError> {
         let missing = || RecordError::NoSuchTest { name: format!("T{number}"), path: self.path.clone() };
         let row = self.row(number)?;
         let (simulator_seed, messages, run): (String, u64, f64) = self
@@ -176,16 +200,11 @@ impl Repository {
                 series: Vec::new(),
             })
             .collect();
-        let points = self.read(
-            "SELECT metric, time_s, value FROM change_points WHERE test = ?1 ORDER BY metric, position",
-            params![row.duplicate_of.unwrap_or(number)],
-            |row| Ok((position(row, 0)?, row.get(1)?, row.get(2)?)),
-        )?;
-        for (metric, time, value) in points {
+        for (metric, points) in if series { self.series(row.duplicate_of.unwrap_or(number))? } else { Vec::new() } {
             let metric = metrics
                 .get_mut(metric)
                 .ok_or_else(|| RecordError::damaged(&self.path, format!("T{number} has a series without a metric")))?;
-            metric.series.push((time, value));
+            metric.series = points;
         }
         Ok(TestRecord {
             number,
@@ -249,6 +268,13 @@ impl Repository {
         self.read("SELECT test FROM result_set_members WHERE result_set = ?1 ORDER BY position", params![set], |row| {
             row.get(0)
         })
+    }
+
+    /// Whether just this set of results is recorded.
+    pub(super) fn has_result_set(&self, set: &ResultSet) -> Result<bool, RecordError> {
+        let sql = "SELECT generation IS ?2 AND status = ?3 FROM result_sets WHERE name = ?1";
+        let same: Vec<bool> = self.read(sql, params![set.name, set.generation, set.status.word()], |row| row.get(0))?;
+        Ok(same == [true] && self.members(&set.name)? == set.members)
     }
 
     /// The final set of results, or the latest one while there is no final one.
@@ -331,8 +357,10 @@ impl Repository {
         let mut operations = self.operations(only)?;
         let mut values: BTreeMap<i64, Vec<MetricValue>> = BTreeMap::new();
         let read = self.read(
-            "SELECT test, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values \
-             WHERE ?1 IS NULL OR test = ?1 ORDER BY test, metric",
+            &format!(
+                "SELECT test, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values {} ORDER BY test, metric",
+                only_of("test", only)
+            ),
             params![only],
             |row| Ok((row.get(0)?, metric_value(row, 1)?)),
         )?;
@@ -340,8 +368,11 @@ impl Repository {
             values.entry(test).or_default().push(value);
         }
         let rows = self.read(
-            "SELECT number, origin, known_test, generation, outcome, outcome_detail, time_limit_s, end_s, duplicate_of \
-             FROM tests WHERE ?1 IS NULL OR number = ?1 ORDER BY number",
+            &format!(
+                "SELECT number, origin, known_test, generation, outcome, outcome_detail, time_limit_s, end_s, duplicate_of \
+                 FROM tests {} ORDER BY number",
+                only_of("number", only)
+            ),
             params![only],
             |row| {
                 let number: u32 = row.get(0)?;
@@ -368,8 +399,10 @@ impl Repository {
 
     fn operations(&self, only: Option<u32>) -> Result<BTreeMap<i64, Vec<TestOperation>>, RecordError> {
         let choices = self.read(
-            "SELECT test, operation, value, low, high, x, y, z, text FROM choices WHERE ?1 IS NULL OR test = ?1 \
-             ORDER BY test, operation, position",
+            &format!(
+                "SELECT test, operation, value, low, high, x, y, z, text FROM choices {} ORDER BY test, operation, position",
+                only_of("test", only)
+            ),
             params![only],
             |row| Ok(((row.get(0)?, row.get(1)?), choice(row, 2)?)),
         )?;
@@ -384,8 +417,11 @@ impl Repository {
             parameters.entry(at).or_default().push(choice);
         }
         let rows = self.read(
-            "SELECT test, position, operation, draw_seed, start_s, end_s, start_condition, end_condition, length_s, times \
-             FROM operations WHERE ?1 IS NULL OR test = ?1 ORDER BY test, position",
+            &format!(
+                "SELECT test, position, operation, draw_seed, start_s, end_s, start_condition, end_condition, length_s, times \
+                 FROM operations {} ORDER BY test, position",
+                only_of("test", only)
+            ),
             params![only],
             |row| {
                 let at: At = (row.get(0)?, row.get(1)?);
@@ -541,6 +577,12 @@ impl Repository {
             .and_then(|mut statement| statement.query_map(parameters, row)?.collect::<rusqlite::Result<Vec<T>>>());
         rows.map_err(|e| RecordError::database("read the results", &self.path, e))
     }
+}
+
+/// The condition that takes the rows of one test, or of all where none is named. Each is a statement of its own: SQLite
+/// would look at all rows for one that may mean either.
+fn only_of(column: &str, only: Option<u32>) -> String {
+    if only.is_some() { format!("WHERE {column} = ?1") } else { "WHERE ?1 IS NULL".to_owned() }
 }
 
 /// A count; a negative one is an error of conversion, not a huge number.
