@@ -15,6 +15,7 @@ mod junit;
 mod markup;
 pub(crate) mod number;
 mod page;
+mod policy;
 mod published;
 mod recording;
 mod regions;

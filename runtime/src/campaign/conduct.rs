@@ -1,8 +1,9 @@
 //! Conducting a campaign: reference run, search, reference run again.
 
 use std::collections::hash_map::Entry;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -32,6 +33,9 @@ const PATIENCE: f64 = 20.0;
 const LEAST_TIMEOUT: Duration = Duration::from_secs(60);
 /// The limit of the undisturbed run, of which nothing is known yet.
 const FIRST_TIMEOUT: Duration = Duration::from_secs(600);
+
+/// How many recorded tests are read at once when a campaign is taken up again.
+const READ_TOGETHER: u32 = 50;
 
 /// How long a test may take, in wall time, when one like it took so many seconds.
 pub fn patience(seconds: f64) -> Duration {
@@ -518,9 +522,11 @@ impl Desk<'_> {
     fn evaluate(&mut self, planned: Vec<Planned>, each: &mut dyn FnMut(&TestRecord)) -> Result<bool, CampaignError> {
         let mut waiting = BTreeMap::new();
         let mut duplicates = Vec::new();
+        let mut known = VecDeque::new();
+        let last = planned.last().map_or(0, |test| test.number);
         for test in planned {
             if self.recorded.contains(&test.number) {
-                let record = self.read(test.number, test.origin)?;
+                let record = self.read(&mut known, test.number..=last, test.origin)?;
                 if record.test != test.test || record.simulator_seed != test.simulator_seed {
                     return Err(CampaignError::OtherCampaign(test.number));
                 }
@@ -557,19 +563,34 @@ impl Desk<'_> {
             }
         }
         for (original, test) in duplicates {
-            let observation = self.read(original, test.origin)?.observation;
+            let observation = self.read(&mut VecDeque::new(), original..=original, test.origin)?.observation;
             self.record(&test.with(observation), each)?;
         }
         Ok(true)
     }
 
-    /// What is recorded of a test, as far as a campaign looks at it: its series only where they are looked at.
-    fn read(&self, number: u32, origin: Origin) -> Result<TestRecord, RecordError> {
-        let repository = self.recorder.repository();
-        if origin == Origin::Reference || search::needs_courses(repository.plan()) {
-            repository.test(number)
-        } else {
-            repository.test_without_series(number)
+    /// What is recorded of the first of these tests, as far as a campaign looks at it: its series only where they are looked
+    /// at. Those that follow are read together with it, and wait in `known`.
+    fn read(
+        &self,
+        known: &mut VecDeque<TestRecord>,
+        numbers: RangeInclusive<u32>,
+        origin: Origin,
+    ) -> Result<TestRecord, RecordError> {
+        let number = *numbers.start();
+        while known.front().is_some_and(|record| record.number < number) {
+            known.pop_front();
+        }
+        if known.is_empty() {
+            let repository = self.recorder.repository();
+            let series = origin == Origin::Reference || search::needs_courses(repository.plan());
+            let together = if series { number } else { number.saturating_add(READ_TOGETHER).min(*numbers.end()) };
+            known.extend(repository.records(number..=together, series)?);
+        }
+        match known.pop_front() {
+            Some(record) if record.number == number => Ok(record),
+            // It is missing: the error says so.
+            _ => self.recorder.repository().test(number),
         }
     }
 

@@ -14,6 +14,7 @@ use crate::report::confirmed::{confirmation_sentence, once_sentence, tally_words
 use crate::report::generations::generations;
 use crate::report::markup::{Markup, coordinate, fill};
 use crate::report::number::{self, plural, with_unit};
+use crate::report::policy::policy;
 use crate::report::regions;
 use crate::report::scatter::{Detail, Dimension, Kind, Point, dimension, scatter};
 use crate::report::show::{TestReport, report_on};
@@ -97,7 +98,10 @@ fn page_in(repository: &Repository, folder: &Path) -> Result<String, RecordError
     let title = format!("{} of {}, seed {}", summary.campaign, summary.space, summary.seed);
     let mut escaped = Markup::default();
     escaped.text(&title);
-    Ok(fill(sesame_templates::report::PAGE, &[("title", &escaped.finish()), ("body", &body.finish())]))
+    let shell = sesame_templates::report::PAGE;
+    // The policy is of the shell alone: what is filled in is not permitted to hold styles or scripts.
+    let policy = policy(shell);
+    Ok(fill(shell, &[("policy", &policy), ("title", &escaped.finish()), ("body", &body.finish())]))
 }
 
 /// Tests that get a timeline, under a heading.
