@@ -731,6 +731,18 @@ mod tests {
     }
 
     #[test]
+    fn an_equal_test_is_known_by_its_first_number_however_many_came_between() {
+        let plan = sample::plan();
+        let records = sample::records(&plan, 300);
+        let mut earlier = Earlier::default();
+        for (number, record) in (0u32..).zip(records.iter().chain(&records)) {
+            let first = records.iter().position(|other| other.test == record.test);
+            let first = u32::try_from(first.expect("it is among them")).unwrap();
+            assert_eq!(earlier.same(&record.test, number), (first < number).then_some(first), "{number}");
+        }
+    }
+
+    #[test]
     fn what_is_covered_after_a_generation_is_the_same_in_any_order_of_its_tests() {
         let plan = sample::plan();
         let records = sample::records(&plan, 40);

@@ -431,6 +431,10 @@ impl Repository {
                     draw_seed: self.seed(&draw_seed)?,
                 });
             }
+            let mut values = values.of(number).map_err(failed)?;
+            // Room to grow would be a third of what all tests take in memory.
+            values.shrink_to_fit();
+            used.shrink_to_fit();
             found.push(TestRow {
                 number,
                 origin: self.origin(&origin, known.as_deref())?,
@@ -439,7 +443,7 @@ impl Repository {
                 outcome: self.outcome(&outcome, detail, limit)?,
                 end,
                 duplicate_of,
-                values: values.of(number).map_err(failed)?,
+                values,
             });
         }
         Ok(found)

@@ -816,3 +816,22 @@ fn a_set_of_results_that_is_recorded_already_is_not_written_again() {
         assert_eq!(recorder.repository().result_sets().unwrap(), [other]);
     }
 }
+
+#[test]
+fn reading_one_test_takes_no_longer_among_many_than_among_few() {
+    let time_among = |tests: u32| {
+        let folder = folder();
+        let plan = sample::plan();
+        let repository = sample::campaign(folder.path(), &plan, tests);
+        let once = |_| {
+            let begun = std::time::Instant::now();
+            assert_eq!(repository.records(11..=20, false).unwrap().len(), 10);
+            assert_eq!(repository.test(12).unwrap().number, 12);
+            begun.elapsed()
+        };
+        (0..20).map(once).min().unwrap()
+    };
+    let (few, many) = (time_among(30), time_among(1500));
+    // Looking at all rows would take some twenty times as long.
+    assert!(many < 5 * few, "{many:?} among many, {few:?} among few");
+}
