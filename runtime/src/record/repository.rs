@@ -424,10 +424,12 @@ impl Repository {
                 let operation = *ids
                     .get(name.as_str())
                     .ok_or_else(|| damaged(format!("T{number} has an operation `{name}` that the plan lacks")))?;
+                let mut parameters = chosen.remove(&at).unwrap_or_default();
+                parameters.shrink_to_fit();
                 used.push(TestOperation {
                     operation,
                     activation: self.activation(number, operation, window, conditions)?,
-                    parameters: chosen.remove(&at).unwrap_or_default(),
+                    parameters,
                     draw_seed: self.seed(&draw_seed)?,
                 });
             }

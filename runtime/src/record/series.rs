@@ -140,7 +140,9 @@ impl Repository {
             let sql = "SELECT metric, time_s, value FROM change_points WHERE test = ?1 ORDER BY metric, position";
             let points =
                 self.read(sql, [test], |row| Ok((super::repository::position(row, 0)?, (row.get(1)?, row.get(2)?))))?;
-            points.into_iter().for_each(|(metric, point)| add(metric, vec![point]));
+            for (metric, point) in points {
+                add(metric, vec![point]);
+            }
             return Ok(found);
         }
         let pieces = self.read(

@@ -775,7 +775,7 @@ fn every_byte_of_a_series_is_in_the_digest_and_a_piece_that_nothing_is_written_a
     for at in 0..numbers.len() {
         let mut changed = numbers.clone();
         changed[at] ^= 1;
-        let digits: String = changed.iter().map(|byte| format!("{byte:02x}")).collect();
+        let digits = changed.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat();
         let (digest, read) = after(&format!("numbers = x'{digits}'"));
         assert_ne!(digest, whole, "byte {at}");
         assert_eq!(read, Ok(()));

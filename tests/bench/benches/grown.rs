@@ -17,15 +17,17 @@ system {
   simulator sim = in_process "faulty_sim::Faulty" { crate "simulator"  step 10ms }
   topic level = "faulty/level" : real
 }
-metric fuzzing_time minimise = fuzzing_time()
-metric highest maximise default 0 = max(level)
-metric now default 0 = last(level)
+metric fuzzing_time = fuzzing_time()
+metric highest maximise default 0 = max(level) outbound
+metric lowest minimise default 0 = min(level) outbound
+metric now default 0 = last(level) outbound
 
 operation shift on level = random offset [-5, 5]
 operation lose  on level = packet loss [0%, 100%]
 
 campaign seeking {
-  objectives fuzzing_time, highest
+  objectives highest, lowest
+  observes   fuzzing_time, now
   operations shift, lose   1..5 per test
   search     nsga2 { population 100  evaluations 100 }
   end        after 5s
