@@ -19,6 +19,7 @@ mod repository;
 pub(crate) mod sample;
 mod scan;
 mod schema;
+mod series;
 #[cfg(test)]
 mod tests;
 

@@ -15,6 +15,7 @@ mod junit;
 mod markup;
 pub(crate) mod number;
 mod page;
+mod policy;
 mod published;
 mod recording;
 mod regions;
@@ -37,6 +38,8 @@ pub(crate) use export::is_name;
 pub use export::{ExportError, Exported, export};
 pub use junit::{junit, write_junit};
 pub(crate) use markup::{Markup, percent};
+#[cfg(feature = "campaign")]
+pub(crate) use page::write_page_with;
 pub use page::{page, write_page};
 pub use recording::{FedMetric, RecordingReplay, Sameness, recording_text};
 pub(crate) use repetition::wilson;

@@ -124,7 +124,7 @@ fn a_campaign_by_condition_comes_out_the_same_on_any_number_of_workers_and_when_
         ("choices", "test"),
         ("intervals", "test"),
         ("metric_values", "test"),
-        ("change_points", "test"),
+        ("series_pieces", "test"),
         ("events", "test"),
         ("wall_times", "test"),
         ("tests", "number"),

@@ -162,7 +162,7 @@ fn results_left_in_the_middle_of_writing_are_put_right_where_something_may_be_wr
         // What a kill leaves of a transaction that has begun to overwrite the file.
         let database = Connection::open(from.join("results.sqlite")).unwrap();
         database.pragma_update(None, "cache_size", 1).unwrap();
-        database.execute_batch("BEGIN IMMEDIATE; UPDATE change_points SET value = value + 1").unwrap();
+        database.execute_batch("BEGIN IMMEDIATE; UPDATE series_pieces SET points = points + 1").unwrap();
         for name in ["results.sqlite", "results.sqlite-journal"] {
             fs::copy(from.join(name), to.join(name)).unwrap();
         }

@@ -1,13 +1,15 @@
 //! Conducting a campaign: reference run, search, reference run again.
 
-use std::collections::btree_map::Entry;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use sesame_plan::{CampaignPlan, CoverageGoal, KnownTestId, OperationId, Recorded, Search, Test};
+use sha2::{Digest as _, Sha256};
 
 use super::again::{Again, LIKE_BEFORE};
 use super::pool::{Ended, Job, Pool, PoolError, PoolSettings};
@@ -31,6 +33,9 @@ const PATIENCE: f64 = 20.0;
 const LEAST_TIMEOUT: Duration = Duration::from_secs(60);
 /// The limit of the undisturbed run, of which nothing is known yet.
 const FIRST_TIMEOUT: Duration = Duration::from_secs(600);
+
+/// How many recorded tests are read at once when a campaign is taken up again.
+const READ_TOGETHER: u32 = 50;
 
 /// How long a test may take, in wall time, when one like it took so many seconds.
 pub fn patience(seconds: f64) -> Duration {
@@ -135,7 +140,7 @@ pub fn conduct(
 ) -> Result<Conducted, CampaignError> {
     let mut strategy = search::strategy(plan, settings.seed)?;
     let mut tracking = plan.campaign.coverage.as_ref().map(|goal| Tracking::of(plan, goal)).transpose()?;
-    let recorded = recorder.repository().tests()?.iter().map(|row| row.number).collect();
+    let recorded = recorder.repository().numbers()?.into_iter().collect();
     let repeated = recorder.repository().repetitions()?;
     let pool = Pool::start(&PoolSettings {
         workers: settings.workers,
@@ -225,6 +230,7 @@ pub fn conduct(
             });
         }
         let mut told = Vec::with_capacity(planned.len());
+        violating.clear();
         originals.extend(planned.iter().filter_map(|test| Some((test.number, test.duplicate_of?))));
         let complete = desk.evaluate(planned, &mut |record| {
             let fitness = search::fitness(plan, &record.observation);
@@ -462,15 +468,19 @@ impl Planned {
     }
 }
 
-/// The tests of this campaign by their content, so that an equal one is not simulated again.
+/// The tests of this campaign by their content, so that an equal one is not simulated again. Of each test its hash is kept:
+/// the tests themselves would be most of what a campaign holds in memory.
 #[derive(Default)]
-struct Earlier(BTreeMap<String, u32>);
+struct Earlier(HashMap<[u8; 16], u32>);
 
 impl Earlier {
     /// The number of the first test equal to this one; this one is remembered if it is the first.
     fn same(&mut self, test: &Test, number: u32) -> Option<u32> {
-        let content = serde_json::to_string(test).unwrap_or_else(|error| unreachable!("a test is plain data: {error}"));
-        match self.0.entry(content) {
+        let content = serde_json::to_vec(test).unwrap_or_else(|error| unreachable!("a test is plain data: {error}"));
+        // Half of a SHA-256: of 10^12 tests two have the same by chance once in 10^14 campaigns.
+        let mut hash = [0; 16];
+        hash.copy_from_slice(&Sha256::digest(content)[..16]);
+        match self.0.entry(hash) {
             Entry::Occupied(first) => Some(*first.get()),
             Entry::Vacant(place) => {
                 place.insert(number);
@@ -512,9 +522,11 @@ impl Desk<'_> {
     fn evaluate(&mut self, planned: Vec<Planned>, each: &mut dyn FnMut(&TestRecord)) -> Result<bool, CampaignError> {
         let mut waiting = BTreeMap::new();
         let mut duplicates = Vec::new();
+        let mut known = VecDeque::new();
+        let last = planned.last().map_or(0, |test| test.number);
         for test in planned {
             if self.recorded.contains(&test.number) {
-                let record = self.recorder.repository().test(test.number)?;
+                let record = self.read(&mut known, test.number..=last, test.origin)?;
                 if record.test != test.test || record.simulator_seed != test.simulator_seed {
                     return Err(CampaignError::OtherCampaign(test.number));
                 }
@@ -551,10 +563,35 @@ impl Desk<'_> {
             }
         }
         for (original, test) in duplicates {
-            let observation = self.recorder.repository().test(original)?.observation;
+            let observation = self.read(&mut VecDeque::new(), original..=original, test.origin)?.observation;
             self.record(&test.with(observation), each)?;
         }
         Ok(true)
+    }
+
+    /// What is recorded of the first of these tests, as far as a campaign looks at it: its series only where they are looked
+    /// at. Those that follow are read together with it, and wait in `known`.
+    fn read(
+        &self,
+        known: &mut VecDeque<TestRecord>,
+        numbers: RangeInclusive<u32>,
+        origin: Origin,
+    ) -> Result<TestRecord, RecordError> {
+        let number = *numbers.start();
+        while known.front().is_some_and(|record| record.number < number) {
+            known.pop_front();
+        }
+        if known.is_empty() {
+            let repository = self.recorder.repository();
+            let series = origin == Origin::Reference || search::needs_courses(repository.plan());
+            let together = if series { number } else { number.saturating_add(READ_TOGETHER).min(*numbers.end()) };
+            known.extend(repository.records(number..=together, series)?);
+        }
+        match known.pop_front() {
+            Some(record) if record.number == number => Ok(record),
+            // It is missing: the error says so.
+            _ => self.recorder.repository().test(number),
+        }
     }
 
     fn record(&mut self, record: &TestRecord, each: &mut dyn FnMut(&TestRecord)) -> Result<(), CampaignError> {
@@ -691,6 +728,18 @@ mod tests {
         let mut reference = sample::observe(&plan, &Test::default(), 1);
         reference.unheard = topic.paths.clone();
         assert_eq!(super::unheard(&known, &reference), [], "only what is to be run counts");
+    }
+
+    #[test]
+    fn an_equal_test_is_known_by_its_first_number_however_many_came_between() {
+        let plan = sample::plan();
+        let records = sample::records(&plan, 300);
+        let mut earlier = Earlier::default();
+        for (number, record) in (0u32..).zip(records.iter().chain(&records)) {
+            let first = records.iter().position(|other| other.test == record.test);
+            let first = u32::try_from(first.expect("it is among them")).unwrap();
+            assert_eq!(earlier.same(&record.test, number), (first < number).then_some(first), "{number}");
+        }
     }
 
     #[test]

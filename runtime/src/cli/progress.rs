@@ -102,6 +102,32 @@ impl<'a> Display<'a> {
     }
 }
 
+/// Says on a terminal what takes a while, until it is dropped; elsewhere nothing.
+pub(super) struct Waiting(Option<ProgressBar>);
+
+impl Waiting {
+    /// For something that looks at so many tests: of few there is nothing to wait for.
+    pub(super) fn on(tests: usize, doing: &str) -> Self {
+        let long = tests >= 2000 && std::io::stderr().is_terminal();
+        Waiting(long.then(|| {
+            let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10));
+            let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed}");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+            bar.set_message(format!("{doing} of {tests} tests"));
+            bar.enable_steady_tick(Duration::from_millis(200));
+            bar
+        }))
+    }
+}
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.0 {
+            bar.finish_and_clear();
+        }
+    }
+}
+
 /// A length of wall time in words.
 pub(super) fn wait(seconds: f64) -> String {
     if seconds < 90.0 {

@@ -12,7 +12,7 @@ use serde::Serialize;
 use sesame_plan::{CampaignPlan, Domain};
 
 use super::gate::Gate;
-use super::progress::{Display, wait};
+use super::progress::{Display, Waiting, wait};
 use super::terminal::{print, print_json, say, text_options};
 use super::{Failure, Format, STOPPED};
 use crate::campaign::{Conducted, Settings, conduct};
@@ -194,7 +194,7 @@ pub(super) fn carry_out(
         Conducted::Finished(repository) => {
             let code = conclude(&repository, folder, &folder.join("report.html"), ending)?;
             let repetitions: usize = repository.repetitions()?.values().map(Vec::len).sum();
-            let (took, tests) = (started.elapsed(), repository.tests()?.len() + repetitions);
+            let (took, tests) = (started.elapsed(), repository.numbers()?.len() + repetitions);
             let took =
                 if took.as_secs() < 90 { format!("{:.1} s", took.as_secs_f64()) } else { wait(took.as_secs_f64()) };
             say(format_args!("      Took {took} for {tests} runs"));
@@ -241,12 +241,14 @@ pub(super) fn conclude(
     page: &Path,
     ending: &Ending,
 ) -> Result<ExitCode, Failure> {
-    report::write_page(repository, page)?;
+    let waiting = Waiting::on(repository.evaluated()?, "making the page");
+    let digest = repository.digest()?;
+    report::write_page_with(repository, page, &digest)?;
     if let Some(junit) = &ending.junit {
         report::write_junit(repository, junit)?;
     }
     let summary = report::summary(repository)?;
-    let digest = repository.digest()?;
+    drop(waiting);
     match ending.format {
         Format::Text => {
             print(&report::summary_text(&summary, text_options()))?;

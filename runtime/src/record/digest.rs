@@ -7,6 +7,7 @@ use rusqlite::Connection;
 use rusqlite::types::ValueRef;
 use sha2::{Digest as _, Sha256};
 
+use crate::record::series::PIECES_SINCE;
 use crate::record::{RecordError, Repository};
 
 /// What is hashed, in this order: a name, and the rows in an order that depends on nothing but the content.
@@ -47,8 +48,9 @@ const CONTENT: &[(&str, &str)] = &[
     ("tails", "SELECT test, operation, position, start_s, end_s FROM tails ORDER BY test, operation, position"),
     ("unheard", "SELECT test, position, path FROM unheard ORDER BY test, position"),
     (
-        "change_points",
-        "SELECT test, metric, position, time_s, value FROM change_points ORDER BY test, metric, position",
+        "series_pieces",
+        "SELECT test, metric, position, points, start_ns, tick_ns, times, numbers FROM series_pieces \
+         ORDER BY test, metric, position",
     ),
     (
         "repetitions",
@@ -73,34 +75,52 @@ const CONTENT: &[(&str, &str)] = &[
     ("events", "SELECT test, text FROM events WHERE kind = 'warning' ORDER BY test, text"),
 ];
 
+/// What was hashed in place of `series_pieces` in results of schemas before [`PIECES_SINCE`].
+const POINTS: (&str, &str) = (
+    "change_points",
+    "SELECT test, metric, position, time_s, value FROM change_points ORDER BY test, metric, position",
+);
+
+/// Bytes that are collected before they are hashed: single numbers are too short for the hash to be fast.
+const PORTION: usize = 1 << 16;
+
 /// SHA-256 over the canonical content of a results repository, as 64 hexadecimal digits.
 ///
 /// Left out are wall times and limits of wall time, hosts, processes, session notes, paths, and the order in which things were written. The
 /// rest is hashed in the order of this module's list: for each table its name as a text, then its rows, then the byte
 /// `;`. A row is the byte `(` and its columns: `N` for null, `I` and 8 bytes (little endian) for an integer, `F` and
 /// the 8 bytes of the IEEE 754 double (little endian, zero without sign), `T`, the length in bytes as 8 bytes (little
-/// endian) and the UTF-8 bytes for a text.
+/// endian) and the UTF-8 bytes for a text, `B`, the length likewise and the bytes for a blob. All of it is read from the
+/// file each time: nothing is taken from a hash that is stored. Results of an earlier schema have the digest that their
+/// release gave them.
 pub fn digest(path: &Path) -> Result<String, RecordError> {
     Repository::open(path)?.digest()
 }
 
-pub(super) fn of_connection(connection: &Connection) -> rusqlite::Result<String> {
+pub(super) fn of_connection(connection: &Connection, schema: i64) -> rusqlite::Result<String> {
     // One read transaction, so that a run writing meanwhile is seen at one point.
     let transaction = connection.unchecked_transaction()?;
     let mut hash = Sha256::new();
-    for (name, sql) in CONTENT {
-        feed(&mut hash, ValueRef::Text(name.as_bytes()));
+    let mut portion = Vec::with_capacity(2 * PORTION);
+    for &content in CONTENT {
+        let (name, sql) = if content.0 == "series_pieces" && schema < PIECES_SINCE { POINTS } else { content };
+        feed(&mut portion, ValueRef::Text(name.as_bytes()));
         let mut statement = transaction.prepare(sql)?;
         let columns = statement.column_count();
         let mut rows = statement.query([])?;
         while let Some(row) = rows.next()? {
-            hash.update(b"(");
+            portion.push(b'(');
             for column in 0..columns {
-                feed(&mut hash, row.get_ref(column)?);
+                feed(&mut portion, row.get_ref(column)?);
+            }
+            if portion.len() >= PORTION {
+                hash.update(&portion);
+                portion.clear();
             }
         }
-        hash.update(b";");
+        portion.push(b';');
     }
+    hash.update(&portion);
     let mut digits = String::with_capacity(64);
     for byte in hash.finalize() {
         write!(digits, "{byte:02x}").expect("a string takes all that is written");
@@ -108,22 +128,24 @@ pub(super) fn of_connection(connection: &Connection) -> rusqlite::Result<String>
     Ok(digits)
 }
 
-fn feed(hash: &mut Sha256, value: ValueRef<'_>) {
+fn feed(portion: &mut Vec<u8>, value: ValueRef<'_>) {
+    let mut sized = |kind: u8, bytes: &[u8]| {
+        portion.push(kind);
+        portion.extend((bytes.len() as u64).to_le_bytes());
+        portion.extend(bytes);
+    };
     match value {
-        ValueRef::Null => hash.update(b"N"),
+        ValueRef::Text(bytes) => sized(b'T', bytes),
+        ValueRef::Blob(bytes) => sized(b'B', bytes),
+        ValueRef::Null => portion.push(b'N'),
         ValueRef::Integer(n) => {
-            hash.update(b"I");
-            hash.update(n.to_le_bytes());
+            portion.push(b'I');
+            portion.extend(n.to_le_bytes());
         }
         ValueRef::Real(x) => {
-            hash.update(b"F");
+            portion.push(b'F');
             // SQLite stores whole numbers as integers and so forgets the sign of zero; the hash must not depend on it.
-            hash.update((x + 0.0).to_le_bytes());
-        }
-        ValueRef::Text(bytes) | ValueRef::Blob(bytes) => {
-            hash.update(b"T");
-            hash.update((bytes.len() as u64).to_le_bytes());
-            hash.update(bytes);
+            portion.extend((x + 0.0).to_le_bytes());
         }
     }
 }

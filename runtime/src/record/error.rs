@@ -72,6 +72,19 @@ pub enum RecordError {
         /// The file.
         path: PathBuf,
     },
+    /// An earlier release wrote the file: it can be read, but not gone on with.
+    #[error(
+        "these results have schema {found}, this release writes {known}: they can be read, but nothing can be added; go on \
+         with the release that wrote them, or run the campaign again: {}", path.display()
+    )]
+    ReadOnly {
+        /// Schema of the file.
+        found: i64,
+        /// Schema of this release.
+        known: i64,
+        /// The file.
+        path: PathBuf,
+    },
     /// The file is cut off or its content contradicts itself.
     #[error("these results are damaged ({problem}); restore the file from a copy, or run the campaign again: {}", path.display())]
     Damaged {

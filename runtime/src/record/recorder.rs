@@ -11,7 +11,9 @@ use crate::condition;
 use crate::observation::{Observation, Outcome};
 use crate::record::folder::{BEGUN, DATABASE, Lock};
 use crate::record::schema::{self, index};
-use crate::record::{Event, EventKind, GenerationCoverage, Origin, RecordError, Repository, ResultSet, TestRecord};
+use crate::record::{
+    Event, EventKind, GenerationCoverage, Origin, RecordError, Repository, ResultSet, TestRecord, series,
+};
 use crate::search;
 use crate::search::indicators::GenerationIndicators;
 
@@ -140,8 +142,11 @@ impl Recorder {
         written.map_err(|e| RecordError::database("record the names of tests", &self.repository.path, e))
     }
 
-    /// Records a set of results; one of the same name is replaced.
+    /// Records a set of results; one of the same name is replaced, unless it is this one.
     pub fn put_result_set(&mut self, set: &ResultSet) -> Result<(), RecordError> {
+        if self.repository.has_result_set(set)? {
+            return Ok(());
+        }
         let written = self.repository.connection.transaction().and_then(|transaction| {
             transaction.execute("DELETE FROM result_set_members WHERE result_set = ?1", [&set.name])?;
             transaction.execute(
@@ -284,7 +289,6 @@ fn tune(connection: &Connection) -> rusqlite::Result<()> {
     // References are for readers: a test's rows are written together, so that checking two for each change point of a
     // series would cost time and find nothing.
     connection.pragma_update(None, "foreign_keys", false)?;
-    connection.set_prepared_statement_cache_capacity(32);
     Ok(())
 }
 
@@ -453,12 +457,7 @@ fn write_test(transaction: &Transaction<'_>, plan: &CampaignPlan, record: &TestR
         if duplicate_of.is_some() {
             continue;
         }
-        let mut insert = transaction.prepare_cached(
-            "INSERT INTO change_points (test, metric, position, time_s, value) VALUES (?1, ?2, ?3, ?4, ?5)",
-        )?;
-        for (position, (time, value)) in shown.series.iter().enumerate() {
-            insert.execute(params![number, index(metric), index(position), time, value])?;
-        }
+        series::write(transaction, *number, metric, &shown.series)?;
     }
     for (position, text) in observation.warnings.iter().enumerate() {
         transaction

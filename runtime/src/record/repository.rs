@@ -1,6 +1,7 @@
 //! Reading results.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use rusqlite::types::FromSql;
@@ -10,6 +11,7 @@ use sesame_plan::{Activation, CampaignPlan, Choice, KnownTestId, OperationId, Sp
 use crate::condition;
 use crate::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, Reach, WallTime};
 use crate::record::folder::{DATABASE, trace_file};
+use crate::record::scan::Cursor;
 use crate::record::{
     Event, EventKind, GenerationCoverage, MetricValue, Origin, RecordError, ResultSet, Session, Status, TestRecord,
     TestRow, digest, schema,
@@ -21,6 +23,8 @@ use crate::search::indicators::GenerationIndicators;
 pub struct Repository {
     pub(super) connection: Connection,
     pub(super) path: PathBuf,
+    /// The schema of the file, which may be an earlier one.
+    pub(super) schema: i64,
     pub(super) facts: CampaignFacts,
 }
 
@@ -37,8 +41,11 @@ pub struct CampaignFacts {
     pub stop: Option<String>,
 }
 
-/// One observed number: test, position of its operation or metric, and the value.
-type At = (i64, i64);
+/// How many statements are kept ready: more than reading and writing a test take together.
+const STATEMENTS: usize = 64;
+
+/// A recorded operation: position, name, seed of its draws, window and conditions.
+type OperationColumns = (i64, String, String, Window, Conditions);
 
 /// Start and end of a planned window.
 type Window = (Option<f64>, Option<f64>);
@@ -69,7 +76,11 @@ impl Repository {
         let plan = serde_json::from_str(&plan)
             .map_err(|e| RecordError::damaged(&path, format!("its plan cannot be read: {e}")))?;
         let seed = seed.parse().map_err(|_| RecordError::damaged(&path, format!("`{seed}` is no seed")))?;
-        Ok(Repository { connection, path, facts: CampaignFacts { plan, seed, runtime, stop } })
+        connection.set_prepared_statement_cache_capacity(STATEMENTS);
+        let schema = connection
+            .pragma_query_value(None, "user_version", |row| row.get(0))
+            .map_err(|e| RecordError::database("read the campaign", &path, e))?;
+        Ok(Repository { connection, path, schema, facts: CampaignFacts { plan, seed, runtime, stop } })
     }
 
     /// The database's file.
@@ -107,7 +118,8 @@ impl Repository {
 
     /// Hash of the canonical content, see [`digest()`].
     pub fn digest(&self) -> Result<String, RecordError> {
-        digest::of_connection(&self.connection).map_err(|e| RecordError::database("read the results", &self.path, e))
+        digest::of_connection(&self.connection, self.schema)
+            .map_err(|e| RecordError::database("read the results", &self.path, e))
     }
 
     /// How many tests there are, the undisturbed runs left aside.
@@ -118,13 +130,18 @@ impl Repository {
 
     /// All tests, by number.
     pub fn tests(&self) -> Result<Vec<TestRow>, RecordError> {
-        self.rows(None)
+        self.rows(0..=u32::MAX)
+    }
+
+    /// The numbers of all tests, ascending.
+    pub fn numbers(&self) -> Result<Vec<u32>, RecordError> {
+        self.read("SELECT number FROM tests ORDER BY number", [], |row| row.get(0))
     }
 
     /// One test without its time series and effects.
     pub fn row(&self, number: u32) -> Result<TestRow, RecordError> {
         let missing = || RecordError::NoSuchTest { name: format!("T{number}"), path: self.path.clone() };
-        self.rows(Some(number))?.pop().ok_or_else(missing)
+        self.rows(number..=number)?.pop().ok_or_else(missing)
     }
 
     /// The number of the test that a user calls `T158`, `158`, by the name of a known test or by the one it had before it
@@ -147,69 +164,80 @@ impl Repository {
     /// One test, whole.
     pub fn test(&self, number: u32) -> Result<TestRecord, RecordError> {
         let missing = || RecordError::NoSuchTest { name: format!("T{number}"), path: self.path.clone() };
-        let row = self.row(number)?;
-        let (simulator_seed, messages, run): (String, u64, f64) = self
-            .read(
-                "SELECT simulator_seed, messages, run_s FROM tests JOIN wall_times ON test = number WHERE number = ?1",
-                params![number],
-                |row| Ok((row.get(0)?, unsigned(row, 1)?, row.get(2)?)),
-            )?
-            .pop()
-            .ok_or_else(missing)?;
-        let parents =
-            self.read("SELECT parent FROM parents WHERE test = ?1 ORDER BY position", params![number], |row| {
-                row.get(0)
-            })?;
-        let warnings = self.read(
-            "SELECT text FROM events WHERE test = ?1 AND kind = 'warning' ORDER BY position",
-            params![number],
-            |row| row.get(0),
+        self.records(number..=number, true)?.pop().ok_or_else(missing)
+    }
+
+    /// The tests whose numbers lie in this range, in their order. Without their time series, which are most of what there is
+    /// of a test, reading many at once takes a small part of the time that each takes by itself.
+    pub fn records(&self, numbers: RangeInclusive<u32>, series: bool) -> Result<Vec<TestRecord>, RecordError> {
+        let within = params![numbers.start(), numbers.end()];
+        let heads = self.read(
+            "SELECT number, simulator_seed, messages, run_s FROM tests JOIN wall_times ON test = number \
+             WHERE number BETWEEN ?1 AND ?2 ORDER BY number",
+            within,
+            |row| Ok((row.get(0)?, (row.get::<_, String>(1)?, unsigned(row, 2)?, row.get(3)?))),
         )?;
-        let mut metrics: Vec<MetricObservation> = row
-            .values
-            .iter()
-            .map(|&MetricValue { value, set, reach, not_finite }| MetricObservation {
-                value,
-                set,
-                reach,
-                not_finite,
-                series: Vec::new(),
-            })
-            .collect();
-        let points = self.read(
-            "SELECT metric, time_s, value FROM change_points WHERE test = ?1 ORDER BY metric, position",
-            params![row.duplicate_of.unwrap_or(number)],
-            |row| Ok((position(row, 0)?, row.get(1)?, row.get(2)?)),
+        let mut heads: BTreeMap<u32, (String, u64, f64)> = heads.into_iter().collect();
+        let mut parents: BTreeMap<u32, Vec<u32>> = self.by_test(
+            "SELECT test, parent FROM parents WHERE test BETWEEN ?1 AND ?2 ORDER BY test, position",
+            &numbers,
+            |row| row.get(1),
         )?;
-        for (metric, time, value) in points {
-            let metric = metrics
-                .get_mut(metric)
-                .ok_or_else(|| RecordError::damaged(&self.path, format!("T{number} has a series without a metric")))?;
-            metric.series.push((time, value));
+        let mut warnings: BTreeMap<u32, Vec<String>> = self.by_test(
+            "SELECT test, text FROM events WHERE test BETWEEN ?1 AND ?2 AND kind = 'warning' ORDER BY test, position",
+            &numbers,
+            |row| row.get(1),
+        )?;
+        let mut unheard: BTreeMap<u32, Vec<String>> = self.by_test(
+            "SELECT test, path FROM unheard WHERE test BETWEEN ?1 AND ?2 ORDER BY test, position",
+            &numbers,
+            |row| row.get(1),
+        )?;
+        let rows = self.rows(numbers.clone())?;
+        let mut effects = self.effects(&numbers, &rows)?;
+        let mut records = Vec::with_capacity(rows.len());
+        for row in rows {
+            let number = row.number;
+            let missing = || RecordError::NoSuchTest { name: format!("T{number}"), path: self.path.clone() };
+            let (simulator_seed, messages, run) = heads.remove(&number).ok_or_else(missing)?;
+            let mut metrics: Vec<MetricObservation> = row
+                .values
+                .iter()
+                .map(|&MetricValue { value, set, reach, not_finite }| MetricObservation {
+                    value,
+                    set,
+                    reach,
+                    not_finite,
+                    series: Vec::new(),
+                })
+                .collect();
+            for (metric, points) in if series { self.series(row.duplicate_of.unwrap_or(number))? } else { Vec::new() } {
+                let metric = metrics.get_mut(metric).ok_or_else(|| {
+                    RecordError::damaged(&self.path, format!("T{number} has a series without a metric"))
+                })?;
+                metric.series = points;
+            }
+            records.push(TestRecord {
+                number,
+                origin: row.origin,
+                generation: row.generation,
+                parents: parents.remove(&number).unwrap_or_default(),
+                test: row.test,
+                simulator_seed: self.seed(&simulator_seed)?,
+                duplicate_of: row.duplicate_of,
+                observation: Observation {
+                    operations: effects.remove(&number).unwrap_or_default(),
+                    unheard: unheard.remove(&number).unwrap_or_default(),
+                    outcome: row.outcome,
+                    end: row.end,
+                    metrics,
+                    messages,
+                    warnings: warnings.remove(&number).unwrap_or_default(),
+                    wall: WallTime { run },
+                },
+            });
         }
-        Ok(TestRecord {
-            number,
-            origin: row.origin,
-            generation: row.generation,
-            parents,
-            test: row.test,
-            simulator_seed: self.seed(&simulator_seed)?,
-            duplicate_of: row.duplicate_of,
-            observation: Observation {
-                operations: self.effects(number, &row.outcome)?,
-                unheard: self.read(
-                    "SELECT path FROM unheard WHERE test = ?1 ORDER BY position",
-                    params![number],
-                    |row| row.get(0),
-                )?,
-                outcome: row.outcome,
-                end: row.end,
-                metrics,
-                messages,
-                warnings,
-                wall: WallTime { run },
-            },
-        })
+        Ok(records)
     }
 
     /// What tests were called in the file they were imported from, by number; empty for a campaign that was run.
@@ -249,6 +277,13 @@ impl Repository {
         self.read("SELECT test FROM result_set_members WHERE result_set = ?1 ORDER BY position", params![set], |row| {
             row.get(0)
         })
+    }
+
+    /// Whether just this set of results is recorded.
+    pub(super) fn has_result_set(&self, set: &ResultSet) -> Result<bool, RecordError> {
+        let sql = "SELECT generation IS ?2 AND status = ?3 FROM result_sets WHERE name = ?1";
+        let same: Vec<bool> = self.read(sql, params![set.name, set.generation, set.status.word()], |row| row.get(0))?;
+        Ok(same == [true] && self.members(&set.name)? == set.members)
     }
 
     /// The final set of results, or the latest one while there is no final one.
@@ -327,95 +362,98 @@ impl Repository {
         })
     }
 
-    fn rows(&self, only: Option<u32>) -> Result<Vec<TestRow>, RecordError> {
-        let mut operations = self.operations(only)?;
-        let mut values: BTreeMap<i64, Vec<MetricValue>> = BTreeMap::new();
-        let read = self.read(
-            "SELECT test, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values \
-             WHERE ?1 IS NULL OR test = ?1 ORDER BY test, metric",
-            params![only],
-            |row| Ok((row.get(0)?, metric_value(row, 1)?)),
-        )?;
-        for (test, value) in read {
-            values.entry(test).or_default().push(value);
-        }
-        let rows = self.read(
-            "SELECT number, origin, known_test, generation, outcome, outcome_detail, time_limit_s, end_s, duplicate_of \
-             FROM tests WHERE ?1 IS NULL OR number = ?1 ORDER BY number",
-            params![only],
-            |row| {
-                let number: u32 = row.get(0)?;
-                let origin: (String, Option<String>) = (row.get(1)?, row.get(2)?);
-                let outcome: (String, Option<String>, Option<f64>) = (row.get(4)?, row.get(5)?, row.get(6)?);
-                Ok((number, origin, row.get(3)?, outcome, row.get(7)?, row.get(8)?))
-            },
-        )?;
-        rows.into_iter()
-            .map(|(number, (origin, known), generation, (outcome, detail, limit), end, duplicate_of)| {
-                Ok(TestRow {
-                    number,
-                    origin: self.origin(&origin, known.as_deref())?,
-                    generation,
-                    test: Test { operations: operations.remove(&i64::from(number)).unwrap_or_default() },
-                    outcome: self.outcome(&outcome, detail, limit)?,
-                    end,
-                    duplicate_of,
-                    values: values.remove(&i64::from(number)).unwrap_or_default(),
-                })
-            })
-            .collect()
-    }
-
-    fn operations(&self, only: Option<u32>) -> Result<BTreeMap<i64, Vec<TestOperation>>, RecordError> {
-        let choices = self.read(
-            "SELECT test, operation, value, low, high, x, y, z, text FROM choices WHERE ?1 IS NULL OR test = ?1 \
-             ORDER BY test, operation, position",
-            params![only],
-            |row| Ok(((row.get(0)?, row.get(1)?), choice(row, 2)?)),
-        )?;
-        let mut parameters: BTreeMap<At, Vec<Choice>> = BTreeMap::new();
-        for (at, choice) in choices {
-            let choice = choice.ok_or_else(|| {
-                RecordError::damaged(
-                    &self.path,
-                    format!("T{} has a choice that is neither value, range, point nor text", at.0),
-                )
-            })?;
-            parameters.entry(at).or_default().push(choice);
-        }
-        let rows = self.read(
+    /// The tests whose numbers lie in this range: all tables are in their order, so that they are gone through side by side.
+    fn rows(&self, numbers: RangeInclusive<u32>) -> Result<Vec<TestRow>, RecordError> {
+        let failed = |error| RecordError::database("read the results", &self.path, error);
+        let damaged = |problem: String| RecordError::damaged(&self.path, problem);
+        let prepare = |sql: &str| self.connection.prepare_cached(sql).map_err(failed);
+        let within = params![numbers.start(), numbers.end()];
+        let mut operations = prepare(
             "SELECT test, position, operation, draw_seed, start_s, end_s, start_condition, end_condition, length_s, times \
-             FROM operations WHERE ?1 IS NULL OR test = ?1 ORDER BY test, position",
-            params![only],
-            |row| {
-                let at: At = (row.get(0)?, row.get(1)?);
+             FROM operations WHERE test BETWEEN ?1 AND ?2 ORDER BY test, position",
+        )?;
+        let mut choices = prepare(
+            "SELECT test, operation, value, low, high, x, y, z, text FROM choices WHERE test BETWEEN ?1 AND ?2 \
+             ORDER BY test, operation, position",
+        )?;
+        let mut values = prepare(
+            "SELECT test, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values \
+             WHERE test BETWEEN ?1 AND ?2 ORDER BY test, metric",
+        )?;
+        let mut tests = prepare(
+            "SELECT number, origin, known_test, generation, outcome, outcome_detail, time_limit_s, end_s, duplicate_of \
+             FROM tests WHERE number BETWEEN ?1 AND ?2 ORDER BY number",
+        )?;
+        let mut operations =
+            Cursor::over(operations.query(within).map_err(failed)?, |row| -> rusqlite::Result<OperationColumns> {
                 let window = (row.get(4)?, row.get(5)?);
                 let conditions = (row.get(6)?, row.get(7)?, row.get(8)?, row.get(9)?);
-                Ok((at, row.get::<_, String>(2)?, row.get::<_, String>(3)?, window, conditions))
-            },
-        )?;
+                Ok((row.get(1)?, row.get(2)?, row.get(3)?, window, conditions))
+            })
+            .map_err(failed)?;
+        let mut choices = Cursor::over(choices.query(within).map_err(failed)?, |row| -> rusqlite::Result<_> {
+            Ok((row.get::<_, i64>(1)?, choice(row, 2)?))
+        })
+        .map_err(failed)?;
+        let mut values =
+            Cursor::over(values.query(within).map_err(failed)?, |row| metric_value(row, 1)).map_err(failed)?;
         let ids: BTreeMap<&str, OperationId> = (0u32..)
             .zip(&self.plan().operations)
             .map(|(id, operation)| (operation.name.as_str(), OperationId(id)))
             .collect();
-        let mut tests: BTreeMap<i64, Vec<TestOperation>> = BTreeMap::new();
-        for (at, name, draw_seed, window, conditions) in rows {
-            let operation = *ids.get(name.as_str()).ok_or_else(|| {
-                RecordError::damaged(&self.path, format!("T{} has an operation `{name}` that the plan lacks", at.0))
-            })?;
-            tests.entry(at.0).or_default().push(TestOperation {
-                operation,
-                activation: self.activation(at.0, operation, window, conditions)?,
-                parameters: parameters.remove(&at).unwrap_or_default(),
-                draw_seed: self.seed(&draw_seed)?,
+
+        let mut found = Vec::new();
+        let mut rows = tests.query(within).map_err(failed)?;
+        while let Some(row) = rows.next().map_err(failed)? {
+            let number: u32 = row.get(0).map_err(failed)?;
+            let head = || -> rusqlite::Result<_> {
+                let origin: (String, Option<String>) = (row.get(1)?, row.get(2)?);
+                let outcome: (String, Option<String>, Option<f64>) = (row.get(4)?, row.get(5)?, row.get(6)?);
+                Ok((origin, row.get(3)?, outcome, row.get(7)?, row.get(8)?))
+            };
+            let ((origin, known), generation, (outcome, detail, limit), end, duplicate_of) = head().map_err(failed)?;
+            let mut chosen: BTreeMap<i64, Vec<Choice>> = BTreeMap::new();
+            for (at, choice) in choices.of(number).map_err(failed)? {
+                let choice = choice.ok_or_else(|| {
+                    damaged(format!("T{number} has a choice that is neither value, range, point nor text"))
+                })?;
+                chosen.entry(at).or_default().push(choice);
+            }
+            let mut used = Vec::new();
+            for (at, name, draw_seed, window, conditions) in operations.of(number).map_err(failed)? {
+                let operation = *ids
+                    .get(name.as_str())
+                    .ok_or_else(|| damaged(format!("T{number} has an operation `{name}` that the plan lacks")))?;
+                let mut parameters = chosen.remove(&at).unwrap_or_default();
+                parameters.shrink_to_fit();
+                used.push(TestOperation {
+                    operation,
+                    activation: self.activation(number, operation, window, conditions)?,
+                    parameters,
+                    draw_seed: self.seed(&draw_seed)?,
+                });
+            }
+            let mut values = values.of(number).map_err(failed)?;
+            // Room to grow would be a third of what all tests take in memory.
+            values.shrink_to_fit();
+            used.shrink_to_fit();
+            found.push(TestRow {
+                number,
+                origin: self.origin(&origin, known.as_deref())?,
+                generation,
+                test: Test { operations: used },
+                outcome: self.outcome(&outcome, detail, limit)?,
+                end,
+                duplicate_of,
+                values,
             });
         }
-        Ok(tests)
+        Ok(found)
     }
 
     fn activation(
         &self,
-        test: i64,
+        test: u32,
         operation: OperationId,
         window: Window,
         conditions: Conditions,
@@ -445,52 +483,73 @@ impl Repository {
         }
     }
 
-    /// What operations of a test did.
-    fn effects(&self, number: u32, outcome: &Outcome) -> Result<Vec<OperationEffect>, RecordError> {
-        let mut effects: Vec<OperationEffect> = self.read(
-            "SELECT seen, changed, dropped, delayed, queued, injected, side_effects, unheard, first_touch_s, last_touch_s \
-             FROM operations WHERE test = ?1 AND (seen IS NOT NULL OR ?2) ORDER BY position",
-            params![number, *outcome == Outcome::Unknown],
+    /// What the operations of these tests did, by test.
+    fn effects(
+        &self,
+        numbers: &RangeInclusive<u32>,
+        rows: &[TestRow],
+    ) -> Result<BTreeMap<u32, Vec<OperationEffect>>, RecordError> {
+        let mut counted: BTreeMap<u32, Vec<Option<OperationEffect>>> = self.by_test(
+            "SELECT test, seen, changed, dropped, delayed, queued, injected, side_effects, unheard, first_touch_s, \
+             last_touch_s FROM operations WHERE test BETWEEN ?1 AND ?2 ORDER BY test, position",
+            numbers,
             |row| {
-                if row.get_ref(0)? == rusqlite::types::ValueRef::Null {
-                    return Ok(OperationEffect::default());
+                if row.get_ref(1)? == rusqlite::types::ValueRef::Null {
+                    return Ok(None);
                 }
-                Ok(OperationEffect {
+                Ok(Some(OperationEffect {
                     intervals: Vec::new(),
                     tails: Vec::new(),
                     counters: Counters {
-                        seen: unsigned(row, 0)?,
-                        changed: unsigned(row, 1)?,
-                        dropped: unsigned(row, 2)?,
-                        delayed: unsigned(row, 3)?,
-                        queued: unsigned(row, 4)?,
-                        injected: unsigned(row, 5)?,
-                        side_effects: unsigned(row, 6)?,
-                        unheard: unsigned(row, 7)?,
+                        seen: unsigned(row, 1)?,
+                        changed: unsigned(row, 2)?,
+                        dropped: unsigned(row, 3)?,
+                        delayed: unsigned(row, 4)?,
+                        queued: unsigned(row, 5)?,
+                        injected: unsigned(row, 6)?,
+                        side_effects: unsigned(row, 7)?,
+                        unheard: unsigned(row, 8)?,
                     },
-                    first_touch: row.get(8)?,
-                    last_touch: row.get(9)?,
-                })
+                    first_touch: row.get(9)?,
+                    last_touch: row.get(10)?,
+                }))
             },
         )?;
+        // A run that could not report what its operations did has no effects; of an imported one nobody counted them.
+        let mut effects: BTreeMap<u32, Vec<OperationEffect>> = BTreeMap::new();
+        for row in rows {
+            let of = counted.remove(&row.number).unwrap_or_default();
+            let of = if row.outcome == Outcome::Unknown {
+                of.into_iter().map(Option::unwrap_or_default).collect()
+            } else {
+                of.into_iter().flatten().collect()
+            };
+            effects.insert(row.number, of);
+        }
         let tables: [(&str, SpansOf); 2] = [
             (
-                "SELECT operation, start_s, end_s FROM intervals WHERE test = ?1 ORDER BY operation, position",
+                "SELECT test, operation, start_s, end_s FROM intervals WHERE test BETWEEN ?1 AND ?2 \
+                 ORDER BY test, operation, position",
                 |effect| &mut effect.intervals,
             ),
-            ("SELECT operation, start_s, end_s FROM tails WHERE test = ?1 ORDER BY operation, position", |effect| {
-                &mut effect.tails
-            }),
+            (
+                "SELECT test, operation, start_s, end_s FROM tails WHERE test BETWEEN ?1 AND ?2 \
+                 ORDER BY test, operation, position",
+                |effect| &mut effect.tails,
+            ),
         ];
         for (sql, spans_of) in tables {
-            let spans = self.read(sql, params![number], |row| {
-                Ok((position(row, 0)?, Span { start: row.get(1)?, end: row.get(2)? }))
-            })?;
-            for (operation, span) in spans {
-                let effect = effects.get_mut(operation).ok_or_else(|| {
-                    RecordError::damaged(&self.path, format!("T{number} has an interval without an operation"))
-                })?;
-                spans_of(effect).push(span);
+            let spans = self
+                .by_test(sql, numbers, |row| Ok((position(row, 1)?, Span { start: row.get(2)?, end: row.get(3)? })))?;
+            for (number, spans) in spans {
+                // What belongs to no test is nobody's.
+                let Some(effects) = effects.get_mut(&number) else { continue };
+                for (operation, span) in spans {
+                    let effect = effects.get_mut(operation).ok_or_else(|| {
+                        RecordError::damaged(&self.path, format!("T{number} has an interval without an operation"))
+                    })?;
+                    spans_of(effect).push(span);
+                }
             }
         }
         Ok(effects)
@@ -527,6 +586,22 @@ impl Repository {
 
     pub(super) fn seed(&self, text: &str) -> Result<u64, RecordError> {
         text.parse().map_err(|_| RecordError::damaged(&self.path, format!("`{text}` is no seed")))
+    }
+
+    /// Rows of the tests in this range, by test, which is their first column.
+    fn by_test<T>(
+        &self,
+        sql: &str,
+        numbers: &RangeInclusive<u32>,
+        mut row: impl FnMut(&Row<'_>) -> rusqlite::Result<T>,
+    ) -> Result<BTreeMap<u32, Vec<T>>, RecordError> {
+        let rows =
+            self.read(sql, params![numbers.start(), numbers.end()], |it| Ok((it.get::<_, u32>(0)?, row(it)?)))?;
+        let mut found: BTreeMap<u32, Vec<T>> = BTreeMap::new();
+        for (number, row) in rows {
+            found.entry(number).or_default().push(row);
+        }
+        Ok(found)
     }
 
     pub(super) fn read<T>(

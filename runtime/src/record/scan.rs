@@ -76,7 +76,7 @@ impl ScannedTest {
 }
 
 /// Rows of a table that are in the order of tests, taken test by test.
-struct Cursor<'s, T> {
+pub(super) struct Cursor<'s, T> {
     rows: Rows<'s>,
     read: fn(&Row<'_>) -> rusqlite::Result<T>,
     next: Option<(u32, T)>,
@@ -84,7 +84,7 @@ struct Cursor<'s, T> {
 
 impl<'s, T> Cursor<'s, T> {
     /// The first column of each row is its test.
-    fn over(rows: Rows<'s>, read: fn(&Row<'_>) -> rusqlite::Result<T>) -> rusqlite::Result<Self> {
+    pub(super) fn over(rows: Rows<'s>, read: fn(&Row<'_>) -> rusqlite::Result<T>) -> rusqlite::Result<Self> {
         let mut cursor = Cursor { rows, read, next: None };
         cursor.step()?;
         Ok(cursor)
@@ -99,7 +99,7 @@ impl<'s, T> Cursor<'s, T> {
     }
 
     /// The rows of a test; tests are asked for in ascending order.
-    fn of(&mut self, test: u32) -> rusqlite::Result<Vec<T>> {
+    pub(super) fn of(&mut self, test: u32) -> rusqlite::Result<Vec<T>> {
         let mut found = Vec::new();
         while let Some((owner, item)) = self.next.take() {
             if owner > test {

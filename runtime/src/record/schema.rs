@@ -7,11 +7,14 @@ use std::path::Path;
 use rusqlite::{Connection, OpenFlags};
 use sesame_plan::{CampaignPlan, Direction};
 
-use crate::record::RecordError;
+use crate::record::{RecordError, series};
 use crate::verdict::ends;
 
 /// The schema's version, in the file's `user_version`.
-pub const SCHEMA: i64 = 5;
+pub const SCHEMA: i64 = 6;
+
+/// The earliest schema that is still read. Nothing is written into results of an earlier schema than [`SCHEMA`].
+pub(crate) const EARLIEST: i64 = 5;
 
 /// Marks an SQLite file as ours, in its `application_id`: "SESM".
 pub(crate) const APPLICATION_ID: i64 = 0x5345_534D;
@@ -22,6 +25,7 @@ const DDL: &str = include_str!("schema.sql");
 pub(crate) fn install(connection: &mut Connection, plan: &CampaignPlan, seed: u64) -> rusqlite::Result<()> {
     let transaction = connection.transaction()?;
     transaction.execute_batch(DDL)?;
+    transaction.execute_batch(&series::views())?;
     transaction.execute_batch(&wide_views(plan))?;
     transaction.execute(
         "INSERT INTO campaign (id, space, name, source, generator, runtime, seed, evaluations, end_after_s, plan) \
@@ -149,6 +153,10 @@ pub(crate) fn open(path: &Path, writable: bool) -> Result<Connection, RecordErro
         .map_err(|e| RecordError::database(OPENING, path, e))?;
     match version {
         SCHEMA => {}
+        found if (EARLIEST..SCHEMA).contains(&found) && writable => {
+            return Err(RecordError::ReadOnly { found, known: SCHEMA, path: path.to_owned() });
+        }
+        found if (EARLIEST..SCHEMA).contains(&found) => {}
         found if found > SCHEMA => return Err(RecordError::Newer { found, known: SCHEMA, path: path.to_owned() }),
         found if found >= 1 => return Err(RecordError::Older { found, known: SCHEMA, path: path.to_owned() }),
         found => return Err(RecordError::damaged(path, format!("there is no schema {found}"))),

@@ -155,13 +155,18 @@ CREATE TABLE metric_values (
     PRIMARY KEY (test, metric)
 ) STRICT, WITHOUT ROWID;
 
--- Time series as change points: a value holds until the next one. A duplicate's series are those of its original.
-CREATE TABLE change_points (
+-- Time series, in pieces of up to 64 points: a value holds from a point until the next one. The views series and
+-- change_points have a row per point. A duplicate's series are those of its original.
+CREATE TABLE series_pieces (
     test            INTEGER NOT NULL REFERENCES tests,
     metric          INTEGER NOT NULL REFERENCES metrics,
-    position        INTEGER NOT NULL,
-    time_s          REAL NOT NULL,
-    value           REAL NOT NULL,
+    position        INTEGER NOT NULL, -- of the piece's first point in the series, from 0
+    points          INTEGER NOT NULL, -- how many
+    start_ns        INTEGER,        -- time of the first one, in nanoseconds; NULL where times are doubles
+    tick_ns         INTEGER,        -- the length of a tick, in nanoseconds; NULL likewise
+    times           BLOB NOT NULL,  -- per point its ticks since the first one, as whole numbers of equal width, big-endian;
+                                    -- empty where they are 0, 1, 2, and so on. NULL ticks: its time in seconds, as a double, likewise
+    numbers         BLOB NOT NULL,  -- per point its value, as a double of 8 bytes, big-endian
     PRIMARY KEY (test, metric, position)
 ) STRICT, WITHOUT ROWID;
 
@@ -246,6 +251,8 @@ CREATE TABLE events (
     position        INTEGER NOT NULL, -- among the events of its test
     text            TEXT NOT NULL
 ) STRICT;
+
+CREATE INDEX events_by_test ON events (test, position);
 
 -- Wall time, processes and hosts: nothing below is part of the digest.
 CREATE TABLE sessions (
@@ -346,9 +353,3 @@ CREATE VIEW confirmations AS
      GROUP BY f.test, r.id
     HAVING f.verdict = 'violated' OR count(*) FILTER (WHERE n.verdict = 'violated') > 0
      ORDER BY f.test, r.id;
-
--- Time series with the names of their metrics.
-CREATE VIEW series AS
-    SELECT t.number AS test, t.name AS test_name, m.name AS metric, m.unit AS unit, c.position AS position,
-           c.time_s AS time_s, c.value AS value
-      FROM tests t JOIN change_points c ON c.test = coalesce(t.duplicate_of, t.number) JOIN metrics m ON m.id = c.metric;

@@ -134,7 +134,7 @@ fn results_whose_run_was_killed_while_it_wrote_its_end_are_read_as_they_were() {
     let (folder, killed) = (folder(), tempfile::tempdir().unwrap());
     let whole = sample::campaign(folder.path(), &sample::plan(), 60).digest().unwrap();
     let before = std::fs::read(folder.path().join(DATABASE)).unwrap();
-    let copy = broken_off(folder.path(), killed.path(), "UPDATE change_points SET value = value + 1");
+    let copy = broken_off(folder.path(), killed.path(), "UPDATE series_pieces SET points = points + 1");
     assert_ne!(std::fs::read(&copy).unwrap(), before, "it was half overwritten");
     let raw = Connection::open_with_flags(&copy, rusqlite::OpenFlags::SQLITE_OPEN_READ_ONLY).unwrap();
     let refused = raw.query_row("SELECT count(*) FROM tests", [], |row| row.get::<_, i64>(0)).unwrap_err();
@@ -723,4 +723,115 @@ fn what_was_imported_keeps_its_intervals_and_names_without_counts() {
     let seen: Option<i64> =
         repository.connection.query_row("SELECT seen FROM operations", [], |row| row.get(0)).unwrap();
     assert_eq!(seen, None, "nobody counted");
+}
+
+/// What a runner of schema 5 recorded, in a folder of its own.
+fn of_schema_5() -> TempDir {
+    let folder = folder();
+    let open = Connection::open(folder.path().join(DATABASE)).unwrap();
+    open.execute_batch(include_str!("schema_5.sql")).unwrap();
+    folder
+}
+
+#[test]
+fn results_of_schema_5_are_read_with_the_digest_they_were_given_and_nothing_is_added_to_them() {
+    let folder = of_schema_5();
+    let before = std::fs::read(folder.path().join(DATABASE)).unwrap();
+    let repository = Repository::open(folder.path()).unwrap();
+    let digest = "159582fa2a626aa26bdf7fa872956f1725ec44b8bf8bda977ea7e54205246737";
+    assert_eq!(repository.digest().unwrap(), digest);
+    let test = repository.test(2).unwrap();
+    let speed = &test.observation.metrics[1].series;
+    assert_eq!((speed.len(), speed[3].0), (4, 0.08));
+    assert_eq!(repository.tests().unwrap().len(), 5);
+    let mut scanned = 0;
+    repository.scan(&mut |_| scanned += 1).unwrap();
+    assert_eq!(scanned, 5);
+    #[cfg(feature = "report")]
+    assert!(crate::report::page(&repository).unwrap().contains(digest));
+    drop(repository);
+    for added in [Recorder::resume(folder.path(), 1), Recorder::reopen(folder.path(), 1)] {
+        let said = added.unwrap_err().to_string();
+        assert!(said.contains("schema 5, this release writes 6: they can be read"), "{said}");
+    }
+    assert_eq!(std::fs::read(folder.path().join(DATABASE)).unwrap(), before);
+}
+
+#[test]
+fn every_byte_of_a_series_is_in_the_digest_and_a_piece_that_nothing_is_written_as_is_damage() {
+    let folder = folder();
+    let whole = sample::campaign(folder.path(), &sample::plan(), 30).digest().unwrap();
+    let open = Connection::open(folder.path().join(DATABASE)).unwrap();
+    let one = "WHERE test = 3 AND metric = 2 AND position = 0";
+    let after = |change: &str| {
+        open.execute_batch("BEGIN").unwrap();
+        assert_eq!(open.execute(&format!("UPDATE series_pieces SET {change} {one}"), []).unwrap(), 1, "{change}");
+        open.execute_batch("COMMIT").unwrap();
+        let read = Repository::open(folder.path()).unwrap();
+        (read.digest().unwrap(), read.test(3).map(|_| ()).map_err(|error| error.to_string()))
+    };
+    let numbers: Vec<u8> =
+        open.query_row(&format!("SELECT numbers FROM series_pieces {one}"), [], |row| row.get(0)).unwrap();
+    for at in 0..numbers.len() {
+        let mut changed = numbers.clone();
+        changed[at] ^= 1;
+        let digits = changed.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat();
+        let (digest, read) = after(&format!("numbers = x'{digits}'"));
+        assert_ne!(digest, whole, "byte {at}");
+        assert_eq!(read, Ok(()));
+    }
+    for change in [
+        "numbers = x'7ff0000000000000'",
+        "numbers = x''",
+        "times = x'01020304050607080910'",
+        "points = 0",
+        "points = -1",
+        "start_ns = 9223372036854775807, tick_ns = 9223372036854775807",
+        "tick_ns = NULL",
+    ] {
+        let (digest, read) = after(change);
+        assert_ne!(digest, whole, "{change}");
+        let said = read.expect_err(change);
+        assert!(said.contains(DATABASE), "{change}: {said}");
+    }
+}
+
+#[test]
+fn a_set_of_results_that_is_recorded_already_is_not_written_again() {
+    let folder = folder();
+    let mut recorder = commit_all(folder.path(), &sample::records(&sample::plan(), 5));
+    let set =
+        ResultSet { name: "a".to_owned(), generation: Some(0), status: Status::Intermediate, members: vec![1, 2] };
+    recorder.put_result_set(&set).unwrap();
+    let writes = |recorder: &Recorder| recorder.repository().connection.total_changes();
+    let before = writes(&recorder);
+    recorder.put_result_set(&set).unwrap();
+    assert_eq!(writes(&recorder), before);
+    for other in [
+        ResultSet { members: vec![2, 1], ..set.clone() },
+        ResultSet { generation: None, ..set.clone() },
+        ResultSet { status: Status::Final, ..set.clone() },
+    ] {
+        recorder.put_result_set(&other).unwrap();
+        assert_eq!(recorder.repository().result_sets().unwrap(), [other]);
+    }
+}
+
+#[test]
+fn reading_one_test_takes_no_longer_among_many_than_among_few() {
+    let time_among = |tests: u32| {
+        let folder = folder();
+        let plan = sample::plan();
+        let repository = sample::campaign(folder.path(), &plan, tests);
+        let once = |_| {
+            let begun = std::time::Instant::now();
+            assert_eq!(repository.records(11..=20, false).unwrap().len(), 10);
+            assert_eq!(repository.test(12).unwrap().number, 12);
+            begun.elapsed()
+        };
+        (0..20).map(once).min().unwrap()
+    };
+    let (few, many) = (time_among(30), time_among(1500));
+    // Looking at all rows would take some twenty times as long.
+    assert!(many < 5 * few, "{many:?} among many, {few:?} among few");
 }

@@ -14,6 +14,7 @@ use crate::report::confirmed::{confirmation_sentence, once_sentence, tally_words
 use crate::report::generations::generations;
 use crate::report::markup::{Markup, coordinate, fill};
 use crate::report::number::{self, plural, with_unit};
+use crate::report::policy::policy;
 use crate::report::regions;
 use crate::report::scatter::{Detail, Dimension, Kind, Point, dimension, scatter};
 use crate::report::show::{TestReport, report_on};
@@ -30,9 +31,14 @@ const TIMELINES: usize = 24;
 
 /// Writes the page beside the results, or wherever it is wanted.
 pub fn write_page(repository: &Repository, path: &Path) -> Result<(), RecordError> {
+    write_page_with(repository, path, &repository.digest()?)
+}
+
+/// The same for results whose digest is known already.
+pub(crate) fn write_page_with(repository: &Repository, path: &Path, digest: &str) -> Result<(), RecordError> {
     let beside = path.parent() == Some(repository.folder());
     let folder = if beside { Path::new("") } else { repository.folder() };
-    write_aside(path, &page_in(repository, folder)?).map_err(|e| RecordError::io("write the page", path, e))
+    write_aside(path, &page_in(repository, folder, digest)?).map_err(|e| RecordError::io("write the page", path, e))
 }
 
 /// Writes a file aside and renames it, so that nobody who reads it meanwhile sees half of it.
@@ -44,11 +50,11 @@ pub(crate) fn write_aside(path: &Path, content: &str) -> std::io::Result<()> {
 
 /// The page, from a campaign's results; a run may still be going on. Links to traces lead from the run's folder.
 pub fn page(repository: &Repository) -> Result<String, RecordError> {
-    page_in(repository, Path::new(""))
+    page_in(repository, Path::new(""), &repository.digest()?)
 }
 
 /// The page, with the run's folder as it is seen from the page's place.
-fn page_in(repository: &Repository, folder: &Path) -> Result<String, RecordError> {
+fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<String, RecordError> {
     let rows = repository.tests()?;
     let members = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
     let summary = summarise(repository, &rows, &members)?;
@@ -57,7 +63,7 @@ fn page_in(repository: &Repository, folder: &Path) -> Result<String, RecordError
     let drawn: Vec<u32> = groups.iter().flat_map(|group| group.tests.iter().copied()).collect();
 
     let mut body = Markup::default();
-    header(&mut body, repository, &summary)?;
+    header(&mut body, repository, &summary, digest)?;
     body.open("main", &[]);
     if let Some(shrinking) = &summary.shrinking {
         shrinking::section(&mut body, shrinking, &drawn);
@@ -97,7 +103,10 @@ fn page_in(repository: &Repository, folder: &Path) -> Result<String, RecordError
     let title = format!("{} of {}, seed {}", summary.campaign, summary.space, summary.seed);
     let mut escaped = Markup::default();
     escaped.text(&title);
-    Ok(fill(sesame_templates::report::PAGE, &[("title", &escaped.finish()), ("body", &body.finish())]))
+    let shell = sesame_templates::report::PAGE;
+    // The policy is of the shell alone: what is filled in is not permitted to hold styles or scripts.
+    let policy = policy(shell);
+    Ok(fill(shell, &[("policy", &policy), ("title", &escaped.finish()), ("body", &body.finish())]))
 }
 
 /// Tests that get a timeline, under a heading.
@@ -143,7 +152,7 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
     ]
 }
 
-fn header(body: &mut Markup, repository: &Repository, summary: &Summary) -> Result<(), RecordError> {
+fn header(body: &mut Markup, repository: &Repository, summary: &Summary, digest: &str) -> Result<(), RecordError> {
     let facts = repository.campaign();
     let plan = &facts.plan;
     let sessions = repository.sessions()?;
@@ -192,7 +201,7 @@ fn header(body: &mut Markup, repository: &Repository, summary: &Summary) -> Resu
         ("Made by", format!("{}, sesame-runtime {}", plan.generator, facts.runtime)),
         ("Source", plan.source.clone()),
         ("Ended", facts.stop.clone().unwrap_or_else(|| "unfinished".to_owned())),
-        ("Digest", repository.digest()?),
+        ("Digest", digest.to_owned()),
     ];
     body.open("dl", &[]);
     for (name, value) in &rows {

@@ -1,5 +1,7 @@
 //! Reports on a made-up campaign, read as a user reads them.
 
+use sha2::Digest as _;
+
 use super::*;
 use crate::record::{Origin, Repository, Standing, sample};
 
@@ -587,4 +589,86 @@ fn violations_that_nobody_looked_at_again_are_counted() {
     let sentence = format!("{} tests that violate a requirement were run once only", once.count());
     assert!(summary_text(&found, WIDE).contains(&sentence), "{sentence}");
     assert!(page(&repository).unwrap().contains(&sentence));
+}
+
+/// A page with all that pages have: fronts by generation, the map of cells, regions, timelines.
+fn full_page() -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let html = page(&sample::campaign_with_fronts(folder.path(), &plan_on_the_published_grid(), 60)).unwrap();
+    for part in ["data-fronts", "data-cells", "class=\"regions\"", "class=\"test\""] {
+        assert!(html.contains(part), "the page has no {part}");
+    }
+    html
+}
+
+#[test]
+fn the_page_permits_its_own_style_and_script_and_nothing_else() {
+    let html = full_page();
+    let document = parsed(&html);
+    let texts = |element: &str| -> Vec<String> {
+        let of = document.descendants().filter(|node| node.tag_name().name() == element);
+        of.inspect(|node| assert_eq!(node.attributes().len(), 0)).map(|node| node.text().unwrap().to_owned()).collect()
+    };
+    assert_eq!((texts("style").len(), texts("script").len()), (1, 1));
+    // The hashes of what is emitted, by another way to write them.
+    let hash = |element: &str| {
+        let text = html.split_once(&format!("<{element}>")).unwrap().1.split_once(&format!("</{element}>")).unwrap().0;
+        let bits = sha2::Sha256::digest(text).iter().map(|byte| format!("{byte:08b}")).collect::<Vec<_>>().concat();
+        let digits: Vec<char> = ('A'..='Z').chain('a'..='z').chain('0'..='9').chain(['+', '/']).collect();
+        let six = |at: usize| usize::from_str_radix(&format!("{:0<6}", &bits[at..(at + 6).min(256)]), 2).unwrap();
+        format!("{}=", (0..256).step_by(6).map(|at| digits[six(at)]).collect::<String>())
+    };
+    let expected = format!(
+        "default-src 'none'; style-src 'sha256-{}'; script-src 'sha256-{}'; base-uri 'none'; form-action 'none'",
+        hash("style"),
+        hash("script")
+    );
+    let meta = document.descendants().find(|node| node.has_attribute("http-equiv")).unwrap();
+    assert_eq!(meta.attribute("http-equiv"), Some("Content-Security-Policy"));
+    assert_eq!(meta.attribute("content"), Some(expected.as_str()));
+    let before = |it: &&roxmltree::Node<'_, '_>| matches!(it.tag_name().name(), "style" | "script" | "title");
+    let first = document.descendants().find(|node| before(&node)).unwrap();
+    assert!(meta.range().end < first.range().start, "a policy holds for what follows it");
+    // What the policy would keep from working.
+    for node in document.descendants() {
+        for attribute in node.attributes() {
+            let name = attribute.name();
+            assert!(name != "style" && name != "src" && !name.starts_with("on"), "{name} in {:?}", node.tag_name());
+        }
+    }
+}
+
+#[test]
+fn a_browser_finds_nothing_on_the_page_that_its_policy_forbids() {
+    let Some(browser) = ["chromium", "chromium-browser", "google-chrome"].into_iter().find(|name| {
+        std::process::Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success())
+    }) else {
+        println!("skipped: there is no Chromium to open the page with");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let opened = |name: &str, html: &str| {
+        let file = folder.path().join(name);
+        std::fs::write(&file, html).unwrap();
+        let output = std::process::Command::new(browser)
+            .args(["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--dump-dom"])
+            .arg(format!("--user-data-dir={}", folder.path().join("profile").display()))
+            .arg(format!("file://{}", file.display()))
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        let refused = said.lines().filter(|line| line.contains("Content Security Policy")).count();
+        (String::from_utf8_lossy(&output.stdout).into_owned(), refused)
+    };
+    let html = full_page();
+    assert!(!html.contains("<select"));
+    let (shown, refused) = opened("page.html", &html);
+    assert!(shown.contains("<select"), "the script did its work: {shown}");
+    assert_eq!(refused, 0);
+    // It is looked for where it would be: what has no hash is refused, and does nothing.
+    let foreign = "<script>document.title = 'taken'</script><p style=\"color: red\" onclick=\"1\">x</p>\
+                   <img src=\"data:image/gif;base64,R0lGODlhAQABAAAAACw=\"/>";
+    let (shown, refused) = opened("foreign.html", &html.replace("<main>", &format!("<main>{foreign}")));
+    assert!(!shown.contains("<title>taken"));
+    assert!(refused >= 3, "{refused}");
 }

@@ -44,7 +44,7 @@ use std::collections::BTreeSet;
 use sesame_plan::condition::{Condition, ConditionEnd, ConditionSpace, Constraint};
 use sesame_plan::{Activation, Choice, Test, TestOperation};
 
-use crate::rng::Stream;
+use crate::rng::{Stream, derive_seed};
 use crate::search::condition::{self, contains};
 use crate::search::initial::{fresh_operation, fresh_test};
 use crate::search::nsga2::{Child, Heritage, Variation};
@@ -112,8 +112,8 @@ pub struct TestVariation {
     permitted: Permitted,
     rates: Rates,
     seed: u64,
-    /// All tests made so far, as [`identity`] has them.
-    made: BTreeSet<Vec<Vec<u64>>>,
+    /// All tests made so far, by their [`key`]: whole they would be most of what a search of many tests holds in memory.
+    made: BTreeSet<[u64; 2]>,
 }
 
 impl TestVariation {
@@ -129,7 +129,7 @@ impl TestVariation {
 
     /// Notes a test that was made elsewhere. False if it was made before.
     pub(crate) fn claim(&mut self, test: &Test) -> bool {
-        self.made.insert(identity(test))
+        self.made.insert(key(test))
     }
 }
 
@@ -138,7 +138,7 @@ impl Variation for TestVariation {
 
     fn initial(&mut self, index: u64) -> Test {
         let test = fresh_test(&self.permitted, &mut Stream::derive(self.seed, "initial", &[index]));
-        self.made.insert(identity(&test));
+        self.made.insert(key(&test));
         test
     }
 
@@ -160,17 +160,24 @@ impl Variation for TestVariation {
             place += 1;
             mutate(&mut genome, &self.permitted, &self.rates, &mut stream);
             for _ in 0..self.rates.tries {
-                if !self.made.contains(&identity(&genome)) {
+                if !self.made.contains(&key(&genome)) {
                     break;
                 }
                 let k = stream.below(genome.operations.len());
                 change_somehow(&mut genome.operations[k], &self.permitted, &self.rates, &mut stream);
                 self.permitted.settle(&mut genome, &mut stream);
             }
-            self.made.insert(identity(&genome));
+            self.made.insert(key(&genome));
             Child { genome, heritage }
         })
     }
+}
+
+/// A hash of a test's [`identity`], of 128 bits: two different tests have the same by chance in no campaign.
+fn key(test: &Test) -> [u64; 2] {
+    let numbers = identity(test).into_iter().flat_map(|numbers| [vec![numbers.len() as u64], numbers].concat());
+    let numbers: Vec<u64> = numbers.collect();
+    ["one half of a key", "the other half"].map(|half| derive_seed(0, half, &numbers))
 }
 
 /// What tells two tests apart: their operations in any order, without draw seeds.
@@ -591,9 +598,11 @@ mod tests {
         let mut other = tests[0].clone();
         other.operations[0].draw_seed += 1;
         assert_eq!(identity(&other), identity(&tests[0]));
+        assert_eq!(key(&other), key(&tests[0]));
         let Activation::Condition { start, end, .. } = &mut other.operations[0].activation else { panic!("{other:?}") };
         std::mem::swap(start, end);
         assert_ne!(identity(&other), identity(&tests[0]));
+        assert_ne!(key(&other), key(&tests[0]));
     }
 
     #[test]

@@ -33,8 +33,8 @@ pub(super) fn file(regions: &Regions, plan: &CampaignPlan) -> String {
 /// The picture on a page.
 pub(super) fn draw(regions: &Regions, plan: &CampaignPlan, markup: &mut Markup) {
     let label = format!("where tests fail: {}, {} regions", regions.target, regions.rules.len());
-    let size = format!("height: {}px", pixels(height(regions)));
-    markup.open("svg", &[("class", "regions"), ("role", "img"), ("aria-label", &label), ("style", &size)]);
+    let height = pixels(height(regions));
+    markup.open("svg", &[("class", "regions"), ("role", "img"), ("aria-label", &label), ("height", &height)]);
     bars(regions, plan, markup);
     markup.close();
 }
@@ -67,9 +67,7 @@ fn bar(
     let (x, y) = (percent(before / all), pixels(top));
     let (wide, high) = (percent(width), pixels(BAND));
     // What does not fit into a bar is cut off there, as pictures inside others are; pointing at it tells it whole.
-    // The style says it again, since the page's gives every picture the whole width.
-    let style = format!("width: {wide}; height: {high}px");
-    let place = [("x", x.as_str()), ("y", &y), ("width", &wide), ("height", &high), ("style", &style)];
+    let place = [("x", x.as_str()), ("y", &y), ("width", &wide), ("height", &high)];
     markup.open("svg", &[&place[..], &[("role", "img"), ("aria-label", &title)]].concat());
     markup.element("title", &[], &title);
     markup.leaf("rect", &[("class", "kept"), ("width", "100%"), ("height", "100%")]);

@@ -1,0 +1,337 @@
+//! Time series as they are kept: in pieces of up to 64 points, 8 bytes a value, of which SQL can still read each point.
+//!
+//! Series are most of what a campaign records: a row per point took three times the space, and ten times as long to read.
+//! The view `change_points` has such a row per point, computed from the pieces.
+
+use std::fmt::Write as _;
+
+use rusqlite::{Transaction, params};
+
+use crate::record::schema::index;
+use crate::record::{RecordError, Repository};
+
+/// A series: times in seconds, and the value from then on.
+pub(super) type Series = Vec<(f64, f64)>;
+
+/// How many points a piece has at most. The row is then small enough to lie on a page with others.
+const PIECE: usize = 64;
+
+/// Nanoseconds in a second, exactly.
+const SECOND: f64 = 1e9;
+
+/// Numbers up to here are exact as doubles.
+const EXACT: f64 = 9_007_199_254_740_992.0;
+
+/// Some consecutive points of a series, as the columns of a row.
+#[derive(Debug, Clone, PartialEq)]
+struct Piece {
+    points: usize,
+    /// When the first point is, and the length of a tick, in nanoseconds; `None` where times are doubles.
+    clock: Option<(i64, i64)>,
+    /// Per point its ticks since the first one, big-endian, all of one width; nothing where they are 0, 1, 2, and so on. Where
+    /// there is no clock, its time as a double, big-endian.
+    times: Vec<u8>,
+    /// Per point its value as a double, big-endian.
+    numbers: Vec<u8>,
+}
+
+impl Piece {
+    /// The piece of some points, which is the same whenever the points are.
+    fn of(points: &[(f64, f64)]) -> Piece {
+        let nanos: Option<Vec<i64>> = points.iter().map(|point| whole_nanos(point.0)).collect();
+        let (clock, times) = match nanos.filter(|nanos| nanos.is_sorted()) {
+            Some(nanos) => {
+                let first = nanos[0];
+                let tick = nanos.iter().fold(0, |tick, nanos| divisor(tick, nanos - first)).max(1);
+                let ticks: Vec<i64> = nanos.iter().map(|nanos| (nanos - first) / tick).collect();
+                (Some((first, tick)), in_bytes(&ticks))
+            }
+            None => (None, doubles(points.iter().map(|point| point.0))),
+        };
+        Piece { points: points.len(), clock, times, numbers: doubles(points.iter().map(|point| point.1)) }
+    }
+
+    /// The points; `None` of a piece that nothing is written as.
+    fn points(&self) -> Option<Series> {
+        let numbers = of_doubles(&self.numbers, self.points).filter(|numbers| !numbers.is_empty())?;
+        let times = match self.clock {
+            None => of_doubles(&self.times, self.points)?,
+            Some((first, tick)) => {
+                let second = |ticks: i64| Some(tick.checked_mul(ticks)?.checked_add(first)? as f64 / SECOND);
+                if self.times.is_empty() {
+                    (0..index(self.points)).map(second).collect::<Option<Vec<f64>>>()?
+                } else {
+                    let width = self.times.len() / self.points;
+                    if !(1..8).contains(&width) || width * self.points != self.times.len() {
+                        return None;
+                    }
+                    let ticks = self.times.chunks_exact(width);
+                    let ticks = ticks.map(|bytes| bytes.iter().fold(0, |sum, &byte| sum << 8 | i64::from(byte)));
+                    ticks.map(second).collect::<Option<Vec<f64>>>()?
+                }
+            }
+        };
+        Some(times.into_iter().zip(numbers).collect())
+    }
+}
+
+/// The time as whole nanoseconds, if that is what it is.
+#[expect(clippy::cast_possible_truncation, reason = "what is out of range is refused before")]
+fn whole_nanos(seconds: f64) -> Option<i64> {
+    let nanos = libm::round(seconds * SECOND);
+    (nanos.abs() <= EXACT && nanos / SECOND == seconds).then_some(nanos as i64)
+}
+
+/// The greatest common divisor; of zero and another number that number.
+fn divisor(a: i64, b: i64) -> i64 {
+    if b == 0 { a } else { divisor(b, a % b) }
+}
+
+/// Ascending ticks from zero on, in as few bytes as the last one needs.
+fn in_bytes(ticks: &[i64]) -> Vec<u8> {
+    if (0..).zip(ticks).all(|(at, &ticks)| at == ticks) {
+        return Vec::new();
+    }
+    let last = ticks.iter().fold(0, |all, ticks| all | ticks);
+    let width = (64 - last.leading_zeros()).div_ceil(8).max(1) as usize;
+    ticks.iter().flat_map(|ticks| ticks.to_be_bytes()[8 - width..].to_vec()).collect()
+}
+
+/// Zero has no sign here: that of equal values is equal.
+fn doubles(numbers: impl Iterator<Item = f64>) -> Vec<u8> {
+    numbers.flat_map(|x| (x + 0.0).to_be_bytes()).collect()
+}
+
+fn of_doubles(bytes: &[u8], count: usize) -> Option<Vec<f64>> {
+    let (numbers, rest) = bytes.as_chunks();
+    let numbers: Vec<f64> = numbers.iter().map(|&bytes| f64::from_be_bytes(bytes)).collect();
+    (rest.is_empty() && numbers.len() == count && numbers.iter().all(|x| x.is_finite())).then_some(numbers)
+}
+
+/// Writes the series of one metric in a test.
+pub(super) fn write(
+    transaction: &Transaction<'_>,
+    test: u32,
+    metric: usize,
+    series: &[(f64, f64)],
+) -> rusqlite::Result<()> {
+    for (at, points) in series.chunks(PIECE).enumerate() {
+        let Piece { points, clock, times, numbers } = Piece::of(points);
+        let (start, tick) = clock.unzip();
+        transaction
+            .prepare_cached(
+                "INSERT INTO series_pieces (test, metric, position, points, start_ns, tick_ns, times, numbers) \
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+            )?
+            .execute(params![test, index(metric), index(at * PIECE), index(points), start, tick, times, numbers])?;
+    }
+    Ok(())
+}
+
+impl Repository {
+    /// The series of a test, each with the position of its metric; none of a metric that never changed.
+    pub(super) fn series(&self, test: u32) -> Result<Vec<(usize, Series)>, RecordError> {
+        let mut found: Vec<(usize, Series)> = Vec::new();
+        let mut add = |metric: usize, points: Series| match found.last_mut() {
+            Some((last, series)) if *last == metric => series.extend(points),
+            _ => found.push((metric, points)),
+        };
+        if self.schema < PIECES_SINCE {
+            let sql = "SELECT metric, time_s, value FROM change_points WHERE test = ?1 ORDER BY metric, position";
+            let points =
+                self.read(sql, [test], |row| Ok((super::repository::position(row, 0)?, (row.get(1)?, row.get(2)?))))?;
+            for (metric, point) in points {
+                add(metric, vec![point]);
+            }
+            return Ok(found);
+        }
+        let pieces = self.read(
+            "SELECT metric, points, start_ns, tick_ns, times, numbers FROM series_pieces WHERE test = ?1 \
+             ORDER BY metric, position",
+            [test],
+            |row| {
+                let clock = Option::zip(row.get(2)?, row.get(3)?);
+                let points = super::repository::position(row, 1)?;
+                let piece = Piece { points, clock, times: row.get(4)?, numbers: row.get(5)? };
+                Ok((super::repository::position(row, 0)?, piece.points()))
+            },
+        )?;
+        for (metric, points) in pieces {
+            let problem = || format!("T{test} has a series that cannot be read");
+            add(metric, points.ok_or_else(|| RecordError::damaged(&self.path, problem()))?);
+        }
+        Ok(found)
+    }
+}
+
+/// The first schema with series in pieces; before, each point was a row.
+pub(super) const PIECES_SINCE: i64 = 6;
+
+/// The views that show series point by point, whatever reads them: doubles are put together from their digits.
+pub(super) fn views() -> String {
+    let zeros = "'[0' || replace(hex(zeroblob(p.points - 1)), '00', ',0') || ']'";
+    let digits = |column: &str, bytes: &str| {
+        format!("substr('00000000000000' || hex(substr(p.{column}, k.key * {bytes} + 1, {bytes})), -16)")
+    };
+    let power = |exponent: &str| {
+        let bit = |bit: u32| {
+            let factor = if bit < 5 {
+                format!("{}.0", 1 << (1 << bit))
+            } else {
+                vec!["4294967296.0"; 1 << (bit - 5)].join(" * ")
+            };
+            format!("CASE WHEN {exponent} & {} THEN {factor} ELSE 1.0 END", 1 << bit)
+        };
+        (0..10).map(bit).collect::<Vec<_>>().join(" * ")
+    };
+    // Each step is exact, whatever computes it: a power of two times a number of 53 bits.
+    let to_double = format!(
+        "CASE WHEN digits >= '8' THEN -1.0 ELSE 1.0 END * CASE \
+         WHEN exponent >= 1023 THEN (1.0 + mantissa / 4503599627370496.0) * ({}) \
+         WHEN exponent > 0 THEN (1.0 + mantissa / 4503599627370496.0) / ({}) \
+         ELSE mantissa / 4503599627370496.0 / ({}) END",
+        power("(exponent - 1023)"),
+        power("(1023 - exponent)"),
+        power("1022"),
+    );
+    // A query within a query with a limit is carried out as it stands, so that digits are taken from the piece once.
+    let double = |column: &str| {
+        format!(
+            "(SELECT {to_double} FROM (SELECT digits, {exponent} & 2047 AS exponent, {mantissa} AS mantissa FROM (SELECT {} AS \
+             digits LIMIT 1) LIMIT 1))",
+            digits(column, "8"),
+            exponent = number_of("digits", 1..4),
+            mantissa = number_of("digits", 4..17),
+        )
+    };
+    let width = "(length(p.times) / p.points)";
+    format!(
+        "-- Time series as change points, one row each: a value holds until the next one. Ask for a test at a time.\n\
+         CREATE VIEW change_points AS\n    \
+         SELECT p.test AS test, p.metric AS metric, p.position + k.key AS position,\n           \
+         CASE WHEN p.tick_ns IS NULL THEN {time}\n                \
+         WHEN length(p.times) = 0 THEN (p.start_ns + p.tick_ns * k.key) / 1e9\n                \
+         ELSE (p.start_ns + p.tick_ns * (SELECT {ticks} FROM (SELECT {tick_digits} AS digits LIMIT 1))) / 1e9\n           \
+         END AS time_s,\n           \
+         {value} AS value\n      \
+         FROM series_pieces p, json_each({zeros}) k;\n\
+         -- Time series with the names of their metrics.\n\
+         CREATE VIEW series AS\n    \
+         SELECT t.number AS test, t.name AS test_name, m.name AS metric, m.unit AS unit, c.position AS position,\n           \
+         c.time_s AS time_s, c.value AS value\n      \
+         FROM tests t JOIN change_points c ON c.test = coalesce(t.duplicate_of, t.number) \
+         JOIN metrics m ON m.id = c.metric;\n",
+        time = double("times"),
+        value = double("numbers"),
+        ticks = number_of("digits", 1..17),
+        tick_digits = digits("times", width),
+    )
+}
+
+/// The whole number that the hexadecimal digits at these places are, counted from 1 and up to the 16th.
+fn number_of(digits: &str, places: std::ops::Range<u32>) -> String {
+    let mut sum = String::new();
+    let last = places.end - 1;
+    for place in places {
+        let plus = if sum.is_empty() { "" } else { " + " };
+        let _ = write!(sum, "{plus}(instr('123456789ABCDEF', substr({digits}, {place}, 1)) << {})", 4 * (last - place));
+    }
+    format!("({sum})")
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use rusqlite::Connection;
+
+    use super::*;
+    use crate::record::{Origin, Recorder, sample};
+
+    fn finite() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            4 => any::<f64>().prop_filter("finite", |x| x.is_finite()),
+            1 => prop::sample::select(vec![0.0, -0.0, 1.0, -1.0, 5e-324, f64::MIN_POSITIVE, f64::MAX, f64::MIN]),
+            1 => (1..1u64 << 52).prop_map(f64::from_bits),
+        ]
+    }
+
+    /// Times as a run has them: ascending whole steps, mostly of one length, here and there a gap; and times of any kind.
+    fn series() -> impl Strategy<Value = Vec<(f64, f64)>> {
+        let steps = (0..3_000_000_000_i64, 1..40_000_000_i64, prop::collection::vec((0..20_i64, finite()), 0..200))
+            .prop_map(|(start, step, points)| {
+                let mut at = start;
+                let timed = points.into_iter().map(|(gap, value)| {
+                    at += step * if gap < 16 { 1 } else { gap * gap * gap };
+                    (at as f64 / SECOND, value)
+                });
+                timed.collect()
+            });
+        let any_times = prop::collection::vec((finite(), finite()), 0..150);
+        let nanos = prop::collection::vec((0..i64::MAX >> 10, finite()), 0..150).prop_map(|mut points| {
+            points.sort_by_key(|point| point.0);
+            points.into_iter().map(|(nanos, value)| (nanos as f64 / SECOND, value)).collect()
+        });
+        prop_oneof![4 => steps, 1 => any_times, 1 => nanos]
+    }
+
+    /// Zero has no sign in results.
+    fn bits(series: &[(f64, f64)]) -> Vec<(u64, u64)> {
+        series.iter().map(|point| ((point.0 + 0.0).to_bits(), (point.1 + 0.0).to_bits())).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn a_series_comes_back_bit_for_bit_and_sql_reads_each_point_of_it(points in series()) {
+            let packed: Vec<Piece> = points.chunks(PIECE).map(Piece::of).collect();
+            let read: Option<Vec<Series>> = packed.iter().map(Piece::points).collect();
+            prop_assert_eq!(bits(&read.unwrap().concat()), bits(&points));
+
+            let folder = tempfile::tempdir().unwrap();
+            let plan = sample::plan();
+            let mut record = sample::record(&plan, 3, Origin::Search, sesame_plan::Test::default());
+            record.observation.metrics[1].series.clone_from(&points);
+            let mut recorder = Recorder::create(folder.path(), &plan, 1, 1).unwrap();
+            recorder.commit(&record).unwrap();
+            prop_assert_eq!(bits(&recorder.repository().test(3).unwrap().observation.metrics[1].series), bits(&points));
+            prop_assert!(recorder.repository().records(3..=3, false).unwrap()[0].observation.metrics[1].series.is_empty());
+            let open = Connection::open(folder.path().join(crate::record::DATABASE)).unwrap();
+            let mut statement =
+                open.prepare("SELECT position, time_s, value FROM series WHERE test = 3 AND metric = 'fuzzing_time'").unwrap();
+            let rows: Vec<(i64, f64, f64)> = statement
+                .query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
+                .unwrap()
+                .collect::<Result<_, _>>()
+                .unwrap();
+            prop_assert!(rows.iter().map(|row| row.0).eq(0..index(points.len())));
+            prop_assert_eq!(bits(&rows.iter().map(|row| (row.1, row.2)).collect::<Vec<_>>()), bits(&points));
+        }
+
+        #[test]
+        fn whatever_a_piece_was_changed_into_it_is_read_or_refused(
+            points in 0..4_usize,
+            clock in prop::option::of((any::<i64>(), any::<i64>())),
+            times in prop::collection::vec(any::<u8>(), 0..33),
+            mut numbers in prop::collection::vec(any::<u8>(), 0..33),
+            whole in any::<bool>(),
+        ) {
+            numbers.resize(if whole { 8 * points } else { numbers.len() }, 64);
+            let piece = Piece { points, clock, times, numbers };
+            if let Some(series) = piece.points() {
+                prop_assert_eq!(series.len(), points);
+                prop_assert!(series.iter().all(|point| point.0.is_finite() && point.1.is_finite()));
+            }
+        }
+    }
+
+    #[test]
+    fn a_value_at_each_step_takes_eight_bytes_and_with_gaps_nine() {
+        let each: Series = (5..69).map(|step| (f64::from(step) * 20.0 / 1000.0, f64::from(step).sqrt())).collect();
+        let piece = Piece::of(&each);
+        assert_eq!((piece.clock, piece.times.len(), piece.numbers.len()), (Some((100_000_000, 20_000_000)), 0, 512));
+        let mut gap = each.clone();
+        gap[63].0 = 3.38;
+        assert_eq!(Piece::of(&gap).times.len(), 64);
+    }
+}
