@@ -88,12 +88,24 @@ enum Command {
     /// Serve a supervisor; started by `run`
     #[command(hide = true)]
     Worker { supervisor: SocketAddr },
-    /// Become the simulator of a worker; started by `worker`
+    /// Keep the simulator of a worker; started by `worker`
     #[cfg(all(feature = "process", target_os = "linux"))]
     #[command(hide = true)]
     Simulator {
         /// Process id of the worker
         worker: u32,
+        /// The file that is told how the simulator ended
+        report: PathBuf,
+        /// The simulator's program with its arguments
+        #[arg(required = true, last = true)]
+        program: Vec<std::ffi::OsString>,
+    },
+    /// Become a simulator; started by `simulator`
+    #[cfg(all(feature = "process", target_os = "linux"))]
+    #[command(hide = true)]
+    Simulated {
+        /// Process id of the keeper
+        keeper: u32,
         /// The simulator's program with its arguments
         #[arg(required = true, last = true)]
         program: Vec<std::ffi::OsString>,
@@ -179,9 +191,14 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
             Ok(ExitCode::SUCCESS)
         }
         #[cfg(all(feature = "process", target_os = "linux"))]
-        Some(Command::Simulator { worker, program }) => {
+        Some(Command::Simulator { worker, report, program }) => {
             let (program, arguments) = program.split_first().expect("the program is required");
-            Ok(crate::transport::become_simulator(worker, program, arguments))
+            Ok(crate::transport::keep_simulator(worker, &report, program, arguments))
+        }
+        #[cfg(all(feature = "process", target_os = "linux"))]
+        Some(Command::Simulated { keeper, program }) => {
+            let (program, arguments) = program.split_first().expect("the program is required");
+            Ok(crate::transport::become_simulator(keeper, program, arguments))
         }
     }
 }

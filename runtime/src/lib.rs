@@ -15,6 +15,8 @@ mod cli;
 pub mod condition;
 pub mod coverage;
 mod decimal;
+#[cfg(feature = "campaign")]
+mod descendants;
 pub mod evaluate;
 #[cfg(test)]
 mod fixture;

@@ -59,6 +59,8 @@ fn read_jobs(mut stream: TcpStream) -> mpsc::Receiver<Job> {
                 return;
             }
         }
+        #[cfg(feature = "process")]
+        crate::transport::end_simulators();
         std::process::exit(0);
     });
     jobs
