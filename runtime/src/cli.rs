@@ -18,7 +18,6 @@ mod shrink;
 mod work;
 
 use std::io::Write as _;
-use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -87,7 +86,7 @@ enum Command {
     Digest(Which),
     /// Serve a supervisor; started by `run`
     #[command(hide = true)]
-    Worker { supervisor: SocketAddr },
+    Worker(campaign::Address),
     /// Keep the simulator of a worker; started by `worker`
     #[cfg(all(feature = "process", target_os = "linux"))]
     #[command(hide = true)]
@@ -184,10 +183,8 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
         Some(Command::List(which)) => list(&results, &which),
         Some(Command::Show { test, which }) => show(&results, &which, &test),
         Some(Command::Digest(which)) => digest(&results, &which),
-        Some(Command::Worker { supervisor }) => {
-            let token = std::env::var("SESAME_WORKER_TOKEN")
-                .map_err(|_| Failure("`worker` is started by `run`, not by hand".to_owned()))?;
-            campaign::serve(runner, &plan, supervisor, token)?;
+        Some(Command::Worker(supervisor)) => {
+            campaign::serve(runner, &plan, &supervisor)?;
             Ok(ExitCode::SUCCESS)
         }
         #[cfg(all(feature = "process", target_os = "linux"))]

@@ -17,6 +17,14 @@ pub(crate) struct Process {
     started: u64,
 }
 
+impl Process {
+    /// Its id.
+    #[cfg(feature = "campaign")]
+    pub(crate) fn id(self) -> u32 {
+        self.id
+    }
+}
+
 /// Makes this process the parent of all processes below it whose own parent ends. Says whether the system can do that.
 pub(crate) fn adopt_orphans() -> bool {
     #[cfg(target_os = "linux")]

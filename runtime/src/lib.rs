@@ -27,6 +27,8 @@ mod last_panic;
 pub mod message;
 pub mod metric;
 pub mod observation;
+#[cfg(any(feature = "process", feature = "campaign"))]
+mod process_group;
 #[cfg(feature = "record")]
 pub mod record;
 pub mod relay;

@@ -14,6 +14,8 @@ mod faults;
 mod first_front;
 mod import;
 mod interruption;
+#[cfg(target_os = "linux")]
+mod killed;
 mod kuka_cell;
 mod large_results;
 mod optimisers;
