@@ -21,7 +21,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 use rustix::process::{
     Pid, Signal, WaitId, WaitIdOptions, WaitOptions, getppid, kill_process_group, set_parent_process_death_signal,
-    waitid, waitpid,
+    wait, waitid,
 };
 
 use super::child::{END_LIMIT, reason};
@@ -153,7 +153,7 @@ fn reap_until_ended(simulator: Pid, (stage, changed): &(Mutex<Stage>, Condvar)) 
             Err(_) => return None,
         }
         let mut stage = stage.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Ok(Some((ended, status))) = waitpid(None, WaitOptions::NOHANG)
+        if let Ok(Some((ended, status))) = wait(WaitOptions::NOHANG)
             && ended == simulator
         {
             let stopped = *stage == Stage::Stopped;
