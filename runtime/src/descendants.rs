@@ -37,19 +37,6 @@ pub(crate) fn adopt_orphans() -> bool {
     }
 }
 
-/// All living processes below this one, near ones first.
-pub(crate) fn below(root: u32) -> Vec<Process> {
-    #[cfg(target_os = "linux")]
-    {
-        linux::below(&linux::all(), vec![root])
-    }
-    #[cfg(not(target_os = "linux"))]
-    {
-        let _ = root;
-        Vec::new()
-    }
-}
-
 /// The children of this process that are not its own, which is to say that it adopted, with all below them.
 pub(crate) fn adopted(is_own: impl Fn(u32) -> bool) -> Vec<Process> {
     #[cfg(target_os = "linux")]
@@ -67,7 +54,7 @@ pub(crate) fn adopted(is_own: impl Fn(u32) -> bool) -> Vec<Process> {
 /// in groups and sessions that they lead. Comes back when none is left, and says how many are: those that the system
 /// does not let go, or does not let us end. Those of them whose parent is this process are reaped, so none of them may be
 /// one that is waited for elsewhere.
-pub(crate) fn end(processes: Vec<Process>, patience: Duration) -> usize {
+fn end(processes: Vec<Process>, patience: Duration) -> usize {
     #[cfg(target_os = "linux")]
     {
         linux::end(processes, patience)
@@ -238,7 +225,7 @@ mod tests {
         }
 
         fn below(&self) -> Vec<Process> {
-            below(self.0.id())
+            linux::below(&linux::all(), vec![self.0.id()])
         }
     }
 

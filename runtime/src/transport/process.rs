@@ -155,9 +155,8 @@ impl Transport for Process {
                     let why = self.explain(fault);
                     // This run is not touched by it.
                     self.aside.killed = killed;
-                    let what = "the simulator was started anew before this test, since after the test that its worker \
-                                ran before";
-                    self.aside.notes.push(format!("{what} {why}"));
+                    let what = "the simulator was started anew before this test, for what it did after the one before";
+                    self.aside.notes.push(format!("{what}: {why}"));
                 }
             }
         }

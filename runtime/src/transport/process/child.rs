@@ -271,13 +271,15 @@ impl Held {
 
     /// Waits for the process to end, and ends what it leaves behind.
     fn watch(&self) {
-        group::wait_for_end(self);
+        let killed = group::wait_for_end(self);
         let mut process = lock(&self.process);
         if process.status.is_none() {
             group::kill(&mut process.child);
         }
         drop(process);
-        self.end_orphans();
+        if killed {
+            self.end_orphans();
+        }
         lock(&self.process).ended = true;
         self.ended.notify_all();
     }
@@ -360,10 +362,18 @@ mod group {
         command.process_group(0);
     }
 
-    /// Waits until the process has ended. It is not reaped, so that its id is given to no other.
-    pub(super) fn wait_for_end(held: &Held) {
-        let Some(id) = Pid::from_raw(held.id.cast_signed()) else { return };
-        while let Err(Errno::INTR) = waitid(WaitId::Pid(id), WaitIdOptions::EXITED | WaitIdOptions::NOWAIT) {}
+    /// Waits until the process has ended, and says whether a signal ended it. It is not reaped, so that its id is given to
+    /// no other.
+    pub(super) fn wait_for_end(held: &Held) -> bool {
+        let Some(id) = Pid::from_raw(held.id.cast_signed()) else { return true };
+        loop {
+            match waitid(WaitId::Pid(id), WaitIdOptions::EXITED | WaitIdOptions::NOWAIT) {
+                Err(Errno::INTR) => {}
+                Ok(Some(status)) => return !status.exited(),
+                // It is reaped already.
+                Ok(None) | Err(_) => return true,
+            }
+        }
     }
 
     /// Ends the process and its group. It must not have been reaped.
@@ -397,11 +407,11 @@ mod group {
 
     pub(super) fn own(_: &mut Command) {}
 
-    pub(super) fn wait_for_end(held: &Held) {
+    pub(super) fn wait_for_end(held: &Held) -> bool {
         loop {
             let mut process = lock(&held.process);
             if process.status.is_some() || !matches!(process.child.try_wait(), Ok(None)) {
-                return;
+                return false;
             }
             drop(process);
             thread::sleep(Duration::from_millis(20));

@@ -20,7 +20,7 @@ use crate::wire::Wire;
 const STEP_LIMIT: u64 = 100_000;
 
 /// What to do about an answer too many.
-const TURNS: &str = "give one answer to each line, in this step or one before it is one too many";
+const TURNS: &str = "give one answer to each line; in this test there is one too many";
 
 /// Why a session came to its end.
 #[derive(Debug)]
