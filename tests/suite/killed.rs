@@ -413,11 +413,9 @@ fn killed_at_random_moments(name: &str, kills: u32) {
         })
         .unwrap();
     let hits = hits.into_inner();
-    for victim in VICTIMS {
-        let of: Vec<_> = hits.iter().filter(|(it, _)| *it == victim).collect();
-        let middle = of.iter().filter(|(_, tests)| tests.is_some_and(|tests| tests > 0)).count();
-        assert!(2 * middle >= of.len(), "most kills are in the middle of a run: {of:?}");
-    }
+    // A run's last part is writing its page, when there is no worker and no simulator any more.
+    let middle = hits.iter().filter(|(_, tests)| tests.is_some_and(|tests| tests > 0)).count();
+    assert!(2 * middle > hits.len(), "most kills are in the middle of a run: {hits:?}");
 }
 
 #[test]

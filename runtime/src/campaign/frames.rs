@@ -116,3 +116,6 @@ impl Greeting {
 pub(super) fn not_reported(limit: Duration) -> io::Error {
     io::Error::new(io::ErrorKind::TimedOut, format!("it did not report within {} s", limit.as_secs()))
 }
+
+#[cfg(test)]
+mod tests;
