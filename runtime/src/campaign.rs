@@ -8,13 +8,18 @@ mod again;
 mod alone;
 mod conduct;
 mod frames;
+mod link;
 mod pool;
+#[cfg(any(not(unix), test))]
+mod port;
 mod traced;
 mod worker;
+mod worker_process;
 
 pub use again::{Further, confirm_further};
 pub use alone::{AloneSettings, run_alone};
 pub use conduct::{CampaignError, Conducted, Progress, Settings, Unheard, conduct, patience};
+pub use link::Address;
 pub use pool::{Ended, Job, Pool, PoolError, PoolSettings};
 pub use traced::TraceOrder;
 pub use worker::serve;

@@ -18,7 +18,6 @@ mod shrink;
 mod terminal;
 mod work;
 
-use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -88,13 +87,25 @@ enum Command {
     Digest(Which),
     /// Serve a supervisor; started by `run`
     #[command(hide = true)]
-    Worker { supervisor: SocketAddr },
-    /// Become the simulator of a worker; started by `worker`
+    Worker(campaign::Address),
+    /// Keep the simulator of a worker; started by `worker`
     #[cfg(all(feature = "process", target_os = "linux"))]
     #[command(hide = true)]
     Simulator {
         /// Process id of the worker
         worker: u32,
+        /// The file that is told how the simulator ended
+        report: PathBuf,
+        /// The simulator's program with its arguments
+        #[arg(required = true, last = true)]
+        program: Vec<std::ffi::OsString>,
+    },
+    /// Become a simulator; started by `simulator`
+    #[cfg(all(feature = "process", target_os = "linux"))]
+    #[command(hide = true)]
+    Simulated {
+        /// Process id of the keeper
+        keeper: u32,
         /// The simulator's program with its arguments
         #[arg(required = true, last = true)]
         program: Vec<std::ffi::OsString>,
@@ -173,16 +184,19 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
         Some(Command::List(which)) => list(&results, &which),
         Some(Command::Show { test, which }) => show(&results, &which, &test),
         Some(Command::Digest(which)) => digest(&results, &which),
-        Some(Command::Worker { supervisor }) => {
-            let token = std::env::var("SESAME_WORKER_TOKEN")
-                .map_err(|_| Failure("`worker` is started by `run`, not by hand".to_owned()))?;
-            campaign::serve(runner, &plan, supervisor, token)?;
+        Some(Command::Worker(supervisor)) => {
+            campaign::serve(runner, &plan, &supervisor)?;
             Ok(ExitCode::SUCCESS)
         }
         #[cfg(all(feature = "process", target_os = "linux"))]
-        Some(Command::Simulator { worker, program }) => {
+        Some(Command::Simulator { worker, report, program }) => {
             let (program, arguments) = program.split_first().expect("the program is required");
-            Ok(crate::transport::become_simulator(worker, program, arguments))
+            Ok(crate::transport::keep_simulator(worker, &report, program, arguments))
+        }
+        #[cfg(all(feature = "process", target_os = "linux"))]
+        Some(Command::Simulated { keeper, program }) => {
+            let (program, arguments) = program.split_first().expect("the program is required");
+            Ok(crate::transport::become_simulator(keeper, program, arguments))
         }
     }
 }

@@ -73,7 +73,7 @@ pub fn evaluate_tapped(
     let finished = relay.finish(end);
     let effect = finished.operations.iter().any(|operation| operation.counters.any_effect());
     let outcome = match failure {
-        Some(message) => Outcome::Crash { message },
+        Some(message) => Outcome::crash(message),
         None if test.operations.is_empty() || effect => Outcome::Completed,
         None => Outcome::Void,
     };

@@ -18,6 +18,8 @@ mod cli;
 pub mod condition;
 pub mod coverage;
 mod decimal;
+#[cfg(feature = "campaign")]
+mod descendants;
 pub mod evaluate;
 #[cfg(test)]
 mod fixture;
@@ -28,6 +30,8 @@ mod last_panic;
 pub mod message;
 pub mod metric;
 pub mod observation;
+#[cfg(any(feature = "process", feature = "campaign"))]
+mod process_group;
 #[cfg(feature = "record")]
 pub mod record;
 pub mod relay;

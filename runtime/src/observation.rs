@@ -26,7 +26,22 @@ pub enum Outcome {
     },
 }
 
+/// How much of what is known of a crash is kept, in bytes.
+const CAUSE_BYTES: usize = 4096;
+
 impl Outcome {
+    /// A crash for this cause. One that is longer than anybody reads, as simulators and panics may have it, is shortened, and
+    /// says by how much.
+    pub fn crash(mut cause: String) -> Self {
+        if cause.len() > CAUSE_BYTES {
+            let whole = cause.len();
+            let kept = (0..=CAUSE_BYTES).rev().find(|&at| cause.is_char_boundary(at)).unwrap_or(0);
+            cause.truncate(kept);
+            cause += &format!("… ({} bytes more)", whole - kept);
+        }
+        Outcome::Crash { message: cause }
+    }
+
     /// Whether the run came to its planned end.
     pub fn is_whole(&self) -> bool {
         matches!(self, Outcome::Completed | Outcome::Void | Outcome::Unknown)
@@ -221,5 +236,20 @@ impl Observation {
     /// The value of the plan's metric at this position; unmeasured when the run reported none.
     pub fn value(&self, metric: sesame_plan::MetricId) -> MetricValue {
         self.metrics.get(metric.index()).map(MetricValue::from).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cause_of_a_crash_is_shortened_between_two_characters() {
+        let short = "ä".repeat(CAUSE_BYTES / 2);
+        assert_eq!(Outcome::crash(short.clone()), Outcome::Crash { message: short });
+        let long = format!("x{}", "ä".repeat(5 << 20));
+        let kept = format!("x{}", "ä".repeat(CAUSE_BYTES / 2 - 1));
+        let left = long.len() - kept.len();
+        assert_eq!(Outcome::crash(long), Outcome::Crash { message: format!("{kept}… ({left} bytes more)") });
     }
 }

@@ -10,6 +10,7 @@ mod process;
 
 use std::path::PathBuf;
 
+use serde::{Deserialize, Serialize};
 use sesame_plan::CampaignPlan;
 
 use crate::relay::Exchange;
@@ -18,10 +19,12 @@ use crate::time::SimTime;
 
 #[cfg(feature = "in-process")]
 pub use in_process::in_process;
-#[cfg(all(feature = "process", feature = "campaign", target_os = "linux"))]
-pub(crate) use process::become_simulator;
+#[cfg(all(feature = "process", feature = "campaign"))]
+pub(crate) use process::end_simulators;
 #[cfg(feature = "process")]
 pub use process::process;
+#[cfg(all(feature = "process", feature = "campaign", target_os = "linux"))]
+pub(crate) use process::{become_simulator, keep_simulator};
 
 /// A connection to a simulator.
 pub trait Transport {
@@ -41,6 +44,21 @@ pub trait Transport {
 
     /// Ends the connection; whatever the transport started is stopped.
     fn close(&mut self);
+
+    /// What befell the simulator since this was last asked.
+    fn aside(&mut self) -> Aside {
+        Aside::default()
+    }
+}
+
+/// What befell a simulator beside what its run showed. It is of one session alone, and no part of results.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Aside {
+    /// Its process was killed (`SIGKILL`), and not by us: by hand, or by a system that had no memory left. The run says
+    /// nothing about the test then.
+    pub killed: bool,
+    /// What else there is to say, in words for the user.
+    pub notes: Vec<String>,
 }
 
 /// What a simulator can do.

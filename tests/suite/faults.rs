@@ -123,6 +123,16 @@ fn a_run_that_the_simulator_ends_early_is_complete_at_its_own_end() {
     assert!(rows.iter().all(|row| row.end == 0.5 && matches!(row.outcome.word(), "completed" | "void")), "{rows:?}");
 }
 
+/// Where workers inherit their connection it is their standard input, until they put an empty one in its place.
+#[test]
+fn a_simulator_or_hook_that_reads_standard_input_finds_it_empty() {
+    let runner = faulty("curious", "harmless");
+    let whole = runner.run(&["--results", "whole", "--evaluations", "6"]).expect(0).digest();
+    let mut curious = runner.command(&["--results", "curious", "--evaluations", "6", "--timeout", "20"]);
+    let curious = sesame_tests::done(curious.env("FAULT", "reads input")).expect(0);
+    assert_eq!(curious.digest(), whole);
+}
+
 #[test]
 fn a_requirement_broken_undisturbed_is_a_warning() {
     let runner = faulty("tilted", "harmless");

@@ -12,8 +12,11 @@ mod exported;
 mod falsification;
 mod faults;
 mod first_front;
+mod hostile;
 mod import;
 mod interruption;
+#[cfg(target_os = "linux")]
+mod killed;
 mod kuka_cell;
 mod large_results;
 mod optimisers;

@@ -58,13 +58,13 @@ pub fn confirm_further(
         let first = last.max(own) + 1;
         wanted.push((number, first..=first.saturating_add(further.times - 1)));
     }
+    let total = further.times.saturating_mul(u32::try_from(further.tests.len()).unwrap_or(u32::MAX));
     let pool = Pool::start(&PoolSettings {
-        workers: settings.workers,
+        workers: settings.workers_for(total),
         program: settings.program.clone(),
         directory: directory.to_path_buf(),
         timeout: settings.timeout.unwrap_or_else(|| patience(longest)),
     })?;
-    let total = further.times.saturating_mul(u32::try_from(further.tests.len()).unwrap_or(u32::MAX));
     let mut desk = Desk { recorder, recorded: BTreeSet::new(), repeated, pool, traces: None, interrupted };
     desk.repeat(&mut again, &wanted, settings.seed, &mut |runs| each(runs, total))
 }
@@ -149,7 +149,7 @@ impl Desk<'_> {
             if self.interrupted.load(Ordering::Relaxed) {
                 return Ok(false);
             }
-            let Some(Ended { number: job, observation, notes, trace_failure: _ }) =
+            let Some(Ended { number: job, observation, notes, trace_failure: _, killed: _ }) =
                 self.pool.next(Duration::from_millis(100))?
             else {
                 continue;

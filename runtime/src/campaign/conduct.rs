@@ -47,7 +47,7 @@ pub fn patience(seconds: f64) -> Duration {
 pub struct Settings {
     /// The campaign's seed.
     pub seed: u64,
-    /// How many worker processes; results do not depend on it.
+    /// How many worker processes at most; results do not depend on it.
     pub workers: usize,
     /// Wall time after which a test is stopped; by default a multiple of what the undisturbed run takes.
     pub timeout: Option<Duration>,
@@ -55,6 +55,13 @@ pub struct Settings {
     pub program: PathBuf,
     /// Whether to go on although nobody hears what an operation disturbs.
     pub allow_unheard: bool,
+}
+
+impl Settings {
+    /// How many worker processes for so many tests: more than tests would have nothing to do.
+    pub(super) fn workers_for(&self, tests: u32) -> usize {
+        self.workers.min(usize::try_from(tests).unwrap_or(usize::MAX)).max(1)
+    }
 }
 
 /// How far a campaign is.
@@ -104,6 +111,17 @@ pub enum CampaignError {
         "the undisturbed reference run failed: {0}\nnothing was fuzzed: a campaign needs a system that works undisturbed"
     )]
     Reference(String),
+    /// An undisturbed run was killed, and again when it was run once more. It is not recorded, so that `resume` runs it again.
+    #[error(
+        "the undisturbed reference run failed: {reason}\nT{test} is not recorded, what was recorded before is kept: `resume` runs it \
+         again. If nobody killed it, give it more memory, or the campaign fewer `--workers`"
+    )]
+    Killed {
+        /// The test.
+        test: u32,
+        /// What is known of it.
+        reason: String,
+    },
     /// Nobody hears what operations disturb, so that tests with them would show nothing.
     #[error(
         "{}\nnothing was fuzzed: such tests would pass without having disturbed anything. Disturb what the simulator \
@@ -143,7 +161,7 @@ pub fn conduct(
     let recorded = recorder.repository().numbers()?.into_iter().collect();
     let repeated = recorder.repository().repetitions()?;
     let pool = Pool::start(&PoolSettings {
-        workers: settings.workers,
+        workers: settings.workers_for(plan.campaign.search.evaluations()),
         program: settings.program.clone(),
         directory: directory.to_path_buf(),
         timeout: settings.timeout.unwrap_or(FIRST_TIMEOUT),
@@ -548,7 +566,7 @@ impl Desk<'_> {
             if self.interrupted.load(Ordering::Relaxed) {
                 return Ok(false);
             }
-            let Some(Ended { number, observation, notes, trace_failure }) =
+            let Some(Ended { number, observation, notes, trace_failure, killed }) =
                 self.pool.next(Duration::from_millis(100))?
             else {
                 continue;
@@ -556,6 +574,13 @@ impl Desk<'_> {
             let Some(test) = waiting.remove(&number) else { continue };
             if let Some(reason) = trace_failure {
                 return Err(CampaignError::Trace { test: number, reason });
+            }
+            if killed && test.origin == Origin::Reference {
+                // Whatever is compared with it would say something of that kill, for good.
+                return Err(CampaignError::Killed {
+                    test: number,
+                    reason: observation.outcome.detail().unwrap_or_default(),
+                });
             }
             self.record(&test.with(observation), each)?;
             for text in notes {

@@ -1,22 +1,24 @@
 //! The supervisor's side of its workers: starts them, hands out tests, and deals with those that die or hang.
 //!
-//! A worker that is killed from outside cannot be told from one that its simulator or a hook brought down: the test it
-//! ran is a crash. What Ctrl-C sends to all of a terminal's foreground processes does not reach workers, since that
-//! would look just the same: the supervisor ends them.
+//! A worker that dies of something else than `SIGKILL` was brought down by its simulator or a hook: the test it ran is a
+//! crash. One that was killed is another matter, and so is a simulator that was: the test is run again. What Ctrl-C sends to
+//! all of a terminal's foreground processes does not reach workers, since that would look like a crash: the supervisor
+//! ends them.
 
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
-use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Command, ExitStatus};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use super::frames::{self, Hello, Reply};
+use super::frames::{self, Reply};
+use super::link::{self, Stream};
 use super::traced;
 use super::worker::{crashed, empty};
+use super::worker_process::WorkerProcess;
 use crate::observation::{Observation, Outcome};
 
 pub use super::frames::Job;
@@ -24,12 +26,18 @@ pub use super::frames::Job;
 /// How long a fresh worker may take to report.
 const START_LIMIT: Duration = Duration::from_secs(30);
 
+/// How long a worker that broke off the conversation may take to end.
+const DEATH_LIMIT: Duration = Duration::from_secs(2);
+
+/// The environment variable with a worker's number, which all that a worker starts inherits.
+pub(super) const WORKER: &str = "SESAME_WORKER";
+
 /// How a pool runs its workers.
 #[derive(Debug, Clone)]
 pub struct PoolSettings {
     /// How many workers; at least one.
     pub workers: usize,
-    /// The program that is a worker when called with `worker ADDRESS`: the runner itself.
+    /// The program that is a worker when called with `worker`: the runner itself.
     pub program: PathBuf,
     /// Folder in which each worker gets a folder of its own.
     pub directory: PathBuf,
@@ -59,6 +67,9 @@ pub struct Ended {
     pub notes: Vec<String>,
     /// Why the trace that was asked for could not be written: the result must not be recorded without it.
     pub trace_failure: Option<String>,
+    /// Whether its worker or its simulator was killed, and again when it was run once more. The observation says so; it
+    /// may say nothing of the test, but only of this machine today.
+    pub killed: bool,
 }
 
 /// Worker processes and the threads that talk to them.
@@ -79,15 +90,16 @@ impl Pool {
         let (sender, results) = mpsc::channel();
         let stop = Arc::new(AtomicBool::new(false));
         let timeout = Arc::new(AtomicU64::new(millis(settings.timeout)));
-        let mut lanes = Vec::with_capacity(settings.workers);
+        // Dropped if a worker cannot be started, which ends those that were.
+        let mut pool = Pool { jobs: Some(jobs), results, lanes: Vec::new(), stop, timeout };
         for number in 1..=settings.workers.max(1) {
-            let (stop, timeout) = (Arc::clone(&stop), Arc::clone(&timeout));
+            let (stop, timeout) = (Arc::clone(&pool.stop), Arc::clone(&pool.timeout));
             let mut lane = Lane { number, settings: settings.clone(), worker: None, stop, timeout };
-            lane.worker = Some(Worker::start(&lane)?);
+            lane.worker = Some(lane.start()?);
             let (queue, sender) = (Arc::clone(&queue), sender.clone());
-            lanes.push(thread::spawn(move || lane.work(&queue, &sender)));
+            pool.lanes.push(thread::spawn(move || lane.work(&queue, &sender)));
         }
-        Ok(Pool { jobs: Some(jobs), results, lanes, stop, timeout })
+        Ok(pool)
     }
 
     /// Changes the wall time after which a test is stopped, for tests not begun yet.
@@ -145,31 +157,45 @@ impl Lane {
         }
     }
 
-    /// Runs a test. If its worker is killed, which no simulator does to itself, the test is run once more: whoever kills
-    /// processes, by hand or for want of memory, is to leave no trace in results. Killed again, it is a crash.
-    fn run(&mut self, job: &Job) -> Result<Ended, PoolError> {
-        let (ended, killed) = self.attempt(job)?;
-        if !killed || self.stop.load(Ordering::Relaxed) {
-            return Ok(ended);
+    /// Starts a worker. One that is killed meanwhile is started once more, as it would be while it runs a test.
+    fn start(&self) -> Result<Worker, PoolError> {
+        match Worker::start(self) {
+            Err(NotStarted { killed: true, .. }) if !self.stop.load(Ordering::Relaxed) => Worker::start(self),
+            started => started,
         }
-        let (mut ended, _) = self.attempt(job)?;
-        ended.notes.insert(0, "the worker was killed while it ran this test, so the test was run again".to_owned());
+        .map_err(|NotStarted { reason, .. }| PoolError { worker: self.number, reason })
+    }
+
+    /// Runs a test. If its worker or its simulator is killed, the test is run once more: whoever kills processes, by hand
+    /// or for want of memory, is to leave no trace in results. Killed again, it is a crash that says so.
+    fn run(&mut self, job: &Job) -> Result<Ended, PoolError> {
+        let (ended, victim) = self.attempt(job)?;
+        let Some(victim) = victim.filter(|_| !self.stop.load(Ordering::Relaxed)) else { return Ok(ended) };
+        let (mut ended, again) = self.attempt(job)?;
+        ended.notes.insert(0, format!("the {victim} was killed while it ran this test, so the test was run again"));
+        if again.is_some() {
+            ended.killed = true;
+            if let Outcome::Crash { message } = &mut ended.observation.outcome {
+                *message = format!("killed twice, by somebody or by the system for want of memory: {message}");
+            }
+        }
         Ok(ended)
     }
 
-    /// Runs a test, and says whether its worker was killed by someone else.
-    fn attempt(&mut self, job: &Job) -> Result<(Ended, bool), PoolError> {
+    /// Runs a test, and says which process was killed by someone else, if one was.
+    fn attempt(&mut self, job: &Job) -> Result<(Ended, Option<&'static str>), PoolError> {
         let mut worker = match self.worker.take() {
             Some(worker) => worker,
-            None => Worker::start(self)?,
+            None => self.start()?,
         };
         let printed = fs::metadata(output_file(&self.directory())).map_or(0, |file| file.len());
         let timeout = Duration::from_millis(self.timeout.load(Ordering::Relaxed));
-        let mut killed = false;
+        let mut killed = None;
         let (observation, notes, trace_failure) = match worker.ask(job, timeout, &self.stop) {
             Ok(reply) => {
                 self.worker = Some(worker);
-                (reply.observation, Vec::new(), reply.trace_failure)
+                killed = reply.aside.killed.then_some("simulator");
+                (reply.observation, reply.aside.notes, reply.trace_failure)
             }
             Err(error) if error.kind() == io::ErrorKind::TimedOut => {
                 let outcome = Outcome::Timeout { limit: timeout.as_secs_f64() };
@@ -180,9 +206,9 @@ impl Lane {
             }
             Err(error) => {
                 // Only what is the same in every session: the cause is part of the digest.
-                let how = worker.how_it_ended(&error);
-                killed = how.as_ref().is_ok_and(|status| was_killed(*status));
-                let how = how.map_or_else(|error| error, |status| status.to_string());
+                let status = worker.process.wait(DEATH_LIMIT);
+                killed = status.is_some_and(was_killed).then_some("worker");
+                let how = status.map_or_else(|| error.to_string(), |status| status.to_string());
                 let observation = crashed(format!("the worker process ended: {how}"));
                 drop(worker);
                 let lost = self.save_trace(job, &observation.outcome);
@@ -191,7 +217,7 @@ impl Lane {
                 (observation, words.into_iter().collect(), lost)
             }
         };
-        Ok((Ended { number: job.number, observation, notes, trace_failure }, killed))
+        Ok((Ended { number: job.number, observation, notes, trace_failure, killed: false }, killed))
     }
 
     /// Saves what a dead worker wrote of a trace that was asked for; why not, otherwise.
@@ -203,83 +229,72 @@ impl Lane {
     fn directory(&self) -> PathBuf {
         self.settings.directory.join(self.number.to_string())
     }
-
-    fn refuse(&self, reason: &impl ToString) -> PoolError {
-        PoolError { worker: self.number, reason: reason.to_string() }
-    }
 }
 
-/// One worker process. Dropping it ends the process.
+/// A worker and the connection to it. Dropping it ends the worker with everything that it started.
 struct Worker {
-    process: Child,
-    stream: Option<TcpStream>,
+    /// Closed before the process is waited for: that is its sign to end.
+    stream: Stream,
+    process: WorkerProcess,
+}
+
+/// Why a worker could not be started.
+struct NotStarted {
+    reason: String,
+    /// Whether it was killed.
+    killed: bool,
+}
+
+impl From<io::Error> for NotStarted {
+    fn from(error: io::Error) -> Self {
+        NotStarted { reason: error.to_string(), killed: false }
+    }
 }
 
 impl Worker {
-    fn start(lane: &Lane) -> Result<Self, PoolError> {
+    fn start(lane: &Lane) -> Result<Self, NotStarted> {
         let directory = lane.directory();
-        let refuse = |reason: io::Error| lane.refuse(&reason);
-        fs::create_dir_all(&directory).map_err(refuse)?;
-        let output = File::options().create(true).append(true).open(output_file(&directory)).map_err(refuse)?;
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(refuse)?;
-        let token = token().map_err(|error| lane.refuse(&error))?;
+        fs::create_dir_all(&directory)?;
+        let output = File::options().create(true).append(true).open(output_file(&directory))?;
         let mut command = Command::new(&lane.settings.program);
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
-        let process = command
-            .arg("worker")
-            .arg(listener.local_addr().map_err(refuse)?.to_string())
-            .env("SESAME_WORKER_TOKEN", &token)
-            .env("SESAME_WORKER", lane.number.to_string())
-            .current_dir(&directory)
-            .stdin(Stdio::null())
-            .stdout(output.try_clone().map_err(refuse)?)
-            .stderr(output)
-            .spawn()
-            .map_err(|error| lane.refuse(&format!("{}: {error}", lane.settings.program.display())))?;
-        let mut worker = Worker { process, stream: None };
-        worker.stream = Some(worker.accept(&listener, &token, lane)?);
-        Ok(worker)
-    }
-
-    /// Waits for the worker's connection. Whoever else connects, without the token, is turned away.
-    fn accept(&mut self, listener: &TcpListener, token: &str, lane: &Lane) -> Result<TcpStream, PoolError> {
-        let refuse = |error: io::Error| lane.refuse(&error);
-        listener.set_nonblocking(true).map_err(refuse)?;
-        let started = Instant::now();
-        while started.elapsed() < START_LIMIT {
-            if let Some(status) = self.process.try_wait().map_err(refuse)? {
-                let output = last_lines(&output_file(&lane.directory()), 0, 10);
-                let output = output.map_or_else(String::new, |lines| format!("; its last words:\n{lines}"));
-                return Err(lane.refuse(&format!("it ended at once, {status}{output}")));
+        let offer = link::offer(&mut command)?;
+        command.env(WORKER, lane.number.to_string()).current_dir(&directory).stdout(output.try_clone()?).stderr(output);
+        let mut process = WorkerProcess::start(command)
+            .map_err(|error| io::Error::other(format!("{}: {error}", lane.settings.program.display())))?;
+        let taken = offer.taken(START_LIMIT, &mut || {
+            if lane.stop.load(Ordering::Relaxed) {
+                return Err(io::Error::new(io::ErrorKind::TimedOut, "the run was stopped"));
             }
-            match listener.accept() {
-                Ok((mut stream, _)) => {
-                    stream.set_nonblocking(false).map_err(refuse)?;
-                    stream.set_nodelay(true).map_err(refuse)?;
-                    stream.set_read_timeout(Some(Duration::from_secs(5))).map_err(refuse)?;
-                    if frames::receive::<Hello>(&mut stream).is_ok_and(|hello| hello.token == token) {
-                        return Ok(stream);
-                    }
-                }
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => thread::sleep(Duration::from_millis(2)),
-                Err(error) => return Err(lane.refuse(&error)),
-            }
+            if process.ended().is_some() { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(()) }
+        });
+        match taken {
+            Ok(stream) => Ok(Worker { stream, process }),
+            Err(error) if error.kind() == io::ErrorKind::TimedOut => Err(error.into()),
+            // It closed the connection, so it is about to end: how says more.
+            Err(error) => Err(process.wait(DEATH_LIMIT).map_or_else(
+                || error.into(),
+                |status| {
+                    let output = last_lines(&output_file(&directory), 0, 10);
+                    let output = output.map_or_else(String::new, |lines| format!("; its last words:\n{lines}"));
+                    NotStarted { reason: format!("it ended at once, {status}{output}"), killed: was_killed(status) }
+                },
+            )),
         }
-        Err(lane.refuse(&format!("it did not report within {} s", START_LIMIT.as_secs())))
     }
 
     /// Runs a test. The error is `TimedOut` when it took too long or the pool was told to stop.
     fn ask(&mut self, job: &Job, timeout: Duration, stop: &AtomicBool) -> io::Result<Reply> {
-        let stream = self.stream.as_mut().ok_or(io::ErrorKind::NotConnected)?;
+        let stream = &mut self.stream;
         frames::send(stream, job)?;
         let asked = Instant::now();
         // Short waits for the first byte, so that a stop is noticed; then the frame is read in one go.
         stream.set_read_timeout(Some(Duration::from_millis(100)))?;
+        let mut first = [0];
         loop {
-            match stream.peek(&mut [0]) {
+            match stream.read(&mut first) {
                 Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
                 Ok(_) => break,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
                     if asked.elapsed() >= timeout || stop.load(Ordering::Relaxed) {
                         return Err(io::ErrorKind::TimedOut.into());
@@ -289,29 +304,7 @@ impl Worker {
             }
         }
         stream.set_read_timeout(Some(Duration::from_secs(60)))?;
-        frames::receive(stream)
-    }
-
-    /// The status of a process that broke off the conversation; the error it broke off with if it has not ended.
-    fn how_it_ended(&mut self, error: &io::Error) -> Result<ExitStatus, String> {
-        let patience = Instant::now();
-        while patience.elapsed() < Duration::from_secs(2) {
-            match self.process.try_wait() {
-                Ok(Some(status)) => return Ok(status),
-                Ok(None) => thread::sleep(Duration::from_millis(5)),
-                Err(_) => break,
-            }
-        }
-        Err(error.to_string())
-    }
-}
-
-impl Drop for Worker {
-    fn drop(&mut self) {
-        // Closing the connection ends a healthy worker; killing ends one that hangs. Both may already be gone.
-        self.stream = None;
-        self.process.kill().ok();
-        self.process.wait().ok();
+        frames::receive(&mut first.chain(stream))
     }
 }
 
@@ -351,10 +344,4 @@ fn last_lines(path: &Path, from: u64, count: usize) -> Option<String> {
     let lines: Vec<&str> = text.lines().collect();
     let tail = lines[lines.len().saturating_sub(count)..].join("\n");
     (!tail.trim().is_empty()).then_some(tail)
-}
-
-fn token() -> Result<String, getrandom::Error> {
-    let high = getrandom::u64()?;
-    let low = getrandom::u64()?;
-    Ok(format!("{high:016x}{low:016x}"))
 }

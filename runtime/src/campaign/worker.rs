@@ -1,16 +1,18 @@
 //! A worker process: runs the tests it is sent, one after another, until the supervisor is gone.
 
 use std::io;
-use std::net::{SocketAddr, TcpStream};
 use std::path::Path;
-use std::sync::mpsc;
+use std::sync::{Mutex, mpsc};
 use std::thread;
+use std::time::Duration;
 
 use sesame_plan::CampaignPlan;
 
-use super::frames::{self, Hello, Job, Reply};
+use super::frames::{self, Job, Reply};
+use super::link::{self, Address, Stream};
 use super::traced;
 use crate::changed_files::ChangedFiles;
+use crate::descendants;
 use crate::evaluate::Custom;
 use crate::last_panic;
 use crate::metric::MetricTable;
@@ -18,15 +20,15 @@ use crate::observation::{Observation, Outcome, WallTime};
 use crate::runner::Runner;
 use crate::wire::WireTable;
 
-/// Serves the supervisor at this address until it closes the connection.
+/// Serves the supervisor that started this process until it closes the connection, and then ends what was started for it.
 ///
 /// A panic of the simulator or of a hook is the outcome of its test; the worker goes on with a fresh connection to the
 /// simulator.
-pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: SocketAddr, token: String) -> io::Result<()> {
-    let mut stream = TcpStream::connect(supervisor)?;
-    stream.set_nodelay(true)?;
-    frames::send(&mut stream, &Hello { token })?;
+pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::Result<()> {
+    let mut stream = link::connect(supervisor)?;
     last_panic::listen();
+    // So that what leaves its parents can be found when it is to end. Where the system cannot do that, groups have to do.
+    descendants::adopt_orphans();
 
     let wires = WireTable::new(plan);
     let metrics = MetricTable::new(plan, &wires, runner.hooks).map_err(io::Error::other)?;
@@ -41,27 +43,44 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: SocketAddr, token
         let simulator = transport.get_or_insert_with(|| runner.connect.transport(plan));
         let (observation, trace_failure) =
             traced::run(plan, &wires, &metrics, simulator.as_mut(), &job, &directory, &mut custom);
+        let aside = simulator.aside();
         if matches!(observation.outcome, Outcome::Crash { .. }) {
             transport = None;
         }
-        frames::send(&mut stream, &Reply { number: job.number, observation, trace_failure })?;
+        let sent = frames::send(&mut stream, &Reply { number: job.number, observation, trace_failure, aside });
+        if sent.is_err() {
+            end_what_was_started();
+            return sent;
+        }
     }
-    Ok(())
+    unreachable!("jobs come until the process is ended")
 }
 
-/// Reads jobs in a thread of its own. When the supervisor is gone the process ends at once, even in the middle of a
-/// test that hangs, so that no worker outlives its supervisor.
-fn read_jobs(mut stream: TcpStream) -> mpsc::Receiver<Job> {
+/// Reads jobs in a thread of its own. When the supervisor is gone, this thread ends what the worker started, and then the
+/// worker, even in the middle of a test that hangs: so no worker outlives its supervisor, and no simulator its worker.
+fn read_jobs(mut stream: Stream) -> mpsc::Receiver<Job> {
     let (sender, jobs) = mpsc::channel();
     thread::spawn(move || {
         while let Ok(job) = frames::receive(&mut stream) {
             if sender.send(job).is_err() {
-                return;
+                break;
             }
         }
+        end_what_was_started();
         std::process::exit(0);
     });
     jobs
+}
+
+/// Ends simulators, after the time that they are given to end by themselves, and then everything else that is below this
+/// process.
+fn end_what_was_started() {
+    // Of the two threads that may get here, the later one waits until the earlier one is done.
+    static TURN: Mutex<()> = Mutex::new(());
+    let _turn = TURN.lock();
+    #[cfg(feature = "process")]
+    crate::transport::end_simulators();
+    descendants::end_adopted(|_| false, Duration::ZERO);
 }
 
 /// The observation of a run that left nothing but its cause.

@@ -23,11 +23,16 @@ use crate::record::{self, Claim, Recorder, Repository};
 use crate::report::{self, Summary};
 use crate::runner::Runner;
 
+/// The most worker processes that may be asked for. Each is a process with a simulator of its own, and takes one of the
+/// supervisor's open files, of which systems permit 1024 by default. Results do not depend on how many there are, and more
+/// than a machine has processors gain something only where simulators wait.
+const MOST_WORKERS: usize = 512;
+
 /// How tests are run.
 #[derive(Debug, Default, Args)]
 pub(super) struct Work {
-    /// How many worker processes; by default one per processor
-    #[arg(long, value_name = "N")]
+    /// How many worker processes, at most 512; by default one per processor, and never more than tests
+    #[arg(long, value_name = "N", value_parser = workers)]
     workers: Option<NonZeroUsize>,
     /// Seconds of wall time after which a test is stopped; by default 20 times the undisturbed run, at least 60
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
@@ -48,6 +53,18 @@ pub(super) struct Ending {
     junit: Option<PathBuf>,
     #[command(flatten)]
     gate: Gate,
+}
+
+/// A number of workers from the command line.
+fn workers(text: &str) -> Result<NonZeroUsize, String> {
+    let asked: NonZeroUsize = text.parse().map_err(|_| "not a number above 0".to_owned())?;
+    if asked.get() > MOST_WORKERS {
+        return Err(format!(
+            "at most {MOST_WORKERS}: each is a process with a simulator of its own. Leave the option out for one per processor; \
+             results are the same with any number"
+        ));
+    }
+    Ok(asked)
 }
 
 /// A length of wall time from the command line.
@@ -77,7 +94,7 @@ impl Work {
     }
 
     fn processes(&self) -> usize {
-        let processors = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        let processors = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get).min(MOST_WORKERS);
         self.workers.map_or_else(processors, NonZeroUsize::get)
     }
 }

@@ -1,23 +1,31 @@
 //! The simulator's process: started without a shell in a group of its own, and ended with all it started.
+//!
+//! However it comes to its end, its input is closed first, and it has [`END_LIMIT`] to end by itself. What it leaves behind
+//! when it ends is ended at once: so nobody is left who holds its output open, and the end of the output tells the end of
+//! the process. On Linux its [keeper](super::keeper) sees to all that, also when the worker is gone.
 
-use std::collections::VecDeque;
 use std::fmt::Write as _;
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::PathBuf;
-use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
-use std::sync::mpsc;
-use std::sync::{Arc, Mutex};
+use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+#[cfg(all(feature = "campaign", target_os = "linux"))]
+use super::keeper::Report;
+use super::words::LastWords;
 use crate::transport::TransportError;
 
 /// How long a simulator whose input is closed may take to end by itself.
-const END_LIMIT: Duration = Duration::from_secs(1);
+pub(super) const END_LIMIT: Duration = Duration::from_secs(1);
 
-/// How much of standard error is kept for error messages, in bytes and in lines.
-const KEPT_BYTES: usize = 4096;
-const KEPT_LINES: usize = 3;
+/// How long a keeper may take beyond that to end what the simulator started, and then itself.
+#[cfg(all(feature = "campaign", target_os = "linux"))]
+const KEEPER_LIMIT: Duration = Duration::from_secs(7);
+
+/// The simulators of this process that may be alive.
+static RUNNING: Mutex<Vec<Weak<Held>>> = Mutex::new(Vec::new());
 
 /// A program that is a simulator.
 #[derive(Debug, Clone)]
@@ -29,7 +37,10 @@ pub(super) struct Program {
     /// The folder it runs in.
     pub(super) folder: PathBuf,
     /// Whether the program of this process is a runner, which can keep watch over the simulator.
-    #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux ends a process with another"))]
+    #[cfg_attr(
+        not(all(feature = "campaign", target_os = "linux")),
+        expect(dead_code, reason = "only Linux ends a process with another")
+    )]
     pub(super) in_runner: bool,
 }
 
@@ -46,7 +57,7 @@ impl Program {
     }
 
     /// Starts it.
-    pub(super) fn start(&self) -> Result<(Running, ChildStdin, ChildStdout), TransportError> {
+    pub(super) fn start(&self) -> Result<(Running, Input, ChildStdout), TransportError> {
         let failed = |error: &io::Error| TransportError::NotStarted {
             command: self.shown(),
             folder: self.folder.clone(),
@@ -61,7 +72,7 @@ impl Program {
         }
         // The folder that a worker has for itself is where it runs; the simulator runs beside its space.
         let own_folder = std::env::current_dir().map_err(|error| failed(&error))?;
-        let mut command = self.command();
+        let (mut command, keeper) = self.command().map_err(|error| failed(&error))?;
         group::own(&mut command);
         let mut child = command
             .current_dir(&self.folder)
@@ -72,10 +83,11 @@ impl Program {
             .stderr(Stdio::piped())
             .spawn()
             .map_err(|error| failed(&error))?;
-        let stdin = child.stdin.take().expect("it is piped");
-        let stdout = child.stdout.take().expect("it is piped");
+        let input = child.stdin.take().expect("it is piped");
+        let output = child.stdout.take().expect("it is piped");
         let words = LastWords::listen(child.stderr.take().expect("it is piped"));
-        Ok((Running { child, words, ended: None }, stdin, stdout))
+        let held = Held::new(child, input, keeper.is_some());
+        Ok((Running { held: Arc::clone(&held), words, keeper }, Input(held), output))
     }
 
     /// The program's path: what has a folder in it is relative to ours, everything else is looked up.
@@ -87,23 +99,29 @@ impl Program {
         }
     }
 
-    #[cfg(target_os = "linux")]
-    fn command(&self) -> Command {
+    /// The command that starts it, and where its keeper will report if it has one.
+    #[cfg(all(feature = "campaign", target_os = "linux"))]
+    fn command(&self) -> io::Result<(Command, Option<Report>)> {
         if !self.in_runner {
-            return plain(self);
+            return Ok((plain(self), None));
         }
-        // The runner becomes the simulator, after it has asked the system to end it with its worker. This is the
-        // runner's own file even if another was put into its place meanwhile.
-        let mut command = Command::new("/proc/self/exe");
-        command.arg("simulator").arg(std::process::id().to_string()).arg("--").arg(self.path()).args(&self.arguments);
-        command
+        // If the keeper is killed, what it kept becomes ours.
+        crate::descendants::adopt_orphans();
+        let report = Report::new()?;
+        let mut command = super::keeper::command(&report);
+        command.arg(self.path()).args(&self.arguments);
+        Ok((command, Some(report)))
     }
 
-    #[cfg(not(target_os = "linux"))]
-    fn command(&self) -> Command {
-        plain(self)
+    #[cfg(not(all(feature = "campaign", target_os = "linux")))]
+    fn command(&self) -> io::Result<(Command, Option<Report>)> {
+        Ok((plain(self), None))
     }
 }
+
+/// Nobody keeps a simulator here, so nobody reports.
+#[cfg(not(all(feature = "campaign", target_os = "linux")))]
+enum Report {}
 
 fn plain(program: &Program) -> Command {
     let mut command = Command::new(program.path());
@@ -111,7 +129,8 @@ fn plain(program: &Program) -> Command {
     command
 }
 
-fn reason(error: &io::Error) -> String {
+/// Why a program does not start, in words.
+pub(super) fn reason(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "there is no such program; install it, or give its path".to_owned(),
         io::ErrorKind::PermissionDenied => format!("{error}; is it marked as executable?"),
@@ -119,164 +138,242 @@ fn reason(error: &io::Error) -> String {
     }
 }
 
-/// Becomes a simulator that ends when its worker does, even if the worker is killed while the simulator hangs. Only
-/// returns if that fails; it is then said in the words of the protocol.
-#[cfg(all(feature = "campaign", target_os = "linux"))]
-pub(crate) fn become_simulator(
-    worker: u32,
-    program: &std::ffi::OsStr,
-    arguments: &[std::ffi::OsString],
-) -> std::process::ExitCode {
-    use std::os::unix::process::CommandExt as _;
-
-    use rustix::process::{Signal, getppid, set_parent_process_death_signal};
-
-    let failed = |what: String| {
-        let mut line = b"{\"failed\":".to_vec();
-        crate::json::quoted(&what, &mut line);
-        line.extend_from_slice(b"}\n");
-        // Nobody is left to be told if this fails.
-        io::stdout().write_all(&line).and_then(|()| io::stdout().flush()).ok();
-        std::process::ExitCode::FAILURE
-    };
-    if let Err(error) = set_parent_process_death_signal(Some(Signal::KILL)) {
-        return failed(format!("it cannot be made to end with its worker: {error}"));
+/// Ends all simulators of this process with all that they started, whatever they do: as when each is closed, but from
+/// any thread, and also while another talks to them.
+#[cfg(feature = "campaign")]
+pub(crate) fn end_simulators() {
+    let running: Vec<Arc<Held>> = lock(&RUNNING).iter().filter_map(Weak::upgrade).collect();
+    // First of all, so that they end side by side.
+    let closed: Vec<bool> = running.iter().map(|held| held.try_close_input()).collect();
+    for (held, closed) in running.iter().zip(closed) {
+        if closed {
+            held.wait();
+        }
+        held.end();
     }
-    // The worker may have gone before the system was asked.
-    if getppid().is_none_or(|parent| parent.as_raw_pid().cast_unsigned() != worker) {
-        return std::process::ExitCode::FAILURE;
-    }
-    let error = Command::new(program).args(arguments).exec();
-    failed(format!("cannot start `{}`: {}", program.display(), reason(&error)))
 }
 
-/// A simulator's process. Dropping it ends the process and all that it started.
+/// The way to a simulator's standard input. Dropping it closes the input.
+pub(super) struct Input(Arc<Held>);
+
+impl Write for Input {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match &mut *lock(&self.0.input) {
+            Some(input) => input.write(bytes),
+            None => Err(io::ErrorKind::BrokenPipe.into()),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Drop for Input {
+    fn drop(&mut self) {
+        *lock(&self.0.input) = None;
+    }
+}
+
+/// What became of a simulator.
+pub(super) struct PostMortem {
+    /// How it ended, as a phrase.
+    pub(super) how: String,
+    /// The last lines of its standard error.
+    pub(super) last_words: String,
+    /// Whether it was killed, and not by us.
+    pub(super) killed: bool,
+}
+
+/// A simulator's process. Dropping it ends the process and all that it started; its input must be closed by then, or it
+/// is not given the time to end by itself.
 pub(super) struct Running {
-    child: Child,
+    held: Arc<Held>,
     words: LastWords,
-    ended: Option<ExitStatus>,
+    #[cfg_attr(
+        not(all(feature = "campaign", target_os = "linux")),
+        expect(dead_code, reason = "only Linux has keepers")
+    )]
+    keeper: Option<Report>,
 }
 
 impl Running {
-    /// Waits a while for the process to end by itself, since its input is closed; then ends it.
-    pub(super) fn close(mut self) {
-        self.wait();
-        self.end();
-    }
-
-    /// What became of a process that closed its output: a phrase, and the last lines of its standard error.
-    pub(super) fn post_mortem(mut self) -> (String, String) {
-        let ended = self.wait();
-        self.end();
-        let how = match self.ended.filter(|_| ended) {
-            Some(status) => format!("ended ({status})"),
-            None => "closed its standard output, but did not end,".to_owned(),
+    /// What became of a process that closed its output. Its input must be closed.
+    pub(super) fn post_mortem(mut self) -> PostMortem {
+        let in_time = self.held.wait();
+        let status = self.held.end();
+        let (how, killed) = match self.ended_by_itself(status.filter(|_| in_time)) {
+            Some(status) => (format!("ended ({status})"), group::was_killed(status)),
+            None => ("closed its standard output, but did not end,".to_owned(), false),
         };
-        (how, self.words.take())
+        PostMortem { how, last_words: self.words.take(), killed }
     }
 
-    /// Forgets what was said on standard error so far.
+    /// A new test begins: forgets what was said on standard error so far.
     pub(super) fn forget_words(&mut self) {
         self.words.forget();
     }
 
-    /// Whether it ended by itself, within a limit. It is not reaped: its id stays its own.
-    fn wait(&mut self) -> bool {
-        let started = Instant::now();
-        let mut pause = Duration::from_micros(200);
-        while started.elapsed() < END_LIMIT {
-            if group::has_ended(&mut self.child) {
-                return true;
-            }
-            thread::sleep(pause);
-            pause = (pause * 2).min(Duration::from_millis(20));
+    /// The status of a simulator that ended by itself. The keeper knows more than its own status says.
+    fn ended_by_itself(&mut self, status: Option<ExitStatus>) -> Option<ExitStatus> {
+        #[cfg(all(feature = "campaign", target_os = "linux"))]
+        if let Some(report) = self.keeper.take() {
+            return report.read().unwrap_or(status);
         }
-        false
-    }
-
-    fn end(&mut self) {
-        if self.ended.is_none() {
-            group::kill(&mut self.child);
-            self.ended = self.child.wait().ok();
-        }
+        status
     }
 }
 
 impl Drop for Running {
     fn drop(&mut self) {
-        self.end();
+        if lock(&self.held.input).is_none() {
+            self.held.wait();
+        }
+        self.held.end();
     }
 }
 
-/// What a simulator says on standard error goes where the worker's goes; its last words are kept.
-struct LastWords {
-    kept: Arc<Mutex<VecDeque<u8>>>,
-    end: mpsc::Receiver<()>,
+/// A process, or its keeper, that several threads hold.
+struct Held {
+    id: u32,
+    kept: bool,
+    /// Locked while a line is written, which may take as long as nobody reads it.
+    input: Mutex<Option<ChildStdin>>,
+    process: Mutex<Process>,
+    ended: Condvar,
 }
 
-impl LastWords {
-    fn listen(mut from: ChildStderr) -> Self {
-        let kept = Arc::new(Mutex::new(VecDeque::new()));
-        let (sender, end) = mpsc::channel();
-        let keep = Arc::clone(&kept);
-        thread::spawn(move || {
-            // Dropped at the end of the stream, which is what the receiver waits for.
-            let _sender: mpsc::Sender<()> = sender;
-            let mut buffer = [0; 4096];
-            loop {
-                match from.read(&mut buffer) {
-                    Ok(0) => return,
-                    Ok(count) => {
-                        let said = &buffer[..count];
-                        // A log that cannot be written is no reason to stop listening.
-                        io::stderr().write_all(said).ok();
-                        let Ok(mut kept) = keep.lock() else { return };
-                        kept.extend(said);
-                        let over = kept.len().saturating_sub(KEPT_BYTES);
-                        kept.drain(..over);
-                    }
-                    Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                    Err(_) => return,
-                }
-            }
+struct Process {
+    child: Child,
+    /// It has ended, and nothing of it is left.
+    ended: bool,
+    /// It is reaped: from then on its id may be another's.
+    status: Option<ExitStatus>,
+}
+
+impl Held {
+    fn new(child: Child, input: ChildStdin, kept: bool) -> Arc<Held> {
+        let held = Arc::new(Held {
+            id: child.id(),
+            kept,
+            input: Mutex::new(Some(input)),
+            process: Mutex::new(Process { child, ended: false, status: None }),
+            ended: Condvar::new(),
         });
-        LastWords { kept, end }
+        let mut running = lock(&RUNNING);
+        running.retain(|held| held.strong_count() > 0);
+        running.push(Arc::downgrade(&held));
+        drop(running);
+        let watched = Arc::clone(&held);
+        thread::spawn(move || watched.watch());
+        held
     }
 
-    fn forget(&self) {
-        if let Ok(mut kept) = self.kept.lock() {
-            kept.clear();
+    /// Waits for the process to end, and ends what it leaves behind.
+    fn watch(&self) {
+        let killed = group::wait_for_end(self);
+        let mut process = lock(&self.process);
+        if process.status.is_none() {
+            group::kill(&mut process.child);
+        }
+        drop(process);
+        if killed {
+            self.end_orphans();
+        }
+        lock(&self.process).ended = true;
+        self.ended.notify_all();
+    }
+
+    /// Waits for the process, whose input is closed, to end by itself; says whether it did within the time it has.
+    fn wait(&self) -> bool {
+        let process = lock(&self.process);
+        let running = |process: &mut Process| !process.ended && process.status.is_none();
+        let waited = self.ended.wait_timeout_while(process, self.limit(), running);
+        let (process, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        process.ended
+    }
+
+    fn limit(&self) -> Duration {
+        #[cfg(all(feature = "campaign", target_os = "linux"))]
+        if self.kept {
+            return END_LIMIT + KEEPER_LIMIT;
+        }
+        END_LIMIT
+    }
+
+    /// Ends the process and all that it started, at once.
+    fn end(&self) -> Option<ExitStatus> {
+        let mut process = lock(&self.process);
+        if process.status.is_none() {
+            let alive = !process.ended;
+            group::kill(&mut process.child);
+            process.status = process.child.wait().ok();
+            let status = process.status;
+            drop(process);
+            if alive {
+                self.end_orphans();
+            }
+            return status;
+        }
+        process.status
+    }
+
+    /// What a keeper leaves behind that is killed itself has become ours. Other children of a worker, which hooks start,
+    /// are in its own group.
+    fn end_orphans(&self) {
+        #[cfg(all(feature = "campaign", target_os = "linux"))]
+        if self.kept {
+            let own: Vec<u32> = lock(&RUNNING).iter().filter_map(Weak::upgrade).map(|held| held.id).collect();
+            crate::descendants::end_adopted(|id| own.contains(&id) || group::is_ours(id), Duration::ZERO);
         }
     }
 
-    /// The last lines, once the stream has ended; its process has.
-    fn take(&self) -> String {
-        self.end.recv_timeout(END_LIMIT).ok();
-        let Ok(kept) = self.kept.lock() else { return String::new() };
-        let bytes: Vec<u8> = kept.iter().copied().collect();
-        let text = String::from_utf8_lossy(&bytes);
-        let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
-        lines[lines.len().saturating_sub(KEPT_LINES)..].join("\n")
+    /// Closes the input unless a line is just being written.
+    #[cfg(feature = "campaign")]
+    fn try_close_input(&self) -> bool {
+        match self.input.try_lock() {
+            Ok(mut input) => {
+                *input = None;
+                true
+            }
+            Err(_) => false,
+        }
     }
+}
+
+/// Nothing that is locked here is left half done by a panic.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Processes with all that they started.
 #[cfg(unix)]
 mod group {
-    use std::os::unix::process::CommandExt as _;
-    use std::process::{Child, Command};
+    use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
+    use std::process::{Child, Command, ExitStatus};
 
+    use rustix::io::Errno;
     use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
+
+    use super::Held;
 
     /// Lets the process begin a group of its own.
     pub(super) fn own(command: &mut Command) {
         command.process_group(0);
     }
 
-    /// Whether the process has ended. It is not reaped, so that its id is given to no other.
-    pub(super) fn has_ended(child: &mut Child) -> bool {
-        let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
-        matches!(waitid(WaitId::Pid(Pid::from_child(child)), options), Ok(Some(_)))
+    /// Waits until the process has ended, and says whether a signal ended it. It is not reaped, so that its id is given to
+    /// no other.
+    pub(super) fn wait_for_end(held: &Held) -> bool {
+        let Some(id) = Pid::from_raw(held.id.cast_signed()) else { return true };
+        loop {
+            match waitid(WaitId::Pid(id), WaitIdOptions::EXITED | WaitIdOptions::NOWAIT) {
+                Err(Errno::INTR) => {}
+                Ok(Some(status)) => return !status.exited(),
+                // It is reaped already.
+                Ok(None) | Err(_) => return true,
+            }
+        }
     }
 
     /// Ends the process and its group. It must not have been reaped.
@@ -284,20 +381,48 @@ mod group {
         // A group that has ended already is what was asked for.
         kill_process_group(Pid::from_child(child), Signal::KILL).ok();
     }
+
+    /// Whether it was killed, which it cannot be but from outside.
+    pub(super) fn was_killed(status: ExitStatus) -> bool {
+        status.signal() == Some(Signal::KILL.as_raw())
+    }
+
+    /// Whether the process is in the group of this one.
+    #[cfg(all(feature = "campaign", target_os = "linux"))]
+    pub(super) fn is_ours(id: u32) -> bool {
+        use rustix::process::{getpgid, getpgrp};
+
+        getpgid(Pid::from_raw(id.cast_signed())).is_ok_and(|group| group == getpgrp())
+    }
 }
 
 /// Processes alone: the standard library knows no more.
 #[cfg(not(unix))]
 mod group {
-    use std::process::{Child, Command};
+    use std::process::{Child, Command, ExitStatus};
+    use std::thread;
+    use std::time::Duration;
+
+    use super::{Held, lock};
 
     pub(super) fn own(_: &mut Command) {}
 
-    pub(super) fn has_ended(child: &mut Child) -> bool {
-        matches!(child.try_wait(), Ok(Some(_)))
+    pub(super) fn wait_for_end(held: &Held) -> bool {
+        loop {
+            let mut process = lock(&held.process);
+            if process.status.is_some() || !matches!(process.child.try_wait(), Ok(None)) {
+                return false;
+            }
+            drop(process);
+            thread::sleep(Duration::from_millis(20));
+        }
     }
 
     pub(super) fn kill(child: &mut Child) {
         child.kill().ok();
+    }
+
+    pub(super) fn was_killed(_: ExitStatus) -> bool {
+        false
     }
 }

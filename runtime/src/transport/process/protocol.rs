@@ -99,6 +99,16 @@ impl<R: BufRead> Lines<R> {
         Lines { reader, line: Vec::new(), count: 0, limit }
     }
 
+    /// Where the lines come from.
+    pub(super) fn reader(&self) -> &R {
+        &self.reader
+    }
+
+    /// The beginning of the line that was read last, for a message.
+    pub(super) fn shown(&self) -> String {
+        shown(&String::from_utf8_lossy(&self.line))
+    }
+
     /// Counts from one again.
     pub(super) fn recount(&mut self) {
         self.count = 0;

@@ -19,6 +19,9 @@ use crate::wire::Wire;
 /// The most messages a simulator may publish in one step.
 const STEP_LIMIT: u64 = 100_000;
 
+/// What to do about an answer too many.
+const TURNS: &str = "give one answer to each line; in this test there is one too many";
+
 /// Why a session came to its end.
 #[derive(Debug)]
 pub(super) enum Fault {
@@ -41,6 +44,7 @@ pub(super) struct Session<R, W> {
     line: Vec<u8>,
     board: Board,
     resets: bool,
+    ready: bool,
 }
 
 /// The topics of one run, and what waits to be delivered.
@@ -69,7 +73,30 @@ impl<R: BufRead, W: Write> Session<R, W> {
     }
 
     fn with_limit(input: R, output: W, limit: usize) -> Self {
-        Session { lines: Lines::new(input, limit), output, line: Vec::new(), board: Board::default(), resets: false }
+        let lines = Lines::new(input, limit);
+        Session { lines, output, line: Vec::new(), board: Board::default(), resets: false, ready: false }
+    }
+
+    /// Where the simulator's lines come from.
+    pub(super) fn input(&self) -> &R {
+        self.lines.reader()
+    }
+
+    /// Whether the simulator has answered the last reset with `ready`.
+    pub(super) fn is_ready(&self) -> bool {
+        self.ready
+    }
+
+    /// What is to be said of a simulator that says more after it has answered everything. Reads what it says.
+    pub(super) fn answer_too_many(&mut self) -> TransportError {
+        match self.lines.read() {
+            Ok(true) => {
+                let problem = format!("comes after everything was answered: {}", self.lines.shown());
+                self.lines.wrong(problem, TURNS)
+            }
+            Ok(false) => self.lines.wrong("begins after everything was answered".to_owned(), TURNS),
+            Err(error) => error,
+        }
     }
 
     /// Whether the simulator can be reset again.
@@ -86,6 +113,7 @@ impl<R: BufRead, W: Write> Session<R, W> {
         relay: &mut dyn Exchange,
     ) -> Result<(), Fault> {
         self.lines.recount();
+        self.ready = false;
         self.board = Board { shapes: mem::take(&mut self.board.shapes), ..Board::default() };
         let wires = relay.wires();
         order::reset(&mut self.line, seed, step, wires.iter().map(|wire| wires.path(wire)));
@@ -100,6 +128,7 @@ impl<R: BufRead, W: Write> Session<R, W> {
             other => return Err(self.out_of_turn(&other, &awaited(), "answer `reset` with `ready`").into()),
         };
         self.resets = ready.resets;
+        self.ready = true;
         self.board.open(&ready, relay)?;
         self.board.publish(plan, SimTime::ZERO, &ready.messages, relay, &self.lines)?;
         Ok(())

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use sesame_plan::{CampaignPlan, Transport as Declared};
 
@@ -167,6 +168,85 @@ fn the_next_run_begins_with_a_new_process_after_a_crash() {
     let Some(mut python) = python_of(&format!("{FRAME}{step}")) else { return };
     assert!(matches!(run(&mut python.transport, 1).outcome, Outcome::Crash { .. }));
     assert_eq!(run(&mut python.transport, 10).outcome, Outcome::Completed);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_simulator_that_ends_has_ended_even_if_a_child_holds_its_output() {
+    let step = "    import subprocess\n    print('the last words', file=sys.stderr)\n    \
+                say({'publish': []})\n    subprocess.Popen(['sleep', '1000'])\n    sys.exit(3)";
+    let started = Instant::now();
+    let Some(crash) = crash(step) else { return };
+    assert_eq!(
+        crash,
+        "the simulator `python3 sim.py` ended (exit status: 3) while the end of its step to 0.100 s was awaited; its last \
+         words:\nthe last words"
+    );
+    assert!(started.elapsed() < Duration::from_secs(60), "and not only when the child ends");
+}
+
+#[cfg(unix)]
+#[test]
+fn that_a_simulator_was_killed_is_told_apart_from_other_ends() {
+    for (signal, killed) in [("SIGKILL", true), ("SIGTERM", false)] {
+        let step = format!("    import os, signal\n    os.kill(os.getpid(), signal.{signal})");
+        let Some(mut python) = python_of(&format!("{FRAME}{step}")) else { return };
+        assert!(matches!(run(&mut python.transport, 1).outcome, Outcome::Crash { .. }));
+        assert_eq!(python.transport.aside(), Aside { killed, notes: Vec::new() });
+        assert_eq!(python.transport.aside(), Aside::default(), "it is said once");
+    }
+}
+
+/// Runs a simulator three times that does this at the end of its first run; the crashes, and what is noted of the others.
+fn after_the_last_answer(what: &str) -> Option<(Vec<Option<String>>, Vec<String>)> {
+    let program = format!(
+        "import os, time\n{}",
+        FRAME
+            .replace("    if \"reset\" in order:", "    if AT_RESET: AT_RESET.pop()()\n    if \"reset\" in order:")
+            .replace("for line in", "AT_RESET = []\nfor line in")
+    );
+    let step = format!("{STEP}    if time > 0.99 and count == 11:\n        {what}\n");
+    let mut python = python_of(&format!("{program}{step}"))?;
+    let mut notes = Vec::new();
+    let crashes = [1, 20, 30].map(|seed| {
+        let outcome = run(&mut python.transport, seed).outcome;
+        notes.extend(python.transport.aside().notes);
+        match outcome {
+            Outcome::Crash { message } => Some(message),
+            Outcome::Completed => None,
+            other => panic!("{other:?}"),
+        }
+    });
+    Some((crashes.to_vec(), notes))
+}
+
+#[cfg(unix)]
+#[test]
+fn an_answer_too_many_is_the_crash_of_its_own_run_and_no_fault_of_the_next() {
+    let Some((crashes, notes)) = after_the_last_answer("say({'done': {}})") else { return };
+    let crash = "line 22 since the simulator's reset comes after everything was answered: `{\"done\": {}}`; give one \
+                 answer to each line; in this test there is one too many";
+    assert_eq!(crashes, [Some(crash.to_owned()), None, None]);
+    assert_eq!(notes, [String::new(); 0]);
+}
+
+#[test]
+fn what_a_simulator_does_between_two_runs_is_noted_and_the_next_begins_with_a_new_process() {
+    let before = "the simulator was started anew before this test, for what it did after the one before: ";
+    for (what, noted) in [
+        ("time.sleep(0.3); say({'done': {}})", "comes after everything was answered"),
+        (
+            "sys.exit(4)",
+            "the simulator `python3 sim.py` ended (exit status: 4) while its answer to `reset` was awaited",
+        ),
+        ("AT_RESET.append(lambda: say({'done': {}}))", "says `done` while its answer to `reset` was awaited"),
+        ("AT_RESET.append(lambda: print('Loading map', flush=True))", "is not JSON: `Loading map`"),
+    ] {
+        let Some((crashes, notes)) = after_the_last_answer(what) else { return };
+        assert_eq!(crashes, [None, None, None], "{what}: {notes:?}");
+        let [note] = &notes[..] else { panic!("{what}: {notes:?}") };
+        assert!(note.starts_with(before) && note.contains(noted), "{what}: {note}");
+    }
 }
 
 #[test]

@@ -3,6 +3,8 @@
 //! Undisturbed, every message is 0 and nothing happens. What has to go wrong without a disturbance is asked for by the
 //! environment variable `FAULT`.
 
+use std::io::Read as _;
+
 use sesame_runtime::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError};
 
 const FAULTS: [&str; 6] = ["panic", "error", "hang", "abort", "hook_panic", "hook_nan"];
@@ -36,6 +38,12 @@ impl Simulator for Faulty {
             "wrong type" => bus.publish(self.level, "high"),
             "flood" => (0..1_000_000).for_each(|_| bus.publish(self.level, 1.0)),
             "early end" if bus.now().seconds() >= 0.5 => return Ok(Progress::Ended),
+            "reads input" => {
+                let mut input = String::new();
+                std::io::stdin().read_to_string(&mut input).expect("it can be read");
+                assert_eq!(input, "", "nobody says anything to a simulator there");
+                bus.publish(self.level, 1.0);
+            }
             "broken requirement" => bus.publish(self.level, 5.0),
             _ => bus.publish(self.level, 1.0),
         }

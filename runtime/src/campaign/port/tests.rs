@@ -1,0 +1,201 @@
+//! Attacks on the port, over real sockets.
+
+use std::io::Write as _;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::*;
+
+/// How long a port waits here.
+const LIMIT: Duration = Duration::from_secs(10);
+
+/// What the worker with the token gets, while strangers do this until it is done, and how long it took.
+fn attacked(attack: impl Fn(SocketAddr, &AtomicBool) + Sync) -> (io::Result<TcpStream>, Duration) {
+    let port = Port::open().unwrap();
+    let (address, token) = (port.address().unwrap(), port.token().to_owned());
+    let done = AtomicBool::new(false);
+    thread::scope(|scope| {
+        scope.spawn(|| attack(address, &done));
+        // The strangers are first.
+        thread::sleep(Duration::from_millis(200));
+        let worker = scope.spawn(move || connect(address, token));
+        let started = Instant::now();
+        let accepted = port.accept(LIMIT, &mut || Ok(()));
+        let took = started.elapsed();
+        done.store(true, Ordering::Relaxed);
+        worker.join().unwrap().unwrap();
+        (accepted, took)
+    })
+}
+
+/// The worker's connection is found, and works, before any stranger would have been given up.
+#[track_caller]
+fn survives(attack: impl Fn(SocketAddr, &AtomicBool) + Sync) {
+    let (accepted, took) = attacked(attack);
+    accepted.unwrap();
+    assert!(took < Duration::from_secs(3), "it took {took:?}");
+}
+
+fn until(done: &AtomicBool) {
+    while !done.load(Ordering::Relaxed) {
+        thread::sleep(Duration::from_millis(10));
+    }
+}
+
+#[test]
+fn silent_connections_hold_up_nobody() {
+    survives(|address, done| {
+        let silent: Vec<_> = (0..40).map(|_| TcpStream::connect(address).unwrap()).collect();
+        until(done);
+        drop(silent);
+    });
+}
+
+#[test]
+fn more_silent_connections_than_are_listened_to_hold_up_nobody() {
+    survives(|address, done| {
+        // As many as the system queues; the rest waits to be taken.
+        let silent: Vec<_> = (0..100).map(|_| TcpStream::connect(address).unwrap()).collect();
+        until(done);
+        drop(silent);
+    });
+}
+
+#[test]
+fn a_byte_every_so_often_holds_up_nobody_and_does_not_move_the_deadline() {
+    let slow = |address: SocketAddr, done: &AtomicBool| {
+        let mut stream = TcpStream::connect(address).unwrap();
+        stream.write_all(&1000u32.to_le_bytes()).unwrap();
+        while !done.load(Ordering::Relaxed) {
+            stream.write_all(b" ").ok();
+            thread::sleep(Duration::from_millis(20));
+        }
+    };
+    survives(slow);
+    // Without a worker.
+    let port = Port::open().unwrap();
+    let address = port.address().unwrap();
+    let done = AtomicBool::new(false);
+    thread::scope(|scope| {
+        scope.spawn(|| slow(address, &done));
+        let started = Instant::now();
+        let error = port.accept(Duration::from_millis(500), &mut || Ok(())).unwrap_err();
+        done.store(true, Ordering::Relaxed);
+        assert_eq!(error.kind(), io::ErrorKind::TimedOut, "{error}");
+        assert!(started.elapsed() < Duration::from_secs(2), "{:?}", started.elapsed());
+    });
+}
+
+#[test]
+fn a_frame_of_a_gibibyte_is_refused_by_its_length() {
+    let sent = AtomicBool::new(false);
+    survives(|address, done| {
+        let mut stream = TcpStream::connect(address).unwrap();
+        stream.write_all(&(1u32 << 30).to_le_bytes()).unwrap();
+        let mebibyte = vec![b' '; 1 << 20];
+        let mut taken = 0;
+        while taken < 1024 && !done.load(Ordering::Relaxed) && stream.write_all(&mebibyte).is_ok() {
+            taken += 1;
+        }
+        // What the system buffers is not in our memory.
+        assert!(taken < 64, "{taken} MiB were taken");
+        sent.store(true, Ordering::Relaxed);
+    });
+    assert!(sent.load(Ordering::Relaxed));
+}
+
+#[test]
+fn what_is_no_greeting_or_has_another_token_is_turned_away() {
+    survives(|address, _| {
+        let wrong = serde_json::to_vec(&Hello { token: Some("0".repeat(32)) }).unwrap();
+        let none = serde_json::to_vec(&Hello { token: None }).unwrap();
+        for body in [wrong.as_slice(), &none, b"{}", b"GET / HTTP/1.1\r\n\r\n", &[0; 1024], b""] {
+            let mut stream = TcpStream::connect(address).unwrap();
+            stream.write_all(&u32::try_from(body.len()).unwrap().to_le_bytes()).unwrap();
+            stream.write_all(body).unwrap();
+        }
+    });
+}
+
+#[test]
+fn a_worker_that_has_ended_ends_the_wait() {
+    let port = Port::open().unwrap();
+    let mut asked = 0;
+    let error = port.accept(LIMIT, &mut || {
+        asked += 1;
+        if asked < 3 { Ok(()) } else { Err(io::Error::other("it is gone")) }
+    });
+    assert_eq!(error.unwrap_err().to_string(), "it is gone");
+}
+
+#[test]
+fn a_worker_that_speaks_slowly_is_understood() {
+    let port = Port::open().unwrap();
+    let (address, token) = (port.address().unwrap(), port.token().to_owned());
+    let worker = thread::spawn(move || {
+        let mut whole = Vec::new();
+        frames::send(&mut whole, &Hello { token: Some(token) }).unwrap();
+        // What follows the greeting is not taken with it.
+        frames::send(&mut whole, &"what follows").unwrap();
+        let mut stream = TcpStream::connect(address).unwrap();
+        for part in whole.chunks(7) {
+            stream.write_all(part).unwrap();
+            thread::sleep(Duration::from_millis(5));
+        }
+    });
+    let mut stream = port.accept(LIMIT, &mut || Ok(())).unwrap();
+    let follows: String = frames::receive(&mut stream).unwrap();
+    assert_eq!(follows, "what follows");
+    worker.join().unwrap();
+}
+
+/// All of these attacks at once, by a user who may do nothing else here.
+#[test]
+fn a_port_survives_what_another_user_does_to_it() {
+    const ATTACK: &str = "
+import socket, sys, time
+port = int(sys.argv[1])
+strangers = [socket.create_connection(('127.0.0.1', port)) for _ in range(40)]
+slow, big = strangers[0], strangers[1]
+slow.sendall((1000).to_bytes(4, 'little'))
+big.setblocking(False)
+big.send((1 << 30).to_bytes(4, 'little'))
+print('attacking', flush=True)
+while True:
+    try:
+        slow.send(b' ')
+        big.send(b' ' * 65536)
+    except OSError:
+        pass
+    time.sleep(0.01)
+";
+    if !rustix::process::geteuid().is_root() {
+        eprintln!("skipped: only root can start a process of another user");
+        return;
+    }
+    if let Err(error) = of_nobody("print('attacking', flush=True)", &[]) {
+        assert!(std::env::var_os("CI").is_none(), "no process of another user can be started: {error}");
+        eprintln!("skipped: no process of another user can be started: {error}");
+        return;
+    }
+    survives(|address, done| {
+        let mut attacker = of_nobody(ATTACK, &[&address.port().to_string()]).unwrap();
+        until(done);
+        attacker.kill().unwrap();
+        attacker.wait().unwrap();
+    });
+}
+
+/// A Python program as the user `nobody`, once it has said that it attacks.
+fn of_nobody(script: &str, arguments: &[&str]) -> io::Result<std::process::Child> {
+    use std::io::BufRead as _;
+    use std::os::unix::process::CommandExt as _;
+    use std::process::{Command, Stdio};
+
+    const NOBODY: u32 = 65534;
+    let mut command = Command::new("python3");
+    command.args(["-c", script]).args(arguments).uid(NOBODY).gid(NOBODY).current_dir("/");
+    let mut process = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn()?;
+    let mut said = String::new();
+    io::BufReader::new(process.stdout.take().expect("it is piped")).read_line(&mut said)?;
+    if said == "attacking\n" { Ok(process) } else { Err(io::Error::other("it did not begin")) }
+}
