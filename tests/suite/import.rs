@@ -63,6 +63,7 @@ fn every_file_of_the_original_platform_is_imported_with_all_its_tests_and_a_brok
         let said = said.expect(0);
         let space = out.join(format!("{stem}.sesame"));
         done(command(sesamec()).arg("check").arg(&space)).expect(0);
+        done(command(sesamec()).args(["fmt", "--check"]).arg(&space)).expect(0);
         let mut recorded = 0;
         if out.join("results").exists() {
             for campaign in fs::read_dir(out.join("results")).unwrap() {
