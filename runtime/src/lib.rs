@@ -30,7 +30,7 @@ mod last_panic;
 pub mod message;
 pub mod metric;
 pub mod observation;
-#[cfg(any(feature = "process", feature = "campaign"))]
+#[cfg(feature = "campaign")]
 mod process_group;
 #[cfg(feature = "record")]
 pub mod record;

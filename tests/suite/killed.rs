@@ -205,7 +205,7 @@ fn what_a_runner_has_below_it_from_the_start_is_left_alone() {
     let mut process = shell.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let others = || {
         let line = |pid: Pid| fs::read_to_string(format!("/proc/{pid}/cmdline")).unwrap_or_default();
-        let is_ours = |pid: &Pid| ["sleep\01001\0", "sleep\01002\0"].contains(&line(*pid).as_str());
+        let is_ours = |pid: &Pid| matches!(line(*pid).split('\0').nth(1), Some("1001" | "1002"));
         with_role(&runner, Role::Other).into_iter().filter(is_ours).collect::<Vec<_>>()
     };
     let patience = Instant::now();
