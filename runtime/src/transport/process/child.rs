@@ -218,7 +218,7 @@ impl Running {
     fn ended_by_itself(&mut self, status: Option<ExitStatus>) -> Option<ExitStatus> {
         #[cfg(all(feature = "campaign", target_os = "linux"))]
         if let Some(report) = self.keeper.take() {
-            return report.read().unwrap_or(status);
+            return report.read(status);
         }
         status
     }
@@ -236,6 +236,10 @@ impl Drop for Running {
 /// A process, or its keeper, that several threads hold.
 struct Held {
     id: u32,
+    #[cfg_attr(
+        not(all(feature = "campaign", target_os = "linux")),
+        expect(dead_code, reason = "only Linux has keepers")
+    )]
     kept: bool,
     /// Locked while a line is written, which may take as long as nobody reads it.
     input: Mutex<Option<ChildStdin>>,
