@@ -277,11 +277,13 @@ impl Held {
     fn watch(&self) {
         let killed = group::wait_for_end(self);
         let mut process = lock(&self.process);
-        if process.status.is_none() {
+        // Whoever reaped it has ended the rest too.
+        let reaped = process.status.is_some();
+        if !reaped {
             group::kill(&mut process.child);
         }
         drop(process);
-        if killed {
+        if killed && !reaped {
             self.end_orphans();
         }
         lock(&self.process).ended = true;
