@@ -1,5 +1,7 @@
 //! What was observed in one run of a test: what a worker reports and the results repository keeps.
 
+use std::fmt::Write as _;
+
 use serde::{Deserialize, Serialize};
 use sesame_plan::{Span, Trend};
 
@@ -37,7 +39,7 @@ impl Outcome {
             let whole = cause.len();
             let kept = (0..=CAUSE_BYTES).rev().find(|&at| cause.is_char_boundary(at)).unwrap_or(0);
             cause.truncate(kept);
-            cause += &format!("… ({} bytes more)", whole - kept);
+            write!(cause, "… ({} bytes more)", whole - kept).expect("text grows as needed");
         }
         Outcome::Crash { message: cause }
     }

@@ -41,31 +41,31 @@ const MODES: &[(&str, Act)] = &[
     ("says_a_long_line", Makes(|| vec![b'x'; 64 << 20])),
     (
         "says_a_line_without_end",
-        Instead(|it| {
+        Instead(|_| {
             loop {
-                it.write(&[b'x'; 1 << 16]);
+                write(&[b'x'; 1 << 16]);
             }
         }),
     ),
     (
         "says_half_a_line_and_waits",
-        Instead(|it| {
-            it.write(br#"{"done":"#);
+        Instead(|_| {
+            write(br#"{"done":"#);
             sleep(LIFE);
         }),
     ),
     (
         "says_half_a_line_and_exits",
-        Instead(|it| {
-            it.write(br#"{"done":"#);
+        Instead(|_| {
+            write(br#"{"done":"#);
             exit(0);
         }),
     ),
     (
         "writes_byte_by_byte",
-        Instead(|it| {
+        Instead(|_| {
             for byte in DONE.bytes().chain([b'\n']) {
-                it.write(&[byte]);
+                write(&[byte]);
                 sleep(Duration::from_millis(2));
             }
         }),
@@ -90,11 +90,11 @@ const MODES: &[(&str, Act)] = &[
     // Messages.
     (
         "publishes_without_end",
-        Instead(|it| {
+        Instead(|_| {
             loop {
                 let many = vec![r#"{"topic":"own","value":1}"#; 1000].join(",");
-                it.say(format!("{{\"publish\":[{many}]}}").as_bytes());
-                it.order();
+                say(format!("{{\"publish\":[{many}]}}").as_bytes());
+                order();
             }
         }),
     ),
@@ -107,9 +107,9 @@ const MODES: &[(&str, Act)] = &[
     ),
     (
         "publishes_nothing",
-        Does(|it| {
-            it.say(br#"{"publish":[]}"#);
-            it.order();
+        Does(|_| {
+            say(br#"{"publish":[]}"#);
+            order();
         }),
     ),
     ("publishes_on_a_topic_it_did_not_name", Makes(|| done(r#"{"topic":"nowhere","value":1}"#))),
@@ -167,17 +167,17 @@ const MODES: &[(&str, Act)] = &[
     ("answers_twice_at_once", Says(b"{\"done\":{}}\n{\"done\":{}}")),
     (
         "answers_twice_one_after_the_other",
-        Instead(|it| {
-            it.say(DONE.as_bytes());
-            it.say(DONE.as_bytes());
+        Instead(|_| {
+            say(DONE.as_bytes());
+            say(DONE.as_bytes());
         }),
     ),
     (
         "answers_twice_with_a_pause",
-        Instead(|it| {
-            it.say(DONE.as_bytes());
+        Instead(|_| {
+            say(DONE.as_bytes());
             sleep(Duration::from_millis(30));
-            it.say(DONE.as_bytes());
+            say(DONE.as_bytes());
         }),
     ),
     ("answers_200000_times", Makes(|| vec![DONE; 200_000].join("\n").into_bytes())),
@@ -185,29 +185,29 @@ const MODES: &[(&str, Act)] = &[
     (
         "answers_twice_at_the_end",
         Does(|it| {
-            it.at_the_end = Some(|it| {
-                it.say(DONE.as_bytes());
-                it.say(DONE.as_bytes());
+            it.at_the_end = Some(|_| {
+                say(DONE.as_bytes());
+                say(DONE.as_bytes());
             });
         }),
     ),
     (
         "speaks_long_after_its_last_answer",
         Does(|it| {
-            it.at_the_end = Some(|it| {
-                it.say(DONE.as_bytes());
+            it.at_the_end = Some(|_| {
+                say(DONE.as_bytes());
                 sleep(Duration::from_millis(400));
-                it.say(DONE.as_bytes());
+                say(DONE.as_bytes());
             });
         }),
     ),
-    ("answers_the_next_reset_wrongly", Does(|it| it.at_reset = Some(|it| it.say(DONE.as_bytes())))),
+    ("answers_the_next_reset_wrongly", Does(|it| it.at_reset = Some(|_| say(DONE.as_bytes())))),
     ("exits_at_the_next_reset", Does(|it| it.at_reset = Some(|_| exit(9)))),
     (
         "exits_after_its_last_answer",
         Does(|it| {
-            it.at_the_end = Some(|it| {
-                it.say(DONE.as_bytes());
+            it.at_the_end = Some(|_| {
+                say(DONE.as_bytes());
                 exit(7);
             });
         }),
@@ -278,14 +278,22 @@ const MODES: &[(&str, Act)] = &[
             sleep(LIFE);
         }),
     ),
+    (
+        "stops_its_keeper",
+        Instead(|_| {
+            child("setsid", false).spawn().ok();
+            signal(parent(std::process::id()), Signal::STOP);
+            sleep(LIFE);
+        }),
+    ),
     ("never_answers", Instead(|_| sleep(LIFE))),
     ("answers_late", Does(|it| it.pause = Duration::from_millis(600))),
     (
         "never_reads",
-        Instead(|it| {
+        Instead(|_| {
             let many = vec![r#"{"topic":"own","value":1}"#; 1000].join(",");
             for _ in 0..90 {
-                it.say(format!("{{\"publish\":[{many}]}}").as_bytes());
+                say(format!("{{\"publish\":[{many}]}}").as_bytes());
             }
             sleep(LIFE);
         }),
@@ -445,19 +453,19 @@ struct Hostile {
 
 impl Hostile {
     fn run(&mut self) {
-        while let Some(order) = self.order() {
-            if order.starts_with("{\"reset\"") {
+        while let Some(told) = order() {
+            if told.starts_with("{\"reset\"") {
                 let at_reset = self.at_reset.take();
                 (self.acted, self.step, self.pause, self.at_the_end) = (false, 0, Duration::ZERO, None);
                 match at_reset {
                     Some(act) => act(self),
-                    None => self.say(READY.as_bytes()),
+                    None => say(READY.as_bytes()),
                 }
                 continue;
             }
             self.step += 1;
-            self.say(br#"{"publish":[{"topic":"control","value":-1}]}"#);
-            let Some(deliver) = self.order() else { break };
+            say(br#"{"publish":[{"topic":"control","value":-1}]}"#);
+            let Some(deliver) = order() else { break };
             sleep(self.pause);
             // What it published itself is no number of a mode.
             let mode = deliver.split("\"value\":").nth(1).and_then(|rest| rest.split(['.', '}']).next()?.parse().ok());
@@ -466,16 +474,16 @@ impl Hostile {
                 &MODES[mode].1
             });
             match asked {
-                Some(Says(bytes)) => self.say(bytes),
-                Some(Makes(make)) => self.say(&make()),
+                Some(Says(bytes)) => say(bytes),
+                Some(Makes(make)) => say(&make()),
                 Some(Instead(act)) => act(self),
                 Some(Does(act)) => {
                     act(self);
-                    self.say(DONE.as_bytes());
+                    say(DONE.as_bytes());
                 }
                 None => match self.at_the_end.filter(|_| self.step == STEPS) {
                     Some(act) => act(self),
-                    None => self.say(DONE.as_bytes()),
+                    None => say(DONE.as_bytes()),
                 },
             }
         }
@@ -483,24 +491,24 @@ impl Hostile {
             act();
         }
     }
+}
 
-    /// What the runner says next; `None` when it says nothing more.
-    fn order(&mut self) -> Option<String> {
-        let mut line = String::new();
-        std::io::stdin().lock().read_line(&mut line).ok().filter(|&length| length > 0)?;
-        Some(line)
-    }
+/// What the runner says next; `None` when it says nothing more.
+fn order() -> Option<String> {
+    let mut line = String::new();
+    std::io::stdin().lock().read_line(&mut line).ok().filter(|&length| length > 0)?;
+    Some(line)
+}
 
-    /// Says a line; all of it in one piece.
-    fn say(&mut self, line: &[u8]) {
-        self.write(&[line, b"\n"].concat());
-    }
+/// Says a line; all of it in one piece.
+fn say(line: &[u8]) {
+    write(&[line, b"\n"].concat());
+}
 
-    fn write(&mut self, bytes: &[u8]) {
-        let mut output = std::io::stdout().lock();
-        if output.write_all(bytes).and_then(|()| output.flush()).is_err() {
-            exit(0);
-        }
+fn write(bytes: &[u8]) {
+    let mut output = std::io::stdout().lock();
+    if output.write_all(bytes).and_then(|()| output.flush()).is_err() {
+        exit(0);
     }
 }
 

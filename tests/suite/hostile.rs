@@ -3,6 +3,7 @@
 //! `tests/hostile` is the simulator, a program whose modes have the names that stand here; each mode is a known test.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -103,6 +104,7 @@ const SMALL: &[(&str, Expected)] = &[
     ("kills_its_worker_once", Completed),
     ("kills_its_worker_each_time", Crash("the worker process ended: signal: 9 (SIGKILL)")),
     ("stops_its_worker", Timeout),
+    ("stops_its_keeper", Timeout),
     ("stops_itself", Timeout),
     ("never_answers", Timeout),
     ("answers_late", Timeout),
@@ -178,7 +180,7 @@ fn space(modes: &[String]) -> String {
         modes.len()
     );
     for (number, mode) in modes.iter().enumerate() {
-        space += &format!("test {mode} {{ mode value {number} from 0.12s to 0.5s }}\n");
+        writeln!(space, "test {mode} {{ mode value {number} from 0.12s to 0.5s }}").unwrap();
     }
     space
         + "campaign all {

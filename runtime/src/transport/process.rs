@@ -114,6 +114,11 @@ impl Process {
         Ok(())
     }
 
+    /// Whether the simulator has answered this run's reset.
+    fn is_ready(&self) -> bool {
+        self.connection.as_ref().is_some_and(|connection| connection.session.is_ready())
+    }
+
     /// Insists that the simulator says nothing more at the end of its run. An answer too many would be taken for one to the
     /// next run's orders: it is this run's fault, and not the next one's.
     fn nothing_is_waiting(&mut self) -> Result<(), TransportError> {
@@ -140,25 +145,22 @@ impl Transport for Process {
             self.close();
         }
         // What a process does that was used before may be the fault of the run before: this run begins anew then.
-        if let Some(connection) = &mut self.connection {
-            let fault = if waiting::for_a_while(connection.session.input(), Duration::ZERO) {
-                Some(connection.session.answer_too_many().into())
-            } else {
-                self.begin(seed, relay).err()
+        if let Some(Connection { session, .. }) = &mut self.connection {
+            let late = waiting::for_a_while(session.input(), Duration::ZERO).then(|| session.answer_too_many().into());
+            let fault = match late {
+                Some(late) => late,
+                None => match self.begin(seed, relay) {
+                    Ok(()) => return Ok(()),
+                    Err(fault) if self.is_ready() => return Err(self.explain(fault)),
+                    Err(fault) => fault,
+                },
             };
-            let ready = self.connection.as_ref().is_some_and(|connection| connection.session.is_ready());
-            match fault {
-                None => return Ok(()),
-                Some(fault) if ready => return Err(self.explain(fault)),
-                Some(fault) => {
-                    let killed = self.aside.killed;
-                    let why = self.explain(fault);
-                    // This run is not touched by it.
-                    self.aside.killed = killed;
-                    let what = "the simulator was started anew before this test, for what it did after the one before";
-                    self.aside.notes.push(format!("{what}: {why}"));
-                }
-            }
+            let killed = self.aside.killed;
+            let why = self.explain(fault);
+            // That it was killed meanwhile does not touch this run.
+            self.aside.killed = killed;
+            let what = "the simulator was started anew before this test, for what it did after the one before";
+            self.aside.notes.push(format!("{what}: {why}"));
         }
         self.begin(seed, relay).map_err(|fault| self.explain(fault))
     }

@@ -218,7 +218,7 @@ impl Running {
     fn ended_by_itself(&mut self, status: Option<ExitStatus>) -> Option<ExitStatus> {
         #[cfg(all(feature = "campaign", target_os = "linux"))]
         if let Some(report) = self.keeper.take() {
-            return report.read().unwrap_or(status);
+            return report.read(status);
         }
         status
     }
@@ -236,6 +236,10 @@ impl Drop for Running {
 /// A process, or its keeper, that several threads hold.
 struct Held {
     id: u32,
+    #[cfg_attr(
+        not(all(feature = "campaign", target_os = "linux")),
+        expect(dead_code, reason = "only Linux has keepers")
+    )]
     kept: bool,
     /// Locked while a line is written, which may take as long as nobody reads it.
     input: Mutex<Option<ChildStdin>>,
@@ -273,11 +277,13 @@ impl Held {
     fn watch(&self) {
         let killed = group::wait_for_end(self);
         let mut process = lock(&self.process);
-        if process.status.is_none() {
+        // Whoever reaped it has ended the rest too.
+        let reaped = process.status.is_some();
+        if !reaped {
             group::kill(&mut process.child);
         }
         drop(process);
-        if killed {
+        if killed && !reaped {
             self.end_orphans();
         }
         lock(&self.process).ended = true;

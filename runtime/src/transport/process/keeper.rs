@@ -50,18 +50,18 @@ impl Report {
         format!("/proc/{}/fd/{}", std::process::id(), self.writer.as_raw_fd())
     }
 
-    /// What a keeper reported that has ended: the status of a simulator that ended by itself, or that it did not.
-    /// `None` when there is no report: the keeper was killed, or had no way to report.
-    pub(super) fn read(mut self) -> Option<Option<ExitStatus>> {
+    /// The status of a simulator that ended by itself, as its keeper reported it, which has ended. Without a report, since
+    /// the keeper was killed or had no way to report, its own status has to do.
+    pub(super) fn read(mut self, of_keeper: Option<ExitStatus>) -> Option<ExitStatus> {
         drop(self.writer);
         // Somebody else may have opened the way, and hold it.
         if rustix::io::ioctl_fionread(&self.reader).is_ok_and(|waiting| waiting == 0) {
-            return None;
+            return of_keeper;
         }
         let mut text = [0; 32];
-        let length = self.reader.read(&mut text).ok()?;
-        let text = std::str::from_utf8(&text[..length]).ok()?.trim();
-        if text == STOPPED { Some(None) } else { Some(Some(ExitStatus::from_raw(text.parse().ok()?))) }
+        let length = self.reader.read(&mut text).unwrap_or(0);
+        let text = std::str::from_utf8(&text[..length]).unwrap_or_default();
+        if text == STOPPED { None } else { text.parse().map_or(of_keeper, |status| Some(ExitStatus::from_raw(status))) }
     }
 }
 
