@@ -2,7 +2,7 @@
 //! supervisor holds in memory while one runs.
 //!
 //! A runner is generated, built and run with one worker. Its tests last 500 steps, and two metrics change with each step that
-//! is disturbed: some 500 points a test.
+//! is disturbed: one to two hundred points a test.
 
 use std::fs;
 use std::path::Path;
