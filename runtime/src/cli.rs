@@ -28,6 +28,7 @@ use sesame_plan::CampaignPlan;
 use crate::campaign;
 use crate::report::{self, TextOptions};
 use crate::runner::Runner;
+use crate::visible::visible_lines;
 
 /// Exit code of a command that did its work and found that something is not as required: what `--fail-on` names was found, a
 /// campaign says too little, or a test came out different.
@@ -134,6 +135,7 @@ pub(crate) fn main(runner: &Runner) -> ExitCode {
     match dispatch(runner) {
         Ok(code) => code,
         Err(Failure(words)) => {
+            let words = visible_lines(&words);
             eprintln!("error: {words}");
             ExitCode::FAILURE
         }

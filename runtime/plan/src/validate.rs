@@ -116,6 +116,17 @@ fn filled<T>(list: &[T]) -> Checked {
     require(!list.is_empty(), || "there is none".to_owned())
 }
 
+/// Names and units are shown on terminals, and written into files of other formats.
+fn name(name: &str) -> Checked {
+    require(!name.is_empty(), || "is empty".to_owned())?;
+    require(!name.chars().any(char::is_control), || format!("{name:?} has control characters"))
+}
+
+/// A unit, where there is one.
+fn unit(unit: Option<&String>) -> Checked {
+    at("unit", unit.map_or(Ok(()), |unit| name(unit)))
+}
+
 fn distinct<T: Ord + fmt::Debug>(items: impl IntoIterator<Item = T>) -> Checked {
     let mut seen = BTreeSet::new();
     for item in items {
@@ -146,17 +157,25 @@ impl CampaignPlan {
     /// Makes sure of what the fields promise. A plan that was deserialized has passed.
     pub fn validate(&self) -> Result<(), PlanError> {
         at("schema", require(self.schema == SCHEMA, || format!("is {}, this release knows {SCHEMA}", self.schema)))?;
+        at("space", name(&self.space))?;
+        at("simulator.name", name(&self.simulator.name))?;
         let (Transport::InProcess { step_ns, .. } | Transport::Process { step_ns, .. }) = self.simulator.transport;
         at("simulator.transport.step_ns", require(step_ns > 0, || "must be positive".to_owned()))?;
         self.messages.iter().enumerate().try_for_each(|(index, message)| {
-            let field = |field: &crate::Field| at("type", earlier(&field.ty, index));
+            let field = |field: &crate::Field| {
+                at("name", name(&field.name))?;
+                at("type", earlier(&field.ty, index))
+            };
+            at(&format!("messages[{index}].name"), name(&message.name))?;
             at(&format!("messages[{index}]"), each("fields", &message.fields, field))
         })?;
         each("topics", &self.topics, |topic| {
+            at("name", name(&topic.name))?;
             at("paths", filled(&topic.paths))?;
             at("type", self.ty(&topic.ty))
         })?;
         each("nodes", &self.nodes, |node| {
+            at("name", name(&node.name))?;
             each("publishes", &node.publishes, |&id| self.has_topic(id))?;
             each("subscribes", &node.subscribes, |&id| self.has_topic(id))
         })?;
@@ -164,6 +183,7 @@ impl CampaignPlan {
         each("metrics", &self.metrics, |metric| self.sound_metric(metric))?;
         at("requirements", distinct(self.requirements.iter().map(|it| &it.name)))?;
         each("requirements", &self.requirements, |requirement| {
+            at("name", name(&requirement.name))?;
             at("metric", self.has_metric(requirement.metric))?;
             at("bound", bound(requirement.bound))
         })?;
@@ -215,6 +235,8 @@ impl CampaignPlan {
     }
 
     fn sound_metric(&self, metric: &Metric) -> Checked {
+        at("name", name(&metric.name))?;
+        unit(metric.unit.as_ref())?;
         at("default", metric.default.map_or(Ok(()), finite))?;
         at("initial", metric.initial.map_or(Ok(()), finite))?;
         let sound = match &metric.source {
@@ -260,6 +282,7 @@ impl CampaignPlan {
     }
 
     fn sound_operation(&self, operation: &Operation) -> Checked {
+        at("name", name(&operation.name))?;
         let beside = operation.kind.is_offline();
         at("topic", operation.topic.map_or(Ok(()), |id| self.has_topic(id)))?;
         at(
@@ -272,7 +295,11 @@ impl CampaignPlan {
             at("kind.texts", filled(texts))?;
         }
         at("parameters", distinct(operation.parameters.iter().map(|it| &it.name)))?;
-        each("parameters", &operation.parameters, |parameter| at("domain", domain(&parameter.domain)))?;
+        each("parameters", &operation.parameters, |parameter| {
+            at("name", name(&parameter.name))?;
+            unit(parameter.unit.as_ref())?;
+            at("domain", domain(&parameter.domain))
+        })?;
         at("within", span(operation.within))?;
         at("inclusion", share(operation.inclusion))?;
         each("constraints", &operation.constraints, |constraint| match constraint {
@@ -282,6 +309,7 @@ impl CampaignPlan {
     }
 
     fn sound_known_test(&self, known: &KnownTest) -> Checked {
+        at("name", name(&known.name))?;
         at("test", self.validate_test(&known.test))?;
         each("expectations", &known.expectations, |expectation| {
             at("metric", self.has_metric(expectation.metric))?;
@@ -329,6 +357,7 @@ impl CampaignPlan {
     }
 
     fn sound_campaign(&self, campaign: &Campaign) -> Checked {
+        at("name", name(&campaign.name))?;
         each("objectives", &campaign.objectives, |&id| {
             self.has_metric(id)?;
             let metric = self.metric(id);
@@ -355,6 +384,7 @@ impl CampaignPlan {
         let ConditionSpace { variables, depth, integers: whole, end, times } = space;
         at("variables", filled(variables))?;
         each("variables", variables, |variable| {
+            unit(variable.unit.as_ref())?;
             at("metric", self.has_metric(variable.metric))?;
             at("low", variable.low.map_or(Ok(()), finite))?;
             at("high", variable.high.map_or(Ok(()), finite))?;

@@ -16,7 +16,7 @@ use rusqlite::types::Value as Sql;
 use serde_json::Value as Json;
 use sesame_plan::condition::ConditionEnd;
 use sesame_plan::{
-    BoostedChildren, CampaignPlan, Confirmation, CoverageGoal, Dimension, Exploration, Expectation, Failing, GridAxis,
+    BoostedChildren, CampaignPlan, Confirmation, CoverageGoal, Dimension, Expectation, Exploration, Failing, GridAxis,
     KnownTestId, MetricId, RequirementId, Search, StopRule, Typical,
 };
 
@@ -63,7 +63,8 @@ fn rich() -> CampaignPlan {
     let children = BoostedChildren::Falling { first: 9, last: 2, drop: 1 };
     plan.campaign.exploration = Some(Exploration::Boost { every_generations: 2, children, tries: 5 });
     plan.campaign.confirm = Some(Confirmation { times: 3, by: Typical::Quantile { share: 0.5 }, violations: true });
-    plan.campaign.stop = vec![StopRule::Stagnation { generations: 3, below: 0.01 }, StopRule::Completeness { share: 0.9 }];
+    plan.campaign.stop =
+        vec![StopRule::Stagnation { generations: 3, below: 0.01 }, StopRule::Completeness { share: 0.9 }];
     let bound = plan.requirements[0].bound;
     plan.tests[0].expectations = vec![Expectation { metric: MetricId(0), bound }];
     plan
@@ -158,9 +159,28 @@ fn wholes() -> Vec<Whole> {
 }
 
 const NUMBERS: [&str; 22] = [
-    "0", "-0.0", "1", "-1", "0.5", "7", "40", "255", "65536", "2147483648", "4294967295", "4294967296",
-    "9007199254740993", "9223372036854775807", "-9223372036854775808", "18446744073709551615", "1e-320", "1e300",
-    "-1.7976931348623157e308", "1.7976931348623157e308", "1e400", "null",
+    "0",
+    "-0.0",
+    "1",
+    "-1",
+    "0.5",
+    "7",
+    "40",
+    "255",
+    "65536",
+    "2147483648",
+    "4294967295",
+    "4294967296",
+    "9007199254740993",
+    "9223372036854775807",
+    "-9223372036854775808",
+    "18446744073709551615",
+    "1e-320",
+    "1e300",
+    "-1.7976931348623157e308",
+    "1.7976931348623157e308",
+    "1e400",
+    "null",
 ];
 
 const TEXTS: [&str; 8] =
@@ -218,6 +238,9 @@ fn one_of<'a, T: ?Sized>(stream: &mut Stream, of: &'a [&'a T]) -> &'a T {
 /// A plan that is not quite what it was.
 fn changed_plan(plan: &str, stream: &mut Stream) -> String {
     let found = tokens(plan);
+    if !plan.bytes().any(|byte| byte.is_ascii_digit()) {
+        return plan.to_owned();
+    }
     let (start, end) = found[stream.below(found.len())];
     match stream.below(5) {
         // A digit.
@@ -242,6 +265,9 @@ fn changed_plan(plan: &str, stream: &mut Stream) -> String {
         // A number in the place of another, all over the plan.
         2 => {
             let numbers: Vec<_> = found.iter().filter(|(start, _)| plan.as_bytes()[*start].is_ascii_digit()).collect();
+            if numbers.is_empty() {
+                return plan.to_owned();
+            }
             let &&(start, end) = &numbers[stream.below(numbers.len())];
             format!("{}{}{}", &plan[..start], one_of(stream, &NUMBERS), &plan[end..])
         }
@@ -307,7 +333,8 @@ fn change_in_sql(file: &Path, stream: &mut Stream) {
         let table = &tables[stream.below(tables.len())];
         let columns = names(&connection, &format!("SELECT name FROM pragma_table_info('{table}') ORDER BY cid"));
         let column = &columns[stream.below(columns.len())];
-        let keys = names(&connection, &format!("SELECT name FROM pragma_table_info('{table}') WHERE pk > 0 ORDER BY pk"));
+        let keys =
+            names(&connection, &format!("SELECT name FROM pragma_table_info('{table}') WHERE pk > 0 ORDER BY pk"));
         let keys = keys.join(", ");
         let rows: i64 = connection.query_row(&format!("SELECT count(*) FROM {table}"), [], |row| row.get(0)).unwrap();
         let chosen = stream.below(usize::try_from(rows.max(1)).unwrap());
@@ -420,7 +447,13 @@ fn read_all(folder: &Path) -> Read {
     let options = TextOptions { width: Some(100), colour: false };
     macro_rules! ask {
         ($question:expr, $then:expr) => {
-            said($question.map(|answer| { let _ = $then(answer); }).map_err(|error| error.to_string()))
+            said(
+                $question
+                    .map(|answer| {
+                        let _ = $then(answer);
+                    })
+                    .map_err(|error| error.to_string()),
+            )
         };
     }
     let shown = |dataset: super::Dataset| (dataset.text(options), dataset.csv(), dataset.json());
@@ -433,7 +466,9 @@ fn read_all(folder: &Path) -> Read {
     ask!(indicators(&repository, None), |it: super::IndicatorAnalysis| shown(it.dataset()));
     ask!(regions::regions(&repository, &all, None, 3), |found: Vec<regions::Regions>| {
         shown(regions::table(&found));
-        found.iter().for_each(|it| drop(it.svg(plan)));
+        for of in &found {
+            drop(of.svg(plan));
+        }
     });
     if let Some(goal) = &plan.campaign.coverage {
         match Grid::new(goal.axes.clone()) {
@@ -460,7 +495,11 @@ fn read_all(folder: &Path) -> Read {
     let runs = [0, 1].map(|_| Repository::open(folder));
     if let [Ok(one), Ok(other)] = runs {
         let runs = [("a", one), ("b", other)].map(|(group, repository)| Run { group: group.to_owned(), repository });
-        ask!(compare(&runs, None, None), |it: super::Comparison| (shown(it.runs()), shown(it.groups()), shown(it.pairs())));
+        ask!(compare(&runs, None, None), |it: super::Comparison| (
+            shown(it.runs()),
+            shown(it.groups()),
+            shown(it.pairs())
+        ));
     }
     // What a run that goes on asks first; tests without number would take their time.
     if plan.campaign.search.evaluations() < 10_000 && plan.campaign.neighbours.unwrap_or(0) < 10_000 {

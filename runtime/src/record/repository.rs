@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use rusqlite::types::FromSql;
 use rusqlite::{Connection, Row, params};
@@ -12,7 +13,7 @@ use crate::observation::{Counters, MetricObservation, Observation, OperationEffe
 use crate::record::folder::{DATABASE, trace_file};
 use crate::record::{
     Event, EventKind, GenerationCoverage, MetricValue, Origin, RecordError, ResultSet, Session, Status, TestRecord,
-    TestRow, digest, schema,
+    TestRow, digest, recognise, schema,
 };
 use crate::search::indicators::GenerationIndicators;
 
@@ -58,6 +59,8 @@ impl Repository {
     }
 
     pub(super) fn from_connection(connection: Connection, path: PathBuf) -> Result<Repository, RecordError> {
+        // Before anything is asked of it: what has the name of a table may be something else that never comes to an end.
+        recognise::tables(&connection, &path)?;
         let row: Result<(String, String, String, Option<String>), _> =
             connection.query_row("SELECT plan, seed, runtime, stop FROM campaign", [], |row| {
                 Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))
@@ -68,6 +71,7 @@ impl Repository {
         })?;
         let plan = serde_json::from_str(&plan)
             .map_err(|e| RecordError::damaged(&path, format!("its plan cannot be read: {e}")))?;
+        recognise::views(&connection, &path, &plan)?;
         let seed = seed.parse().map_err(|_| RecordError::damaged(&path, format!("`{seed}` is no seed")))?;
         Ok(Repository { connection, path, facts: CampaignFacts { plan, seed, runtime, stop } })
     }
@@ -152,7 +156,7 @@ impl Repository {
             .read(
                 "SELECT simulator_seed, messages, run_s FROM tests JOIN wall_times ON test = number WHERE number = ?1",
                 params![number],
-                |row| Ok((row.get(0)?, unsigned(row, 1)?, row.get(2)?)),
+                |row| Ok((row.get(0)?, unsigned(row, 1)?, finite(row, 2)?)),
             )?
             .pop()
             .ok_or_else(missing)?;
@@ -179,7 +183,7 @@ impl Repository {
         let points = self.read(
             "SELECT metric, time_s, value FROM change_points WHERE test = ?1 ORDER BY metric, position",
             params![row.duplicate_of.unwrap_or(number)],
-            |row| Ok((position(row, 0)?, row.get(1)?, row.get(2)?)),
+            |row| Ok((position(row, 0)?, finite(row, 1)?, finite(row, 2)?)),
         )?;
         for (metric, time, value) in points {
             let metric = metrics
@@ -290,8 +294,8 @@ impl Repository {
                     crashes: row.get(4)?,
                     timeouts: row.get(5)?,
                     front: row.get(6)?,
-                    hypervolume: row.get(7)?,
-                    standard_error: row.get(8)?,
+                    hypervolume: perhaps_finite(row, 7)?,
+                    standard_error: perhaps_finite(row, 8)?,
                 })
             },
         )
@@ -300,7 +304,12 @@ impl Repository {
     /// The point that the hypervolumes of [`Repository::indicators`] are measured from, a value per objective in its unit;
     /// `None` where there is none.
     pub fn reference_point(&self) -> Result<Option<Vec<f64>>, RecordError> {
-        let point = self.read("SELECT value FROM reference_point ORDER BY objective", [], |row| row.get(0))?;
+        let point = self.read("SELECT value FROM reference_point ORDER BY objective", [], |row| finite(row, 0))?;
+        let needed = self.plan().campaign.objectives.len();
+        if !point.is_empty() && point.len() != needed {
+            let problem = format!("its reference point has {} values for {needed} objectives", point.len());
+            return Err(RecordError::damaged(&self.path, problem));
+        }
         Ok(Some(point).filter(|point| !point.is_empty()))
     }
 
@@ -328,16 +337,24 @@ impl Repository {
     }
 
     fn rows(&self, only: Option<u32>) -> Result<Vec<TestRow>, RecordError> {
+        // One read transaction, so that a run writing meanwhile is seen at one point; there is one already within others.
+        let alone = self.connection.is_autocommit();
+        let _transaction = alone
+            .then(|| self.connection.unchecked_transaction())
+            .transpose()
+            .map_err(|e| RecordError::database("read the results", &self.path, e))?;
         let mut operations = self.operations(only)?;
         let mut values: BTreeMap<i64, Vec<MetricValue>> = BTreeMap::new();
         let read = self.read(
-            "SELECT test, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values \
+            "SELECT test, metric, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values \
              WHERE ?1 IS NULL OR test = ?1 ORDER BY test, metric",
             params![only],
-            |row| Ok((row.get(0)?, metric_value(row, 1)?)),
+            |row| Ok((row.get(0)?, position(row, 1)?, metric_value(row, 2)?)),
         )?;
-        for (test, value) in read {
-            values.entry(test).or_default().push(value);
+        for (test, metric, value) in read {
+            let of = values.entry(test).or_default();
+            self.in_order(test, "values", metric, of.len())?;
+            of.push(value);
         }
         let rows = self.read(
             "SELECT number, origin, known_test, generation, outcome, outcome_detail, time_limit_s, end_s, duplicate_of \
@@ -346,42 +363,80 @@ impl Repository {
             |row| {
                 let number: u32 = row.get(0)?;
                 let origin: (String, Option<String>) = (row.get(1)?, row.get(2)?);
-                let outcome: (String, Option<String>, Option<f64>) = (row.get(4)?, row.get(5)?, row.get(6)?);
-                Ok((number, origin, row.get(3)?, outcome, row.get(7)?, row.get(8)?))
+                let outcome: (String, Option<String>, Option<f64>) =
+                    (row.get(4)?, row.get(5)?, perhaps_finite(row, 6)?);
+                Ok((number, origin, row.get(3)?, outcome, finite(row, 7)?, row.get(8)?))
             },
         )?;
-        rows.into_iter()
+        let rows = rows
+            .into_iter()
             .map(|(number, (origin, known), generation, (outcome, detail, limit), end, duplicate_of)| {
+                let test = Test { operations: operations.remove(&i64::from(number)).unwrap_or_default() };
+                let values = values.remove(&i64::from(number)).unwrap_or_default();
+                self.fitting(number, &test, values.len())?;
                 Ok(TestRow {
                     number,
                     origin: self.origin(&origin, known.as_deref())?,
                     generation,
-                    test: Test { operations: operations.remove(&i64::from(number)).unwrap_or_default() },
+                    test,
                     outcome: self.outcome(&outcome, detail, limit)?,
                     end,
                     duplicate_of,
-                    values: values.remove(&i64::from(number)).unwrap_or_default(),
+                    values,
                 })
             })
-            .collect()
+            .collect::<Result<_, _>>()?;
+        match operations.keys().chain(values.keys()).min() {
+            Some(&orphan) if only.is_none() => Err(self.without_test(orphan)),
+            _ => Ok(rows),
+        }
+    }
+
+    /// Rows of a test are numbered from 0, none is missing.
+    pub(super) fn in_order(&self, test: i64, what: &str, found: usize, expected: usize) -> Result<(), RecordError> {
+        if found == expected {
+            return Ok(());
+        }
+        Err(RecordError::damaged(&self.path, format!("of the {what} of T{test}, number {expected} is missing")))
+    }
+
+    /// A test is one of the plan, and has a value for each of its metrics or, after a crash of the worker, none.
+    pub(super) fn fitting(&self, number: u32, test: &Test, values: usize) -> Result<(), RecordError> {
+        let damaged = |problem: String| RecordError::damaged(&self.path, format!("T{number}: {problem}"));
+        self.plan().validate_test(test).map_err(|error| damaged(error.to_string()))?;
+        let metrics = self.plan().metrics.len();
+        if values != 0 && values != metrics {
+            return Err(damaged(format!("there are {values} values of {metrics} metrics")));
+        }
+        Ok(())
+    }
+
+    /// Something is recorded of a test, but not the test.
+    pub(super) fn without_test(&self, number: impl std::fmt::Display) -> RecordError {
+        RecordError::damaged(
+            &self.path,
+            format!("T{number} is gone, and some of what was recorded of it is still there"),
+        )
     }
 
     fn operations(&self, only: Option<u32>) -> Result<BTreeMap<i64, Vec<TestOperation>>, RecordError> {
         let choices = self.read(
-            "SELECT test, operation, value, low, high, x, y, z, text FROM choices WHERE ?1 IS NULL OR test = ?1 \
-             ORDER BY test, operation, position",
+            "SELECT test, operation, position, value, low, high, x, y, z, text FROM choices \
+             WHERE ?1 IS NULL OR test = ?1 ORDER BY test, operation, position",
             params![only],
-            |row| Ok(((row.get(0)?, row.get(1)?), choice(row, 2)?)),
+            |row| Ok(((row.get(0)?, row.get(1)?), position(row, 2)?, choice(row, 3)?)),
         )?;
         let mut parameters: BTreeMap<At, Vec<Choice>> = BTreeMap::new();
-        for (at, choice) in choices {
+        for (at, position, choice) in choices {
             let choice = choice.ok_or_else(|| {
                 RecordError::damaged(
                     &self.path,
                     format!("T{} has a choice that is neither value, range, point nor text", at.0),
                 )
             })?;
-            parameters.entry(at).or_default().push(choice);
+            let of = parameters.entry(at).or_default();
+            self.in_order(at.0, "choices", position, of.len())?;
+            of.push(choice);
         }
         let rows = self.read(
             "SELECT test, position, operation, draw_seed, start_s, end_s, start_condition, end_condition, length_s, times \
@@ -389,8 +444,8 @@ impl Repository {
             params![only],
             |row| {
                 let at: At = (row.get(0)?, row.get(1)?);
-                let window = (row.get(4)?, row.get(5)?);
-                let conditions = (row.get(6)?, row.get(7)?, row.get(8)?, row.get(9)?);
+                let window = (perhaps_finite(row, 4)?, perhaps_finite(row, 5)?);
+                let conditions = (row.get(6)?, row.get(7)?, perhaps_finite(row, 8)?, row.get(9)?);
                 Ok((at, row.get::<_, String>(2)?, row.get::<_, String>(3)?, window, conditions))
             },
         )?;
@@ -403,14 +458,21 @@ impl Repository {
             let operation = *ids.get(name.as_str()).ok_or_else(|| {
                 RecordError::damaged(&self.path, format!("T{} has an operation `{name}` that the plan lacks", at.0))
             })?;
-            tests.entry(at.0).or_default().push(TestOperation {
+            let of = tests.entry(at.0).or_default();
+            self.in_order(at.0, "operations", usize::try_from(at.1).unwrap_or(usize::MAX), of.len())?;
+            of.push(TestOperation {
                 operation,
                 activation: self.activation(at.0, operation, window, conditions)?,
                 parameters: parameters.remove(&at).unwrap_or_default(),
                 draw_seed: self.seed(&draw_seed)?,
             });
         }
-        Ok(tests)
+        match parameters.keys().next() {
+            Some((test, _)) => {
+                Err(RecordError::damaged(&self.path, format!("T{test} has a choice without an operation")))
+            }
+            None => Ok(tests),
+        }
     }
 
     fn activation(
@@ -468,8 +530,8 @@ impl Repository {
                         side_effects: unsigned(row, 6)?,
                         unheard: unsigned(row, 7)?,
                     },
-                    first_touch: row.get(8)?,
-                    last_touch: row.get(9)?,
+                    first_touch: perhaps_finite(row, 8)?,
+                    last_touch: perhaps_finite(row, 9)?,
                 })
             },
         )?;
@@ -483,9 +545,7 @@ impl Repository {
             }),
         ];
         for (sql, spans_of) in tables {
-            let spans = self.read(sql, params![number], |row| {
-                Ok((position(row, 0)?, Span { start: row.get(1)?, end: row.get(2)? }))
-            })?;
+            let spans = self.read(sql, params![number], |row| Ok((position(row, 0)?, span(row, 1)?)))?;
             for (operation, span) in spans {
                 let effect = effects.get_mut(operation).ok_or_else(|| {
                     RecordError::damaged(&self.path, format!("T{number} has an interval without an operation"))
@@ -520,7 +580,10 @@ impl Repository {
             ("void", None, None) => Ok(Outcome::Void),
             ("unknown", None, None) => Ok(Outcome::Unknown),
             ("crash", Some(message), None) => Ok(Outcome::Crash { message }),
-            ("timeout", None, Some(limit)) => Ok(Outcome::Timeout { limit }),
+            // A length of wall time, as programs count it.
+            ("timeout", None, Some(limit)) if Duration::try_from_secs_f64(limit).is_ok() => {
+                Ok(Outcome::Timeout { limit })
+            }
             _ => Err(RecordError::damaged(&self.path, format!("a test cannot have ended as `{word}`"))),
         }
     }
@@ -555,11 +618,34 @@ pub(super) fn unsigned(row: &Row<'_>, column: usize) -> rusqlite::Result<u64> {
 /// what was not finite.
 pub(super) fn metric_value(row: &Row<'_>, first: usize) -> rusqlite::Result<MetricValue> {
     Ok(MetricValue {
-        value: row.get(first)?,
+        value: perhaps_finite(row, first)?,
         set: row.get(first + 1)?,
-        reach: Reach { low: row.get(first + 2)?, high: row.get(first + 3)? },
-        not_finite: row.get(first + 4)?,
+        reach: Reach { low: perhaps_finite(row, first + 2)?, high: perhaps_finite(row, first + 3)? },
+        not_finite: perhaps_finite(row, first + 4)?,
     })
+}
+
+/// A number; infinity, which is never recorded, is an error of conversion.
+pub(super) fn finite(row: &Row<'_>, column: usize) -> rusqlite::Result<f64> {
+    let number: f64 = row.get(column)?;
+    if number.is_finite() {
+        return Ok(number);
+    }
+    let words = format!("{number} is recorded where only finite numbers are");
+    Err(rusqlite::Error::FromSqlConversionFailure(column, rusqlite::types::Type::Real, words.into()))
+}
+
+/// A number, if there is one.
+pub(super) fn perhaps_finite(row: &Row<'_>, column: usize) -> rusqlite::Result<Option<f64>> {
+    match row.get_ref(column)? {
+        rusqlite::types::ValueRef::Null => Ok(None),
+        _ => finite(row, column).map(Some),
+    }
+}
+
+/// A stretch of time, from the columns of its ends.
+pub(super) fn span(row: &Row<'_>, first: usize) -> rusqlite::Result<Span> {
+    Ok(Span { start: finite(row, first)?, end: finite(row, first + 1)? })
 }
 
 /// A position in a list.
@@ -571,8 +657,9 @@ pub(super) fn position(row: &Row<'_>, column: usize) -> rusqlite::Result<usize> 
 /// What was chosen for a parameter, from the columns value, low, high, x, y, z and text that begin here; `None` where it
 /// is neither value, range, point nor text.
 pub(super) fn choice(row: &Row<'_>, first: usize) -> rusqlite::Result<Option<Choice>> {
-    let point: [Option<f64>; 3] = [row.get(first + 3)?, row.get(first + 4)?, row.get(first + 5)?];
-    Ok(match (row.get(first)?, row.get(first + 1)?, row.get(first + 2)?, point, row.get(first + 6)?) {
+    let number = |column: usize| perhaps_finite(row, first + column);
+    let point = [number(3)?, number(4)?, number(5)?];
+    Ok(match (number(0)?, number(1)?, number(2)?, point, row.get(first + 6)?) {
         (Some(value), None, None, [None, None, None], None) => Some(Choice::Value { value }),
         (None, Some(low), Some(high), [None, None, None], None) => Some(Choice::Range { low, high }),
         (None, None, None, [Some(x), Some(y), Some(z)], None) => Some(Choice::Point { point: [x, y, z] }),
