@@ -16,6 +16,7 @@ mod import;
 mod interruption;
 mod kuka_cell;
 mod large_results;
+mod latest;
 mod optimisers;
 mod random_models;
 mod regeneration;
