@@ -392,6 +392,8 @@ impl CampaignPlan {
             ends.map_or(Ok(()), |(low, high)| require(low <= high, || format!("runs from {low} to {high}")))
         })?;
         at("depth", at_least_one(*depth))?;
+        let most = ConditionSpace::MOST_DEPTH;
+        at("depth", require(*depth <= most, || format!("is {depth}, more than {most}")))?;
         at("integers", integers(*whole))?;
         if let ConditionEnd::Length { low, high } = *end {
             at("end", positive(low))?;

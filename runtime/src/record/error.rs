@@ -207,7 +207,7 @@ fn refusal(source: &rusqlite::Error) -> String {
     let said = visible(&source.to_string());
     match source.sqlite_error() {
         Some(error) if WRITING.contains(&error.extended_code) => {
-            format!("{said} while it was written; perhaps the disk is full")
+            format!("{said} while writing; perhaps the disk is full")
         }
         _ => said,
     }

@@ -47,6 +47,9 @@ type Window = (Option<f64>, Option<f64>);
 /// Start condition, end condition, length and times of an activation by condition.
 type Conditions = (Option<String>, Option<String>, Option<f64>, Option<u32>);
 
+/// The longest wall time of a run that is believed, in seconds: thirty years, of which programs can still count multiples.
+const LONGEST_RUN: f64 = 1e9;
+
 /// Which intervals of an operation a table has.
 type SpansOf = fn(&mut OperationEffect) -> &mut Vec<Span>;
 
@@ -160,6 +163,9 @@ impl Repository {
             )?
             .pop()
             .ok_or_else(missing)?;
+        if !(0.0..=LONGEST_RUN).contains(&run) {
+            return Err(RecordError::damaged(&self.path, format!("the run of T{number} took {run} s")));
+        }
         let parents =
             self.read("SELECT parent FROM parents WHERE test = ?1 ORDER BY position", params![number], |row| {
                 row.get(0)

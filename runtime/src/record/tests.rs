@@ -432,6 +432,14 @@ fn positions_with_gaps_and_numbers_that_are_never_recorded_are_damage() {
         let said = Repository::open(folder.path()).unwrap().tests().unwrap_err().to_string();
         assert!(said.contains(words), "{change}: {said}");
     }
+    for seconds in ["-1", "1e300"] {
+        let folder = folder();
+        drop(commit_all(folder.path(), &sample::records(&sample::plan(), 3)));
+        let connection = Connection::open(folder.path().join(DATABASE)).unwrap();
+        connection.execute_batch(&format!("UPDATE wall_times SET run_s = {seconds}")).unwrap();
+        let said = Repository::open(folder.path()).unwrap().test(1).unwrap_err().to_string();
+        assert!(said.contains("the run of T1 took"), "{said}");
+    }
 }
 
 #[test]
