@@ -9,6 +9,8 @@ mod indicators;
 mod rank_sum;
 pub mod regions;
 #[cfg(test)]
+mod tampered;
+#[cfg(test)]
 mod tests;
 
 use std::collections::BTreeSet;

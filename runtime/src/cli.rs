@@ -22,11 +22,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
-use sesame_plan::{CampaignPlan, SCHEMA};
+use sesame_plan::CampaignPlan;
 
 use crate::campaign;
 use crate::report;
 use crate::runner::Runner;
+use crate::visible::visible_lines;
 use terminal::{print, print_json, say, text_options};
 
 /// Exit code of a command that did its work and found that something is not as required: what `--fail-on` names was found, a
@@ -146,7 +147,7 @@ pub(crate) fn main(runner: &Runner) -> ExitCode {
     match dispatch(runner) {
         Ok(code) => code,
         Err(Failure(words)) => {
-            say(format_args!("error: {words}"));
+            say(format_args!("error: {}", visible_lines(&words)));
             ExitCode::FAILURE
         }
     }
@@ -156,12 +157,6 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
     let plan: CampaignPlan = serde_json::from_str(runner.plan).map_err(|error| {
         Failure(format!("the plan in this runner is damaged ({error}): run `sesamec generate` again"))
     })?;
-    if plan.schema != SCHEMA {
-        let (found, known) = (plan.schema, SCHEMA);
-        return Err(Failure(format!(
-            "the plan has schema {found}, this runtime knows {known}: run `sesamec generate` again"
-        )));
-    }
     let about = format!("Campaign `{}` of the space `{}`.\n\n{}", plan.campaign.name, plan.space, plan.campaign.doc);
     let command = Cli::command().name(plan.campaign.name.clone()).bin_name(plan.campaign.name.clone()).about(about);
     let cli = match command.try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches)) {
@@ -224,4 +219,16 @@ fn digest(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
         Format::Text => print(&format!("{digest}\n")),
         Format::Json => print_json(&serde_json::json!({ "digest": digest })),
     }
+}
+
+/// What commands ask of recorded results beside what reports do: whether a gate closes, how a test is to be made smaller, and
+/// how long it may take when it is run again.
+#[cfg(test)]
+pub(crate) fn asked_beside_reports(repository: &crate::record::Repository, test: &str) -> Result<(), String> {
+    let words = |error: crate::record::RecordError| error.to_string();
+    drop(gate::every_objection(&report::summary(repository).map_err(words)?, repository.plan()));
+    let record = repository.find(test).and_then(|number| repository.test(number)).map_err(words)?;
+    replay::limit(&record);
+    drop(shrink::failing(repository, &record, &[]).map_err(|Failure(words)| words)?);
+    Ok(())
 }

@@ -50,6 +50,8 @@ pub mod trace;
 pub mod transport;
 pub mod value;
 pub mod verdict;
+#[cfg(any(feature = "record", feature = "mcap"))]
+mod visible;
 pub mod wire;
 
 #[cfg(feature = "campaign")]

@@ -19,6 +19,7 @@ mod interruption;
 mod killed;
 mod kuka_cell;
 mod large_results;
+mod latest;
 mod optimisers;
 mod random_models;
 mod regeneration;

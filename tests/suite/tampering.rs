@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use nix::sys::signal::Signal;
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
-use sesame_tests::{Runner, copy};
+use sesame_tests::{Done, Runner, command, copy, done, sesamec};
 
 use crate::faults::faulty;
 
@@ -84,6 +84,73 @@ fn foreign_newer_and_damaged_results_are_refused_and_left_alone() {
         &spoiled(&runner, run, "no_campaign", |path| sql(path, "DELETE FROM campaign")),
         "there is no campaign",
     );
+}
+
+/// What everything that reads results or goes on with them says of a folder, each with its words.
+fn everybody(runner: &Runner, folder: &Path) -> Vec<(String, Done)> {
+    let name = folder.to_str().unwrap();
+    let page = folder.join("page.html");
+    let runners: [&[&str]; 11] = [
+        &["list", "--results", name],
+        &["show", "T2", "--results", name],
+        &["digest", "--results", name],
+        &["report", "--results", name, "--output", page.to_str().unwrap()],
+        &["export", "T2", "--results", name],
+        &["replay", "T2", "--results", name],
+        &["repeat", "T2", "1", "--results", name],
+        &["confirm", "T2", "-n", "1", "--results", name],
+        &["confirm", "--violations", "--results", name],
+        &["shrink", "T2", "--evaluations", "2", "--results", name],
+        &["resume", name],
+    ];
+    let analyses = ["campaigns", "tests", "front", "sspr", "regions", "coverage", "indicators", "compare"];
+    let said_of_runs = runners.map(|arguments| (arguments.join(" "), runner.run(arguments)));
+    let said_of_files = analyses.map(|analysis| {
+        let mut sesamec = command(sesamec());
+        sesamec.args(["results", analysis, name]);
+        if analysis == "compare" {
+            sesamec.arg(name);
+        }
+        (format!("results {analysis}"), done(&mut sesamec))
+    });
+    said_of_runs.into_iter().chain(said_of_files).collect()
+}
+
+#[test]
+fn a_plan_with_one_altered_digit_is_refused_by_everybody_with_the_place_in_it() {
+    let runner = faulty("altered", "harmless");
+    let run = unfinished(&runner);
+    let altered = [
+        (r#""objectives":["#, r#""objectives":[4"#, "campaign.objectives[0]: there is no metric 4"),
+        (r#""direction":"maximise""#, r#""direction":null"#, "has no direction"),
+        (r#""population":"#, r#""population":-"#, "its plan cannot be read"),
+        (r#""end_after":1"#, r#""end_after":-1"#, "campaign.end_after: -1 is not above 0"),
+        (r#""name":""#, "\"name\":\"\u{1b}[31m", "its plan cannot be read"),
+    ];
+    let changed = |name: &str, from: &str, to: &str| {
+        spoiled(&runner, run, name, |path| {
+            let connection = rusqlite::Connection::open(path).unwrap();
+            let plan: String = connection.query_row("SELECT plan FROM campaign", [], |row| row.get(0)).unwrap();
+            assert!(plan.contains(from), "{from} in {plan}");
+            connection.execute("UPDATE campaign SET plan = ?1", [plan.replacen(from, to, 1)]).unwrap();
+        })
+    };
+    for (at, (from, to, words)) in altered.into_iter().enumerate() {
+        let folder = changed(&format!("altered-{at}"), from, to);
+        let file = folder.join("results.sqlite");
+        let before = fs::read(&file).unwrap();
+        for (command, said) in everybody(&runner, &folder) {
+            assert_eq!(said.code, Some(1), "{command} of {to}: {said:?}");
+            assert!(
+                said.err.contains("error: ") && said.err.contains("these results are damaged"),
+                "{command}: {said:?}"
+            );
+            assert!(said.err.contains(words), "{command}: {said:?}");
+            assert!(!said.err.contains("panicked") && !said.err.contains('\u{1b}'), "{command}: {said:?}");
+            assert_eq!(said.out, "", "{command}");
+            assert!(fs::read(&file).unwrap() == before, "{command} changed the file");
+        }
+    }
 }
 
 #[test]

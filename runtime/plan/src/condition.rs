@@ -74,7 +74,7 @@ impl Comparison {
 pub struct ConditionSpace {
     /// The variables; at least one.
     pub variables: Vec<Variable>,
-    /// The most levels of a condition's tree, from 1: a comparison alone is one level.
+    /// The most levels of a condition's tree, from 1 to [`ConditionSpace::MOST_DEPTH`]: a comparison alone is one level.
     pub depth: u32,
     /// The least and the greatest whole number that variables are compared with; `lowest <= highest`.
     pub integers: Integers,
@@ -82,6 +82,11 @@ pub struct ConditionSpace {
     pub end: ConditionEnd,
     /// How often an operation may be activated in one run, from 1.
     pub times: u32,
+}
+
+impl ConditionSpace {
+    /// The most levels that conditions of a search may have: a tree of so many has a thousand comparisons.
+    pub const MOST_DEPTH: u32 = 10;
 }
 
 /// A condition variable.

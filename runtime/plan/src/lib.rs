@@ -4,8 +4,8 @@
 //! results repository keeps a copy, so that reports speak in the names of the `.sesame` file. It is the only thing
 //! generator and runtime share, hence a crate of its own with no logic beyond look-ups.
 //!
-//! Guarantees of a plan written by the generator: every id is in range; every range has `low <= high`; times are in
-//! seconds of simulation time; every other quantity is in the unit its field, metric or topic declares (the unit on
+//! Guarantees of every plan that was read: every id is in range, every number is finite, every range has `low <= high`
+//! ([`CampaignPlan::validate`]). Of a plan written by the generator moreover: times are in seconds of simulation time; every other quantity is in the unit its field, metric or topic declares (the unit on
 //! the wire), probabilities are in `0..=1`.
 
 pub mod condition;
@@ -18,6 +18,7 @@ mod model;
 pub mod stl;
 mod stop;
 mod test;
+mod validate;
 
 pub use confirmation::*;
 pub use coverage::*;
@@ -27,6 +28,7 @@ pub use kind::*;
 pub use model::*;
 pub use stop::*;
 pub use test::*;
+pub use validate::PlanError;
 
 /// The version of this schema. A runner refuses a plan of another version: both come from one release.
 pub const SCHEMA: u32 = 1;

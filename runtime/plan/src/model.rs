@@ -46,8 +46,9 @@ id!(
     RequirementId
 );
 
-/// Everything a runner knows of its campaign.
+/// Everything a runner knows of its campaign. Deserializing one [validates](CampaignPlan::validate) it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(remote = "Self")]
 pub struct CampaignPlan {
     /// [`crate::SCHEMA`] of the generator that wrote the plan.
     pub schema: u32,

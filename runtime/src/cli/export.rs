@@ -9,6 +9,7 @@ use super::recorded::open;
 use super::terminal::{print, print_json};
 use super::{Failure, Format, Which};
 use crate::report;
+use crate::visible::visible_lines;
 
 /// Which test is written, and under which name.
 #[derive(Debug, Args)]
@@ -34,6 +35,8 @@ pub(super) fn export(results: &Path, options: &Options) -> Result<ExitCode, Fail
     let repository = open(results, options.which.results.as_deref())?;
     let exported = report::export(&repository, &options.test, options.name.as_deref())?;
     match options.which.format {
+        // A block is the test to the last sign of its texts; on a terminal some of these would do more than be read.
+        Format::Text if console::Term::stdout().is_term() => print(&visible_lines(&exported.block)),
         Format::Text => print(&exported.block),
         Format::Json => print_json(&exported),
     }

@@ -85,6 +85,12 @@ impl Gate {
     }
 }
 
+/// All that could close a gate.
+#[cfg(test)]
+pub(super) fn every_objection(summary: &Summary, plan: &CampaignPlan) -> Vec<String> {
+    Gate { fail_on: vec![Finding::Any] }.objections(summary, plan)
+}
+
 fn tests(count: usize) -> String {
     if count == 1 { "1 test".to_owned() } else { format!("{count} tests") }
 }

@@ -73,7 +73,7 @@ pub(super) fn replay(
 }
 
 /// How long the test may take now.
-fn limit(record: &TestRecord) -> Duration {
+pub(super) fn limit(record: &TestRecord) -> Duration {
     match record.observation.outcome {
         Outcome::Timeout { limit } => Duration::from_secs_f64(limit),
         _ => patience(record.observation.wall.run),

@@ -67,6 +67,7 @@ pub(super) fn replay_recording(runner: &Runner, plan: &CampaignPlan, options: &O
 fn compared(plan: &CampaignPlan, options: &Options, fed: crate::trace::Fed) -> crate::report::RecordingReplay {
     use crate::record::MetricValue;
     use crate::report::{FedMetric, RecordingReplay, Sameness};
+    use crate::visible::visible;
 
     let recorded = fed.run.as_ref().map_or(&[][..], |run| &run.metrics);
     let metrics: Vec<FedMetric> = plan
@@ -91,7 +92,7 @@ fn compared(plan: &CampaignPlan, options: &Options, fed: crate::trace::Fed) -> c
         .collect();
     RecordingReplay {
         recording: options.recording.clone(),
-        run: fed.run.as_ref().map(|run| format!("{} of {} ({})", run.test, run.campaign, run.outcome)),
+        run: fed.run.as_ref().map(|run| visible(&format!("{} of {} ({})", run.test, run.campaign, run.outcome))),
         messages: fed.messages,
         same: metrics.iter().all(|metric| metric.sameness != Sameness::Differs),
         metrics,

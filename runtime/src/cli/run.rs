@@ -36,7 +36,7 @@ pub(super) struct Options {
 /// How a stopped run is taken up again.
 #[derive(Debug, Args)]
 pub(super) struct ResumeOptions {
-    /// Folder of the run, for example `results/42`; by default the latest
+    /// Folder of the run, for example `results/42`; by default the latest that is unfinished
     #[arg(value_name = "DIR")]
     results: Option<PathBuf>,
     #[command(flatten)]
@@ -81,8 +81,9 @@ pub(super) fn resume(
 ) -> Result<ExitCode, Failure> {
     let folder = match &options.results {
         Some(folder) => folder.clone(),
-        None => record::latest_folder(results)?
-            .ok_or_else(|| Failure(format!("there is nothing to go on with in {}", results.display())))?,
+        None => record::latest_unfinished(results)?.ok_or_else(|| {
+            Failure(format!("there is nothing to go on with: no run in {} is unfinished", results.display()))
+        })?,
     };
     let recorder = Recorder::resume(&folder, options.work.workers())?;
     let campaign = recorder.repository().campaign();

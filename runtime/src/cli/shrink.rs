@@ -70,7 +70,7 @@ pub(super) fn shrink(
 }
 
 /// How a test failed, and with which requirements.
-fn failing(repository: &Repository, record: &TestRecord, wanted: &[String]) -> Result<Failing, Failure> {
+pub(super) fn failing(repository: &Repository, record: &TestRecord, wanted: &[String]) -> Result<Failing, Failure> {
     let plan = repository.plan();
     let test = format!("T{}", record.number);
     if record.test.operations.is_empty() {

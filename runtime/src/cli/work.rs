@@ -19,7 +19,7 @@ use crate::campaign::{Conducted, Settings, conduct};
 use crate::changed_files::ChangedFiles;
 use crate::fuzz::unimplemented_operations;
 use crate::metric::unimplemented_hooks;
-use crate::record::{self, Claim, Recorder, Repository};
+use crate::record::{self, Recorder, Repository};
 use crate::report::{self, Summary};
 use crate::runner::Runner;
 
@@ -181,11 +181,12 @@ pub(super) fn begin(
     seed: u64,
     work: &Work,
 ) -> Result<(Recorder, PathBuf), Failure> {
-    let Claim { folder, unfinished } = record::claim_folder(results, name)?;
-    if let Some(unfinished) = unfinished {
-        say(format_args!("note: an earlier run is unfinished: `resume {}` goes on with it", shown(&unfinished)));
+    let claim = record::claim_folder(results, name)?;
+    if let Some(unfinished) = &claim.unfinished {
+        say(format_args!("note: an earlier run is unfinished: `resume {}` goes on with it", shown(unfinished)));
     }
-    Ok((Recorder::create(&folder, plan, seed, work.workers())?, folder))
+    let folder = claim.folder.clone();
+    Ok((Recorder::create_in(claim, plan, seed, work.workers())?, folder))
 }
 
 /// Runs a campaign to its end and says what was found.

@@ -39,39 +39,72 @@ fn enclosed(condition: &Condition, parentheses: bool, metrics: &[Metric]) -> Str
     if parentheses { format!("({text})") } else { text }
 }
 
+/// The most levels of a condition that is read, more than one of the language may have: what comes from a file must not
+/// exhaust the stack.
+const MOST_LEVELS: u32 = 100;
+
+/// A condition, and how many levels its tree has.
+type Levelled = (Condition, u32);
+
 /// Reads what [`write()`] wrote. The error says what was found where something else was needed.
 pub fn read(text: &str, metrics: &[Metric]) -> Result<Condition, String> {
     // Names, numbers and signs stand apart; parentheses touch what they enclose.
     let spaced = text.replace('(', "( ").replace(')', " )");
     let mut words = spaced.split_whitespace().peekable();
-    let condition = either(&mut words, metrics)?;
+    let (condition, _) = either(&mut words, metrics, MOST_LEVELS)?;
     match words.next() {
         None => Ok(condition),
         Some(word) => Err(format!("`{word}` after the end of a condition")),
     }
 }
 
-fn either<'a>(words: &mut Peekable<impl Iterator<Item = &'a str>>, metrics: &[Metric]) -> Result<Condition, String> {
-    let mut condition = both(words, metrics)?;
+fn joined(
+    (a, levels_of_a): Levelled,
+    (b, levels_of_b): Levelled,
+    with: fn(Box<Condition>, Box<Condition>) -> Condition,
+) -> Result<Levelled, String> {
+    let levels = levels_of_a.max(levels_of_b) + 1;
+    if levels > MOST_LEVELS { Err(too_deep()) } else { Ok((with(Box::new(a), Box::new(b)), levels)) }
+}
+
+fn too_deep() -> String {
+    format!("a condition has more than {MOST_LEVELS} levels")
+}
+
+fn either<'a>(
+    words: &mut Peekable<impl Iterator<Item = &'a str>>,
+    metrics: &[Metric],
+    room: u32,
+) -> Result<Levelled, String> {
+    let mut condition = both(words, metrics, room)?;
     while words.next_if_eq(&"or").is_some() {
-        condition = Condition::Or(Box::new(condition), Box::new(both(words, metrics)?));
+        condition = joined(condition, both(words, metrics, room)?, Condition::Or)?;
     }
     Ok(condition)
 }
 
-fn both<'a>(words: &mut Peekable<impl Iterator<Item = &'a str>>, metrics: &[Metric]) -> Result<Condition, String> {
-    let mut condition = one(words, metrics)?;
+fn both<'a>(
+    words: &mut Peekable<impl Iterator<Item = &'a str>>,
+    metrics: &[Metric],
+    room: u32,
+) -> Result<Levelled, String> {
+    let mut condition = one(words, metrics, room)?;
     while words.next_if_eq(&"and").is_some() {
-        condition = Condition::And(Box::new(condition), Box::new(one(words, metrics)?));
+        condition = joined(condition, one(words, metrics, room)?, Condition::And)?;
     }
     Ok(condition)
 }
 
-fn one<'a>(words: &mut Peekable<impl Iterator<Item = &'a str>>, metrics: &[Metric]) -> Result<Condition, String> {
+/// A comparison, or a condition in parentheses, of which as many more may be open as there is room.
+fn one<'a>(
+    words: &mut Peekable<impl Iterator<Item = &'a str>>,
+    metrics: &[Metric],
+    room: u32,
+) -> Result<Levelled, String> {
     let mut next = || words.next().ok_or("a condition ends too early");
     let left = next()?;
     if left == "(" {
-        let inside = either(words, metrics)?;
+        let inside = either(words, metrics, room.checked_sub(1).ok_or_else(too_deep)?)?;
         return match words.next() {
             Some(")") => Ok(inside),
             other => Err(format!("`{}` where a parenthesis should close", other.unwrap_or("the end"))),
@@ -90,7 +123,7 @@ fn one<'a>(words: &mut Peekable<impl Iterator<Item = &'a str>>, metrics: &[Metri
             .map(Operand::Number)
             .ok_or_else(|| format!("`{word}` is neither a metric nor a number in its unit")),
     };
-    Ok(Condition::Compare { left: operand(left)?, by, right: operand(right)? })
+    Ok((Condition::Compare { left: operand(left)?, by, right: operand(right)? }, 1))
 }
 
 #[cfg(test)]
@@ -136,6 +169,20 @@ mod tests {
         assert_eq!(refused("(near_zone1 > 3 or"), "a condition ends too early");
         assert_eq!(refused("(near_zone1 > 3"), "`the end` where a parenthesis should close");
         assert_eq!(refused("near_zone1 > 3 speed"), "`speed` after the end of a condition");
+    }
+
+    #[test]
+    fn what_is_deeper_than_any_condition_of_the_language_is_refused_before_the_stack_is_exhausted() {
+        let many = 200_000;
+        let nested = format!("{}near_zone1 > 1{}", "(".repeat(many), ")".repeat(many));
+        let chained = vec!["near_zone1 > 1"; many].join(" and ");
+        let either = vec!["near_zone1 > 1"; many].join(" or ");
+        for text in [nested, "(".repeat(many), chained, either] {
+            assert_eq!(read(&text, &metrics()).unwrap_err(), "a condition has more than 100 levels");
+        }
+        let within = format!("{}near_zone1 > 1{}", "(".repeat(100), ")".repeat(100));
+        assert!(read(&within, &metrics()).is_ok());
+        assert!(read(&vec!["near_zone1 > 1"; 100].join(" and "), &metrics()).is_ok());
     }
 
     proptest! {

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::visible::visible;
+
 /// Why results could not be written or read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -23,6 +25,15 @@ pub enum RecordError {
     Locked {
         /// The holder, where the lock file tells it.
         pid: Option<u32>,
+        /// The lock file.
+        path: PathBuf,
+    },
+    /// The lock was taken away while a run went on, so that another may write these results too.
+    #[error(
+        "the lock of these results was removed while they were written, so that another run may write them: this one ends; \
+         `resume` goes on: {}", path.display()
+    )]
+    LockLost {
         /// The lock file.
         path: PathBuf,
     },
@@ -151,7 +162,7 @@ pub enum RecordError {
         path: PathBuf,
     },
     /// The database refused.
-    #[error("cannot {doing}: {source}: {}", path.display())]
+    #[error("cannot {doing}: {}: {}", refusal(source), path.display())]
     Database {
         /// What was being done.
         doing: &'static str,
@@ -173,24 +184,45 @@ impl RecordError {
         let path = path.to_owned();
         match source.sqlite_error_code() {
             Some(NotADatabase) => RecordError::Foreign { found: "not an SQLite file".to_owned(), path },
-            Some(DatabaseCorrupt) => RecordError::Damaged { problem: source.to_string(), path },
+            Some(DatabaseCorrupt) => RecordError::Damaged { problem: visible(&source.to_string()), path },
             _ => RecordError::Database { doing, source, path },
         }
     }
 
-    pub(crate) fn damaged(path: &Path, problem: impl Into<String>) -> Self {
-        RecordError::Damaged { problem: problem.into(), path: path.to_owned() }
+    /// What is wrong with a file may quote it, so it is made fit to be shown.
+    pub(crate) fn damaged(path: &Path, problem: impl AsRef<str>) -> Self {
+        RecordError::Damaged { problem: visible(problem.as_ref()), path: path.to_owned() }
     }
 }
 
 /// The sets there are, in words; of many the first and the last.
 fn known_sets(known: &[String]) -> String {
-    let quoted: Vec<String> = known.iter().map(|name| format!("`{name}`")).collect();
+    let quoted: Vec<String> = known.iter().map(|name| format!("`{}`", visible(name))).collect();
     match quoted.as_slice() {
         [] => "there are none".to_owned(),
         [only] => format!("there is {only}"),
         [first, second, .., last] if quoted.len() > 6 => format!("there are {first}, {second}, … and {last}"),
         [most @ .., last] => format!("there are {} and {last}", most.join(", ")),
+    }
+}
+
+/// What the database says; of a failed write also the most common reason, which it does not know.
+fn refusal(source: &rusqlite::Error) -> String {
+    use rusqlite::ffi;
+    const WRITING: [std::ffi::c_int; 6] = [
+        ffi::SQLITE_IOERR_WRITE,
+        ffi::SQLITE_IOERR_TRUNCATE,
+        ffi::SQLITE_IOERR_FSYNC,
+        ffi::SQLITE_IOERR_SHMOPEN,
+        ffi::SQLITE_IOERR_SHMSIZE,
+        ffi::SQLITE_IOERR_SHMMAP,
+    ];
+    let said = visible(&source.to_string());
+    match source.sqlite_error() {
+        Some(error) if WRITING.contains(&error.extended_code) => {
+            format!("{said} while writing; perhaps the disk is full")
+        }
+        _ => said,
     }
 }
 

@@ -3,6 +3,7 @@
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use crate::record::{RecordError, Repository};
 
@@ -24,58 +25,131 @@ pub fn trace_file(folder: &Path, test: u32) -> PathBuf {
 }
 
 /// A fresh folder for a run.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug)]
 pub struct Claim {
-    /// The folder; it exists now, is empty, and is nobody else's.
+    /// The folder; it exists now, holds no results, and is nobody else's as long as the claim is kept.
     pub folder: PathBuf,
     /// The latest run of the same name that was begun, is not finished, and that no process is writing: what `resume`
     /// could go on with.
     pub unfinished: Option<PathBuf>,
+    pub(crate) lock: Lock,
 }
 
 /// Makes a fresh folder for a run: `<results>/<name>`, and where that is taken `<name>-2`, `<name>-3`, … A run of the
 /// campaign is named by its seed, so that [`latest_folder`] finds it.
+///
+/// A folder in which a run was killed before it had results is as good as a fresh one.
 pub fn claim_folder(results: &Path, name: &str) -> Result<Claim, RecordError> {
     std::fs::create_dir_all(results).map_err(|e| RecordError::io("make the folder for results", results, e))?;
     let mut unfinished = None;
     let mut n = 1u32;
     loop {
         let folder = results.join(if n == 1 { name.to_owned() } else { format!("{name}-{n}") });
-        // Making the folder is the claim: of two processes that try at once, one gets the next number.
         match std::fs::create_dir(&folder) {
-            Ok(()) => return Ok(Claim { folder, unfinished }),
-            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
-                if can_be_resumed(&folder) {
-                    unfinished = Some(folder);
-                }
-                n += 1;
+            Err(error) if error.kind() != std::io::ErrorKind::AlreadyExists => {
+                return Err(RecordError::io("make the folder for results", &folder, error));
             }
-            Err(error) => return Err(RecordError::io("make the folder for results", &folder, error)),
+            _ => {}
         }
+        if let Some(lock) = locked_for_a_beginning(&folder)? {
+            return Ok(Claim { folder, unfinished, lock });
+        }
+        if can_be_resumed(&folder) {
+            unfinished = Some(folder);
+        }
+        n += 1;
     }
 }
 
-/// The folder of the campaign's run whose results were written last, if there is any. Its name begins with its seed:
-/// what else was run on the side (known tests, repetitions) is looked at when it is asked for.
+/// The lock of a folder without results, unless another process has it. Of two that try at once, one gets it.
+fn locked_for_a_beginning(folder: &Path) -> Result<Option<Lock>, RecordError> {
+    if !holds_nothing(folder)? {
+        return Ok(None);
+    }
+    match Lock::acquire(folder) {
+        // Whoever had it until now may have begun.
+        Ok(lock) => Ok(holds_nothing(folder)?.then_some(lock)),
+        Err(RecordError::Locked { .. }) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// Whether there is nothing in a folder but what a run leaves that was killed as it began.
+fn holds_nothing(folder: &Path) -> Result<bool, RecordError> {
+    let failed = |error| RecordError::io("look into the folder", folder, error);
+    let entries = match std::fs::read_dir(folder) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotADirectory => return Ok(false),
+        entries => entries.map_err(failed)?,
+    };
+    for entry in entries {
+        let name = entry.map_err(failed)?.file_name();
+        if name != LOCK && name != BEGUN && name.to_str() != Some(&format!("{BEGUN}-journal")) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// The folder of the campaign's run whose results were written last, if there is any: the first of those that
+/// [`latest_unfinished`] goes through. Its name begins with its seed: what else was run on the side (known tests, repetitions)
+/// is looked at when it is asked for.
 pub fn latest_folder(results: &Path) -> Result<Option<PathBuf>, RecordError> {
+    Ok(latest_first(results)?.into_iter().next())
+}
+
+/// The folder of the campaign's run whose results were written last, of those that are not finished and that no process is
+/// writing, if there is any. Where all that are not finished are being written, the error names the process of the latest.
+///
+/// A run that was written later than it and cannot be read is an error: it may be the one that is meant.
+pub fn latest_unfinished(results: &Path) -> Result<Option<PathBuf>, RecordError> {
+    let mut at_work = None;
+    for folder in latest_first(results)? {
+        if Repository::open(&folder)?.campaign().stop.is_some() {
+            continue;
+        }
+        // The lock is let go at once: asking must not keep anybody from writing.
+        match Lock::acquire(&folder) {
+            Ok(_) => return Ok(Some(folder)),
+            Err(error @ RecordError::Locked { .. }) => at_work = at_work.or(Some(error)),
+            Err(error) => return Err(error),
+        }
+    }
+    at_work.map_or(Ok(None), Err)
+}
+
+/// The folders of the campaign's runs, those first whose results were written last.
+fn latest_first(results: &Path) -> Result<Vec<PathBuf>, RecordError> {
     let failed = |error| RecordError::io("look for results", results, error);
     let entries = match std::fs::read_dir(results) {
         Ok(entries) => entries,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
         Err(error) => return Err(failed(error)),
     };
-    let mut latest = None;
+    let mut runs = Vec::new();
     for entry in entries {
         let folder = entry.map_err(failed)?.path();
         let name = folder.file_name().unwrap_or_default().to_string_lossy();
-        if !name.starts_with(|first: char| first.is_ascii_digit()) {
-            continue;
+        if name.starts_with(|first: char| first.is_ascii_digit()) {
+            runs.extend(written_at(&folder).map(|written| (written, folder)));
         }
-        let Ok(written) = std::fs::metadata(folder.join(DATABASE)).and_then(|file| file.modified()) else { continue };
-        // Equal times are told apart by name, so that the answer does not depend on the order of the listing.
-        latest = latest.max(Some((written, folder)));
     }
-    Ok(latest.map(|(_, folder)| folder))
+    // Equal times are told apart by name, so that the answer does not depend on the order of the listing.
+    runs.sort();
+    Ok(runs.into_iter().rev().map(|(_, folder)| folder).collect())
+}
+
+/// When something was last written into the database of a folder, if there is one.
+///
+/// While a run goes on, and after it was killed, what is new is in the log beside the database. An empty log says nothing:
+/// reading makes one.
+fn written_at(folder: &Path) -> Option<SystemTime> {
+    let written = |name: String| {
+        let file = std::fs::metadata(folder.join(name)).ok()?;
+        Some((file.modified().ok()?, file.len()))
+    };
+    let (database, _) = written(DATABASE.to_owned())?;
+    let log = written(format!("{DATABASE}-wal")).filter(|&(_, length)| length > 0);
+    Some(log.map_or(database, |(log, _)| log.max(database)))
 }
 
 fn can_be_resumed(folder: &Path) -> bool {
@@ -87,7 +161,8 @@ fn can_be_resumed(folder: &Path) -> bool {
 /// The right to write into a folder; let go when dropped, and by the system when the process dies.
 #[derive(Debug)]
 pub(crate) struct Lock {
-    _file: File,
+    file: File,
+    path: PathBuf,
 }
 
 impl Lock {
@@ -117,6 +192,24 @@ impl Lock {
             .and_then(|()| file.rewind())
             .and_then(|()| file.write_all(format!("{}\n", std::process::id()).as_bytes()));
         written.map_err(|e| RecordError::io(doing, &path, e))?;
-        Ok(Lock { _file: file })
+        Ok(Lock { file, path })
+    }
+
+    /// Makes sure that the lock is still where others look for it. Somebody who removes the file lets another process in.
+    pub(crate) fn check(&self) -> Result<(), RecordError> {
+        let held = self.is_in_place().map_err(|e| RecordError::io("look at the lock", &self.path, e))?;
+        if held { Ok(()) } else { Err(RecordError::LockLost { path: self.path.clone() }) }
+    }
+
+    #[cfg(unix)]
+    fn is_in_place(&self) -> std::io::Result<bool> {
+        use std::os::unix::fs::MetadataExt as _;
+        Ok(self.file.metadata()?.nlink() > 0)
+    }
+
+    /// Elsewhere the name of an open file stays taken.
+    #[cfg(not(unix))]
+    fn is_in_place(&self) -> std::io::Result<bool> {
+        self.file.metadata().map(|_| true)
     }
 }

@@ -12,7 +12,7 @@ use crate::observation::{Observation, Outcome};
 use crate::record::folder::{BEGUN, DATABASE, Lock};
 use crate::record::schema::{self, index};
 use crate::record::{
-    Event, EventKind, GenerationCoverage, Origin, RecordError, Repository, ResultSet, TestRecord, series,
+    Claim, Event, EventKind, GenerationCoverage, Origin, RecordError, Repository, ResultSet, TestRecord, series,
 };
 use crate::search;
 use crate::search::indicators::GenerationIndicators;
@@ -25,14 +25,28 @@ pub struct Recorder {
     // Before the lock: the database is closed when the lock is let go.
     repository: Repository,
     session: i64,
-    _lock: Lock,
+    lock: Lock,
 }
 
 impl Recorder {
     /// Begins the results of a run in a folder, which is made if absent and must not hold results.
     pub fn create(folder: &Path, plan: &CampaignPlan, seed: u64, workers: u32) -> Result<Recorder, RecordError> {
         std::fs::create_dir_all(folder).map_err(|e| RecordError::io("make the folder for results", folder, e))?;
-        let lock = Lock::acquire(folder)?;
+        Recorder::create_locked(folder, Lock::acquire(folder)?, plan, seed, workers)
+    }
+
+    /// Begins the results of a run in a folder that was claimed for it.
+    pub fn create_in(claim: Claim, plan: &CampaignPlan, seed: u64, workers: u32) -> Result<Recorder, RecordError> {
+        Recorder::create_locked(&claim.folder, claim.lock, plan, seed, workers)
+    }
+
+    fn create_locked(
+        folder: &Path,
+        lock: Lock,
+        plan: &CampaignPlan,
+        seed: u64,
+        workers: u32,
+    ) -> Result<Recorder, RecordError> {
         let path = folder.join(DATABASE);
         if path.exists() {
             return Err(RecordError::Exists { path });
@@ -55,7 +69,14 @@ impl Recorder {
         std::fs::rename(&begun, &path).map_err(|e| RecordError::io("begin the results", &path, e))?;
         let connection = Connection::open(&path).map_err(failed)?;
         tune(&connection).map_err(failed)?;
-        Recorder::begin_session(Repository::from_connection(connection, path)?, lock, workers)
+        let repository = Repository::from_connection(connection, path).map_err(|error| match error {
+            // Reading back needs room for what SQLite keeps beside the file.
+            RecordError::Database { source, path, doing: _ } => {
+                RecordError::database("begin the results", &path, source)
+            }
+            other => other,
+        })?;
+        Recorder::begin_session(repository, lock, workers)
     }
 
     /// Goes on with the results of a run that was interrupted.
@@ -95,12 +116,16 @@ impl Recorder {
             )
             .map_err(|e| RecordError::database("begin a session", &repository.path, e))?;
         let session = repository.connection.last_insert_rowid();
-        Ok(Recorder { repository, session, _lock: lock })
+        Ok(Recorder { repository, session, lock })
     }
 
     /// What was recorded so far.
     pub fn repository(&self) -> &Repository {
         &self.repository
+    }
+
+    pub(super) fn check_lock(&self) -> Result<(), RecordError> {
+        self.lock.check()
     }
 
     pub(super) fn connection(&mut self) -> &mut Connection {
@@ -111,6 +136,7 @@ impl Recorder {
     pub fn commit(&mut self, record: &TestRecord) -> Result<(), RecordError> {
         let plan = &self.repository.facts.plan;
         let path = self.repository.path.clone();
+        self.lock.check()?;
         if let Some(what) = unrecordable(record) {
             return Err(RecordError::Unrecordable { test: record.number, what, path });
         }
@@ -120,7 +146,10 @@ impl Recorder {
         });
         written.map_err(|source| match source.sqlite_error() {
             Some(error) if error.extended_code == rusqlite::ffi::SQLITE_CONSTRAINT_PRIMARYKEY => {
-                RecordError::TestExists { number: record.number, path }
+                match self.repository.row(record.number) {
+                    Err(RecordError::NoSuchTest { .. }) => self.repository.without_test(record.number),
+                    _ => RecordError::TestExists { number: record.number, path },
+                }
             }
             _ => RecordError::database("record a test", &path, source),
         })

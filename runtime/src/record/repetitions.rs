@@ -112,6 +112,7 @@ impl Recorder {
     /// Records a repetition that has ended, of a test that was committed, and what its hooks warned of: all of it in one
     /// transaction, or nothing.
     pub fn put_repetition(&mut self, repetition: &Repetition, warnings: &[String]) -> Result<(), RecordError> {
+        self.check_lock()?;
         let Repetition { test, position, simulator_seed, outcome, end, messages, values } = repetition;
         let path = self.repository().path().to_owned();
         let unrecordable = |what: String| RecordError::Unrecordable { test: *test, what, path: path.clone() };
@@ -180,17 +181,19 @@ impl Repository {
     /// All repetitions of all tests: by test, and of each in their order.
     pub fn repetitions(&self) -> Result<BTreeMap<u32, Vec<Repetition>>, RecordError> {
         let values = self.read(
-            "SELECT test, position, value, is_set, reach_low, reach_high, not_finite_s FROM repetition_values \
+            "SELECT test, position, metric, value, is_set, reach_low, reach_high, not_finite_s FROM repetition_values \
              ORDER BY test, position, metric",
             [],
             |row| {
                 let at: (u32, u32) = (row.get(0)?, row.get(1)?);
-                Ok((at, super::repository::metric_value(row, 2)?))
+                Ok((at, super::repository::position(row, 2)?, super::repository::metric_value(row, 3)?))
             },
         )?;
         let mut of: BTreeMap<(u32, u32), Vec<MetricValue>> = BTreeMap::new();
-        for (at, value) in values {
-            of.entry(at).or_default().push(value);
+        for (at, metric, value) in values {
+            let of = of.entry(at).or_default();
+            self.in_order(at.0, "values in a repetition", metric, of.len())?;
+            of.push(value);
         }
         let rows = self.read(
             "SELECT test, position, simulator_seed, end_s, messages, outcome, outcome_detail, time_limit_s \
@@ -198,8 +201,9 @@ impl Repository {
             [],
             |row| {
                 let at: (u32, u32) = (row.get(0)?, row.get(1)?);
-                let ended: (f64, u64) = (row.get(3)?, super::repository::unsigned(row, 4)?);
-                let outcome: (String, Option<String>, Option<f64>) = (row.get(5)?, row.get(6)?, row.get(7)?);
+                let ended: (f64, u64) = (super::repository::finite(row, 3)?, super::repository::unsigned(row, 4)?);
+                let limit = super::repository::perhaps_finite(row, 7)?;
+                let outcome: (String, Option<String>, Option<f64>) = (row.get(5)?, row.get(6)?, limit);
                 Ok((at, row.get::<_, String>(2)?, ended, outcome))
             },
         )?;

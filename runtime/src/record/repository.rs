@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use rusqlite::types::FromSql;
 use rusqlite::{Connection, Row, params};
@@ -14,7 +15,7 @@ use crate::record::folder::{DATABASE, trace_file};
 use crate::record::scan::Cursor;
 use crate::record::{
     Event, EventKind, GenerationCoverage, MetricValue, Origin, RecordError, ResultSet, Session, Status, TestRecord,
-    TestRow, digest, schema,
+    TestRow, digest, recognise, schema,
 };
 use crate::search::indicators::GenerationIndicators;
 
@@ -45,13 +46,16 @@ pub struct CampaignFacts {
 const STATEMENTS: usize = 64;
 
 /// A recorded operation: position, name, seed of its draws, window and conditions.
-type OperationColumns = (i64, String, String, Window, Conditions);
+type OperationColumns = (usize, String, String, Window, Conditions);
 
 /// Start and end of a planned window.
 type Window = (Option<f64>, Option<f64>);
 
 /// Start condition, end condition, length and times of an activation by condition.
 type Conditions = (Option<String>, Option<String>, Option<f64>, Option<u32>);
+
+/// The longest wall time of a run that is believed, in seconds: thirty years, of which programs can still count multiples.
+const LONGEST_RUN: f64 = 1e9;
 
 /// Which intervals of an operation a table has.
 type SpansOf = fn(&mut OperationEffect) -> &mut Vec<Span>;
@@ -65,6 +69,8 @@ impl Repository {
     }
 
     pub(super) fn from_connection(connection: Connection, path: PathBuf) -> Result<Repository, RecordError> {
+        // Before anything is asked of it: what has the name of a table may be something else that never comes to an end.
+        recognise::tables(&connection, &path)?;
         let row: Result<(String, String, String, Option<String>), _> =
             connection.query_row("SELECT plan, seed, runtime, stop FROM campaign", [], |row| {
                 Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))
@@ -75,6 +81,7 @@ impl Repository {
         })?;
         let plan = serde_json::from_str(&plan)
             .map_err(|e| RecordError::damaged(&path, format!("its plan cannot be read: {e}")))?;
+        recognise::views(&connection, &path, &plan)?;
         let seed = seed.parse().map_err(|_| RecordError::damaged(&path, format!("`{seed}` is no seed")))?;
         connection.set_prepared_statement_cache_capacity(STATEMENTS);
         let schema = connection
@@ -175,7 +182,7 @@ impl Repository {
             "SELECT number, simulator_seed, messages, run_s FROM tests JOIN wall_times ON test = number \
              WHERE number BETWEEN ?1 AND ?2 ORDER BY number",
             within,
-            |row| Ok((row.get(0)?, (row.get::<_, String>(1)?, unsigned(row, 2)?, row.get(3)?))),
+            |row| Ok((row.get(0)?, (row.get::<_, String>(1)?, unsigned(row, 2)?, finite(row, 3)?))),
         )?;
         let mut heads: BTreeMap<u32, (String, u64, f64)> = heads.into_iter().collect();
         let mut parents: BTreeMap<u32, Vec<u32>> = self.by_test(
@@ -200,6 +207,9 @@ impl Repository {
             let number = row.number;
             let missing = || RecordError::NoSuchTest { name: format!("T{number}"), path: self.path.clone() };
             let (simulator_seed, messages, run) = heads.remove(&number).ok_or_else(missing)?;
+            if !(0.0..=LONGEST_RUN).contains(&run) {
+                return Err(RecordError::damaged(&self.path, format!("the run of T{number} took {run} s")));
+            }
             let mut metrics: Vec<MetricObservation> = row
                 .values
                 .iter()
@@ -325,8 +335,8 @@ impl Repository {
                     crashes: row.get(4)?,
                     timeouts: row.get(5)?,
                     front: row.get(6)?,
-                    hypervolume: row.get(7)?,
-                    standard_error: row.get(8)?,
+                    hypervolume: perhaps_finite(row, 7)?,
+                    standard_error: perhaps_finite(row, 8)?,
                 })
             },
         )
@@ -335,7 +345,12 @@ impl Repository {
     /// The point that the hypervolumes of [`Repository::indicators`] are measured from, a value per objective in its unit;
     /// `None` where there is none.
     pub fn reference_point(&self) -> Result<Option<Vec<f64>>, RecordError> {
-        let point = self.read("SELECT value FROM reference_point ORDER BY objective", [], |row| row.get(0))?;
+        let point = self.read("SELECT value FROM reference_point ORDER BY objective", [], |row| finite(row, 0))?;
+        let needed = self.plan().campaign.objectives.len();
+        if !point.is_empty() && point.len() != needed {
+            let problem = format!("its reference point has {} values for {needed} objectives", point.len());
+            return Err(RecordError::damaged(&self.path, problem));
+        }
         Ok(Some(point).filter(|point| !point.is_empty()))
     }
 
@@ -365,6 +380,9 @@ impl Repository {
     /// The tests whose numbers lie in this range: all tables are in their order, so that they are gone through side by side.
     fn rows(&self, numbers: RangeInclusive<u32>) -> Result<Vec<TestRow>, RecordError> {
         let failed = |error| RecordError::database("read the results", &self.path, error);
+        // One read transaction, so that a run writing meanwhile is seen at one point; there is one already within others.
+        let alone = self.connection.is_autocommit();
+        let _transaction = alone.then(|| self.connection.unchecked_transaction()).transpose().map_err(failed)?;
         let damaged = |problem: String| RecordError::damaged(&self.path, problem);
         let prepare = |sql: &str| self.connection.prepare_cached(sql).map_err(failed);
         let within = params![numbers.start(), numbers.end()];
@@ -373,11 +391,11 @@ impl Repository {
              FROM operations WHERE test BETWEEN ?1 AND ?2 ORDER BY test, position",
         )?;
         let mut choices = prepare(
-            "SELECT test, operation, value, low, high, x, y, z, text FROM choices WHERE test BETWEEN ?1 AND ?2 \
+            "SELECT test, operation, position, value, low, high, x, y, z, text FROM choices WHERE test BETWEEN ?1 AND ?2 \
              ORDER BY test, operation, position",
         )?;
         let mut values = prepare(
-            "SELECT test, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values \
+            "SELECT test, metric, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values \
              WHERE test BETWEEN ?1 AND ?2 ORDER BY test, metric",
         )?;
         let mut tests = prepare(
@@ -386,17 +404,18 @@ impl Repository {
         )?;
         let mut operations =
             Cursor::over(operations.query(within).map_err(failed)?, |row| -> rusqlite::Result<OperationColumns> {
-                let window = (row.get(4)?, row.get(5)?);
-                let conditions = (row.get(6)?, row.get(7)?, row.get(8)?, row.get(9)?);
-                Ok((row.get(1)?, row.get(2)?, row.get(3)?, window, conditions))
+                let window = (perhaps_finite(row, 4)?, perhaps_finite(row, 5)?);
+                let conditions = (row.get(6)?, row.get(7)?, perhaps_finite(row, 8)?, row.get(9)?);
+                Ok((position(row, 1)?, row.get(2)?, row.get(3)?, window, conditions))
             })
             .map_err(failed)?;
         let mut choices = Cursor::over(choices.query(within).map_err(failed)?, |row| -> rusqlite::Result<_> {
-            Ok((row.get::<_, i64>(1)?, choice(row, 2)?))
+            Ok((position(row, 1)?, position(row, 2)?, choice(row, 3)?))
         })
         .map_err(failed)?;
         let mut values =
-            Cursor::over(values.query(within).map_err(failed)?, |row| metric_value(row, 1)).map_err(failed)?;
+            Cursor::over(values.query(within).map_err(failed)?, |row| Ok((position(row, 1)?, metric_value(row, 2)?)))
+                .map_err(failed)?;
         let ids: BTreeMap<&str, OperationId> = (0u32..)
             .zip(&self.plan().operations)
             .map(|(id, operation)| (operation.name.as_str(), OperationId(id)))
@@ -408,19 +427,23 @@ impl Repository {
             let number: u32 = row.get(0).map_err(failed)?;
             let head = || -> rusqlite::Result<_> {
                 let origin: (String, Option<String>) = (row.get(1)?, row.get(2)?);
-                let outcome: (String, Option<String>, Option<f64>) = (row.get(4)?, row.get(5)?, row.get(6)?);
-                Ok((origin, row.get(3)?, outcome, row.get(7)?, row.get(8)?))
+                let outcome: (String, Option<String>, Option<f64>) =
+                    (row.get(4)?, row.get(5)?, perhaps_finite(row, 6)?);
+                Ok((origin, row.get(3)?, outcome, finite(row, 7)?, row.get(8)?))
             };
             let ((origin, known), generation, (outcome, detail, limit), end, duplicate_of) = head().map_err(failed)?;
-            let mut chosen: BTreeMap<i64, Vec<Choice>> = BTreeMap::new();
-            for (at, choice) in choices.of(number).map_err(failed)? {
+            let mut chosen: BTreeMap<usize, Vec<Choice>> = BTreeMap::new();
+            for (at, position, choice) in choices.of(number).map_err(failed)? {
                 let choice = choice.ok_or_else(|| {
                     damaged(format!("T{number} has a choice that is neither value, range, point nor text"))
                 })?;
-                chosen.entry(at).or_default().push(choice);
+                let of = chosen.entry(at).or_default();
+                self.in_order(number, "choices", position, of.len())?;
+                of.push(choice);
             }
             let mut used = Vec::new();
             for (at, name, draw_seed, window, conditions) in operations.of(number).map_err(failed)? {
+                self.in_order(number, "operations", at, used.len())?;
                 let operation = *ids
                     .get(name.as_str())
                     .ok_or_else(|| damaged(format!("T{number} has an operation `{name}` that the plan lacks")))?;
@@ -433,22 +456,63 @@ impl Repository {
                     draw_seed: self.seed(&draw_seed)?,
                 });
             }
-            let mut values = values.of(number).map_err(failed)?;
+            if !chosen.is_empty() {
+                return Err(damaged(format!("T{number} has a choice without an operation")));
+            }
+            let mut measured = Vec::new();
+            for (metric, value) in values.of(number).map_err(failed)? {
+                self.in_order(number, "values", metric, measured.len())?;
+                measured.push(value);
+            }
             // Room to grow would be a third of what all tests take in memory.
-            values.shrink_to_fit();
+            measured.shrink_to_fit();
             used.shrink_to_fit();
+            let test = Test { operations: used };
+            self.fitting(number, &test, measured.len())?;
             found.push(TestRow {
                 number,
                 origin: self.origin(&origin, known.as_deref())?,
                 generation,
-                test: Test { operations: used },
+                test,
                 outcome: self.outcome(&outcome, detail, limit)?,
                 end,
                 duplicate_of,
-                values,
+                values: measured,
             });
         }
-        Ok(found)
+        let orphans = [operations.orphan(), choices.orphan(), values.orphan()];
+        match orphans.into_iter().flatten().min() {
+            // A test that is asked for by itself is missing for whoever asked.
+            Some(orphan) if numbers.start() < numbers.end() => Err(self.without_test(orphan)),
+            _ => Ok(found),
+        }
+    }
+
+    /// Rows of a test are numbered from 0, none is missing.
+    pub(super) fn in_order(&self, test: u32, what: &str, found: usize, expected: usize) -> Result<(), RecordError> {
+        if found == expected {
+            return Ok(());
+        }
+        Err(RecordError::damaged(&self.path, format!("of the {what} of T{test}, number {expected} is missing")))
+    }
+
+    /// A test is one of the plan, and has a value for each of its metrics or, after a crash of the worker, none.
+    pub(super) fn fitting(&self, number: u32, test: &Test, values: usize) -> Result<(), RecordError> {
+        let damaged = |problem: String| RecordError::damaged(&self.path, format!("T{number}: {problem}"));
+        self.plan().validate_test(test).map_err(|error| damaged(error.to_string()))?;
+        let metrics = self.plan().metrics.len();
+        if values != 0 && values != metrics {
+            return Err(damaged(format!("there are {values} values of {metrics} metrics")));
+        }
+        Ok(())
+    }
+
+    /// Something is recorded of a test, but not the test.
+    pub(super) fn without_test(&self, number: impl std::fmt::Display) -> RecordError {
+        RecordError::damaged(
+            &self.path,
+            format!("T{number} is gone, and some of what was recorded of it is still there"),
+        )
     }
 
     fn activation(
@@ -510,8 +574,8 @@ impl Repository {
                         side_effects: unsigned(row, 7)?,
                         unheard: unsigned(row, 8)?,
                     },
-                    first_touch: row.get(9)?,
-                    last_touch: row.get(10)?,
+                    first_touch: perhaps_finite(row, 9)?,
+                    last_touch: perhaps_finite(row, 10)?,
                 }))
             },
         )?;
@@ -539,8 +603,7 @@ impl Repository {
             ),
         ];
         for (sql, spans_of) in tables {
-            let spans = self
-                .by_test(sql, numbers, |row| Ok((position(row, 1)?, Span { start: row.get(2)?, end: row.get(3)? })))?;
+            let spans = self.by_test(sql, numbers, |row| Ok((position(row, 1)?, span(row, 2)?)))?;
             for (number, spans) in spans {
                 // What belongs to no test is nobody's.
                 let Some(effects) = effects.get_mut(&number) else { continue };
@@ -579,7 +642,10 @@ impl Repository {
             ("void", None, None) => Ok(Outcome::Void),
             ("unknown", None, None) => Ok(Outcome::Unknown),
             ("crash", Some(message), None) => Ok(Outcome::Crash { message }),
-            ("timeout", None, Some(limit)) => Ok(Outcome::Timeout { limit }),
+            // A length of wall time, as programs count it.
+            ("timeout", None, Some(limit)) if Duration::try_from_secs_f64(limit).is_ok() => {
+                Ok(Outcome::Timeout { limit })
+            }
             _ => Err(RecordError::damaged(&self.path, format!("a test cannot have ended as `{word}`"))),
         }
     }
@@ -630,11 +696,34 @@ pub(super) fn unsigned(row: &Row<'_>, column: usize) -> rusqlite::Result<u64> {
 /// what was not finite.
 pub(super) fn metric_value(row: &Row<'_>, first: usize) -> rusqlite::Result<MetricValue> {
     Ok(MetricValue {
-        value: row.get(first)?,
+        value: perhaps_finite(row, first)?,
         set: row.get(first + 1)?,
-        reach: Reach { low: row.get(first + 2)?, high: row.get(first + 3)? },
-        not_finite: row.get(first + 4)?,
+        reach: Reach { low: perhaps_finite(row, first + 2)?, high: perhaps_finite(row, first + 3)? },
+        not_finite: perhaps_finite(row, first + 4)?,
     })
+}
+
+/// A number; infinity, which is never recorded, is an error of conversion.
+pub(super) fn finite(row: &Row<'_>, column: usize) -> rusqlite::Result<f64> {
+    let number: f64 = row.get(column)?;
+    if number.is_finite() {
+        return Ok(number);
+    }
+    let words = format!("{number} is recorded where only finite numbers are");
+    Err(rusqlite::Error::FromSqlConversionFailure(column, rusqlite::types::Type::Real, words.into()))
+}
+
+/// A number, if there is one.
+pub(super) fn perhaps_finite(row: &Row<'_>, column: usize) -> rusqlite::Result<Option<f64>> {
+    match row.get_ref(column)? {
+        rusqlite::types::ValueRef::Null => Ok(None),
+        _ => finite(row, column).map(Some),
+    }
+}
+
+/// A stretch of time, from the columns of its ends.
+pub(super) fn span(row: &Row<'_>, first: usize) -> rusqlite::Result<Span> {
+    Ok(Span { start: finite(row, first)?, end: finite(row, first + 1)? })
 }
 
 /// A position in a list.
@@ -646,8 +735,9 @@ pub(super) fn position(row: &Row<'_>, column: usize) -> rusqlite::Result<usize> 
 /// What was chosen for a parameter, from the columns value, low, high, x, y, z and text that begin here; `None` where it
 /// is neither value, range, point nor text.
 pub(super) fn choice(row: &Row<'_>, first: usize) -> rusqlite::Result<Option<Choice>> {
-    let point: [Option<f64>; 3] = [row.get(first + 3)?, row.get(first + 4)?, row.get(first + 5)?];
-    Ok(match (row.get(first)?, row.get(first + 1)?, row.get(first + 2)?, point, row.get(first + 6)?) {
+    let number = |column: usize| perhaps_finite(row, first + column);
+    let point = [number(3)?, number(4)?, number(5)?];
+    Ok(match (number(0)?, number(1)?, number(2)?, point, row.get(first + 6)?) {
         (Some(value), None, None, [None, None, None], None) => Some(Choice::Value { value }),
         (None, Some(low), Some(high), [None, None, None], None) => Some(Choice::Range { low, high }),
         (None, None, None, [Some(x), Some(y), Some(z)], None) => Some(Choice::Point { point: [x, y, z] }),

@@ -7,7 +7,7 @@ use sesame_plan::{CampaignPlan, Choice, OperationId, Span};
 
 use crate::coverage;
 use crate::observation::Outcome;
-use crate::record::repository::{choice, metric_value, position};
+use crate::record::repository::{choice, metric_value, perhaps_finite, position, span};
 use crate::record::{MetricValue, Origin, RecordError, Repository};
 use crate::sspr::{Convention, Disturbance, Point, disturbance};
 
@@ -80,12 +80,14 @@ pub(super) struct Cursor<'s, T> {
     rows: Rows<'s>,
     read: fn(&Row<'_>) -> rusqlite::Result<T>,
     next: Option<(u32, T)>,
+    /// A test that rows were passed over of: nobody asked for it.
+    passed_over: Option<u32>,
 }
 
 impl<'s, T> Cursor<'s, T> {
     /// The first column of each row is its test.
     pub(super) fn over(rows: Rows<'s>, read: fn(&Row<'_>) -> rusqlite::Result<T>) -> rusqlite::Result<Self> {
-        let mut cursor = Cursor { rows, read, next: None };
+        let mut cursor = Cursor { rows, read, next: None, passed_over: None };
         cursor.step()?;
         Ok(cursor)
     }
@@ -108,15 +110,22 @@ impl<'s, T> Cursor<'s, T> {
             }
             if owner == test {
                 found.push(item);
+            } else {
+                self.passed_over = Some(owner);
             }
             self.step()?;
         }
         Ok(found)
     }
+
+    /// A test that has rows here, and that was not asked for.
+    pub(super) fn orphan(&self) -> Option<u32> {
+        self.passed_over.or(self.next.as_ref().map(|(owner, _)| *owner))
+    }
 }
 
-/// A row of `operations`: the operation's name, when it was to be active, and whether it had an effect, or nobody counted.
-type PlannedRow = (String, Option<Span>, bool);
+/// A row of `operations`: its position, the operation's name, when it was to be active, and whether it had an effect, or nobody counted.
+type PlannedRow = (usize, String, Option<Span>, bool);
 
 /// A row of `choices`: the position of its operation, and the choice; `None` where it is none.
 type ChoiceRow = (usize, Option<Choice>);
@@ -132,7 +141,7 @@ impl Repository {
         let _transaction = self.connection.unchecked_transaction().map_err(failed)?;
 
         let mut operations = prepare(
-            "SELECT test, operation, start_s, end_s, \
+            "SELECT test, position, operation, start_s, end_s, \
              coalesce(changed + dropped + delayed + queued + injected + side_effects > 0, TRUE) \
              FROM operations ORDER BY test, position",
         )?;
@@ -142,7 +151,8 @@ impl Repository {
         let mut intervals =
             prepare("SELECT test, operation, start_s, end_s FROM intervals ORDER BY test, operation, position")?;
         let mut values = prepare(
-            "SELECT test, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values ORDER BY test, metric",
+            "SELECT test, metric, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values \
+             ORDER BY test, metric",
         )?;
         let mut tests = prepare(
             "SELECT number, origin, known_test, generation, outcome, outcome_detail, time_limit_s, duplicate_of \
@@ -150,19 +160,21 @@ impl Repository {
         )?;
         let mut operations =
             Cursor::over(operations.query([]).map_err(failed)?, |row| -> rusqlite::Result<PlannedRow> {
-                let (start, end): (Option<f64>, Option<f64>) = (row.get(2)?, row.get(3)?);
-                Ok((row.get(1)?, start.zip(end).map(|(start, end)| Span { start, end }), row.get(4)?))
+                let (start, end) = (perhaps_finite(row, 3)?, perhaps_finite(row, 4)?);
+                let planned = start.zip(end).map(|(start, end)| Span { start, end });
+                Ok((position(row, 1)?, row.get(2)?, planned, row.get(5)?))
             })
             .map_err(failed)?;
         let mut choices = Cursor::over(choices.query([]).map_err(failed)?, |row| -> rusqlite::Result<ChoiceRow> {
             Ok((position(row, 1)?, choice(row, 2)?))
         })
         .map_err(failed)?;
-        let mut intervals = Cursor::over(intervals.query([]).map_err(failed)?, |row| {
-            Ok((position(row, 1)?, Span { start: row.get(2)?, end: row.get(3)? }))
-        })
-        .map_err(failed)?;
-        let mut values = Cursor::over(values.query([]).map_err(failed)?, |row| metric_value(row, 1)).map_err(failed)?;
+        let mut intervals =
+            Cursor::over(intervals.query([]).map_err(failed)?, |row| Ok((position(row, 1)?, span(row, 2)?)))
+                .map_err(failed)?;
+        let mut values =
+            Cursor::over(values.query([]).map_err(failed)?, |row| Ok((position(row, 1)?, metric_value(row, 2)?)))
+                .map_err(failed)?;
 
         let ids: BTreeMap<&str, OperationId> = (0u32..)
             .zip(&self.plan().operations)
@@ -173,7 +185,8 @@ impl Repository {
             let number: u32 = row.get(0).map_err(failed)?;
             let head = || -> rusqlite::Result<_> {
                 let origin: (String, Option<String>) = (row.get(1)?, row.get(2)?);
-                let outcome: (String, Option<String>, Option<f64>) = (row.get(4)?, row.get(5)?, row.get(6)?);
+                let outcome: (String, Option<String>, Option<f64>) =
+                    (row.get(4)?, row.get(5)?, perhaps_finite(row, 6)?);
                 Ok((origin, row.get(3)?, outcome, row.get(7)?))
             };
             let ((origin, known), generation, (outcome, detail, limit), duplicate_of) = head().map_err(failed)?;
@@ -184,9 +197,14 @@ impl Repository {
                 outcome: self.outcome(&outcome, detail, limit)?,
                 duplicate_of,
                 operations: Vec::new(),
-                values: values.of(number).map_err(failed)?,
+                values: Vec::new(),
             };
-            for (name, planned, acted) in operations.of(number).map_err(failed)? {
+            for (metric, value) in values.of(number).map_err(failed)? {
+                self.in_order(number, "values", metric, test.values.len())?;
+                test.values.push(value);
+            }
+            for (at, name, planned, acted) in operations.of(number).map_err(failed)? {
+                self.in_order(number, "operations", at, test.operations.len())?;
                 let operation = *ids
                     .get(name.as_str())
                     .ok_or_else(|| damaged(format!("T{number} has an operation `{name}` that the plan lacks")))?;
@@ -208,9 +226,22 @@ impl Repository {
             for (at, span) in intervals.of(number).map_err(failed)? {
                 test.operations.get_mut(at).ok_or_else(|| stray("an interval"))?.intervals.push(span);
             }
+            for it in &test.operations {
+                let (needed, chosen) = (self.plan().operation(it.operation).parameters.len(), it.choices.len());
+                if needed != chosen {
+                    return Err(damaged(format!("T{number} has {chosen} choices for {needed} parameters")));
+                }
+            }
+            if !test.values.is_empty() && test.values.len() != self.plan().metrics.len() {
+                return Err(damaged(format!("T{number} has {} values", test.values.len())));
+            }
             each(test);
         }
-        Ok(())
+        let orphans = [operations.orphan(), choices.orphan(), intervals.orphan(), values.orphan()];
+        match orphans.into_iter().flatten().min() {
+            Some(orphan) => Err(self.without_test(orphan)),
+            None => Ok(()),
+        }
     }
 }
 

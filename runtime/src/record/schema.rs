@@ -19,7 +19,7 @@ pub(crate) const EARLIEST: i64 = 5;
 /// Marks an SQLite file as ours, in its `application_id`: "SESM".
 pub(crate) const APPLICATION_ID: i64 = 0x5345_534D;
 
-const DDL: &str = include_str!("schema.sql");
+pub(super) const DDL: &str = include_str!("schema.sql");
 
 /// Makes all tables and views, and fills in what is fixed for a campaign; all or nothing.
 pub(crate) fn install(connection: &mut Connection, plan: &CampaignPlan, seed: u64) -> rusqlite::Result<()> {
@@ -88,7 +88,7 @@ pub(crate) fn index(position: usize) -> i64 {
 
 /// The views with a column per metric, which only a plan can name: `results` has a row per test, `front` those of the
 /// final front, or of the latest one while the campaign is unfinished.
-fn wide_views(plan: &CampaignPlan) -> String {
+pub(super) fn wide_views(plan: &CampaignPlan) -> String {
     let mut columns = String::new();
     for (id, metric) in plan.metrics.iter().enumerate() {
         let name = metric.name.replace('"', "\"\"");

@@ -266,17 +266,180 @@ fn what_is_no_repository_of_this_release_is_refused_with_what_to_do() {
 #[test]
 fn a_taken_folder_gets_the_next_number_and_an_unfinished_one_is_named() {
     let results = folder();
-    let first = claim_folder(results.path(), "42").unwrap();
-    assert_eq!(first, Claim { folder: results.path().join("42"), unfinished: None });
-    let running = commit_all(&first.folder, &[]);
-    let second = claim_folder(results.path(), "42").unwrap();
-    assert_eq!(second, Claim { folder: results.path().join("42-2"), unfinished: None }, "the first still runs");
+    let claimed = |name: &str| {
+        let Claim { folder, unfinished, .. } = claim_folder(results.path(), name).unwrap();
+        (folder, unfinished)
+    };
+    let (first, second, third) = (results.path().join("42"), results.path().join("42-2"), results.path().join("42-3"));
+    assert_eq!(claimed("42"), (first.clone(), None));
+    let running = commit_all(&first, &[]);
+    assert_eq!(claimed("42"), (second.clone(), None), "the first still runs");
+    std::fs::write(second.join("mine"), "what is in a folder is not touched").unwrap();
     running.interrupt().unwrap();
-    let third = claim_folder(results.path(), "42").unwrap();
-    assert_eq!(third, Claim { folder: results.path().join("42-3"), unfinished: Some(first.folder.clone()) });
-    Recorder::resume(&first.folder, 1).unwrap().finish("done").unwrap();
-    assert_eq!(claim_folder(results.path(), "42").unwrap().unfinished, None);
-    assert_eq!(claim_folder(results.path(), "7").unwrap().folder, results.path().join("7"));
+    assert_eq!(claimed("42"), (third, Some(first.clone())));
+    Recorder::resume(&first, 1).unwrap().finish("done").unwrap();
+    assert_eq!(claimed("42").1, None);
+    assert_eq!(claimed("7").0, results.path().join("7"));
+}
+
+#[test]
+fn a_folder_that_a_run_left_without_results_is_taken_by_the_next_one_unless_it_is_being_begun() {
+    let results = folder();
+    let run = results.path().join("42");
+    let leftovers: [&[&str]; 3] =
+        [&[], &["results.lock"], &["results.lock", "results.sqlite.begun", "results.sqlite.begun-journal"]];
+    for left in leftovers {
+        std::fs::create_dir_all(&run).unwrap();
+        for name in left {
+            std::fs::write(run.join(name), "half").unwrap();
+        }
+        let claim = claim_folder(results.path(), "42").unwrap();
+        assert_eq!(claim.folder, run, "{left:?}");
+        let other = claim_folder(results.path(), "42").unwrap();
+        assert_eq!(other.folder, results.path().join("42-2"), "{left:?}: the first is claimed");
+        drop(other);
+        let recorder = Recorder::create_in(claim, &sample::plan(), 42, 1).unwrap();
+        assert_eq!(claim_folder(results.path(), "42").unwrap().folder, results.path().join("42-2"));
+        recorder.finish("done").unwrap();
+        std::fs::remove_dir_all(&run).unwrap();
+    }
+}
+
+/// Sets back the clock of what is in a folder, by so many seconds.
+fn age(folder: &Path, seconds: u64) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let file = std::fs::File::options().write(true).open(entry.unwrap().path()).unwrap();
+        let then = file.metadata().unwrap().modified().unwrap() - std::time::Duration::from_secs(seconds);
+        file.set_modified(then).unwrap();
+    }
+}
+
+#[test]
+fn a_killed_run_whose_log_was_written_last_is_the_latest_and_the_one_to_go_on_with() {
+    let (results, elsewhere) = (folder(), folder());
+    let [killed, finished] = ["7", "8"].map(|name| results.path().join(name));
+    assert_eq!(latest_unfinished(results.path()).unwrap(), None);
+    // The run that is killed was begun first, and its database is as old as that.
+    let recorder = commit_all(&elsewhere.path().join("7"), &sample::records(&sample::plan(), 3));
+    std::fs::create_dir(&killed).unwrap();
+    for entry in std::fs::read_dir(elsewhere.path().join("7")).unwrap() {
+        let entry = entry.unwrap();
+        std::fs::copy(entry.path(), killed.join(entry.file_name())).unwrap();
+    }
+    drop(recorder);
+    age(&killed, 500);
+    commit_all(&finished, &[]).finish("done").unwrap();
+    age(&finished, 100);
+    assert_eq!(latest_folder(results.path()).unwrap(), Some(finished.clone()), "it was written last");
+    assert_eq!(latest_unfinished(results.path()).unwrap(), Some(killed.clone()));
+
+    let log = std::fs::File::options().write(true).open(killed.join("results.sqlite-wal")).unwrap();
+    assert!(log.metadata().unwrap().len() > 0);
+    log.set_modified(std::time::SystemTime::now()).unwrap();
+    assert_eq!(latest_folder(results.path()).unwrap(), Some(killed.clone()), "its log was written last");
+    assert_eq!(latest_unfinished(results.path()).unwrap(), Some(killed.clone()));
+
+    let resumed = Recorder::resume(&killed, 1).unwrap();
+    assert!(matches!(latest_unfinished(results.path()), Err(RecordError::Locked { .. })), "somebody is at it");
+    resumed.finish("done").unwrap();
+    assert_eq!(latest_unfinished(results.path()).unwrap(), None);
+}
+
+#[test]
+fn reading_an_older_run_does_not_make_it_the_latest() {
+    let results = folder();
+    let [older, newer] = ["7", "8"].map(|name| results.path().join(name));
+    // Interrupted in good order: a database that wants a log, and none beside it.
+    commit_all(&older, &[]).interrupt().unwrap();
+    age(&older, 500);
+    commit_all(&newer, &[]).interrupt().unwrap();
+    age(&newer, 100);
+    let reading = Repository::open(&older).unwrap();
+    assert!(reading.tests().unwrap().is_empty());
+    assert_eq!(latest_folder(results.path()).unwrap(), Some(newer.clone()));
+    drop(reading);
+    assert_eq!(latest_folder(results.path()).unwrap(), Some(newer.clone()));
+    assert_eq!(latest_unfinished(results.path()).unwrap(), Some(newer.clone()));
+    // What was written last and cannot be read may be the one that is meant.
+    std::fs::write(newer.join(DATABASE), "notes").unwrap();
+    assert!(matches!(latest_unfinished(results.path()), Err(RecordError::Foreign { .. })));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_whose_lock_was_removed_writes_no_more_and_can_be_gone_on_with() {
+    let folder = folder();
+    let records = sample::records(&sample::plan(), 3);
+    let mut recorder = commit_all(folder.path(), &records[..2]);
+    std::fs::remove_file(folder.path().join(LOCK)).unwrap();
+    let other = Recorder::resume(folder.path(), 1).unwrap();
+    let said = recorder.commit(&records[2]).unwrap_err().to_string();
+    assert!(said.contains("the lock of these results was removed"), "{said}");
+    drop(other);
+    drop(recorder);
+    let mut resumed = Recorder::resume(folder.path(), 1).unwrap();
+    records[2..].iter().for_each(|record| resumed.commit(record).unwrap());
+}
+
+#[test]
+fn a_test_of_which_only_parts_are_left_is_damage_for_those_who_read_and_those_who_go_on() {
+    let folder = folder();
+    let records = sample::records(&sample::plan(), 3);
+    drop(commit_all(folder.path(), &records[..4]));
+    let connection = Connection::open(folder.path().join(DATABASE)).unwrap();
+    connection.pragma_update(None, "foreign_keys", false).unwrap();
+    for number in [0u32, 3] {
+        connection.execute("DELETE FROM tests WHERE number = ?1", [number]).unwrap();
+        let gone = format!("T{number} is gone, and some of what was recorded of it is still there");
+        let repository = Repository::open(folder.path()).unwrap();
+        for said in [repository.tests().map(drop), repository.scan(&mut drop)] {
+            let said = said.unwrap_err().to_string();
+            assert!(said.contains(&gone), "{said}");
+        }
+        let mut resumed = Recorder::resume(folder.path(), 1).unwrap();
+        let said = resumed.commit(&records[number as usize]).unwrap_err().to_string();
+        assert!(said.contains(&gone), "{said}");
+        drop(resumed);
+        let tables = ["metric_values", "operations", "choices", "intervals", "change_points", "wall_times"];
+        for table in tables {
+            connection.execute(&format!("DELETE FROM {table} WHERE test = ?1"), [number]).unwrap();
+        }
+    }
+}
+
+#[test]
+fn positions_with_gaps_and_numbers_that_are_never_recorded_are_damage() {
+    let changes = [
+        ("DELETE FROM metric_values WHERE test = 1 AND metric = 1", "of the values of T1, number 1 is missing"),
+        ("DELETE FROM metric_values WHERE test = 1 AND metric = 4", "there are 4 values of 5 metrics"),
+        ("UPDATE operations SET position = 3 WHERE test = 1", "of the operations of T1, number 0 is missing"),
+        ("DELETE FROM choices WHERE test = 1", "parameters: there are 0 instead of 1"),
+        ("UPDATE choices SET position = 1 WHERE test = 1", "of the choices of T1, number 0 is missing"),
+        (
+            "UPDATE choices SET low = NULL, high = NULL, text = 'x' WHERE test = 1",
+            "is of another kind than its parameter",
+        ),
+        ("UPDATE choices SET high = -9 WHERE test = 1", "runs from 0.27 to -9"),
+        ("UPDATE operations SET start_s = 9e999 WHERE test = 1", "inf is recorded where only finite numbers are"),
+        ("UPDATE tests SET end_s = -9e999 WHERE number = 1", "-inf is recorded where only finite numbers are"),
+        ("UPDATE tests SET outcome = 'timeout', time_limit_s = -1 WHERE number = 1", "cannot have ended as `timeout`"),
+        ("UPDATE metric_values SET reach_high = 9e999", "inf is recorded where only finite numbers are"),
+    ];
+    for (change, words) in changes {
+        let folder = folder();
+        drop(commit_all(folder.path(), &sample::records(&sample::plan(), 3)));
+        Connection::open(folder.path().join(DATABASE)).unwrap().execute_batch(change).unwrap();
+        let said = Repository::open(folder.path()).unwrap().tests().unwrap_err().to_string();
+        assert!(said.contains(words), "{change}: {said}");
+    }
+    for seconds in ["-1", "1e300"] {
+        let folder = folder();
+        drop(commit_all(folder.path(), &sample::records(&sample::plan(), 3)));
+        let connection = Connection::open(folder.path().join(DATABASE)).unwrap();
+        connection.execute_batch(&format!("UPDATE wall_times SET run_s = {seconds}")).unwrap();
+        let said = Repository::open(folder.path()).unwrap().test(1).unwrap_err().to_string();
+        assert!(said.contains("the run of T1 took"), "{said}");
+    }
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Tables of text for a terminal.
 
+pub(crate) use crate::visible::visible;
+
 use unicode_width::UnicodeWidthStr as _;
 
 use crate::analysis::{Dataset, Datum};
@@ -149,14 +151,6 @@ pub(crate) fn wrap(text: &str, width: usize) -> Vec<String> {
         }
     }
     lines
-}
-
-/// Text on one line without control characters.
-pub(crate) fn visible(text: &str) -> String {
-    text.chars()
-        .map(|c| if c == '\n' || c == '\t' { ' ' } else { c })
-        .map(|c| if c.is_control() { '�' } else { c })
-        .collect()
 }
 
 #[cfg(test)]

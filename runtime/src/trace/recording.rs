@@ -20,6 +20,7 @@ use crate::metric::{MetricTable, Metrics};
 use crate::observation::{MetricObservation, OperationEffect};
 use crate::time::SimTime;
 use crate::value::Value;
+use crate::visible::visible;
 use crate::wire::{Wire, WireTable};
 
 /// The largest record that is read, in bytes.
@@ -231,9 +232,9 @@ fn sorted(error: McapError, path: &Path) -> RecordingError {
     match error {
         McapError::BadMagic => RecordingError::Foreign { path },
         McapError::UnexpectedEof => RecordingError::CutOff { path },
-        McapError::UnsupportedCompression(method) => RecordingError::Compressed { method, path },
+        McapError::UnsupportedCompression(method) => RecordingError::Compressed { method: visible(&method), path },
         McapError::Io(error) => RecordingError::Unreadable { reason: error.to_string(), path },
-        other => RecordingError::Damaged { problem: other.to_string(), path },
+        other => RecordingError::Damaged { problem: visible(&other.to_string()), path },
     }
 }
 
@@ -297,7 +298,7 @@ impl Feeder<'_> {
         };
         if channel.message_encoding != "json" {
             return Err(RecordingError::Encoding {
-                topic: channel.topic.clone(),
+                topic: visible(&channel.topic),
                 encoding: channel.message_encoding.escape_debug().to_string(),
                 path: self.path.to_owned(),
             });
@@ -325,7 +326,7 @@ impl Feeder<'_> {
         let value = payload(self.plan, &mut self.shapes, ty, data).map_err(|reason| RecordingError::WrongType {
             topic: self.wires.path(wire).to_owned(),
             time,
-            reason,
+            reason: visible(&reason),
             path: self.path.to_owned(),
         })?;
         if delivered {

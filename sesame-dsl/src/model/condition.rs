@@ -118,7 +118,7 @@ pub struct ConditionSpace {
 
 impl ConditionSpace {
     /// The most levels that a campaign may permit.
-    pub const MAX_DEPTH: u32 = 10;
+    pub const MAX_DEPTH: u32 = sesame_plan::condition::ConditionSpace::MOST_DEPTH;
     /// The levels of a campaign that says nothing of them.
     pub const DEFAULT_DEPTH: u32 = 4;
     /// The whole numbers of a campaign that says nothing of them.
