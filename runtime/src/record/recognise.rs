@@ -12,18 +12,43 @@ use std::sync::OnceLock;
 use rusqlite::Connection;
 use sesame_plan::CampaignPlan;
 
-use crate::record::RecordError;
-use crate::record::schema::{DDL, wide_views};
+use crate::record::schema::{DDL, SCHEMA, wide_views};
+use crate::record::{RecordError, series};
 
 /// What a schema holds, by name: the kind of each object, and the words it was made by.
 type Objects = BTreeMap<String, (String, String)>;
 
+/// What turns the tables of this program into those of schema 5, whose series had a row per point.
+const TO_SCHEMA_5: &str = "
+DROP TABLE series_pieces;
+DROP INDEX events_by_test;
+CREATE TABLE change_points (
+    test            INTEGER NOT NULL REFERENCES tests,
+    metric          INTEGER NOT NULL REFERENCES metrics,
+    position        INTEGER NOT NULL,
+    time_s          REAL NOT NULL,
+    value           REAL NOT NULL,
+    PRIMARY KEY (test, metric, position)
+) STRICT, WITHOUT ROWID;
+CREATE VIEW series AS
+    SELECT t.number AS test, t.name AS test_name, m.name AS metric, m.unit AS unit, c.position AS position,
+           c.time_s AS time_s, c.value AS value
+      FROM tests t JOIN change_points c ON c.test = coalesce(t.duplicate_of, t.number) JOIN metrics m ON m.id = c.metric;
+";
+
 /// Makes sure of all that does not depend on the campaign, and that nothing happens by itself when something is written.
-pub(super) fn tables(connection: &Connection, path: &Path) -> Result<(), RecordError> {
-    static OURS: OnceLock<Objects> = OnceLock::new();
-    let ours = OURS.get_or_init(|| {
-        made_by(&[DDL]).unwrap_or_else(|error| unreachable!("the schema of this program is sound: {error}"))
-    });
+/// Results may be of any schema that is read.
+pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Result<(), RecordError> {
+    static CURRENT: OnceLock<Objects> = OnceLock::new();
+    static SCHEMA_5: OnceLock<Objects> = OnceLock::new();
+    let sound = |made: rusqlite::Result<Objects>| {
+        made.unwrap_or_else(|error| unreachable!("the schema of this program is sound: {error}"))
+    };
+    let ours = if schema == SCHEMA {
+        CURRENT.get_or_init(|| sound(made_by(&[DDL, &series::views()])))
+    } else {
+        SCHEMA_5.get_or_init(|| sound(made_by(&[DDL, TO_SCHEMA_5])))
+    };
     let found = objects(connection).map_err(|error| RecordError::database("read the results", path, error))?;
     if let Some((name, _)) = found.iter().find(|(_, (kind, _))| kind == "trigger") {
         return Err(RecordError::damaged(path, format!("there is a trigger `{name}`, which no run makes")));

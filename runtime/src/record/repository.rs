@@ -69,8 +69,11 @@ impl Repository {
     }
 
     pub(super) fn from_connection(connection: Connection, path: PathBuf) -> Result<Repository, RecordError> {
+        let schema = connection
+            .pragma_query_value(None, "user_version", |row| row.get(0))
+            .map_err(|e| RecordError::database("read the campaign", &path, e))?;
         // Before anything is asked of it: what has the name of a table may be something else that never comes to an end.
-        recognise::tables(&connection, &path)?;
+        recognise::tables(&connection, &path, schema)?;
         let row: Result<(String, String, String, Option<String>), _> =
             connection.query_row("SELECT plan, seed, runtime, stop FROM campaign", [], |row| {
                 Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))
@@ -84,9 +87,6 @@ impl Repository {
         recognise::views(&connection, &path, &plan)?;
         let seed = seed.parse().map_err(|_| RecordError::damaged(&path, format!("`{seed}` is no seed")))?;
         connection.set_prepared_statement_cache_capacity(STATEMENTS);
-        let schema = connection
-            .pragma_query_value(None, "user_version", |row| row.get(0))
-            .map_err(|e| RecordError::database("read the campaign", &path, e))?;
         Ok(Repository { connection, path, schema, facts: CampaignFacts { plan, seed, runtime, stop } })
     }
 

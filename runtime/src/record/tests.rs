@@ -400,7 +400,7 @@ fn a_test_of_which_only_parts_are_left_is_damage_for_those_who_read_and_those_wh
         let said = resumed.commit(&records[number as usize]).unwrap_err().to_string();
         assert!(said.contains(&gone), "{said}");
         drop(resumed);
-        let tables = ["metric_values", "operations", "choices", "intervals", "change_points", "wall_times"];
+        let tables = ["metric_values", "operations", "choices", "intervals", "series_pieces", "wall_times"];
         for table in tables {
             connection.execute(&format!("DELETE FROM {table} WHERE test = ?1"), [number]).unwrap();
         }

@@ -267,13 +267,16 @@ pub(crate) fn digest(folder: &Path) -> String {
 }
 
 /// Takes all that a wider plan added out of the results in a folder, row by row: what is left is to be what the plan
-/// without it leaves. `metrics` has for each metric of that plan its place in the wider one, and `unread` is the number
-/// of messages on topics that were added.
-pub(crate) fn leave_out_additions(folder: &Path, plan: &CampaignPlan, metrics: &[usize], unread: usize) {
+/// without it leaves, in another folder. `metrics` has for each metric of that plan its place in the wider one, and `unread`
+/// is the number of messages on topics that were added.
+pub(crate) fn leave_out_additions(folder: &Path, without: &Path, metrics: &[usize], unread: usize) {
     let database = Connection::open(folder.join(DATABASE)).expect("the results are there");
+    let narrow = Connection::open(without.join(DATABASE)).expect("the results are there");
+    let text = |sql: &str| narrow.query_row(sql, [], |row| row.get::<_, String>(0)).expect("there is one row");
+    let plan = text("SELECT plan FROM campaign");
     let mut sql = String::from("PRAGMA foreign_keys = OFF; BEGIN;");
     for (table, column) in
-        [("metrics", "id"), ("requirements", "metric"), ("metric_values", "metric"), ("change_points", "metric")]
+        [("metrics", "id"), ("requirements", "metric"), ("metric_values", "metric"), ("series_pieces", "metric")]
     {
         // Twice, so that no number is taken before it is free.
         for (place, wider) in metrics.iter().enumerate() {
@@ -288,6 +291,10 @@ pub(crate) fn leave_out_additions(folder: &Path, plan: &CampaignPlan, metrics: &
     )
     .unwrap();
     database.execute_batch(&sql).expect("these tables and columns are there");
-    let plan = serde_json::to_string(plan).unwrap();
+    // Views with a column for each metric.
+    for view in ["results", "front"] {
+        let made = text(&format!("SELECT sql FROM sqlite_schema WHERE name = '{view}'"));
+        database.execute_batch(&format!("DROP VIEW {view}; {made};")).expect("there is such a view");
+    }
     database.execute("UPDATE campaign SET plan = ?1", [plan]).expect("there is a campaign");
 }

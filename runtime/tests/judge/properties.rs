@@ -522,7 +522,7 @@ fn recorded_differences(case: &Case) -> Vec<String> {
     adapter::record(&before, &case.plan, &case.test, &narrow);
     adapter::record(&now, &wider.case.plan, &wider.case.test, &wide);
     let unread = told.published.iter().filter(|message| message.path.starts_with("unread/")).count();
-    adapter::leave_out_additions(&now, &case.plan, &wider.metrics, unread);
+    adapter::leave_out_additions(&now, &before, &wider.metrics, unread);
     let (before, now) = (adapter::digest(&before), adapter::digest(&now));
     if before == now { Vec::new() } else { vec![format!("the digest was {before}, now it is {now}")] }
 }
