@@ -141,8 +141,8 @@ pub enum RecordError {
         /// The database.
         path: PathBuf,
     },
-    /// A number that is to be recorded does not fit: the runtime promises finite numbers and small counts.
-    #[error("test T{test}: {what} cannot be recorded: {}", path.display())]
+    /// A test that could not be read back: a number that is not finite, a large count, or what does not fit the plan.
+    #[error("test T{test} cannot be recorded ({what}): {}", path.display())]
     Unrecordable {
         /// The test.
         test: u32,

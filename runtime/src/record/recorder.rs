@@ -137,7 +137,9 @@ impl Recorder {
         let plan = &self.repository.facts.plan;
         let path = self.repository.path.clone();
         self.lock.check()?;
-        if let Some(what) = unrecordable(record) {
+        // What would be refused when it is read is never written.
+        let unfit = || plan.validate_test(&record.test).err().map(|error| error.to_string());
+        if let Some(what) = unrecordable(record).or_else(unfit) {
             return Err(RecordError::Unrecordable { test: record.number, what, path });
         }
         let written = self.repository.connection.transaction().and_then(|transaction| {

@@ -187,7 +187,12 @@ fn a_test_that_cannot_be_recorded_leaves_nothing_behind() {
     let mut bad = records[3].clone();
     bad.observation.metrics[2].series[0].1 = f64::NAN;
     let error = recorder.commit(&bad).unwrap_err();
-    assert!(error.to_string().starts_with("test T3: a value in a series is NaN cannot be recorded"), "{error}");
+    assert!(error.to_string().starts_with("test T3 cannot be recorded (a value in a series is NaN)"), "{error}");
+    // What would be refused when it is read.
+    let mut unfit = records[3].clone();
+    unfit.test.operations[0].activation = sesame_plan::Activation::Time { start: -1.0, end: 2.0 };
+    let error = recorder.commit(&unfit).unwrap_err().to_string();
+    assert!(error.contains("operations[0].activation") && error.contains("before the start"), "{error}");
     let error = recorder.commit(&records[2]).unwrap_err();
     assert!(matches!(error, RecordError::TestExists { number: 2, .. }), "{error}");
     assert_eq!(recorder.repository().tests().unwrap().len(), 3);
@@ -693,7 +698,7 @@ fn a_number_in_a_condition_that_is_none_is_refused() {
     }
     let mut recorder = Recorder::create(folder.path(), &plan, 1, 1).unwrap();
     let refused = recorder.commit(&record).unwrap_err().to_string();
-    assert!(refused.starts_with("test T3: a number in a condition is NaN cannot be recorded"), "{refused}");
+    assert!(refused.starts_with("test T3 cannot be recorded (a number in a condition is NaN)"), "{refused}");
 }
 
 #[test]

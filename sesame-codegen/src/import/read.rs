@@ -277,7 +277,8 @@ fn operation(original: &mut Original, element: &Element) -> Result<Operation, St
         None => Activation::Unsaid,
         Some(found) => match found.kind.as_deref() {
             Some("FixedTimeActivation") => {
-                Activation::Time(number(found, "startTime", 0.0)?, number(found, "endTime", 0.0)?)
+                // Nothing happens before a test begins.
+                Activation::Time(number(found, "startTime", 0.0)?.max(0.0), number(found, "endTime", 0.0)?.max(0.0))
             }
             Some("ConditionBasedActivation") => {
                 Activation::Condition(condition(original, found, "starting")?, condition(original, found, "ending")?)
