@@ -151,7 +151,13 @@ impl Dial {
             }
             _ => return None,
         };
-        // What is left by rounding is no way to go.
+        // A step is at least what a number of this size can move by: a range that a campaign permits may be tiny beside
+        // the numbers in it, and a step that leads nowhere would be taken for ever.
+        let mut step = step;
+        while step > 0.0 && (if from < to { from + step } else { from - step }) == from {
+            step *= 2.0;
+        }
+        // What is left by rounding is not a way to go.
         (step > 0.0 && (to - from).abs() > step * ROUNDING).then_some((from, to, step))
     }
 

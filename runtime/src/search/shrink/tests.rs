@@ -321,6 +321,11 @@ fn a_value_goes_to_what_disturbs_least_of_its_kind() {
     assert_eq!(least(OperationKind::Bias, "bias", -3.0, 3.0), 0.0);
     assert_eq!(least(OperationKind::Bias, "bias", -3.0, -1.0), -1.0);
     assert_eq!(
+        least(OperationKind::Bias, "bias", 1e17, 1e17 + 64.0),
+        1e17,
+        "a hundredth of the range is lost in rounding"
+    );
+    assert_eq!(
         least(OperationKind::StuckAt { truth: None }, "value", 0.0, 10.0),
         6.0,
         "no value is milder than another"
