@@ -42,7 +42,7 @@ fn the_first_command_finds_a_front_and_the_same_one_each_time() {
     }
     let page = fs::read_to_string(folder.join("report.html")).unwrap();
     assert!(page.contains("<svg") && page.contains("coverage_experiment"));
-    let addresses = page.matches("http").count();
+    let addresses = page.matches("http://").count() + page.matches("https://").count();
     assert_eq!(addresses, page.matches("http://www.w3.org/2000/svg").count(), "the page needs nothing from elsewhere");
 
     let runner = project.build("coverage_experiment");
