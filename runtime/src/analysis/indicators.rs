@@ -102,6 +102,14 @@ pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<
     let stored = repository.reference_point()?.as_deref().map(oriented);
 
     let recorded = repository.indicators()?;
+    if let Some(pair) = recorded.windows(2).find(|pair| pair[0].evaluations > pair[1].evaluations) {
+        let (before, after) = (&pair[0], &pair[1]);
+        let problem = format!(
+            "generation {} ends after {} tests, and generation {} after {}",
+            before.generation, before.evaluations, after.generation, after.evaluations
+        );
+        return Err(RecordError::damaged(repository.path(), problem));
+    }
     let ran = !recorded.is_empty() || tests.iter().any(|test| test.generation.is_some());
     let (generations, reference) = if ran {
         let mut generations: Vec<Indicator> = recorded

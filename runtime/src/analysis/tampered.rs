@@ -701,3 +701,11 @@ fn of_35_000_changes_to_results_none_is_too_much() {
         }
     });
 }
+
+/// A shrunk test that was gone to for ever, and generations that end before those before them.
+#[test]
+fn changes_that_were_once_too_much_are_read_or_refused() {
+    for change in [20_827, 22_243] {
+        all_are_read_or_refused(change..change + 1);
+    }
+}
