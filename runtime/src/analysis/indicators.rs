@@ -102,8 +102,8 @@ pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<
     let stored = repository.reference_point()?.as_deref().map(oriented);
 
     let recorded = repository.indicators()?;
-    if let Some(pair) = recorded.windows(2).find(|pair| pair[0].evaluations > pair[1].evaluations) {
-        let (before, after) = (&pair[0], &pair[1]);
+    let mut neighbours = recorded.iter().zip(recorded.iter().skip(1));
+    if let Some((before, after)) = neighbours.find(|(before, after)| before.evaluations > after.evaluations) {
         let problem = format!(
             "generation {} ends after {} tests, and generation {} after {}",
             before.generation, before.evaluations, after.generation, after.evaluations
