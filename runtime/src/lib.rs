@@ -30,7 +30,7 @@ mod last_panic;
 pub mod message;
 pub mod metric;
 pub mod observation;
-#[cfg(feature = "campaign")]
+#[cfg(any(feature = "campaign", feature = "process"))]
 mod process_group;
 #[cfg(feature = "record")]
 pub mod record;

@@ -1,13 +1,17 @@
 //! Groups of processes: a process that was started with its own can be ended together with those that stayed in it.
 
-pub(crate) use self::system::{has_ended, kill, own};
+#[cfg(feature = "campaign")]
+pub(crate) use self::system::has_ended;
+#[cfg(all(feature = "campaign", feature = "process", target_os = "linux"))]
+pub(crate) use self::system::is_ours;
+pub(crate) use self::system::{kill, own, was_killed};
 
 #[cfg(unix)]
 mod system {
-    use std::os::unix::process::CommandExt as _;
-    use std::process::{Child, Command};
+    use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
+    use std::process::{Child, Command, ExitStatus};
 
-    use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
+    use rustix::process::{Pid, Signal, kill_process_group};
 
     /// Lets the process begin a group of its own.
     pub(crate) fn own(command: &mut Command) {
@@ -15,7 +19,10 @@ mod system {
     }
 
     /// Whether the process has ended. It is not reaped, so that its id is given to no other.
+    #[cfg(feature = "campaign")]
     pub(crate) fn has_ended(child: &mut Child) -> bool {
+        use rustix::process::{WaitId, WaitIdOptions, waitid};
+
         let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
         matches!(waitid(WaitId::Pid(Pid::from_child(child)), options), Ok(Some(_)))
     }
@@ -25,20 +32,39 @@ mod system {
         // A group that has ended already is what was asked for.
         kill_process_group(Pid::from_child(child), Signal::KILL).ok();
     }
+
+    /// Whether a process is in the group of this one.
+    #[cfg(all(feature = "campaign", feature = "process", target_os = "linux"))]
+    pub(crate) fn is_ours(id: u32) -> bool {
+        use rustix::process::{getpgid, getpgrp};
+
+        getpgid(Pid::from_raw(id.cast_signed())).is_ok_and(|group| group == getpgrp())
+    }
+
+    /// Whether a process was killed. Only another process, or the system, can have done that.
+    pub(crate) fn was_killed(status: ExitStatus) -> bool {
+        status.signal() == Some(Signal::KILL.as_raw())
+    }
 }
 
 /// Processes alone: the standard library knows no more.
 #[cfg(not(unix))]
 mod system {
-    use std::process::{Child, Command};
+    use std::process::{Child, Command, ExitStatus};
 
     pub(crate) fn own(_: &mut Command) {}
 
+    #[cfg(feature = "campaign")]
     pub(crate) fn has_ended(child: &mut Child) -> bool {
         matches!(child.try_wait(), Ok(Some(_)))
     }
 
     pub(crate) fn kill(child: &mut Child) {
         child.kill().ok();
+    }
+
+    /// The status does not tell here.
+    pub(crate) fn was_killed(_: ExitStatus) -> bool {
+        false
     }
 }

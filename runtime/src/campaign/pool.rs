@@ -8,7 +8,7 @@
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus};
+use std::process::Command;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread::{self, JoinHandle};
@@ -20,6 +20,7 @@ use super::traced;
 use super::worker::{crashed, empty};
 use super::worker_process::WorkerProcess;
 use crate::observation::{Observation, Outcome};
+use crate::process_group::was_killed;
 
 pub use super::frames::Job;
 
@@ -306,20 +307,6 @@ impl Worker {
         stream.set_read_timeout(Some(Duration::from_secs(60)))?;
         frames::receive(&mut first.chain(stream))
     }
-}
-
-/// Whether a process was killed, which it cannot be but from outside.
-#[cfg(unix)]
-fn was_killed(status: ExitStatus) -> bool {
-    /// `SIGKILL`, which POSIX numbers.
-    const KILL: i32 = 9;
-    std::os::unix::process::ExitStatusExt::signal(&status) == Some(KILL)
-}
-
-/// Whether a process was killed: its status does not tell here.
-#[cfg(not(unix))]
-fn was_killed(_: ExitStatus) -> bool {
-    false
 }
 
 fn millis(duration: Duration) -> u64 {

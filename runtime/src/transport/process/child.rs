@@ -15,6 +15,7 @@ use std::time::Duration;
 #[cfg(all(feature = "campaign", target_os = "linux"))]
 use super::keeper::Report;
 use super::words::LastWords;
+use crate::process_group;
 use crate::transport::TransportError;
 
 /// How long a simulator whose input is closed may take to end by itself.
@@ -73,7 +74,7 @@ impl Program {
         // The folder that a worker has for itself is where it runs; the simulator runs beside its space.
         let own_folder = std::env::current_dir().map_err(|error| failed(&error))?;
         let (mut command, keeper) = self.command().map_err(|error| failed(&error))?;
-        group::own(&mut command);
+        process_group::own(&mut command);
         let mut child = command
             .current_dir(&self.folder)
             .env_remove("SESAME_WORKER_TOKEN")
@@ -203,7 +204,7 @@ impl Running {
         let in_time = self.held.wait();
         let status = self.held.end();
         let (how, killed) = match self.ended_by_itself(status.filter(|_| in_time)) {
-            Some(status) => (format!("ended ({status})"), group::was_killed(status)),
+            Some(status) => (format!("ended ({status})"), process_group::was_killed(status)),
             None => ("closed its standard output, but did not end,".to_owned(), false),
         };
         PostMortem { how, last_words: self.words.take(), killed }
@@ -275,12 +276,12 @@ impl Held {
 
     /// Waits for the process to end, and ends what it leaves behind.
     fn watch(&self) {
-        let killed = group::wait_for_end(self);
+        let killed = end::wait_for_end(self);
         let mut process = lock(&self.process);
         // Whoever reaped it has ended the rest too.
         let reaped = process.status.is_some();
         if !reaped {
-            group::kill(&mut process.child);
+            process_group::kill(&mut process.child);
         }
         drop(process);
         if killed && !reaped {
@@ -312,7 +313,7 @@ impl Held {
         let mut process = lock(&self.process);
         if process.status.is_none() {
             let alive = !process.ended;
-            group::kill(&mut process.child);
+            process_group::kill(&mut process.child);
             process.status = process.child.wait().ok();
             let status = process.status;
             drop(process);
@@ -330,7 +331,7 @@ impl Held {
         #[cfg(all(feature = "campaign", target_os = "linux"))]
         if self.kept {
             let own: Vec<u32> = lock(&RUNNING).iter().filter_map(Weak::upgrade).map(|held| held.id).collect();
-            crate::descendants::end_adopted(|id| own.contains(&id) || group::is_ours(id), Duration::ZERO);
+            crate::descendants::end_adopted(|id| own.contains(&id) || process_group::is_ours(id), Duration::ZERO);
         }
     }
 
@@ -352,21 +353,13 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Processes with all that they started.
+/// How the end of a process is awaited without reaping it.
 #[cfg(unix)]
-mod group {
-    use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
-    use std::process::{Child, Command, ExitStatus};
-
+mod end {
     use rustix::io::Errno;
-    use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
+    use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
 
     use super::Held;
-
-    /// Lets the process begin a group of its own.
-    pub(super) fn own(command: &mut Command) {
-        command.process_group(0);
-    }
 
     /// Waits until the process has ended, and says whether a signal ended it. It is not reaped, so that its id is given to
     /// no other.
@@ -381,37 +374,15 @@ mod group {
             }
         }
     }
-
-    /// Ends the process and its group. It must not have been reaped.
-    pub(super) fn kill(child: &mut Child) {
-        // A group that has ended already is what was asked for.
-        kill_process_group(Pid::from_child(child), Signal::KILL).ok();
-    }
-
-    /// Whether it was killed, which it cannot be but from outside.
-    pub(super) fn was_killed(status: ExitStatus) -> bool {
-        status.signal() == Some(Signal::KILL.as_raw())
-    }
-
-    /// Whether the process is in the group of this one.
-    #[cfg(all(feature = "campaign", target_os = "linux"))]
-    pub(super) fn is_ours(id: u32) -> bool {
-        use rustix::process::{getpgid, getpgrp};
-
-        getpgid(Pid::from_raw(id.cast_signed())).is_ok_and(|group| group == getpgrp())
-    }
 }
 
-/// Processes alone: the standard library knows no more.
+/// The same where the standard library offers nothing better than to ask again and again.
 #[cfg(not(unix))]
-mod group {
-    use std::process::{Child, Command, ExitStatus};
+mod end {
     use std::thread;
     use std::time::Duration;
 
     use super::{Held, lock};
-
-    pub(super) fn own(_: &mut Command) {}
 
     pub(super) fn wait_for_end(held: &Held) -> bool {
         loop {
@@ -422,13 +393,5 @@ mod group {
             drop(process);
             thread::sleep(Duration::from_millis(20));
         }
-    }
-
-    pub(super) fn kill(child: &mut Child) {
-        child.kill().ok();
-    }
-
-    pub(super) fn was_killed(_: ExitStatus) -> bool {
-        false
     }
 }
