@@ -416,10 +416,7 @@ impl Repository {
         let mut values =
             Cursor::over(values.query(within).map_err(failed)?, |row| Ok((position(row, 1)?, metric_value(row, 2)?)))
                 .map_err(failed)?;
-        let ids: BTreeMap<&str, OperationId> = (0u32..)
-            .zip(&self.plan().operations)
-            .map(|(id, operation)| (operation.name.as_str(), OperationId(id)))
-            .collect();
+        let ids = self.operation_ids();
 
         let mut found = Vec::new();
         let mut rows = tests.query(within).map_err(failed)?;
@@ -486,6 +483,14 @@ impl Repository {
             Some(orphan) if numbers.start() < numbers.end() => Err(self.without_test(orphan)),
             _ => Ok(found),
         }
+    }
+
+    /// The plan's operations by name, as tests have them.
+    pub(super) fn operation_ids(&self) -> BTreeMap<&str, OperationId> {
+        (0u32..)
+            .zip(&self.plan().operations)
+            .map(|(id, operation)| (operation.name.as_str(), OperationId(id)))
+            .collect()
     }
 
     /// Rows of a test are numbered from 0, none is missing.

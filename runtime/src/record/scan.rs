@@ -1,7 +1,5 @@
 //! Going through all tests of a run, one after the other, without holding them all: what analyses do.
 
-use std::collections::BTreeMap;
-
 use rusqlite::{Row, Rows};
 use sesame_plan::{CampaignPlan, Choice, OperationId, Span};
 
@@ -176,10 +174,7 @@ impl Repository {
             Cursor::over(values.query([]).map_err(failed)?, |row| Ok((position(row, 1)?, metric_value(row, 2)?)))
                 .map_err(failed)?;
 
-        let ids: BTreeMap<&str, OperationId> = (0u32..)
-            .zip(&self.plan().operations)
-            .map(|(id, operation)| (operation.name.as_str(), OperationId(id)))
-            .collect();
+        let ids = self.operation_ids();
         let mut rows = tests.query([]).map_err(failed)?;
         while let Some(row) = rows.next().map_err(failed)? {
             let number: u32 = row.get(0).map_err(failed)?;
