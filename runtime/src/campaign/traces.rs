@@ -15,7 +15,7 @@ use sesame_relay::metric::MetricTable;
 use sesame_relay::transport::Transport;
 use sesame_relay::wire::WireTable;
 
-use crate::campaign::protocol::Job;
+use crate::campaign::executor::Job;
 use crate::campaign::worker::crashed;
 
 /// Name of a trace on its way, in its worker's folder.
@@ -24,7 +24,7 @@ const UNFINISHED: &str = "trace.unfinished";
 
 /// Asks for the trace of a test.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct TraceOrder {
+pub struct TraceRequest {
     /// The file it is to be, in a folder that exists.
     pub file: PathBuf,
     /// Whether to keep it whatever the outcome.
@@ -43,7 +43,7 @@ pub(super) fn run(
 ) -> (Observation, Option<String>) {
     let Job { test, simulator_seed, .. } = job;
     let what = Run { test, simulator_seed: *simulator_seed };
-    let Some(order) = &job.trace else {
+    let Some(request) = &job.trace else {
         let observed = evaluate_tapped(plan, wires, metrics, transport, &what, custom, None);
         return (observed.unwrap_or_else(|misfit| crashed(misfit.to_string())), None);
     };
@@ -58,31 +58,31 @@ pub(super) fn run(
         };
         let observed = evaluate_tapped(plan, wires, metrics, transport, &what, custom, Some(&mut writer));
         let observation = observed.unwrap_or_else(|misfit| crashed(misfit.to_string()));
-        let settled = if is_kept(plan, order.keep, &observation) {
-            writer.keep(&observation, &order.file).map_err(|error| error.to_string())
+        let settled = if is_kept(plan, request.keep, &observation) {
+            writer.keep(&observation, &request.file).map_err(|error| error.to_string())
         } else {
             drop(writer);
-            discard(&order.file)
+            discard(&request.file)
         };
         (observation, settled.err())
     }
     #[cfg(not(feature = "mcap"))]
     {
-        let _ = (order, directory);
+        let _ = (request, directory);
         (crashed("there was no trace to write to".to_owned()), Some(NOT_BUILT_IN.to_owned()))
     }
 }
 
 /// Saves what a worker that died wrote of a trace. The error says why that is not possible.
-pub(super) fn save(order: &TraceOrder, directory: &Path, outcome: &Outcome) -> Result<(), String> {
+pub(super) fn save(request: &TraceRequest, directory: &Path, outcome: &Outcome) -> Result<(), String> {
     #[cfg(feature = "mcap")]
     {
-        sesame_relay::trace::salvage(&directory.join(UNFINISHED), outcome, &order.file)
+        sesame_relay::trace::salvage(&directory.join(UNFINISHED), outcome, &request.file)
             .map_err(|error| error.to_string())
     }
     #[cfg(not(feature = "mcap"))]
     {
-        let _ = (order, directory, outcome);
+        let _ = (request, directory, outcome);
         Err(NOT_BUILT_IN.to_owned())
     }
 }

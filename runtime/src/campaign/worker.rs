@@ -11,10 +11,11 @@ use sesame_relay::changed_files::ChangedFiles;
 use sesame_relay::evaluate::Custom;
 use sesame_relay::metric::MetricTable;
 use sesame_relay::wire::WireTable;
-use sesame_relay::{descendants, panic_capture as last_panic};
+use sesame_relay::{descendants, panic_capture};
 
+use crate::campaign::executor::Job;
 use crate::campaign::link::{self, Address, Stream};
-use crate::campaign::protocol::{self, Job, Reply};
+use crate::campaign::protocol::{self, Reply};
 use crate::campaign::traces;
 use crate::runner::Runner;
 
@@ -24,7 +25,7 @@ use crate::runner::Runner;
 /// simulator.
 pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::Result<()> {
     let mut stream = link::connect(supervisor)?;
-    last_panic::listen();
+    panic_capture::listen();
     // So that what leaves its parents can be found when it is to end. Where the system cannot do that, groups have to do.
     descendants::adopt_orphans();
 
