@@ -16,7 +16,7 @@ use crate::campaign::evaluator::Evaluator;
 use crate::campaign::executor::{Job, JobResult};
 use crate::campaign::numbering::Numbering;
 use crate::campaign::pool::Pool;
-use crate::campaign::run::{Settings, default_timeout};
+use crate::campaign::settings::{Settings, default_timeout};
 
 /// What is said when no confirmation could have shown anything.
 const DETERMINISTIC_SIMULATOR: &str = "each run that confirms a test had exactly the results of the run it repeats: the simulator \

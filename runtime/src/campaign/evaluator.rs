@@ -10,9 +10,8 @@ use sesame_plan::{CampaignPlan, Recorded};
 use sesame_results::record::{self, Event, EventKind, Origin, RecordError, Recorder, Repetition, TestRecord};
 
 use crate::campaign::error::{CampaignError, Halt};
-use crate::campaign::executor::{Executor, Job, JobResult};
+use crate::campaign::executor::{Executor, Job, JobResult, TraceRequest};
 use crate::campaign::numbering::PlannedTest;
-use crate::campaign::traces::TraceRequest;
 
 /// How many recorded tests are read at once when a campaign is resumed.
 const READ_TOGETHER: u32 = 50;

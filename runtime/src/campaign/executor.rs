@@ -3,14 +3,13 @@
 //! Tests are independent of each other, and results depend neither on the order in which they end nor on where they ran.
 //! So an executor may be [processes of this machine](crate::campaign::pool), or machines far away.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
 use sesame_base::observation::Observation;
-use sesame_plan::Test;
-
-use crate::campaign::traces::TraceRequest;
+use sesame_plan::{Recorded, Test};
 
 /// Carries out tests, in any order.
 pub trait Executor {
@@ -35,6 +34,15 @@ pub struct Job {
     pub simulator_seed: u64,
     /// The trace that is asked for, if any.
     pub trace: Option<TraceRequest>,
+}
+
+/// Asks for the trace of a test.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct TraceRequest {
+    /// The file it is to be, in a folder that exists.
+    pub file: PathBuf,
+    /// Whether to keep it whatever the outcome.
+    pub keep: Recorded,
 }
 
 /// A test that has ended.

@@ -14,24 +14,20 @@ use std::sync::{Arc, Mutex, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use sesame_base::observation::Outcome;
+use sesame_base::observation::{Observation, Outcome};
 use sesame_relay::process_group::was_killed;
 
 use crate::campaign::executor::{Executor, ExecutorError, Job, JobResult};
 use crate::campaign::link::{self, Stream};
 use crate::campaign::protocol::{self, Reply};
 use crate::campaign::traces;
-use crate::campaign::worker::{crashed, empty};
-use crate::campaign::worker_process::WorkerProcess;
+use crate::campaign::worker_process::{WORKER, WorkerProcess};
 
 /// How long a fresh worker may take to report.
 const START_LIMIT: Duration = Duration::from_secs(30);
 
 /// How long a worker that broke off the conversation may take to end.
 const DEATH_LIMIT: Duration = Duration::from_secs(2);
-
-/// The environment variable with a worker's number, which all that a worker starts inherits.
-pub(super) const WORKER: &str = "SESAME_WORKER";
 
 /// How a pool runs its workers.
 #[derive(Debug, Clone)]
@@ -175,14 +171,14 @@ impl WorkerSlot {
                 // Only of a worker that is gone is it known that it writes no more.
                 drop(worker);
                 let lost = self.save_trace(job, &outcome);
-                (empty(outcome), Vec::new(), lost)
+                (Observation::without_run(outcome), Vec::new(), lost)
             }
             Err(error) => {
                 // Only what is the same in every session: the cause is part of the digest.
                 let status = worker.process.wait(DEATH_LIMIT);
                 killed = status.is_some_and(was_killed).then_some("worker");
                 let how = status.map_or_else(|| error.to_string(), |status| status.to_string());
-                let observation = crashed(format!("the worker process ended: {how}"));
+                let observation = Observation::crashed(format!("the worker process ended: {how}"));
                 drop(worker);
                 let lost = self.save_trace(job, &observation.outcome);
                 let words = last_lines(&output_file(&self.directory()), printed, 10);

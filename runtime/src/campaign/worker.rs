@@ -5,7 +5,7 @@ use std::sync::{Mutex, mpsc};
 use std::time::Duration;
 use std::{io, thread};
 
-use sesame_base::observation::{Observation, Outcome, WallTime};
+use sesame_base::observation::Outcome;
 use sesame_plan::CampaignPlan;
 use sesame_relay::changed_files::ChangedFiles;
 use sesame_relay::evaluate::Custom;
@@ -80,22 +80,4 @@ fn end_what_was_started() {
     #[cfg(feature = "process")]
     sesame_relay::transport::end_simulators();
     descendants::end_adopted(|_| false, Duration::ZERO);
-}
-
-/// The observation of a run that left nothing but its cause.
-pub(super) fn crashed(message: String) -> Observation {
-    empty(Outcome::Crash { message })
-}
-
-pub(super) fn empty(outcome: Outcome) -> Observation {
-    Observation {
-        outcome,
-        end: 0.0,
-        operations: Vec::new(),
-        unheard: Vec::new(),
-        metrics: Vec::new(),
-        messages: 0,
-        warnings: Vec::new(),
-        wall: WallTime::default(),
-    }
 }

@@ -13,10 +13,11 @@ use sesame_results::report;
 
 use crate::campaign::{Confirmations, confirm_recorded};
 use crate::cli::execution::{ExecutionArgs, claim_files, interruptible, refuse_unfilled, shown};
+use crate::cli::failure::{Failure, STOPPED};
 use crate::cli::gate::Gate;
 use crate::cli::results_folder::{open, refuse_changed};
+use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json, say, text_options};
-use crate::cli::{Failure, Format, STOPPED};
 use crate::runner::Runner;
 
 /// How often a line is printed.

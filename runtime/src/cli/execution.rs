@@ -18,10 +18,11 @@ use sesame_results::record::{self, Recorder, Repository};
 use sesame_results::report::{self, Summary};
 
 use crate::campaign::{CampaignEnd, Settings, run_campaign};
+use crate::cli::failure::{Failure, STOPPED};
 use crate::cli::gate::Gate;
 use crate::cli::progress::{Display, Waiting, wait};
+use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json, say, text_options};
-use crate::cli::{Failure, Format, STOPPED};
 use crate::runner::Runner;
 
 /// The most worker processes that may be asked for. Each is a process with a simulator of its own, and takes one of the

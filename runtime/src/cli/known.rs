@@ -7,8 +7,8 @@ use clap::Args;
 
 use sesame_plan::{CampaignPlan, KnownTestId, Search};
 
-use crate::cli::Failure;
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
+use crate::cli::failure::Failure;
 use crate::runner::Runner;
 
 /// Which known tests are run, and how.

@@ -8,8 +8,8 @@ use clap::Args;
 use sesame_plan::{CampaignPlan, KnownTest, KnownTestId, Search, Test};
 use sesame_rng::derive_seed;
 
-use crate::cli::Failure;
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
+use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_changed};
 use crate::runner::Runner;
 

@@ -13,9 +13,11 @@ use sesame_results::report::{Replay, replay_text};
 
 use crate::campaign::{Job, JobResult, SingleSettings, default_timeout, run_single};
 use crate::cli::execution::{claim_files, interruptible, refuse_unfilled, seconds};
+use crate::cli::failure::{Failure, NOT_AS_REQUIRED, STOPPED};
 use crate::cli::results_folder::{open, refuse_changed};
+use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json, say, text_options};
-use crate::cli::{Failure, Format, NOT_AS_REQUIRED, STOPPED, Which};
+use crate::cli::view::Which;
 use crate::runner::Runner;
 
 /// Which test is run once more.

@@ -8,8 +8,8 @@ use clap::Args;
 use sesame_plan::{CampaignPlan, Search};
 use sesame_results::record::{self, Recorder};
 
-use crate::cli::Failure;
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled, shown};
+use crate::cli::failure::Failure;
 use crate::cli::results_folder::same_model;
 use crate::runner::Runner;
 

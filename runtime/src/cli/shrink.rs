@@ -9,8 +9,8 @@ use sesame_base::observation::{Observation, Outcome};
 use sesame_plan::{CampaignPlan, Failing, KnownTest, KnownTestId, RequirementId, Search};
 use sesame_results::record::{Origin, Repository, TestRecord, Verdict, verdict};
 
-use crate::cli::Failure;
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
+use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_changed};
 use crate::runner::Runner;
 

@@ -7,7 +7,7 @@ use sesame_results::record::{GenerationCoverage, RecordError, Recorder, TestReco
 use sesame_search::coverage::{self, Coverage, Feasible, Grid, GridError};
 use sesame_search::sspr::{self, Point};
 
-use crate::campaign::observers::{EndedTest, Generation, Observer};
+use crate::campaign::observer::{EndedTest, Generation, Observer};
 
 /// Counts cells while a campaign runs, and ends it when its goal is reached. Hits add up in any order, so that what is
 /// covered after a generation does not depend on the order in which its tests end.

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use sesame_results::record::{RecordError, Recorder, ResultSet, Status};
 
-use crate::campaign::observers::{Generation, Observer};
+use crate::campaign::observer::{Generation, Observer};
 
 /// Records the front after each generation.
 #[derive(Debug)]

@@ -6,7 +6,7 @@ use sesame_optimise::dominance::Fitness;
 use sesame_results::record::{RecordError, Recorder};
 use sesame_search::indicators::Indicators;
 
-use crate::campaign::observers::{EndedTest, Generation, Observer};
+use crate::campaign::observer::{EndedTest, Generation, Observer};
 
 /// Measures and records the indicators of each generation.
 #[derive(Debug)]

@@ -7,7 +7,7 @@ use sesame_plan::CampaignPlan;
 use sesame_results::record::{RecordError, Recorder};
 use sesame_search::StopRules;
 
-use crate::campaign::observers::{Generation, Observer};
+use crate::campaign::observer::{Generation, Observer};
 
 /// Ends the search when one of the campaign's rules to stop holds.
 pub(super) struct Rules {

@@ -1,6 +1,8 @@
 //! Campaigns without processes: an executor in this thread, which ends tests in whatever order it is told to.
 
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use sesame_plan::{Confirmation, CoverageGoal, Dimension, GridAxis, Typical};
 use sesame_results::record::sample;
