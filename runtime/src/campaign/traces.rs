@@ -7,7 +7,9 @@
 use std::path::Path;
 
 use sesame_base::observation::{Observation, Outcome};
-use sesame_plan::{CampaignPlan, Recorded};
+use sesame_plan::CampaignPlan;
+#[cfg(feature = "mcap")]
+use sesame_plan::Recorded;
 use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
 use sesame_relay::metric::MetricTable;
 use sesame_relay::transport::Transport;
