@@ -110,7 +110,7 @@ fn used_topics(space: &Space) -> BTreeSet<TopicId> {
         used.extend(eddi.otherwise.mitigation.iter().map(|mitigation| mitigation.field.topic));
     }
     used.extend(space.eddis.values().map(|eddi| eddi.publishes));
-    used.extend(space.surroundings.launch.iter().filter_map(|launch| launch.ready).map(|ready| ready.topic));
+    used.extend(space.lifecycle.launch.iter().filter_map(|launch| launch.ready).map(|ready| ready.topic));
     used
 }
 

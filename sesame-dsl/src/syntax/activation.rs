@@ -3,8 +3,8 @@
 use sesame_grammar::Rule;
 
 use super::ast::{Activation, ByCondition, Choice, Contained, Count, Name, Range, TestOperation, Trigger, TriggerEnd};
-use super::explain::Place;
 use super::parse::{Pair, Reader, child, children, expect_child, first_of};
+use super::syntax_error::Place;
 
 impl Reader<'_> {
     pub(super) fn test_operation(&mut self, pair: &Pair<'_>) -> TestOperation {

@@ -4,8 +4,8 @@
 //! block around it is marked as damaged, so that one mistake does not look like several.
 
 use super::eddi::Eddi;
+use super::lifecycle::{Command, Launch, RelayBudget};
 use super::physical::Physical;
-use super::surroundings::{Command, Launch, RelayBudget};
 use crate::span::Span;
 use sesame_plan::Copies;
 

@@ -9,8 +9,8 @@ use super::ast::{
     Operation, OperationBody, Operations, Passive, Process, Record, Repeat, Requirement, Search, Simulator, Strategy,
     System, Test, Topic, Transport, Trend, Type, TypeKind,
 };
-use super::explain::{Place, explain};
 use super::limits::{MAX_BYTES, parse_bounded, too_deep};
+use super::syntax_error::{Place, explain};
 use super::token::{TokenKind, token_at};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::{FileId, Span};

@@ -3,8 +3,8 @@
 use sesame_grammar::Rule;
 
 use super::ast::{Bound, Count, Head, Name, Point, Quantity, Range, Text};
-use super::explain::Place;
 use super::parse::{Pair, Reader, child, children, expect_child};
+use super::syntax_error::Place;
 use crate::span::Span;
 
 /// A lab, and how tests are chosen for it.

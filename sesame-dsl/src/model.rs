@@ -10,7 +10,7 @@ pub mod eddi;
 mod formula;
 mod fuzz;
 mod ids;
-mod measure;
+mod metrics;
 pub mod physical;
 mod system;
 mod temporal;
@@ -19,7 +19,7 @@ pub use campaign::*;
 pub use formula::*;
 pub use fuzz::*;
 pub use ids::*;
-pub use measure::*;
+pub use metrics::*;
 pub use system::*;
 pub use temporal::*;
 
@@ -42,7 +42,7 @@ pub struct Space {
     /// The simulator under test.
     pub simulator: Simulator,
     /// What the system needs beside it, and what a relay may cost.
-    pub surroundings: Surroundings,
+    pub lifecycle: Lifecycle,
     /// Message types, each after the types it contains, otherwise in declaration order.
     pub messages: Arena<MessageId, Message>,
     /// Topics, in declaration order.

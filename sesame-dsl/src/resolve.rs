@@ -2,16 +2,17 @@
 //!
 //! 1. [`collect`] has who is called what, doubles, and what a space cannot do without
 //! 2. [`system`] has message types (in an order in which each follows those it contains), topics, nodes, the simulator
-//! 3. [`measure`] has metrics (their formulas in [`formula`]) and requirements
+//! 3. [`metrics`] has metrics (their formulas in [`formula`]) and requirements
 //! 4. [`fuzz`] has operations ([`disturbance`] what they disturb and permit, [`custom`] those in the user's code) and known
 //!    tests
 //! 5. [`campaign`] has campaigns, whose inherited clauses [`inherit`] has put in their places before all else;
 //!    [`condition`] the conditions of tests and what those of campaigns are made of
-//! 6. [`eddi`] has runtime monitors, [`physical`] labs, and [`surroundings`] what a system says beside its simulator
+//! 6. [`eddi`] has runtime monitors, [`physical`] labs, and [`lifecycle`] what a system says beside its simulator
 //!
 //! Each pass reports all it finds. A declaration with a mistake is `None` from then on, and whoever mentions it says
 //! nothing: so one mistake is one diagnostic.
 
+mod boolean;
 mod campaign;
 mod collect;
 mod condition;
@@ -24,15 +25,14 @@ mod exploration;
 mod formula;
 mod fuzz;
 mod inherit;
-mod measure;
+mod lifecycle;
+mod metrics;
 mod nodes;
 mod physical;
 mod quantity;
 mod robustness;
 mod stop;
-mod surroundings;
 mod system;
-mod truth;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -69,7 +69,7 @@ pub(crate) fn resolve(
     };
     resolver.collect();
     let simulator = resolver.system();
-    let surroundings = resolver.surroundings();
+    let lifecycle = resolver.lifecycle();
     resolver.metrics();
     let requirements = resolver.requirements();
     resolver.operations();
@@ -86,7 +86,7 @@ pub(crate) fn resolve(
     Some(Space {
         declaration: declaration(sources, file.spaces.first()?),
         simulator: simulator?,
-        surroundings: surroundings?,
+        lifecycle: lifecycle?,
         messages: arena(system.messages)?,
         topics: arena(system.topics)?,
         nodes: arena(system.nodes)?,

@@ -3,8 +3,8 @@
 use sesame_grammar::Rule;
 
 use super::ast::{Name, Quantity, Text};
-use super::explain::Place;
 use super::parse::{Pair, Reader, child, children, expect_child};
+use super::syntax_error::Place;
 use crate::span::Span;
 
 /// A program that the system needs beside its simulator.

@@ -3,14 +3,14 @@
 mod activation;
 pub(crate) mod ast;
 pub(crate) mod eddi;
-mod explain;
 mod exploration;
 mod formula;
+pub(crate) mod lifecycle;
 mod limits;
 mod operation;
 mod parse;
 pub(crate) mod physical;
-pub(crate) mod surroundings;
+mod syntax_error;
 mod token;
 mod words;
 
