@@ -76,8 +76,8 @@ impl Space {
     /// Whether copies of one operation may act at the same time in the tests of all campaigns that search, of which there
     /// is one at least.
     pub fn copies_may_overlap(&self) -> bool {
-        let mut searching = self.campaigns.values().filter_map(|campaign| campaign.search.content()).peekable();
-        searching.peek().is_some() && searching.all(|content| content.copies == Copies::MayOverlap)
+        let mut searching = self.campaigns.values().filter_map(|campaign| campaign.search.template()).peekable();
+        searching.peek().is_some() && searching.all(|template| template.copies == Copies::MayOverlap)
     }
 
     /// The file that something is declared in, as seen from the folder of the space's own file.

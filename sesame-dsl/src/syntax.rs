@@ -1,20 +1,17 @@
 //! From text to [`ast`]: parsing with recovery.
+//!
+//! [`ast`] is the data, `parse` makes it from the grammar's pairs, and `syntax_error` says what is wrong where the grammar
+//! gave up.
 
-mod activation;
 pub(crate) mod ast;
-pub(crate) mod eddi;
-mod exploration;
-mod formula;
-pub(crate) mod lifecycle;
 mod limits;
-mod operation;
 mod parse;
-pub(crate) mod physical;
 mod syntax_error;
+mod text;
 mod token;
-mod words;
 
 pub use limits::MAX_BYTES;
 pub(crate) use limits::parse_bounded;
 pub(crate) use parse::parse;
+pub use text::quoted;
 pub(crate) use token::{is_keyword, token_at};

@@ -3,7 +3,7 @@
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
-    self, Activation, ActivationMode, CampaignId, Content, Copies, Id as _, MetricId, OperationId, Search, TestId,
+    self, Activation, ActivationMode, CampaignId, Copies, Id as _, MetricId, OperationId, Search, TestId, TestTemplate,
 };
 use crate::span::Span;
 use crate::syntax::ast::{self, Count, Strategy};
@@ -43,7 +43,7 @@ impl<'a> Resolver<'a> {
             ast::Record::Failing => model::Recorded::Failing,
             ast::Record::All => model::Recorded::All,
         });
-        let content = self.content(campaign, end_after, activation);
+        let template = self.template(campaign, end_after, activation);
         let coverage = self.coverage(campaign);
         let exploration = self.exploration(campaign);
         let confirm = self.confirm(campaign);
@@ -64,9 +64,9 @@ impl<'a> Resolver<'a> {
                 let search = self.repeat(repeat, end_after);
                 (search, self.seed(&repeat.seed))
             }
-            (Some(search), None, None) => (self.search(campaign, search, content), self.seed(&search.seed)),
+            (Some(search), None, None) => (self.search(campaign, search, template), self.seed(&search.seed)),
             (None, None, None) => {
-                if !campaign.damaged {
+                if !campaign.has_errors {
                     let title =
                         format!("campaign `{}` neither searches nor repeats nor observes", campaign.head.name.text);
                     let diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, campaign.head.name.span, title)
@@ -98,7 +98,7 @@ impl<'a> Resolver<'a> {
 
     fn end(&mut self, campaign: &'a ast::Campaign) -> Option<f64> {
         let Some(end) = self.single(&campaign.ends, "end after") else {
-            if !campaign.damaged {
+            if !campaign.has_errors {
                 self.missing(&campaign.head.name, "the time at which its tests end", "end after 70s");
             }
             return None;
@@ -117,7 +117,7 @@ impl<'a> Resolver<'a> {
             if campaign.repeats.is_empty()
                 && campaign.passives.is_empty()
                 && !campaign.searches.is_empty()
-                && !campaign.damaged
+                && !campaign.has_errors
             {
                 self.missing(&campaign.head.name, "its objectives", "objectives fuzzing_time, collision_occurrence");
             }
@@ -150,19 +150,19 @@ impl<'a> Resolver<'a> {
     }
 
     /// What the tests of a search hold.
-    fn content(
+    fn template(
         &mut self,
         campaign: &'a ast::Campaign,
         end_after: Option<f64>,
         activation: Option<ActivationMode>,
-    ) -> Option<Content> {
+    ) -> Option<TestTemplate> {
         let spans: Vec<Span> = campaign.operations.iter().map(|it| it.span).collect();
         self.at_most_one(&spans, "operations");
         let Some(operations) = campaign.operations.first() else {
             if campaign.repeats.is_empty()
                 && campaign.passives.is_empty()
                 && !campaign.searches.is_empty()
-                && !campaign.damaged
+                && !campaign.has_errors
             {
                 self.missing(&campaign.head.name, "the operations of its tests", "operations jitter 1..5 per test");
             }
@@ -197,7 +197,7 @@ impl<'a> Resolver<'a> {
         let found: Vec<OperationId> = found?.into_iter().map(OperationId::from_index).collect();
         let copies = operations.copies.map_or_else(Copies::default, |(_, copies)| copies);
         self.enough_operations(campaign, operations, &found, min)?;
-        Some(Content { operations: found, min, max, copies, activation: activation? })
+        Some(TestTemplate { operations: found, min, max, copies, activation: activation? })
     }
 
     /// Reports a test that would have to hold more operations than there are, where one may hold each only once.
@@ -263,12 +263,12 @@ impl<'a> Resolver<'a> {
         &mut self,
         campaign: &'a ast::Campaign,
         search: &'a ast::Search,
-        content: Option<Content>,
+        template: Option<TestTemplate>,
     ) -> Option<Search> {
         let strategy = search.strategy?;
         let population = self.single(&search.population, "population").copied();
         let evaluations = self.single(&search.evaluations, "evaluations").copied();
-        if evaluations.is_none() && !search.damaged {
+        if evaluations.is_none() && !search.has_errors {
             self.missing(&campaign.head.name, "the number of tests to evaluate", "evaluations 200");
         }
         let found = evaluations.and_then(|count| self.count(count, 1, "a search evaluates"));
@@ -287,11 +287,11 @@ impl<'a> Resolver<'a> {
                     self.report(diagnostic);
                     return None;
                 }
-                let (content, evaluations) = (content?, found?);
+                let (template, evaluations) = (template?, found?);
                 Some(match strategy {
-                    Strategy::Random => Search::Random { content, evaluations },
-                    Strategy::Sobol => Search::Sobol { content, evaluations },
-                    _ => Search::LatinHypercube { content, evaluations },
+                    Strategy::Random => Search::Random { template, evaluations },
+                    Strategy::Sobol => Search::Sobol { template, evaluations },
+                    _ => Search::LatinHypercube { template, evaluations },
                 })
             }
             Strategy::Falsification => {
@@ -299,12 +299,12 @@ impl<'a> Resolver<'a> {
                     Some(count) => self.count(count, 1, "a falsification tries at a time"),
                     None => Some(1),
                 };
-                let (content, population, evaluations) = (content?, population?, found?);
-                Some(Search::Falsification { content, population, evaluations })
+                let (template, population, evaluations) = (template?, population?, found?);
+                Some(Search::Falsification { template, population, evaluations })
             }
             Strategy::Nsga2 | Strategy::MapElites => {
                 let Some(count) = population else {
-                    if !search.damaged {
+                    if !search.has_errors {
                         self.missing(&campaign.head.name, "the size of its population", "population 10");
                     }
                     return None;
@@ -328,10 +328,10 @@ impl<'a> Resolver<'a> {
                     self.report(diagnostic);
                     return None;
                 }
-                let (content, population, evaluations) = (content?, size, found);
+                let (template, population, evaluations) = (template?, size, found);
                 Some(match strategy {
-                    Strategy::Nsga2 => Search::Nsga2 { content, population, evaluations },
-                    _ => Search::MapElites { content, population, evaluations },
+                    Strategy::Nsga2 => Search::Nsga2 { template, population, evaluations },
+                    _ => Search::MapElites { template, population, evaluations },
                 })
             }
         }

@@ -21,7 +21,7 @@ impl<'a> Resolver<'a> {
             }
         };
         let violations = self.single(&written.violations, "violations").is_some();
-        if let Some((span, ())) = written.violations.first().filter(|_| !campaign.unread)
+        if let Some((span, ())) = written.violations.first().filter(|_| !campaign.inherited_errors)
             && self.file.requirements.is_empty()
         {
             let title = "there is no requirement whose violations could be confirmed";

@@ -35,7 +35,7 @@ impl<'a> Resolver<'a> {
 
     fn axes(&mut self, written: &ast::Coverage) -> Option<Vec<CoverageAxis>> {
         if written.axes.is_empty() {
-            if !written.damaged {
+            if !written.has_errors {
                 let diagnostic =
                     Diagnostic::new(Code::CLAUSE_MISSING, written.span, "this `coverage` lacks its dimensions")
                         .label("add the dimensions whose cells are counted")
@@ -112,7 +112,7 @@ impl<'a> Resolver<'a> {
 
     fn failsafe(&mut self, campaign: &ast::Campaign, written: &ast::Coverage, count: ast::Count) -> Option<u32> {
         let found = self.count(count, 1, "a search evaluates")?;
-        if written.stops.is_empty() && !written.damaged {
+        if written.stops.is_empty() && !written.has_errors {
             let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, count.span, "there is nothing to give up")
                 .label("`failsafe` ends a search that is to stop at a coverage and does not reach it")
                 .note("add for example `stop at 50%`");

@@ -72,7 +72,7 @@ impl<'a> Resolver<'a> {
             None => Some(DROP),
         };
         let Some(&[from, to]) = self.single(&written.children, "from … to") else {
-            if !written.damaged {
+            if !written.has_errors {
                 let diagnostic =
                     Diagnostic::new(Code::CLAUSE_MISSING, written.span, "this boost does not say how many")
                         .label("add how many children are boosted at first and at last")
@@ -149,9 +149,9 @@ impl<'a> Resolver<'a> {
     /// Whether a campaign has what its strategies work on.
     pub(super) fn explorable(&mut self, campaign: &'a ast::Campaign, search: &Search) -> bool {
         // A campaign that searches nothing was told so.
-        let Some(content) = search.content() else { return true };
+        let Some(template) = search.template() else { return true };
         let mut complete = true;
-        let by_condition = matches!(content.activation, ActivationMode::Condition(_));
+        let by_condition = matches!(template.activation, ActivationMode::Condition(_));
         let mut refuse = |resolver: &mut Self, span: Span, what: &str, lacks: &str, label: &str| {
             let title = format!("{what} {lacks}");
             resolver.report(Diagnostic::new(Code::NOTHING_TO_EXPLORE, span, title).label(label));
@@ -159,8 +159,8 @@ impl<'a> Resolver<'a> {
         };
         let written = campaign.searches.first();
         let strategy = written.and_then(|search| Some((search.span, search.strategy?)));
-        let without_requirements = self.file.requirements.is_empty() && !campaign.unread;
-        let without_cells = campaign.coverages.is_empty() && !campaign.unread;
+        let without_requirements = self.file.requirements.is_empty() && !campaign.inherited_errors;
+        let without_cells = campaign.coverages.is_empty() && !campaign.inherited_errors;
         match strategy {
             Some((span, Strategy::MapElites)) if without_cells => {
                 refuse(self, span, "MAP-Elites", "has no cells to keep tests in", "add a `coverage`");

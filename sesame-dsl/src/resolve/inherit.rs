@@ -41,8 +41,8 @@ pub(super) fn inherit(file: &mut File, diagnostics: &mut Vec<Diagnostic>) {
                 }
                 // What is inherited is not known, so nothing is missing.
                 None if file.campaigns[index].from.is_some() => {
-                    file.campaigns[index].damaged = true;
-                    file.campaigns[index].unread = true;
+                    file.campaigns[index].has_errors = true;
+                    file.campaigns[index].inherited_errors = true;
                 }
                 None => {}
             }
@@ -80,8 +80,8 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
     }
     let searches = !child.searches.is_empty();
     // What the base lacks was said of it.
-    child.damaged |= base.damaged || !own || searches != base.searches.is_empty();
-    child.unread |= base.unread;
+    child.has_errors |= base.has_errors || !own || searches != base.searches.is_empty();
+    child.inherited_errors |= base.inherited_errors;
     if child.observes.is_empty() {
         child.observes.clone_from(&base.observes);
     }

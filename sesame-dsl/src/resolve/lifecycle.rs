@@ -4,8 +4,8 @@ use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{self, Id as _, Lifecycle, TopicId};
 use crate::span::Span;
+use crate::syntax::ast::lifecycle as written;
 use crate::syntax::ast::{Quantity, System};
-use crate::syntax::lifecycle as written;
 use crate::units::Unit;
 
 impl<'a> Resolver<'a> {
@@ -65,7 +65,7 @@ impl<'a> Resolver<'a> {
         let latency = self.single(&budget.latency, "latency");
         let jitter = self.single(&budget.jitter, "jitter");
         if latency.is_none() && jitter.is_none() {
-            if !budget.damaged {
+            if !budget.has_errors {
                 let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, span, "this `relay budget` limits nothing");
                 self.report(diagnostic.label("add `latency` or `jitter`").note("for example `latency 5ms`"));
             }
