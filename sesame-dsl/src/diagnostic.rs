@@ -79,6 +79,12 @@ impl Diagnostic {
         self
     }
 
+    /// With the suggestion to write a name that looks like the one at `span`.
+    pub fn did_you_mean(self, span: Span, meant: impl Into<String>) -> Self {
+        let meant = meant.into();
+        self.suggest(format!("did you mean `{meant}`?"), span, meant)
+    }
+
     /// Error or warning.
     pub fn severity(&self) -> Severity {
         self.code.severity()

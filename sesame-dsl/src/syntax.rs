@@ -1,9 +1,10 @@
 //! From text to [`ast`]: parsing with recovery.
 //!
 //! [`ast`] is the data, `parse` makes it from the grammar's pairs, and `syntax_error` says what is wrong where the grammar
-//! gave up.
+//! gave up. Both know from `blocks` what stands in which block.
 
 pub(crate) mod ast;
+mod blocks;
 mod limits;
 mod parse;
 mod syntax_error;

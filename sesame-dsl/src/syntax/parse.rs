@@ -18,7 +18,6 @@ use sesame_grammar::Rule;
 use self::reader::{Pair, Reader, expect_child};
 use super::ast::File;
 use super::limits::{MAX_BYTES, parse_bounded, too_deep};
-use super::syntax_error::Place;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::{FileId, Span};
 
@@ -53,7 +52,7 @@ pub(crate) fn parse(file: FileId, text: &str, diagnostics: &mut Vec<Diagnostic>)
 
 impl Reader<'_> {
     fn file(&mut self, root: &Pair<'_>) {
-        let has_errors = self.members(root, Place::File, |reader, item| match item.as_rule() {
+        let has_errors = self.members(root, |reader, item| match item.as_rule() {
             Rule::space => {
                 let head = reader.head(&item);
                 reader.out.spaces.push(head);

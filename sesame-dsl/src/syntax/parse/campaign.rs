@@ -8,7 +8,6 @@ use crate::span::Span;
 use crate::syntax::ast::{
     ActivationMode, ByCondition, Campaign, Count, Inherited, Operations, Passive, Record, Repeat, Search, Strategy,
 };
-use crate::syntax::syntax_error::Place;
 
 impl Reader<'_> {
     pub(super) fn campaign(&mut self, pair: &Pair<'_>) -> Campaign {
@@ -32,7 +31,7 @@ impl Reader<'_> {
             has_errors: false,
             inherited_errors: false,
         };
-        campaign.has_errors = self.members(pair, Place::Campaign, |reader, member| {
+        campaign.has_errors = self.members(pair, |reader, member| {
             let span = reader.keyword_span(&member);
             match member.as_rule() {
                 Rule::objectives => campaign.objectives.push((span, reader.names(&member))),
@@ -113,7 +112,7 @@ impl Reader<'_> {
         ];
         search.strategy = strategies.into_iter().find(|(rule, _)| child(pair, *rule).is_some()).map(|(_, it)| it);
         let settings = expect_child(pair, Rule::search_settings);
-        search.has_errors = self.members(&settings, Place::Search, |reader, setting| {
+        search.has_errors = self.members(&settings, |reader, setting| {
             let value = (reader.keyword_span(&setting), reader.count(&expect_child(&setting, Rule::number)));
             match setting.as_rule() {
                 Rule::setting_population => search.population.push(value),
@@ -129,7 +128,7 @@ impl Reader<'_> {
     fn seeds(&mut self, pair: &Pair<'_>) -> Vec<(Span, Count)> {
         let mut seeds = Vec::new();
         if let Some(settings) = child(pair, Rule::repeat_settings) {
-            self.members(&settings, Place::Repeat, |reader, setting| {
+            self.members(&settings, |reader, setting| {
                 let span = reader.keyword_span(&setting);
                 seeds.push((span, reader.count(&expect_child(&setting, Rule::number))));
             });
@@ -152,7 +151,7 @@ impl Reader<'_> {
         }
         if let Some(settings) = child(pair, Rule::condition_settings) {
             // Each setting has a default, so a block with errors lacks none.
-            self.members(&settings, Place::Condition, |reader, setting| {
+            self.members(&settings, |reader, setting| {
                 let span = reader.keyword_span(&setting);
                 match setting.as_rule() {
                     Rule::setting_depth => {

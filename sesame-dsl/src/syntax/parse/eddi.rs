@@ -4,7 +4,6 @@ use sesame_grammar::Rule;
 
 use super::reader::{Pair, Reader, child, children, expect_child};
 use crate::syntax::ast::eddi::{Demand, Eddi, Evidence, Guarantee, Mitigation, Otherwise};
-use crate::syntax::syntax_error::Place;
 
 impl Reader<'_> {
     pub(super) fn eddi(&mut self, pair: &Pair<'_>) -> Eddi {
@@ -18,7 +17,7 @@ impl Reader<'_> {
             otherwise: vec![],
             has_errors: false,
         };
-        eddi.has_errors = self.members(pair, Place::Eddi, |reader, member| match member.as_rule() {
+        eddi.has_errors = self.members(pair, |reader, member| match member.as_rule() {
             Rule::demand => {
                 let from = children(&member, Rule::name).nth(1).expect("a demand names whom it is made of");
                 eddi.demands.push(Demand { head: reader.head(&member), eddi: reader.name(&from) });

@@ -4,13 +4,12 @@ use sesame_grammar::Rule;
 
 use super::reader::{Pair, Reader, child, children, expect_child};
 use crate::syntax::ast::lifecycle::{Command, Launch, Ready, RelayBudget};
-use crate::syntax::syntax_error::Place;
 
 impl Reader<'_> {
     pub(super) fn launch(&mut self, pair: &Pair<'_>) -> Launch {
         let mut launch = Launch { command: self.command(pair), ready: vec![] };
         if let Some(settings) = child(pair, Rule::launch_settings) {
-            self.members(&settings, Place::Launch, |reader, ready| {
+            self.members(&settings, |reader, ready| {
                 let topic = reader.name(&expect_child(&ready, Rule::name));
                 let within = reader.signed(&expect_child(&ready, Rule::signed));
                 launch.ready.push((reader.keyword_span(&ready), Ready { topic, within }));
@@ -27,7 +26,7 @@ impl Reader<'_> {
     pub(super) fn relay_budget(&mut self, pair: &Pair<'_>) -> RelayBudget {
         let mut budget = RelayBudget { latency: vec![], jitter: vec![], has_errors: false };
         let settings = expect_child(pair, Rule::budget_settings);
-        budget.has_errors = self.members(&settings, Place::Budget, |reader, setting| {
+        budget.has_errors = self.members(&settings, |reader, setting| {
             let value = (reader.keyword_span(&setting), reader.signed(&expect_child(&setting, Rule::signed)));
             match setting.as_rule() {
                 Rule::setting_latency => budget.latency.push(value),

@@ -4,7 +4,6 @@ use sesame_grammar::Rule;
 
 use super::reader::{Pair, Reader, child, children, comparison, expect_child, first_of};
 use crate::syntax::ast::{Bound, Direction, Metric, MetricSource, Requirement, Trend};
-use crate::syntax::syntax_error::Place;
 
 impl Reader<'_> {
     pub(super) fn metric(&mut self, pair: &Pair<'_>) -> Metric {
@@ -33,7 +32,7 @@ impl Reader<'_> {
         let source = match source.as_rule() {
             Rule::hook_block => {
                 let mut hooks = Vec::new();
-                let has_errors = self.members(&source, Place::Hook, |reader, hook| {
+                let has_errors = self.members(&source, |reader, hook| {
                     hooks.push((reader.keyword_span(&hook), reader.names(&hook)));
                 });
                 MetricSource::Hook { hooks, has_errors }

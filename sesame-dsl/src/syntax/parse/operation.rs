@@ -181,7 +181,7 @@ impl Reader<'_> {
         let moment = child(pair, Rule::moment).map(|moment| self.moment(&moment));
         let mut custom = Custom { span, moment, parameters: vec![], has_errors: false };
         let block = expect_child(pair, Rule::custom_parameters);
-        custom.has_errors = self.members(&block, crate::syntax::syntax_error::Place::Custom, |reader, member| {
+        custom.has_errors = self.members(&block, |reader, member| {
             let word = expect_child(&member, Rule::parameter_name);
             let domains = [Rule::number_domain, Rule::point_domain, Rule::text_domain, Rule::file_domain];
             let domain = first_of(&member, &domains).expect("a parameter has a domain");

@@ -5,7 +5,6 @@ use sesame_grammar::Rule;
 use super::reader::{Pair, Reader, child, children, expect_child};
 use crate::syntax::ast::Name;
 use crate::syntax::ast::physical::{Budget, Fit, Form, LabSimulator, Physical, Setting, Shape, ShapePlace};
-use crate::syntax::syntax_error::Place;
 
 impl Reader<'_> {
     pub(super) fn physical(&mut self, pair: &Pair<'_>) -> Physical {
@@ -23,7 +22,7 @@ impl Reader<'_> {
             fits: vec![],
             has_errors: false,
         };
-        lab.has_errors = self.members(pair, Place::Physical, |reader, member| {
+        lab.has_errors = self.members(pair, |reader, member| {
             let span = reader.keyword_span(&member);
             match member.as_rule() {
                 Rule::lab_simulator => lab.simulators.push((span, reader.lab_simulator(&member))),
@@ -85,7 +84,7 @@ impl Reader<'_> {
         let arguments = children(pair, Rule::text).map(|text| self.text_of(&text)).collect();
         let mut settings = Vec::new();
         if let Some(block) = child(pair, Rule::lab_settings) {
-            self.members(&block, Place::Lab, |reader, setting| {
+            self.members(&block, |reader, setting| {
                 let name = expect_child(&setting, Rule::lab_setting_name);
                 let name = Name { text: name.as_str().to_owned(), span: reader.span(&name) };
                 let number = child(&setting, Rule::signed).map(|number| Setting::Quantity(reader.signed(&number)));

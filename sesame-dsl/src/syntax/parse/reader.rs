@@ -6,7 +6,8 @@ use sesame_grammar::Rule;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::{FileId, Span};
 use crate::syntax::ast::{Comparison, File, Name};
-use crate::syntax::syntax_error::{Place, explain};
+use crate::syntax::blocks::{self, Block};
+use crate::syntax::syntax_error::explain;
 use crate::syntax::token::{TokenKind, token_at};
 
 pub(super) type Pair<'i> = PestPair<'i, Rule>;
@@ -80,102 +81,100 @@ impl Reader<'_> {
     }
 
     /// Visits the members of a block. What could not be read is explained; returns whether there was such a thing.
-    pub(super) fn members<'i>(
-        &mut self,
-        block: &Pair<'i>,
-        place: Place,
-        mut visit: impl FnMut(&mut Self, Pair<'i>),
-    ) -> bool {
+    pub(super) fn members<'i>(&mut self, block: &Pair<'i>, mut visit: impl FnMut(&mut Self, Pair<'i>)) -> bool {
+        let row = blocks::block(block.as_rule());
         let mut has_errors = false;
         let mut previous = None;
         let mut opened = None;
+        // Words that are no members, from the first that was not explained yet.
+        let mut stretch: Option<Span> = None;
         for pair in block.clone().into_inner() {
-            match pair.as_rule() {
-                Rule::COMMENT => {}
-                Rule::open => opened = Some(self.span(&pair)),
-                Rule::not_closed | Rule::fields_not_closed => {
-                    has_errors = true;
-                    self.not_closed(block, &pair, opened);
+            let rule = pair.as_rule();
+            if rule == Rule::COMMENT {
+                continue;
+            }
+            if rule == Rule::error_setting {
+                let span = self.span(&pair);
+                let begins = row.begins_with(token_at(self.text, pair.as_span().start()).text);
+                if let Some(before) = stretch.filter(|_| !begins) {
+                    stretch = Some(before.to(span));
+                    continue;
                 }
-                rule if rule == place.error_rule() => {
-                    has_errors = true;
-                    let span = self.span(&pair);
-                    self.undeclared_names(&pair);
-                    // A stretch that begins at the mistake before it is the rest of the same mistake.
-                    let start = token_at(self.text, pair.as_span().start()).lo;
-                    let reported = self.mistake == Some(start);
-                    if !reported {
-                        let diagnostic = explain(self.file, self.text, span, place, previous);
-                        self.mistake = Some(diagnostic.span.lo as usize);
-                        self.report(diagnostic);
-                    }
-                    previous = None;
-                }
-                rule if place.member_rules().contains(&rule) => {
-                    previous = Some(self.span(&pair));
-                    visit(self, pair);
-                }
-                _ => {}
+                self.unread(row, stretch.replace(span), &mut previous);
+                has_errors = true;
+                continue;
+            }
+            self.unread(row, stretch.take(), &mut previous);
+            if rule == Rule::open {
+                opened = Some(self.span(&pair));
+            } else if matches!(rule, Rule::not_closed | Rule::fields_not_closed) {
+                has_errors = true;
+                self.not_closed(row, &pair, opened);
+            } else if rule == row.error {
+                has_errors = true;
+                self.unread(row, Some(self.span(&pair)), &mut previous);
+            } else if row.members.iter().any(|member| member.rule == rule) {
+                previous = Some(self.span(&pair));
+                visit(self, pair);
             }
         }
+        self.unread(row, stretch, &mut previous);
         has_errors
     }
 
-    fn not_closed(&mut self, block: &Pair<'_>, end: &Pair<'_>, opened: Option<Span>) {
+    /// Explains a stretch of a block that could not be read, if there is one, given the member before it, which none is
+    /// for the next.
+    fn unread(&mut self, row: &Block, stretch: Option<Span>, previous: &mut Option<Span>) {
+        let Some(stretch) = stretch else { return };
+        self.undeclared_names(stretch);
+        let previous = previous.take();
+        // A stretch that begins at the mistake before it is the rest of the same mistake.
+        let start = token_at(self.text, stretch.lo as usize).lo;
+        if self.mistake == Some(start) {
+            return;
+        }
+        let diagnostic = explain(self.file, self.text, stretch, row, previous);
+        self.mistake = Some(diagnostic.span.lo as usize);
+        self.report(diagnostic);
+    }
+
+    fn not_closed(&mut self, row: &Block, end: &Pair<'_>, opened: Option<Span>) {
         let opened = opened.expect("a block begins with its brace");
         let at = token_at(self.text, end.as_span().start());
         let span = self.span_of(at.lo, at.hi());
-        let what = match block.as_rule() {
-            Rule::hook_block => "metric".to_owned(),
-            Rule::custom_parameters => "operation".to_owned(),
-            rule => format!("{rule:?}").replace("_settings", ""),
-        };
         let label = if at.text.is_empty() {
             "the file ends here".to_owned()
         } else {
             format!("`{}` begins a new declaration", at.text)
         };
-        let diagnostic = Diagnostic::new(Code::NOT_CLOSED, span, format!("the block of this `{what}` is not closed"))
-            .label(label)
-            .also(opened, "opened here");
+        let diagnostic =
+            Diagnostic::new(Code::NOT_CLOSED, span, format!("the block of this `{}` is not closed", row.name))
+                .label(label)
+                .also(opened, "opened here");
         self.report(diagnostic);
     }
 
     /// Keeps the name that a broken or unsupported construct was about to declare.
-    fn undeclared_names(&mut self, pair: &Pair<'_>) {
-        let lo = pair.as_span().start();
+    fn undeclared_names(&mut self, stretch: Span) {
+        let [lo, end] = [stretch.lo as usize, stretch.hi as usize];
         let mut at = lo;
         // A misspelt first word may have been about to declare the second.
         let first = token_at(self.text, lo);
         let second = token_at(self.text, first.hi());
         let both_words = [first, second].iter().all(|token| token.kind == TokenKind::Word);
-        if both_words && second.lo < pair.as_span().end() {
+        if both_words && second.lo < end {
             let span = self.span_of(second.lo, second.hi());
             self.out.undeclared.push(Name { text: second.text.to_owned(), span });
         }
         loop {
             let token = token_at(self.text, at);
-            if token.lo >= pair.as_span().end() || token.text.is_empty() {
+            if token.lo >= end || token.text.is_empty() {
                 return;
             }
             at = token.hi();
-            let declares = matches!(
-                token.text,
-                "simulator"
-                    | "message"
-                    | "topic"
-                    | "node"
-                    | "metric"
-                    | "requirement"
-                    | "operation"
-                    | "test"
-                    | "campaign"
-                    | "eddi"
-                    | "physical"
-            );
-            if declares {
+            if blocks::declares(token.text) {
                 let name = token_at(self.text, at);
-                if name.kind == TokenKind::Word && name.lo < pair.as_span().end() {
+                if name.kind == TokenKind::Word && name.lo < end {
                     let span = self.span_of(name.lo, name.hi());
                     self.out.undeclared.push(Name { text: name.text.to_owned(), span });
                     at = name.hi();
@@ -196,7 +195,7 @@ impl Reader<'_> {
             Rule::unsupported_strategy => format!("search strategy `{word}`"),
             _ => format!("`{word}`"),
         };
-        self.undeclared_names(pair);
+        self.undeclared_names(self.span(pair));
         self.report(
             Diagnostic::new(
                 Code::NOT_SUPPORTED,

@@ -7,7 +7,6 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::syntax::ast::{
     Field, Head, InProcess, Message, Node, Process, Simulator, System, Topic, Transport, Type, TypeKind,
 };
-use crate::syntax::syntax_error::Place;
 
 impl Reader<'_> {
     pub(super) fn system(&mut self, pair: &Pair<'_>) -> System {
@@ -23,7 +22,7 @@ impl Reader<'_> {
             relay_budgets: vec![],
             has_errors: false,
         };
-        system.has_errors = self.members(pair, Place::System, |reader, member| match member.as_rule() {
+        system.has_errors = self.members(pair, |reader, member| match member.as_rule() {
             Rule::simulator => system.simulators.push(reader.simulator(&member)),
             Rule::message => system.messages.push(reader.message(&member)),
             Rule::topic => system.topics.push(Topic {
@@ -56,7 +55,7 @@ impl Reader<'_> {
         let path = self.text_of(&expect_child(pair, Rule::text));
         let mut transport = InProcess { path, crates: vec![], steps: vec![], has_errors: false };
         let settings = expect_child(pair, Rule::simulator_settings);
-        transport.has_errors = self.members(&settings, Place::Simulator, |reader, setting| {
+        transport.has_errors = self.members(&settings, |reader, setting| {
             let span = reader.keyword_span(&setting);
             match setting.as_rule() {
                 Rule::setting_crate => {
@@ -73,7 +72,7 @@ impl Reader<'_> {
         let program = texts.next().expect("a process has a program");
         let mut transport = Process { program, arguments: texts.collect(), steps: vec![], has_errors: false };
         let settings = expect_child(pair, Rule::process_settings);
-        transport.has_errors = self.members(&settings, Place::Process, |reader, setting| {
+        transport.has_errors = self.members(&settings, |reader, setting| {
             let span = reader.keyword_span(&setting);
             transport.steps.push((span, reader.signed(&expect_child(&setting, Rule::signed))));
         });
@@ -83,7 +82,7 @@ impl Reader<'_> {
     fn message(&mut self, pair: &Pair<'_>) -> Message {
         let head = self.head(pair);
         let mut fields = Vec::new();
-        let has_errors = self.members(pair, Place::Message, |reader, field| {
+        let has_errors = self.members(pair, |reader, field| {
             let name = expect_child(&field, Rule::field_name);
             fields.push(Field {
                 head: Head { name: reader.field_name(&name), doc: Self::doc(&field) },
@@ -125,7 +124,7 @@ impl Reader<'_> {
 
     fn node(&mut self, pair: &Pair<'_>) -> Node {
         let mut node = Node { head: self.head(pair), publishes: vec![], subscribes: vec![] };
-        self.members(pair, Place::Node, |reader, member| {
+        self.members(pair, |reader, member| {
             let list = (reader.keyword_span(&member), reader.names(&member));
             match member.as_rule() {
                 Rule::publishes => node.publishes.push(list),

@@ -6,12 +6,11 @@ use super::reader::{Pair, Reader, child, children, expect_child, first_of};
 use crate::syntax::ast::{
     Activation, Choice, Count, Expectation, Name, Range, Test, TestOperation, Trigger, TriggerEnd,
 };
-use crate::syntax::syntax_error::Place;
 
 impl Reader<'_> {
     pub(super) fn test(&mut self, pair: &Pair<'_>) -> Test {
         let mut test = Test { head: self.head(pair), operations: vec![], expectations: vec![], has_errors: false };
-        test.has_errors = self.members(pair, Place::Test, |reader, member| match member.as_rule() {
+        test.has_errors = self.members(pair, |reader, member| match member.as_rule() {
             Rule::expectation => test.expectations.push(Expectation {
                 metric: reader.name(&expect_child(&member, Rule::name)),
                 bound: reader.bound(&expect_child(&member, Rule::bound)),
