@@ -3,7 +3,9 @@
 //! Numbers are in the units of the wire or of a conversion that is part of the expression; so whoever evaluates one needs
 //! no units.
 
-use super::{Comparison, FieldPath, Members};
+use sesame_plan::{Comparison, Members};
+
+use super::system::FieldPath;
 
 /// A metric computed from messages without any code of the user.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,11 @@
 //! Fuzzing operations and the known tests that apply them.
 
 use super::condition::{Condition, Constraint};
-use super::{Bound, Declaration, MetricId, Moment, OperationId, OperationKind, Range, Shape, Step, TopicId};
+use sesame_plan::{Moment, OperationKind, Shape, Step};
+
+use super::declaration::Declaration;
+use super::ids::{MetricId, OperationId, TopicId};
+use super::metrics::{Bound, Range};
 use crate::units::Unit;
 
 /// A fuzzing operation with its permitted ranges.

@@ -2,7 +2,13 @@
 
 pub use sesame_plan::Trend;
 
-use super::{Declaration, Direction, FieldPath, Formula, MetricId, Robustness, TopicId};
+use sesame_plan::Direction;
+
+use super::declaration::Declaration;
+use super::formula::Formula;
+use super::ids::{MetricId, TopicId};
+use super::system::FieldPath;
+use super::temporal::Robustness;
 use crate::units::Unit;
 
 /// A number computed from the messages of a test.

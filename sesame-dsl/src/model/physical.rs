@@ -1,6 +1,10 @@
 //! Physical labs: how tests are chosen for one, run in it, and compared with simulation.
 
-use super::{Bound, Declaration, Dimension, MetricId, Range};
+use sesame_plan::Dimension;
+
+use super::declaration::Declaration;
+use super::ids::MetricId;
+use super::metrics::{Bound, Range};
 
 /// A lab.
 #[derive(Debug, Clone, PartialEq)]
