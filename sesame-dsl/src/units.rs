@@ -43,7 +43,7 @@ impl Dimension {
             .filter(|&(_, exponent)| exponent != 0)
             .map(|(base, exponent)| if exponent == 1 { (*base).to_owned() } else { format!("{base}^{exponent}") })
             .collect();
-        format!("a quantity in {}", factors.join("*"))
+        format!("a quantity of dimension {}", factors.join("*"))
     }
 }
 
@@ -408,7 +408,7 @@ mod tests {
         assert_eq!(unit("W/A").dimension(), unit("V").dimension());
         assert_ne!(unit("rad/s").dimension(), unit("Hz").dimension());
         assert_eq!(unit("m/s").dimension().name(), "a speed");
-        assert_eq!(unit("kg*m").dimension().name(), "a quantity in m*kg");
+        assert_eq!(unit("kg*m").dimension().name(), "a quantity of dimension m*kg");
     }
 
     #[test]
