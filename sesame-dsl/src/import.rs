@@ -162,9 +162,9 @@ impl Merger<'_> {
             format!("{first} imports itself")
         } else {
             let by: Vec<&str> = self.open[at + 1..].iter().map(|&id| name(id)).collect();
-            format!("{first} imports itself by way of {}", by.join(", "))
+            format!("{first} imports itself through {}", by.join(", "))
         };
-        let diagnostic = Diagnostic::new(Code::CIRCLE, import.span, title).label("this import closes the circle");
+        let diagnostic = Diagnostic::new(Code::CIRCLE, import.span, title).label("this import closes the cycle");
         self.diagnostics.push(diagnostic);
     }
 }
