@@ -1,4 +1,4 @@
-//! Text from diagnostics: for people, for one-line tools, for programs, for GitHub.
+//! Diagnostics as text: for people, for line-based tools, for programs, for GitHub.
 
 mod github;
 mod human;
@@ -14,7 +14,7 @@ pub use short::short;
 
 use super::{Diagnostic, visible};
 
-/// A diagnostic for a terminal, whatever it quotes.
+/// A diagnostic whose texts contain nothing that a terminal interprets.
 fn for_terminals(diagnostic: &Diagnostic) -> Diagnostic {
     let mut shown = diagnostic.clone();
     let texts = [&mut shown.title, &mut shown.label].into_iter();

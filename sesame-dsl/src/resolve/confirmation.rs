@@ -7,7 +7,7 @@ use crate::syntax::ast::{self, Strategy};
 
 impl<'a> Resolver<'a> {
     /// The campaign's confirmation. The outer `None` means that it has mistakes.
-    #[expect(clippy::option_option, reason = "the outer says whether it was in order, the inner is the model's")]
+    #[expect(clippy::option_option, reason = "the outer `None` means a mistake, the inner is the model's")]
     pub(super) fn confirm(&mut self, campaign: &'a ast::Campaign) -> Option<Option<Confirmation>> {
         let spans: Vec<_> = campaign.confirms.iter().map(|confirm| confirm.span).collect();
         self.at_most_one(&spans, "confirm");
@@ -35,7 +35,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// The number of neighbours that the search averages over. The outer `None` means that it has mistakes.
-    #[expect(clippy::option_option, reason = "the outer says whether it was in order, the inner is the model's")]
+    #[expect(clippy::option_option, reason = "the outer `None` means a mistake, the inner is the model's")]
     pub(super) fn neighbours(&mut self, search: &'a ast::Search) -> Option<Option<u32>> {
         let Some(&count) = self.single(&search.neighbours, "neighbours") else { return Some(None) };
         let learns_nothing = "its tests do not depend on the results of earlier ones";

@@ -10,7 +10,7 @@ const MOST_CELLS: u64 = 100_000;
 
 impl<'a> Resolver<'a> {
     /// The campaign's coverage. The outer `None` means that it has mistakes.
-    #[expect(clippy::option_option, reason = "the outer says whether it was in order, the inner is the model's")]
+    #[expect(clippy::option_option, reason = "the outer `None` means a mistake, the inner is the model's")]
     pub(super) fn coverage(&mut self, campaign: &'a ast::Campaign) -> Option<Option<model::Coverage>> {
         let spans: Vec<_> = campaign.coverages.iter().map(|coverage| coverage.span).collect();
         self.at_most_one(&spans, "coverage");

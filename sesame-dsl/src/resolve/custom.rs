@@ -131,7 +131,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// The first unit that is written, if any; the outer `None` for one that does not exist.
-    #[expect(clippy::option_option, reason = "the outer says whether it was in order")]
+    #[expect(clippy::option_option, reason = "the outer `None` means a mistake")]
     fn declared_unit(&mut self, written: [Option<&ast::UnitName>; 3]) -> Option<Option<Unit>> {
         match written.into_iter().flatten().next() {
             Some(name) => self.unit(name).map(Some),

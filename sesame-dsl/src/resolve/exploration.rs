@@ -21,7 +21,7 @@ const NEIGHBOURS: u32 = 10;
 
 impl<'a> Resolver<'a> {
     /// The campaign's exploration. The outer `None` means that it has mistakes.
-    #[expect(clippy::option_option, reason = "the outer says whether it was in order, the inner is the model's")]
+    #[expect(clippy::option_option, reason = "the outer `None` means a mistake, the inner is the model's")]
     pub(super) fn exploration(&mut self, campaign: &'a ast::Campaign) -> Option<Option<Exploration>> {
         if let Some(again) = campaign.explorations.get(1) {
             let diagnostic = Diagnostic::new(

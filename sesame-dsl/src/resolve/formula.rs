@@ -267,7 +267,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// The unit of a number in a formula, where `2rad*link0` is a likely mistake.
-    #[expect(clippy::option_option, reason = "the outer says whether it was in order, the inner is the number's")]
+    #[expect(clippy::option_option, reason = "the outer `None` means a mistake, the inner is the number's")]
     fn unit_in_formula(&mut self, quantity: &ast::Quantity) -> Option<Option<Unit>> {
         let Some(name) = &quantity.unit else { return Some(None) };
         let unit = self.unit(name);
