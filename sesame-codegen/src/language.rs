@@ -51,15 +51,15 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
         format!("{file}:{}", sources.position(span).line)
     };
     let mut notes = Vec::new();
-    if let Some(launch) = &space.surroundings.launch {
+    if let Some(launch) = &space.lifecycle.launch {
         let place = at(launch.command.span);
         notes.push(format!("`launch` ({place}) is not used by runners yet: they start the simulator themselves"));
     }
-    if let Some(terminate) = &space.surroundings.terminate {
+    if let Some(terminate) = &space.lifecycle.terminate {
         let place = at(terminate.span);
         notes.push(format!("`terminate` ({place}) is not used by runners yet: they end the simulator themselves"));
     }
-    if let Some(budget) = &space.surroundings.relay_budget {
+    if let Some(budget) = &space.lifecycle.relay_budget {
         let place = at(budget.span);
         notes.push(format!("`relay budget` ({place}) is not used by runners yet: in lock-step a relay adds no delay"));
     }

@@ -4,10 +4,10 @@
 //! space of its own and be imported by another. However often and from wherever a file is imported, it is there once.
 
 use std::collections::BTreeMap;
-use std::path::{Component, Path, PathBuf};
+use std::path::Path;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::source::SourceMap;
+use crate::source::{SourceMap, normal_path};
 use crate::span::FileId;
 use crate::syntax::{self, ast};
 
@@ -52,23 +52,7 @@ fn is_space(name: &str) -> bool {
 /// The name of what a file imports: relative to what the importing file's name is relative to.
 fn imported_name(importing: &str, written: &str) -> String {
     let folder = Path::new(importing).parent().unwrap_or(Path::new(""));
-    normal(&folder.join(written))
-}
-
-/// A path without `.`, and without `..` but at its beginning.
-pub(crate) fn normal(path: &Path) -> String {
-    let mut parts: Vec<Component<'_>> = Vec::new();
-    for part in path.components() {
-        match (part, parts.last()) {
-            (Component::ParentDir, Some(Component::Normal(_))) => {
-                parts.pop();
-            }
-            // Nothing is above the root.
-            (Component::CurDir, _) | (Component::ParentDir, Some(Component::RootDir)) => {}
-            _ => parts.push(part),
-        }
-    }
-    parts.into_iter().collect::<PathBuf>().to_string_lossy().into_owned()
+    normal_path(&folder.join(written))
 }
 
 /// The files of a space as one.
@@ -179,8 +163,8 @@ fn append(all: &mut ast::File, mut file: ast::File) {
     all.campaigns.append(&mut file.campaigns);
     all.eddis.append(&mut file.eddis);
     all.physicals.append(&mut file.physicals);
-    all.broken.append(&mut file.broken);
-    all.damaged |= file.damaged;
+    all.undeclared.append(&mut file.undeclared);
+    all.has_errors |= file.has_errors;
     all.incomplete |= file.incomplete;
 }
 

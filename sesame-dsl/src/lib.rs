@@ -21,7 +21,7 @@ use source::SourceMap;
 use span::FileId;
 
 pub use import::load_imports;
-pub use syntax::MAX_BYTES;
+pub use syntax::{MAX_BYTES, quoted};
 
 /// What an analysis found.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,11 +52,6 @@ pub fn analyse(sources: &SourceMap, root: FileId) -> Analysis {
     diagnostics.sort_by_key(|diagnostic| (diagnostic.span, diagnostic.code));
     diagnostics.dedup();
     Analysis { model, diagnostics }
-}
-
-/// A text as the language writes it, in quotes.
-pub fn quoted(text: &str) -> String {
-    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
 /// Whether a word is reserved, so that nothing but a message field can be named by it.

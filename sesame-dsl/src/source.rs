@@ -2,9 +2,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 
-use crate::import::normal;
 use crate::span::{FileId, Span};
 
 /// The files of one analysis. Nothing here touches a disk: the caller reads files and adds their text.
@@ -45,7 +44,7 @@ impl SourceMap {
     pub fn add(&mut self, name: impl Into<String>, text: impl Into<String>) -> FileId {
         let id = FileId(u32::try_from(self.files.len()).expect("fewer than 2^32 files"));
         let name = name.into();
-        self.by_name.entry(normal(Path::new(&name))).or_insert(id);
+        self.by_name.entry(normal_path(Path::new(&name))).or_insert(id);
         self.files.push(SourceFile::new(name, text.into()));
         id
     }
@@ -62,7 +61,7 @@ impl SourceMap {
 
     /// The file of a name, `.` and `..` in it worked out.
     pub fn find(&self, name: &str) -> Option<FileId> {
-        self.by_name.get(&normal(Path::new(name))).copied()
+        self.by_name.get(&normal_path(Path::new(name))).copied()
     }
 
     /// The file of an id of this map.
@@ -118,6 +117,22 @@ impl SourceFile {
         let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
         LineColumn { line: count(line), column: count(column) }
     }
+}
+
+/// A path without `.`, and without `..` but at its beginning.
+pub(crate) fn normal_path(path: &Path) -> String {
+    let mut parts: Vec<Component<'_>> = Vec::new();
+    for part in path.components() {
+        match (part, parts.last()) {
+            (Component::ParentDir, Some(Component::Normal(_))) => {
+                parts.pop();
+            }
+            // Nothing is above the root.
+            (Component::CurDir, _) | (Component::ParentDir, Some(Component::RootDir)) => {}
+            _ => parts.push(part),
+        }
+    }
+    parts.into_iter().collect::<PathBuf>().to_string_lossy().into_owned()
 }
 
 #[cfg(test)]

@@ -147,8 +147,8 @@ fn a_clause_replaces_the_inherited_one_whole_and_all_others_stay() {
     assert_eq!((&second.objectives, second.end_after), (&first.objectives, 70.0));
     assert_eq!(second.observed, first.observed);
     assert_eq!(second.from, space.campaign("c"));
-    let Search::Random { evaluations, content } = second.search else { panic!("{second:?}") };
-    assert_eq!((evaluations, content.operations.len()), (20, 1));
+    let Search::Random { evaluations, template } = second.search else { panic!("{second:?}") };
+    assert_eq!((evaluations, template.operations.len()), (20, 1));
     assert_eq!((first.seed, second.seed), (3, 1), "the inherited seed went with its search");
 }
 
@@ -184,7 +184,7 @@ fn explorations_are_inherited_where_they_can_work_and_reasons_to_stop_by_every_s
         });
         assert_eq!(
             campaign.confirm.is_some(),
-            campaign.search.content().is_some(),
+            campaign.search.template().is_some(),
             "every search confirms what it finds"
         );
         (explores, campaign.coverage.is_some(), campaign.stop.len())
@@ -228,8 +228,8 @@ fn conditions_traces_and_custom_operations_come_from_imports_and_other_campaigns
     let space = space(&files);
     let campaign = |name| &space.campaigns[space.campaign(name).unwrap()];
     let variables = |name| {
-        let Search::Random { content, .. } = &campaign(name).search else { panic!("{name} searches") };
-        let ActivationMode::Condition(grown) = &content.activation else { panic!("{name} grows conditions") };
+        let Search::Random { template, .. } = &campaign(name).search else { panic!("{name} searches") };
+        let ActivationMode::Condition(grown) = &template.activation else { panic!("{name} grows conditions") };
         let names = grown.variables.iter().map(|it| space.metrics[it.metric].declaration.name.as_str());
         names.collect::<Vec<_>>()
     };

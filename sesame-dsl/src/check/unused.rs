@@ -11,8 +11,8 @@ use crate::span::FileId;
 pub(super) fn operations(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnostic>) {
     let mut used: BTreeSet<OperationId> = BTreeSet::new();
     for campaign in space.campaigns.values() {
-        if let Some(content) = campaign.search.content() {
-            used.extend(&content.operations);
+        if let Some(template) = campaign.search.template() {
+            used.extend(&template.operations);
         }
     }
     used.extend(space.tests.values().flat_map(|test| &test.operations).map(|operation| operation.operation));
@@ -47,8 +47,8 @@ fn used_metrics(space: &Space) -> BTreeSet<MetricId> {
     for campaign in space.campaigns.values() {
         used.extend(&campaign.objectives);
         used.extend(&campaign.observed);
-        if let Some(content) = campaign.search.content()
-            && let ActivationMode::Condition(grown) = &content.activation
+        if let Some(template) = campaign.search.template()
+            && let ActivationMode::Condition(grown) = &template.activation
         {
             used.extend(grown.variables.iter().map(|variable| variable.metric));
         }
@@ -110,7 +110,7 @@ fn used_topics(space: &Space) -> BTreeSet<TopicId> {
         used.extend(eddi.otherwise.mitigation.iter().map(|mitigation| mitigation.field.topic));
     }
     used.extend(space.eddis.values().map(|eddi| eddi.publishes));
-    used.extend(space.surroundings.launch.iter().filter_map(|launch| launch.ready).map(|ready| ready.topic));
+    used.extend(space.lifecycle.launch.iter().filter_map(|launch| launch.ready).map(|ready| ready.topic));
     used
 }
 

@@ -39,7 +39,7 @@ pub enum Transport {
 
 /// What a system says beside its simulator.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Surroundings {
+pub struct Lifecycle {
     /// What starts it.
     pub launch: Option<Launch>,
     /// What ends it.

@@ -4,7 +4,7 @@ use super::exploration::exploring;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
-    self, Activation, ActivationMode, CampaignId, Content, Copies, Id as _, MetricId, OperationId, Search, TestId,
+    self, Activation, ActivationMode, CampaignId, Copies, Id as _, MetricId, OperationId, Search, TestId, TestTemplate,
 };
 use crate::span::Span;
 use crate::syntax::ast::{self, Count, Strategy};
@@ -44,7 +44,7 @@ impl<'a> Resolver<'a> {
             ast::Record::Failing => model::Recorded::Failing,
             ast::Record::All => model::Recorded::All,
         });
-        let content = self.content(campaign, end_after, activation);
+        let template = self.template(campaign, end_after, activation);
         let coverage = self.coverage(campaign);
         let exploration = self.exploration(campaign);
         let confirm = self.confirm(campaign);
@@ -72,11 +72,11 @@ impl<'a> Resolver<'a> {
             }
             (Some(search), None, None) => {
                 let explorable = self.explorable(campaign);
-                let resolved = self.search(campaign, search, content).filter(|_| explorable);
+                let resolved = self.search(campaign, search, template).filter(|_| explorable);
                 (resolved, self.seed(&search.seed))
             }
             (None, None, None) => {
-                if !campaign.damaged {
+                if !campaign.has_errors {
                     let title = format!("campaign `{}` needs `search`, `repeat` or `passive`", campaign.head.name.text);
                     let diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, campaign.head.name.span, title)
                         .label("add one of them")
@@ -106,7 +106,7 @@ impl<'a> Resolver<'a> {
 
     fn end(&mut self, campaign: &'a ast::Campaign) -> Option<f64> {
         let Some(end) = self.single(&campaign.ends, "end after") else {
-            if !campaign.damaged {
+            if !campaign.has_errors {
                 self.missing(&campaign.head.name, "the time at which its tests end", "end after 70s");
             }
             return None;
@@ -125,7 +125,7 @@ impl<'a> Resolver<'a> {
             if campaign.repeats.is_empty()
                 && campaign.passives.is_empty()
                 && !campaign.searches.is_empty()
-                && !campaign.damaged
+                && !campaign.has_errors
             {
                 self.missing(&campaign.head.name, "its objectives", "objectives fuzzing_time, collision_occurrence");
             }
@@ -158,19 +158,19 @@ impl<'a> Resolver<'a> {
     }
 
     /// What the tests of a search contain.
-    fn content(
+    fn template(
         &mut self,
         campaign: &'a ast::Campaign,
         end_after: Option<f64>,
         activation: Option<ActivationMode>,
-    ) -> Option<Content> {
+    ) -> Option<TestTemplate> {
         let spans: Vec<Span> = campaign.operations.iter().map(|it| it.span).collect();
         self.at_most_one(&spans, "operations");
         let Some(operations) = campaign.operations.first() else {
             if campaign.repeats.is_empty()
                 && campaign.passives.is_empty()
                 && !campaign.searches.is_empty()
-                && !campaign.damaged
+                && !campaign.has_errors
             {
                 self.missing(&campaign.head.name, "the operations of its tests", "operations jitter 1..5 per test");
             }
@@ -205,7 +205,7 @@ impl<'a> Resolver<'a> {
         let found: Vec<OperationId> = found?.into_iter().map(OperationId::from_index).collect();
         let copies = operations.copies.map_or_else(Copies::default, |(_, copies)| copies);
         self.enough_operations(campaign, operations, &found, min)?;
-        Some(Content { operations: found, min, max, copies, activation: activation? })
+        Some(TestTemplate { operations: found, min, max, copies, activation: activation? })
     }
 
     /// Reports a test that needs more operations than there are, if it may contain each only once.
@@ -272,12 +272,12 @@ impl<'a> Resolver<'a> {
         &mut self,
         campaign: &'a ast::Campaign,
         search: &'a ast::Search,
-        content: Option<Content>,
+        template: Option<TestTemplate>,
     ) -> Option<Search> {
         let strategy = search.strategy?;
         let population = self.single(&search.population, "population").copied();
         let evaluations = self.single(&search.evaluations, "evaluations").copied();
-        if evaluations.is_none() && !search.damaged {
+        if evaluations.is_none() && !search.has_errors {
             self.missing(&campaign.head.name, "its number of evaluations", "evaluations 200");
         }
         let found = evaluations.and_then(|count| self.count(count, 1, "the number of evaluations"));
@@ -296,11 +296,11 @@ impl<'a> Resolver<'a> {
                     self.report(diagnostic);
                     return None;
                 }
-                let (content, evaluations) = (content?, found?);
+                let (template, evaluations) = (template?, found?);
                 Some(match strategy {
-                    Strategy::Random => Search::Random { content, evaluations },
-                    Strategy::Sobol => Search::Sobol { content, evaluations },
-                    _ => Search::LatinHypercube { content, evaluations },
+                    Strategy::Random => Search::Random { template, evaluations },
+                    Strategy::Sobol => Search::Sobol { template, evaluations },
+                    _ => Search::LatinHypercube { template, evaluations },
                 })
             }
             Strategy::Falsification => {
@@ -308,12 +308,12 @@ impl<'a> Resolver<'a> {
                     Some(count) => self.count(count, 1, "the population"),
                     None => Some(1),
                 };
-                let (content, population, evaluations) = (content?, population?, found?);
-                Some(Search::Falsification { content, population, evaluations })
+                let (template, population, evaluations) = (template?, population?, found?);
+                Some(Search::Falsification { template, population, evaluations })
             }
             Strategy::Nsga2 | Strategy::MapElites => {
                 let Some(count) = population else {
-                    if !search.damaged {
+                    if !search.has_errors {
                         self.missing(&campaign.head.name, "its population size", "population 10");
                     }
                     return None;
@@ -339,10 +339,10 @@ impl<'a> Resolver<'a> {
                     self.report(diagnostic);
                     return None;
                 }
-                let (content, population, evaluations) = (content.filter(|_| even)?, size, found);
+                let (template, population, evaluations) = (template.filter(|_| even)?, size, found);
                 Some(match strategy {
-                    Strategy::Nsga2 => Search::Nsga2 { content, population, evaluations },
-                    _ => Search::MapElites { content, population, evaluations },
+                    Strategy::Nsga2 => Search::Nsga2 { template, population, evaluations },
+                    _ => Search::MapElites { template, population, evaluations },
                 })
             }
         }

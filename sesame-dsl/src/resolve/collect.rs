@@ -29,8 +29,8 @@ impl<'a> Resolver<'a> {
             }
             self.report(diagnostic);
         }
-        let broken = self.file.broken.iter().map(|name| name.text.as_str());
-        self.silent.extend(broken);
+        let undeclared = self.file.undeclared.iter().map(|name| name.text.as_str());
+        self.silent.extend(undeclared);
         self.collisions(&heads);
         self.required();
     }
@@ -107,8 +107,8 @@ impl<'a> Resolver<'a> {
     fn required(&mut self) {
         let start = Span { file: self.root, lo: 0, hi: 0 };
         let file = self.file;
-        let damaged = file.damaged || file.incomplete;
-        if file.spaces.is_empty() && !damaged {
+        let has_errors = file.has_errors || file.incomplete;
+        if file.spaces.is_empty() && !has_errors {
             let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, start, "this file has no `space` declaration")
                 .label("expected `space` and a name")
                 .note("for example `space kuka_cell`");
@@ -124,7 +124,7 @@ impl<'a> Resolver<'a> {
         let simulators: Vec<Span> = self.simulators().map(|simulator| simulator.head.name.span).collect();
         self.only_one(&simulators, "simulator");
         match file.systems.first() {
-            None if !damaged => {
+            None if !has_errors => {
                 let at = spaces.first().copied().unwrap_or(start);
                 let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, at, "this space has no `system`")
                     .label("expected a `system` block")
@@ -132,7 +132,9 @@ impl<'a> Resolver<'a> {
                 self.report(diagnostic);
             }
             Some(System { span, .. })
-                if simulators.is_empty() && !file.incomplete && !file.systems.iter().any(|system| system.damaged) =>
+                if simulators.is_empty()
+                    && !file.incomplete
+                    && !file.systems.iter().any(|system| system.has_errors) =>
             {
                 let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, *span, "this system has no simulator")
                     .label("expected a `simulator` inside")

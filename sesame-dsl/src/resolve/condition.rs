@@ -2,7 +2,9 @@
 
 use super::{Kind, Resolver, list};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::condition::{Comparison, Condition, ConditionSpace, Constraint, Integers, Known, Operand, Variable};
+use crate::model::condition::{
+    Comparison, Condition, ConditionSpace, Constraint, Integers, Operand, ValueRange, Variable,
+};
 use crate::model::{Activation, Aggregate, End, Expression, Id as _, Metric, MetricId, MetricSource, Range};
 use crate::span::Span;
 use crate::syntax::ast::{self, ByCondition, Contained, ExpressionKind, Relation, Trigger, TriggerEnd};
@@ -98,7 +100,7 @@ impl<'a> Resolver<'a> {
         let compared = match (left_side, right_side) {
             (Side::Number(left), Side::Number(right)) => {
                 let outcome = match (left.unit.is_none(), right.unit.is_none()) {
-                    (true, true) => Known::exactly(left.value).outcome(by, Known::exactly(right.value)),
+                    (true, true) => ValueRange::exactly(left.value).outcome(by, ValueRange::exactly(right.value)),
                     _ => None,
                 };
                 let label = outcome.map_or("constant", |outcome| if outcome { "always true" } else { "always false" });
@@ -233,7 +235,7 @@ impl<'a> Resolver<'a> {
     /// Reports a comparison whose outcome follows from what is known of its metrics.
     fn open_outcome(&mut self, span: Span, (left, right): (Operand, Operand), by: Comparison) -> Option<()> {
         let known = [left, right].map(|side| match side {
-            Operand::Number(number) => Known::exactly(number),
+            Operand::Number(number) => ValueRange::exactly(number),
             Operand::Variable(metric) => known_of(self.metric_of(metric)),
         });
         let Some(outcome) = known[0].outcome(by, known[1]) else { return Some(()) };
@@ -242,7 +244,7 @@ impl<'a> Resolver<'a> {
                 .label("this is known before the test begins");
         for (side, known) in [left, right].into_iter().zip(known) {
             if let Operand::Variable(id) = side
-                && known != Known::NOTHING
+                && known != ValueRange::NOTHING
             {
                 let declared = &self.metric_of(id).declaration;
                 let label = format!("`{}` is {}", declared.name, in_words(known, self.metric_of(id).unit.as_ref()));
@@ -332,7 +334,7 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         }
-        let known = Known { low: found.low.max(own.low), high: found.high.min(own.high) };
+        let known = ValueRange { low: found.low.max(own.low), high: found.high.min(own.high) };
         if known.low > known.high {
             let title = format!("`{}` can never be in this range", name.text);
             let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, range.span, title)
@@ -480,10 +482,10 @@ enum Side<'a> {
 }
 
 /// What is known of a metric's values before any test, its initial value included.
-fn known_of(metric: &Metric) -> Known {
+fn known_of(metric: &Metric) -> ValueRange {
     let from_zero = match &metric.source {
         // It needs no message, so it has a value from the beginning.
-        MetricSource::FuzzingTime => return Known { low: 0.0, high: f64::INFINITY },
+        MetricSource::FuzzingTime => return ValueRange { low: 0.0, high: f64::INFINITY },
         MetricSource::Formula(formula) => match &formula.aggregate {
             Aggregate::Count(_) | Aggregate::Duration(_) => true,
             // Over groups and keys these are the least, the greatest or the sum of values that are not negative.
@@ -492,9 +494,9 @@ fn known_of(metric: &Metric) -> Known {
         MetricSource::Hook(_) | MetricSource::Last(_) | MetricSource::Robustness(_) => false,
     };
     if !from_zero {
-        return Known::NOTHING;
+        return ValueRange::NOTHING;
     }
-    Known { low: metric.initial.map_or(0.0, |initial| initial.min(0.0)), high: f64::INFINITY }
+    ValueRange { low: metric.initial.map_or(0.0, |initial| initial.min(0.0)), high: f64::INFINITY }
 }
 
 fn never_negative(expression: &Expression) -> bool {
@@ -535,7 +537,7 @@ fn same_unit(unit: Option<&Unit>, other: Option<&Unit>) -> bool {
 }
 
 /// What is known of a number, for example `0s or more`.
-fn in_words(known: Known, unit: Option<&Unit>) -> String {
+fn in_words(known: ValueRange, unit: Option<&Unit>) -> String {
     let unit = unit_text(unit);
     match (known.low.is_finite(), known.high.is_finite()) {
         (true, true) => format!("from {}{unit} to {}{unit}", known.low, known.high),

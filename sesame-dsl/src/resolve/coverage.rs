@@ -33,7 +33,7 @@ impl<'a> Resolver<'a> {
 
     fn axes(&mut self, written: &ast::Coverage) -> Option<Vec<CoverageAxis>> {
         if written.axes.is_empty() {
-            if !written.damaged {
+            if !written.has_errors {
                 let diagnostic =
                     Diagnostic::new(Code::CLAUSE_MISSING, written.span, "`coverage` needs at least one dimension")
                         .label("add the dimensions whose cells are counted")
@@ -88,7 +88,7 @@ impl<'a> Resolver<'a> {
 
     fn failsafe(&mut self, campaign: &ast::Campaign, written: &ast::Coverage, count: ast::Count) -> Option<u32> {
         let found = self.count(count, 1, "`failsafe`");
-        if written.stops.is_empty() && !written.damaged {
+        if written.stops.is_empty() && !written.has_errors {
             let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, count.span, "`failsafe` needs `stop at`")
                 .label("this ends a search that does not reach its `stop at`")
                 .note("for example `stop at 50%`");

@@ -72,7 +72,7 @@ impl<'a> Resolver<'a> {
                 domain,
             }));
         }
-        (parameters.len() == custom.parameters.len() && !custom.damaged).then_some(parameters)
+        (parameters.len() == custom.parameters.len() && !custom.has_errors).then_some(parameters)
     }
 
     fn domain(&mut self, domain: &'a ast::Domain, what: &str) -> Option<(Option<Unit>, Domain)> {

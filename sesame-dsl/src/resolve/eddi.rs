@@ -8,8 +8,8 @@ use crate::model::eddi::{Demand, Eddi, Evidence, Gate, Guarantee, Literal, Mitig
 use crate::model::{EddiId, Id as _, TopicId, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
+use crate::syntax::ast::eddi as written;
 use crate::syntax::ast::{self, ExpressionKind, Name};
-use crate::syntax::eddi as written;
 use crate::units::Unit;
 
 /// The names inside a monitor, and what each stands for.
@@ -37,11 +37,11 @@ impl<'a> Resolver<'a> {
         let demands: Vec<_> = eddi.demands.iter().map(|demand| self.demand(demand)).collect();
         let evidence: Vec<_> = eddi.evidence.iter().map(|evidence| self.evidence(evidence)).collect();
         let mut guarantees = self.guarantees(eddi, &members);
-        if eddi.otherwise.is_empty() && !eddi.damaged {
+        if eddi.otherwise.is_empty() && !eddi.has_errors {
             self.missing(name, "its state when no guarantee holds", "otherwise not_safe");
         }
         let otherwise = self.single(&eddi.otherwise, "otherwise").and_then(|otherwise| self.otherwise(otherwise));
-        if eddi.guarantees.is_empty() && !eddi.damaged {
+        if eddi.guarantees.is_empty() && !eddi.has_errors {
             self.missing(name, "a guarantee", "guarantee safe  integrity 1 = brakes_ok");
             return None;
         }
@@ -103,7 +103,7 @@ impl<'a> Resolver<'a> {
         let index = self.find(&demand.eddi, Kind::Eddi)?;
         let other = &self.file.eddis[index];
         let guarantees: Vec<&str> = other.guarantees.iter().map(|it| it.head.name.text.as_str()).collect();
-        if !guarantees.contains(&name.text.as_str()) && !other.damaged {
+        if !guarantees.contains(&name.text.as_str()) && !other.has_errors {
             let title = format!("monitor `{}` has no guarantee named `{}`", demand.eddi.text, name.text);
             let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title)
                 .label("unknown guarantee")
@@ -299,7 +299,7 @@ impl<'a> Resolver<'a> {
             .filter(|(_, (member, _))| !matches!(member, Member::State))
             .map(|(known, _)| *known)
             .collect();
-        if eddi.damaged {
+        if eddi.has_errors {
             return None;
         }
         let title = format!("monitor `{}` has no evidence or demand named `{}`", eddi.head.name.text, name.text);

@@ -77,7 +77,7 @@ impl<'a> Resolver<'a> {
             None => Some(DROP),
         };
         let Some(&[from, to]) = self.single(&written.children, "from … to") else {
-            if !written.damaged {
+            if !written.has_errors {
                 let diagnostic = Diagnostic::new(
                     Code::CLAUSE_MISSING,
                     written.span,
@@ -169,8 +169,8 @@ impl<'a> Resolver<'a> {
         let by_condition =
             campaign.activates.first().is_some_and(|(_, mode)| matches!(mode, ActivationMode::Condition(_)));
         // Clauses that could not be read may be the missing ones.
-        let without_conditions = !by_condition && !campaign.unread;
-        let without_cells = campaign.coverages.is_empty() && !campaign.unread;
+        let without_conditions = !by_condition && !campaign.inherited_errors;
+        let without_cells = campaign.coverages.is_empty() && !campaign.inherited_errors;
         let strategy = campaign.searches.first().and_then(|search| Some((search.span, search.strategy?)));
         if let Some((span, strategy)) = strategy {
             let keyword = match strategy {
@@ -219,7 +219,7 @@ impl<'a> Resolver<'a> {
 
     /// Whether the space has no requirement, as far as its files and this campaign could be read.
     pub(super) fn without_requirements(&self, campaign: &ast::Campaign) -> bool {
-        self.file.requirements.is_empty() && !self.file.incomplete && !campaign.unread
+        self.file.requirements.is_empty() && !self.file.incomplete && !campaign.inherited_errors
     }
 }
 

@@ -4,9 +4,9 @@ use super::quantity::percent;
 use super::{Kind, Resolver, list};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{self, Activation, Choice, Domain, Id as _, OperationId, OperationKind, Parameter, Range, Shape};
-use crate::quoted;
+
 use crate::span::Span;
-use crate::syntax::ast;
+use crate::syntax::{ast, quoted};
 use crate::units::{Unit, convert};
 
 impl<'a> Resolver<'a> {
@@ -123,8 +123,8 @@ impl<'a> Resolver<'a> {
     }
 
     fn test(&mut self, test: &'a ast::Test) -> Option<model::Test> {
-        let mut complete = !test.damaged;
-        if test.operations.is_empty() && !test.damaged {
+        let mut complete = !test.has_errors;
+        if test.operations.is_empty() && !test.has_errors {
             self.missing(&test.head.name, "an operation", "jitter offset [0.1rad, 0.2rad] from 8s to 57s");
             complete = false;
         }

@@ -42,8 +42,8 @@ pub(super) fn inherit(file: &mut File, diagnostics: &mut Vec<Diagnostic>) {
                 }
                 // What is inherited is unknown, so nothing is reported as missing.
                 None if file.campaigns[index].from.is_some() => {
-                    file.campaigns[index].damaged = true;
-                    file.campaigns[index].unread = true;
+                    file.campaigns[index].has_errors = true;
+                    file.campaigns[index].inherited_errors = true;
                 }
                 None => {}
             }
@@ -81,8 +81,8 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
     }
     let searches = !child.searches.is_empty();
     // What is missing in the base was reported there.
-    child.damaged |= base.damaged || !own || searches != base.searches.is_empty();
-    child.unread |= base.unread;
+    child.has_errors |= base.has_errors || !own || searches != base.searches.is_empty();
+    child.inherited_errors |= base.inherited_errors;
     if child.observes.is_empty() {
         child.observes.clone_from(&base.observes);
     }

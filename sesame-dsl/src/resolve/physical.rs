@@ -8,8 +8,8 @@ use crate::model::physical::{Budget, Cost, Fit, Form, LabSetting, LabSimulator, 
 use crate::model::{Dimension, Id as _, MetricId};
 use crate::similar::most_similar;
 use crate::span::Span;
+use crate::syntax::ast::physical as written;
 use crate::syntax::ast::{self, Name, Quantity};
-use crate::syntax::physical as written;
 use crate::units::Unit;
 
 /// What a setting of a transport takes.

@@ -1,8 +1,8 @@
 //! Metrics that are the robustness of a temporal formula: its signals, their common unit, and the scope of its operators.
 
 use super::Resolver;
+use super::boolean::relation;
 use super::formula::{MAX_DEPTH, scaled};
-use super::truth::relation;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{Comparison, Expression, Input, Interval, Members, MetricSource, Robustness, Temporal};
 use crate::span::Span;

@@ -29,7 +29,7 @@ impl<'a> Resolver<'a> {
         if let Some((span, word)) = by_cells
             && campaign.coverages.is_empty()
             && !campaign.searches.is_empty()
-            && !campaign.unread
+            && !campaign.inherited_errors
         {
             let diagnostic = Diagnostic::new(Code::NOTHING_TO_EXPLORE, span, format!("`{word}` needs a `coverage`"));
             self.report(diagnostic.label("add a `coverage`, whose cells are counted"));
@@ -37,7 +37,7 @@ impl<'a> Resolver<'a> {
         }
         let rules = [time, stagnation, discovery, completeness];
         let none = rules.iter().all(Option::is_none);
-        if none && !written.damaged {
+        if none && !written.has_errors {
             let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, written.span, "`stop` needs at least one rule")
                 .label("add a rule that says when the search stops")
                 .note("for example `stop { time 2h  stagnation 10 generations below 1% }`");

@@ -40,13 +40,13 @@ impl<'a> Resolver<'a> {
             ast::Transport::InProcess(in_process) => {
                 let path = self.rust_path(&in_process.path);
                 let folder = self.single(&in_process.crates, "crate");
-                let step_ns = self.step_of(name, &in_process.steps, in_process.damaged);
+                let step_ns = self.step_of(name, &in_process.steps, in_process.has_errors);
                 let crate_folder = folder.map(|folder| folder.text.clone());
                 Transport::InProcess { path: path?, crate_folder, step_ns: step_ns? }
             }
             ast::Transport::Process(process) => {
                 let program = self.program(&process.program);
-                let step_ns = self.step_of(name, &process.steps, process.damaged);
+                let step_ns = self.step_of(name, &process.steps, process.has_errors);
                 // Empty texts were reported where they were read.
                 let arguments = process.arguments.iter().map(|argument| argument.text.clone()).collect();
                 Transport::Process { program: program?, arguments, step_ns: step_ns? }
@@ -55,9 +55,9 @@ impl<'a> Resolver<'a> {
         Some(Simulator { declaration: self.declaration(&simulator.head), transport })
     }
 
-    fn step_of(&mut self, name: &Name, steps: &'a [(Span, ast::Quantity)], damaged: bool) -> Option<u64> {
+    fn step_of(&mut self, name: &Name, steps: &'a [(Span, ast::Quantity)], has_errors: bool) -> Option<u64> {
         let step = self.single(steps, "step");
-        if step.is_none() && !damaged {
+        if step.is_none() && !has_errors {
             self.missing(name, "its step size", "step 20ms");
         }
         self.step(step?)
@@ -250,7 +250,7 @@ impl<'a> Resolver<'a> {
     fn message(&mut self, message: &'a ast::Message) -> Option<model::Message> {
         let mut first: BTreeMap<&str, Span> = BTreeMap::new();
         let mut fields = Vec::new();
-        let mut complete = !message.damaged;
+        let mut complete = !message.has_errors;
         for field in &message.fields {
             let name = &field.head.name;
             if let Some(&before) = first.get(name.text.as_str()) {
@@ -264,7 +264,7 @@ impl<'a> Resolver<'a> {
                 None => complete = false,
             }
         }
-        if message.fields.is_empty() && !message.damaged {
+        if message.fields.is_empty() && !message.has_errors {
             self.missing(&message.head.name, "a field", "level: real[mm]");
             complete = false;
         }

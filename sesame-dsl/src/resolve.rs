@@ -2,16 +2,17 @@
 //!
 //! 1. [`collect`] collects names, and reports duplicates and missing declarations
 //! 2. [`system`] resolves message types (ordered so that each follows those it contains), topics, nodes, the simulator
-//! 3. [`measure`] resolves metrics (their formulas in [`formula`]) and requirements
+//! 3. [`metrics`] resolves metrics (their formulas in [`formula`]) and requirements
 //! 4. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`custom`] those in the user's code) and
 //!    tests
 //! 5. [`campaign`] resolves campaigns, whose inherited clauses [`inherit`] has copied before all else; [`condition`]
 //!    resolves the conditions of tests and the building blocks of campaigns' conditions
-//! 6. [`eddi`] resolves runtime monitors, [`physical`] labs, and [`surroundings`] the rest of a system's clauses
+//! 6. [`eddi`] resolves runtime monitors, [`physical`] labs, and [`lifecycle`] the rest of a system's clauses
 //!
 //! Each pass reports all it finds. A declaration with a mistake is `None` from then on, and references to it are not
 //! reported again: one mistake is one diagnostic.
 
+mod boolean;
 mod campaign;
 mod collect;
 mod condition;
@@ -24,15 +25,14 @@ mod exploration;
 mod formula;
 mod fuzz;
 mod inherit;
-mod measure;
+mod lifecycle;
+mod metrics;
 mod nodes;
 mod physical;
 mod quantity;
 mod robustness;
 mod stop;
-mod surroundings;
 mod system;
-mod truth;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -69,7 +69,7 @@ pub(crate) fn resolve(
     };
     resolver.collect();
     let simulator = resolver.system();
-    let surroundings = resolver.surroundings();
+    let lifecycle = resolver.lifecycle();
     resolver.metrics();
     let requirements = resolver.requirements();
     resolver.operations();
@@ -86,7 +86,7 @@ pub(crate) fn resolve(
     Some(Space {
         declaration: declaration(sources, file.spaces.first()?),
         simulator: simulator?,
-        surroundings: surroundings?,
+        lifecycle: lifecycle?,
         messages: arena(system.messages)?,
         topics: arena(system.topics)?,
         nodes: arena(system.nodes)?,

@@ -32,8 +32,8 @@ impl<'a> Resolver<'a> {
         }
         // Both are resolved, so that a mistake in one does not hide one in the other or in the default.
         let (source, ty): (Option<MetricSource>, Option<Type>) = match &metric.source {
-            ast::MetricSource::Hook { hooks, damaged } => {
-                (self.hook(name, hooks, *damaged), self.hook_type(metric.ty.as_ref()))
+            ast::MetricSource::Hook { hooks, has_errors } => {
+                (self.hook(name, hooks, *has_errors), self.hook_type(metric.ty.as_ref()))
             }
             ast::MetricSource::FuzzingTime => {
                 self.no_type(metric.ty.as_ref(), "`fuzzing_time()` is in seconds");
@@ -95,10 +95,10 @@ impl<'a> Resolver<'a> {
         &mut self,
         name: &Name,
         hooks: &'a [(crate::span::Span, Vec<Name>)],
-        damaged: bool,
+        has_errors: bool,
     ) -> Option<MetricSource> {
         let Some(topics) = self.single(hooks, "hook on") else {
-            if !damaged {
+            if !has_errors {
                 self.missing(name, "the topics that its hook reads", "hook on zones");
             }
             return None;

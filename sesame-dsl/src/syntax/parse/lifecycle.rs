@@ -1,46 +1,15 @@
-//! What a system says beside its simulator and messages: how it is launched and ended, and what a relay may cost.
+//! How a system is launched and ended, and what a relay may cost.
 
 use sesame_grammar::Rule;
 
-use super::ast::{Name, Quantity, Text};
-use super::explain::Place;
-use super::parse::{Pair, Reader, child, children, expect_child};
-use crate::span::Span;
-
-/// A program that the system needs beside its simulator.
-#[derive(Debug)]
-pub(crate) struct Launch {
-    pub(crate) command: Command,
-    pub(crate) ready: Vec<(Span, Ready)>,
-}
-
-/// A program and its arguments; at least the program.
-#[derive(Debug)]
-pub(crate) struct Command {
-    pub(crate) program: Text,
-    pub(crate) arguments: Vec<Text>,
-}
-
-/// When a launched system counts as ready.
-#[derive(Debug)]
-pub(crate) struct Ready {
-    pub(crate) topic: Name,
-    pub(crate) within: Quantity,
-}
-
-/// What a relay may add.
-#[derive(Debug)]
-pub(crate) struct RelayBudget {
-    pub(crate) latency: Vec<(Span, Quantity)>,
-    pub(crate) jitter: Vec<(Span, Quantity)>,
-    pub(crate) damaged: bool,
-}
+use super::reader::{Pair, Reader, child, children, expect_child};
+use crate::syntax::ast::lifecycle::{Command, Launch, Ready, RelayBudget};
 
 impl Reader<'_> {
     pub(super) fn launch(&mut self, pair: &Pair<'_>) -> Launch {
         let mut launch = Launch { command: self.command(pair), ready: vec![] };
         if let Some(settings) = child(pair, Rule::launch_settings) {
-            self.members(&settings, Place::Launch, |reader, ready| {
+            self.members(&settings, |reader, ready| {
                 let topic = reader.name(&expect_child(&ready, Rule::name));
                 let within = reader.signed(&expect_child(&ready, Rule::signed));
                 launch.ready.push((reader.keyword_span(&ready), Ready { topic, within }));
@@ -55,9 +24,9 @@ impl Reader<'_> {
     }
 
     pub(super) fn relay_budget(&mut self, pair: &Pair<'_>) -> RelayBudget {
-        let mut budget = RelayBudget { latency: vec![], jitter: vec![], damaged: false };
+        let mut budget = RelayBudget { latency: vec![], jitter: vec![], has_errors: false };
         let settings = expect_child(pair, Rule::budget_settings);
-        budget.damaged = self.members(&settings, Place::Budget, |reader, setting| {
+        budget.has_errors = self.members(&settings, |reader, setting| {
             let value = (reader.keyword_span(&setting), reader.signed(&expect_child(&setting, Rule::signed)));
             match setting.as_rule() {
                 Rule::setting_latency => budget.latency.push(value),

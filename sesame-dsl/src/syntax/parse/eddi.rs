@@ -1,59 +1,9 @@
-//! `eddi` blocks: what they say, and reading them.
+//! Runtime monitors.
 
 use sesame_grammar::Rule;
 
-use super::ast::{Count, Expression, Head, Name, Path, Quantity, Text};
-use super::explain::Place;
-use super::parse::{Pair, Reader, child, children, expect_child};
-use crate::span::Span;
-
-/// A runtime monitor.
-#[derive(Debug)]
-pub(crate) struct Eddi {
-    pub(crate) head: Head,
-    pub(crate) publishes: Name,
-    pub(crate) demands: Vec<Demand>,
-    pub(crate) evidence: Vec<Evidence>,
-    pub(crate) guarantees: Vec<Guarantee>,
-    pub(crate) otherwise: Vec<(Span, Otherwise)>,
-    pub(crate) damaged: bool,
-}
-
-#[derive(Debug)]
-pub(crate) struct Demand {
-    pub(crate) head: Head,
-    pub(crate) eddi: Name,
-}
-
-#[derive(Debug)]
-pub(crate) struct Evidence {
-    pub(crate) head: Head,
-    pub(crate) condition: Expression,
-    pub(crate) held: Vec<(Span, Quantity)>,
-    /// When it is stale, and whether it is unknown then; false otherwise.
-    pub(crate) stale: Vec<(Span, (Quantity, bool))>,
-}
-
-#[derive(Debug)]
-pub(crate) struct Guarantee {
-    pub(crate) head: Head,
-    pub(crate) integrity: Count,
-    pub(crate) gate: Expression,
-}
-
-#[derive(Debug)]
-pub(crate) struct Otherwise {
-    pub(crate) head: Head,
-    pub(crate) mitigation: Option<(Path, Mitigation)>,
-}
-
-/// What a mitigation sends.
-#[derive(Debug)]
-pub(crate) enum Mitigation {
-    Truth(bool, Span),
-    Number(Quantity),
-    Text(Text),
-}
+use super::reader::{Pair, Reader, child, children, expect_child};
+use crate::syntax::ast::eddi::{Demand, Eddi, Evidence, Guarantee, Mitigation, Otherwise};
 
 impl Reader<'_> {
     pub(super) fn eddi(&mut self, pair: &Pair<'_>) -> Eddi {
@@ -65,9 +15,9 @@ impl Reader<'_> {
             evidence: vec![],
             guarantees: vec![],
             otherwise: vec![],
-            damaged: false,
+            has_errors: false,
         };
-        eddi.damaged = self.members(pair, Place::Eddi, |reader, member| match member.as_rule() {
+        eddi.has_errors = self.members(pair, |reader, member| match member.as_rule() {
             Rule::demand => {
                 let from = children(&member, Rule::name).nth(1).expect("a demand names whom it is made of");
                 eddi.demands.push(Demand { head: reader.head(&member), eddi: reader.name(&from) });

@@ -1,78 +1,10 @@
-//! `physical` blocks: what they say, and reading them.
+//! Physical labs.
 
 use sesame_grammar::Rule;
 
-use super::ast::{Bound, Count, Head, Name, Point, Quantity, Range, Text};
-use super::explain::Place;
-use super::parse::{Pair, Reader, child, children, expect_child};
-use crate::span::Span;
-
-/// A lab, and how tests are chosen for it.
-#[derive(Debug)]
-pub(crate) struct Physical {
-    pub(crate) head: Head,
-    pub(crate) simulators: Vec<(Span, LabSimulator)>,
-    pub(crate) repeats: Vec<(Span, Count)>,
-    /// What a test costs, and what each of its operations costs besides.
-    pub(crate) costs: Vec<(Span, (Quantity, Option<Quantity>))>,
-    pub(crate) excludes: Vec<(Name, Bound)>,
-    /// Metrics, with whether larger values come first.
-    pub(crate) ranks: Vec<(Span, Vec<(Name, bool)>)>,
-    pub(crate) budgets: Vec<(Span, Budget)>,
-    pub(crate) tolerances: Vec<(Span, Vec<(Name, Quantity)>)>,
-    pub(crate) interlocks: Vec<(Span, Vec<Name>)>,
-    pub(crate) shapes: Vec<Shape>,
-    pub(crate) fits: Vec<(Span, Vec<Fit>)>,
-    pub(crate) damaged: bool,
-}
-
-/// How the lab is reached.
-#[derive(Debug)]
-pub(crate) struct LabSimulator {
-    pub(crate) head: Head,
-    pub(crate) transport: Name,
-    pub(crate) arguments: Vec<Text>,
-    pub(crate) settings: Vec<(Name, Option<Setting>)>,
-}
-
-#[derive(Debug)]
-pub(crate) enum Setting {
-    Quantity(Quantity),
-    Text(Text),
-}
-
-#[derive(Debug)]
-pub(crate) struct Budget {
-    pub(crate) limit: Quantity,
-    pub(crate) lambda: Quantity,
-    pub(crate) over: Vec<Name>,
-}
-
-#[derive(Debug)]
-pub(crate) struct Shape {
-    pub(crate) head: Head,
-    pub(crate) form: Form,
-    pub(crate) place: ShapePlace,
-    pub(crate) expand: Option<Quantity>,
-}
-
-#[derive(Debug)]
-pub(crate) enum Form {
-    Sphere(Quantity),
-    Box(Point),
-}
-
-#[derive(Debug)]
-pub(crate) enum ShapePlace {
-    Carried(Text),
-    Fixed(Point),
-}
-
-#[derive(Debug)]
-pub(crate) enum Fit {
-    Delay(Range),
-    Parameter(Text, Range),
-}
+use super::reader::{Pair, Reader, child, children, expect_child};
+use crate::syntax::ast::Name;
+use crate::syntax::ast::physical::{Budget, Fit, Form, LabSimulator, Physical, Setting, Shape, ShapePlace};
 
 impl Reader<'_> {
     pub(super) fn physical(&mut self, pair: &Pair<'_>) -> Physical {
@@ -88,9 +20,9 @@ impl Reader<'_> {
             interlocks: vec![],
             shapes: vec![],
             fits: vec![],
-            damaged: false,
+            has_errors: false,
         };
-        lab.damaged = self.members(pair, Place::Physical, |reader, member| {
+        lab.has_errors = self.members(pair, |reader, member| {
             let span = reader.keyword_span(&member);
             match member.as_rule() {
                 Rule::lab_simulator => lab.simulators.push((span, reader.lab_simulator(&member))),
@@ -152,7 +84,7 @@ impl Reader<'_> {
         let arguments = children(pair, Rule::text).map(|text| self.text_of(&text)).collect();
         let mut settings = Vec::new();
         if let Some(block) = child(pair, Rule::lab_settings) {
-            self.members(&block, Place::Lab, |reader, setting| {
+            self.members(&block, |reader, setting| {
                 let name = expect_child(&setting, Rule::lab_setting_name);
                 let name = Name { text: name.as_str().to_owned(), span: reader.span(&name) };
                 let number = child(&setting, Rule::signed).map(|number| Setting::Quantity(reader.signed(&number)));

@@ -2,9 +2,9 @@
 
 use sesame_grammar::Rule;
 
-use super::ast::{Count, Head, Name, Path, Point, Quantity, Range, Text, UnitName};
-use super::parse::{Pair, Reader, child, children, expect_child};
+use super::reader::{Pair, Reader, child, children, expect_child};
 use crate::diagnostic::{Code, Diagnostic};
+use crate::syntax::ast::{Count, Head, Name, Path, Point, Quantity, Range, Text, UnitName};
 
 impl Reader<'_> {
     pub(super) fn head(&mut self, pair: &Pair<'_>) -> Head {

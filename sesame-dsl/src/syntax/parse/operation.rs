@@ -1,10 +1,13 @@
-//! What operations disturb, and how.
+//! Operations: what they disturb, and how.
 
 use sesame_grammar::Rule;
 
-use super::ast::{Amounts, Distribution, Drain, NotFinite, OperationKind, Place, Range, Step, Stuck, Target, Text};
-use super::parse::{Pair, Reader, child, children, expect_child, first_of};
+use super::reader::{Pair, Reader, child, children, expect_child, first_of};
 use crate::span::Span;
+use crate::syntax::ast::{
+    Amounts, Contained, Custom, CustomParameter, Distribution, Domain, Drain, Moment, NotFinite, Operation,
+    OperationBody, OperationKind, Place, Range, Step, Stuck, Target, Text,
+};
 
 const KINDS: [Rule; 18] = [
     Rule::random_value,
@@ -28,7 +31,38 @@ const KINDS: [Rule; 18] = [
 ];
 
 impl Reader<'_> {
-    pub(super) fn target(&mut self, pair: &Pair<'_>) -> Target {
+    pub(super) fn operation(&mut self, pair: &Pair<'_>) -> Operation {
+        let head = self.head(pair);
+        let unsupported = first_of(pair, &[Rule::unsupported_operation, Rule::unsupported_kind]);
+        if let Some(unsupported) = unsupported {
+            self.unsupported(&unsupported);
+            return Operation { head, body: None };
+        }
+        let kind = self.operation_kind(pair);
+        let mut signed = |rule| {
+            let clauses = children(pair, rule);
+            clauses.map(|it| (self.keyword_span(&it), self.signed(&expect_child(&it, Rule::signed)))).collect()
+        };
+        let priority = signed(Rule::priority);
+        let inclusion = signed(Rule::inclusion);
+        let within = children(pair, Rule::within)
+            .map(|within| (self.keyword_span(&within), self.range(&expect_child(&within, Rule::range))))
+            .collect();
+        let contains = children(pair, Rule::start_contains)
+            .map(|clause| (self.keyword_span(&clause), self.contained(&clause)))
+            .collect();
+        let untimed = children(pair, Rule::untimed).map(|untimed| self.span(&untimed)).collect();
+        let mut nodes = |rule| child(pair, rule).map(|nodes| (self.keyword_span(&nodes), self.names(&nodes)));
+        let from = nodes(Rule::from_nodes);
+        let to = nodes(Rule::to_nodes);
+        let target = child(pair, Rule::targets).map(|targets| self.target(&targets));
+        Operation {
+            head,
+            body: Some(OperationBody { target, from, to, kind, within, priority, inclusion, untimed, contains }),
+        }
+    }
+
+    fn target(&mut self, pair: &Pair<'_>) -> Target {
         let places: Vec<Place> = children(pair, Rule::target).map(|place| self.place(&place)).collect();
         let topic = places.first().expect("an operation has a target").topic.clone();
         Target { topic, places, span: self.span(pair) }
@@ -47,7 +81,7 @@ impl Reader<'_> {
         Place { topic: self.name(&expect_child(pair, Rule::name)), steps, span: self.span(pair) }
     }
 
-    pub(super) fn operation_kind(&mut self, pair: &Pair<'_>) -> OperationKind {
+    fn operation_kind(&mut self, pair: &Pair<'_>) -> OperationKind {
         let kind = first_of(pair, &KINDS).expect("an operation has a kind");
         match kind.as_rule() {
             Rule::random_value => match child(&kind, Rule::value_mode) {
@@ -140,5 +174,67 @@ impl Reader<'_> {
             (self.keyword_span(&drain), mode)
         });
         drains.collect()
+    }
+
+    fn custom(&mut self, pair: &Pair<'_>) -> Custom {
+        let span = self.keyword_span(pair);
+        let moment = child(pair, Rule::moment).map(|moment| self.moment(&moment));
+        let mut custom = Custom { span, moment, parameters: vec![], has_errors: false };
+        let block = expect_child(pair, Rule::custom_parameters);
+        custom.has_errors = self.members(&block, |reader, member| {
+            let word = expect_child(&member, Rule::parameter_name);
+            let domains = [Rule::number_domain, Rule::point_domain, Rule::text_domain, Rule::file_domain];
+            let domain = first_of(&member, &domains).expect("a parameter has a domain");
+            custom.parameters.push(CustomParameter {
+                name: reader.name(&word),
+                doc: Self::doc(&member),
+                span: reader.span(&domain),
+                domain: reader.domain(&domain),
+            });
+        });
+        custom
+    }
+
+    pub(super) fn moment(&mut self, pair: &Pair<'_>) -> (Span, Moment) {
+        let moment = if child(pair, Rule::k_before).is_some() { Moment::BeforeStart } else { Moment::AfterEnd };
+        (self.span(pair), moment)
+    }
+
+    fn domain(&mut self, pair: &Pair<'_>) -> Domain {
+        let unit = child(pair, Rule::unit_in_brackets).map(|unit| self.unit(&expect_child(&unit, Rule::unit)));
+        match pair.as_rule() {
+            Rule::number_domain => Domain::Number {
+                integer: child(pair, Rule::k_int).is_some(),
+                unit,
+                range: self.range(&expect_child(pair, Rule::range)),
+            },
+            Rule::point_domain => {
+                let mut corners = children(pair, Rule::point).map(|point| self.point(&point)).collect::<Vec<_>>();
+                let high = corners.pop().expect("a box has two corners");
+                let low = corners.pop().expect("a box has two corners");
+                Domain::Point { unit, corners: Box::new([low, high]) }
+            }
+            rule => {
+                let texts = expect_child(pair, Rule::texts);
+                let texts = children(&texts, Rule::text).map(|text| self.text_of(&text)).collect();
+                if rule == Rule::file_domain { Domain::Files(texts) } else { Domain::Texts(texts) }
+            }
+        }
+    }
+
+    /// What stands in one `start contains`.
+    fn contained(&mut self, pair: &Pair<'_>) -> Vec<Contained> {
+        let mut found = Vec::new();
+        for item in pair.clone().into_inner() {
+            match item.as_rule() {
+                Rule::name => found.push(Contained::Variable(self.name(&item))),
+                Rule::contained_integer => {
+                    let range = self.range(&expect_child(&item, Rule::range));
+                    found.push(Contained::Integer(self.span(&item), range));
+                }
+                _ => {}
+            }
+        }
+        found
     }
 }

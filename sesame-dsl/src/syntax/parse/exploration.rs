@@ -2,17 +2,42 @@
 
 use sesame_grammar::Rule;
 
-use super::ast::{Confirm, Count, Exploration, ExplorationKind, Stop, Typical};
-use super::explain::Place;
-use super::parse::{Pair, Reader, child, children, expect_child};
+use super::reader::{Pair, Reader, child, children, expect_child};
 use crate::span::Span;
+use crate::syntax::ast::{Confirm, Count, Coverage, CoverageAxis, Exploration, ExplorationKind, Name, Stop, Typical};
 
 impl Reader<'_> {
+    pub(super) fn coverage(&mut self, pair: &Pair<'_>, span: Span) -> Coverage {
+        let mut coverage =
+            Coverage { span, axes: vec![], hits: vec![], stops: vec![], failsafes: vec![], has_errors: false };
+        coverage.has_errors = self.members(pair, |reader, member| {
+            let span = reader.keyword_span(&member);
+            match member.as_rule() {
+                Rule::coverage_axis => {
+                    let dimension = expect_child(&member, Rule::dimension);
+                    coverage.axes.push(CoverageAxis {
+                        dimension: Name { text: dimension.as_str().to_owned(), span: reader.span(&dimension) },
+                        range: reader.range(&expect_child(&member, Rule::range)),
+                        cells: reader.count(&expect_child(&member, Rule::number)),
+                    });
+                }
+                Rule::coverage_stop => {
+                    coverage.stops.push((span, reader.signed(&expect_child(&member, Rule::signed))));
+                }
+                rule => {
+                    let count = (span, reader.count(&expect_child(&member, Rule::number)));
+                    if rule == Rule::coverage_hits { &mut coverage.hits } else { &mut coverage.failsafes }.push(count);
+                }
+            }
+        });
+        coverage
+    }
+
     pub(super) fn boost(&mut self, pair: &Pair<'_>, span: Span) -> Exploration {
         let fixed = child(pair, Rule::k_fixed).is_some();
         let kind = if fixed { ExplorationKind::BoostFixed } else { ExplorationKind::BoostLinear };
         let mut boost = empty(span, kind);
-        boost.damaged = self.members(&expect_child(pair, Rule::boost_settings), Place::Boost, |reader, setting| {
+        boost.has_errors = self.members(&expect_child(pair, Rule::boost_settings), |reader, setting| {
             let span = reader.keyword_span(&setting);
             let mut counts = children(&setting, Rule::number).map(|it| reader.count(&it)).collect::<Vec<Count>>();
             let last = counts.pop().expect("a setting of `boost` has a number");
@@ -29,24 +54,22 @@ impl Reader<'_> {
 
     pub(super) fn construct(&mut self, pair: &Pair<'_>, span: Span) -> Exploration {
         let mut construct = empty(span, ExplorationKind::Construct);
-        construct.damaged =
-            self.members(&expect_child(pair, Rule::construct_settings), Place::Construct, |reader, setting| {
-                let share = (reader.keyword_span(&setting), reader.signed(&expect_child(&setting, Rule::signed)));
-                match setting.as_rule() {
-                    Rule::construct_share => construct.shares.push(share),
-                    _ => construct.untils.push(share),
-                }
-            });
+        construct.has_errors = self.members(&expect_child(pair, Rule::construct_settings), |reader, setting| {
+            let share = (reader.keyword_span(&setting), reader.signed(&expect_child(&setting, Rule::signed)));
+            match setting.as_rule() {
+                Rule::construct_share => construct.shares.push(share),
+                _ => construct.untils.push(share),
+            }
+        });
         construct
     }
 
     pub(super) fn predict(&mut self, pair: &Pair<'_>, span: Span) -> Exploration {
         let mut predict = empty(span, ExplorationKind::Predict);
-        predict.damaged =
-            self.members(&expect_child(pair, Rule::predict_settings), Place::Predict, |reader, setting| {
-                let count = reader.count(&expect_child(&setting, Rule::number));
-                predict.candidates.push((reader.keyword_span(&setting), count));
-            });
+        predict.has_errors = self.members(&expect_child(pair, Rule::predict_settings), |reader, setting| {
+            let count = reader.count(&expect_child(&setting, Rule::number));
+            predict.candidates.push((reader.keyword_span(&setting), count));
+        });
         predict
     }
 
@@ -54,7 +77,7 @@ impl Reader<'_> {
         let times = self.count(&expect_child(pair, Rule::number));
         let mut confirm = Confirm { span, times, by: vec![], violations: vec![] };
         if let Some(settings) = child(pair, Rule::confirm_settings) {
-            self.members(&settings, Place::Confirm, |reader, setting| {
+            self.members(&settings, |reader, setting| {
                 if setting.as_rule() == Rule::confirm_violations {
                     confirm.violations.push((reader.keyword_span(&setting), ()));
                     return;
@@ -74,14 +97,13 @@ impl Reader<'_> {
 
     pub(super) fn novelty(&mut self, pair: &Pair<'_>, span: Span) -> Exploration {
         let mut novelty = empty(span, ExplorationKind::Novelty);
-        novelty.damaged =
-            self.members(&expect_child(pair, Rule::novelty_settings), Place::Novelty, |reader, setting| {
-                let span = reader.keyword_span(&setting);
-                match setting.as_rule() {
-                    Rule::novelty_over => novelty.overs.push((span, reader.names(&setting))),
-                    _ => novelty.neighbours.push((span, reader.count(&expect_child(&setting, Rule::number)))),
-                }
-            });
+        novelty.has_errors = self.members(&expect_child(pair, Rule::novelty_settings), |reader, setting| {
+            let span = reader.keyword_span(&setting);
+            match setting.as_rule() {
+                Rule::novelty_over => novelty.overs.push((span, reader.names(&setting))),
+                _ => novelty.neighbours.push((span, reader.count(&expect_child(&setting, Rule::number)))),
+            }
+        });
         novelty
     }
 
@@ -92,9 +114,9 @@ impl Reader<'_> {
             stagnations: vec![],
             discoveries: vec![],
             completenesses: vec![],
-            damaged: false,
+            has_errors: false,
         };
-        stop.damaged = self.members(&expect_child(pair, Rule::stop_settings), Place::Stop, |reader, rule| {
+        stop.has_errors = self.members(&expect_child(pair, Rule::stop_settings), |reader, rule| {
             let span = reader.keyword_span(&rule);
             let quantity = reader.signed(&expect_child(&rule, Rule::signed));
             match rule.as_rule() {
@@ -125,6 +147,6 @@ fn empty(span: Span, kind: ExplorationKind) -> Exploration {
         candidates: vec![],
         neighbours: vec![],
         overs: vec![],
-        damaged: false,
+        has_errors: false,
     }
 }

@@ -2,14 +2,14 @@
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, Id as _, Surroundings, TopicId};
+use crate::model::{self, Id as _, Lifecycle, TopicId};
 use crate::span::Span;
+use crate::syntax::ast::lifecycle as written;
 use crate::syntax::ast::{Quantity, System};
-use crate::syntax::surroundings as written;
 use crate::units::Unit;
 
 impl<'a> Resolver<'a> {
-    pub(super) fn surroundings(&mut self) -> Option<Surroundings> {
+    pub(super) fn lifecycle(&mut self) -> Option<Lifecycle> {
         let systems = &self.file.systems;
         let launches = self.one_of_all(systems, |system| &system.launches, "launch");
         let terminates = self.one_of_all(systems, |system| &system.terminates, "terminate");
@@ -26,7 +26,7 @@ impl<'a> Resolver<'a> {
             Some((span, budget)) => self.relay_budget(*span, budget).map(Some),
             None => Some(None),
         };
-        Some(Surroundings { launch: launch?, terminate: terminate?, relay_budget: relay_budget? })
+        Some(Lifecycle { launch: launch?, terminate: terminate?, relay_budget: relay_budget? })
     }
 
     /// The one clause of all systems; further ones are reported.
@@ -65,7 +65,7 @@ impl<'a> Resolver<'a> {
         let latency = self.single(&budget.latency, "latency");
         let jitter = self.single(&budget.jitter, "jitter");
         if latency.is_none() && jitter.is_none() {
-            if !budget.damaged {
+            if !budget.has_errors {
                 let diagnostic =
                     Diagnostic::new(Code::CLAUSE_MISSING, span, "`relay budget` needs `latency` or `jitter`");
                 self.report(diagnostic.label("add at least one of them").note("for example `latency 5ms`"));

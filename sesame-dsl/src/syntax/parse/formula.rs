@@ -2,10 +2,10 @@
 
 use sesame_grammar::Rule;
 
-use super::ast::{
+use super::reader::{Pair, Reader, child, children, comparison, expect_child};
+use crate::syntax::ast::{
     Expression, ExpressionKind, Formula, FormulaKind, Members, Name, Prefix, PrefixWord, Relation, Until,
 };
-use super::parse::{Pair, Reader, child, children, comparison, expect_child};
 
 impl Reader<'_> {
     pub(super) fn formula(&mut self, pair: &Pair<'_>) -> Formula {

@@ -10,7 +10,7 @@ pub mod eddi;
 mod formula;
 mod fuzz;
 mod ids;
-mod measure;
+mod metrics;
 pub mod physical;
 mod system;
 mod temporal;
@@ -19,7 +19,7 @@ pub use campaign::*;
 pub use formula::*;
 pub use fuzz::*;
 pub use ids::*;
-pub use measure::*;
+pub use metrics::*;
 pub use system::*;
 pub use temporal::*;
 
@@ -42,7 +42,7 @@ pub struct Space {
     /// The simulator under test.
     pub simulator: Simulator,
     /// What the system needs beside it, and what a relay may cost.
-    pub surroundings: Surroundings,
+    pub lifecycle: Lifecycle,
     /// Message types, each after the types it contains, otherwise in declaration order.
     pub messages: Arena<MessageId, Message>,
     /// Topics, in declaration order.
@@ -76,8 +76,8 @@ impl Space {
     /// Whether copies of one operation may act at the same time in the tests of all campaigns that search, of which there
     /// is one at least.
     pub fn copies_may_overlap(&self) -> bool {
-        let mut searching = self.campaigns.values().filter_map(|campaign| campaign.search.content()).peekable();
-        searching.peek().is_some() && searching.all(|content| content.copies == Copies::MayOverlap)
+        let mut searching = self.campaigns.values().filter_map(|campaign| campaign.search.template()).peekable();
+        searching.peek().is_some() && searching.all(|template| template.copies == Copies::MayOverlap)
     }
 
     /// The file that something is declared in, as seen from the folder of the space's own file.

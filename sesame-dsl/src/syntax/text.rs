@@ -1,0 +1,6 @@
+//! Texts as the language writes them.
+
+/// A text as the language writes it, in quotes.
+pub fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
+}
