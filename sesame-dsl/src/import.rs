@@ -107,14 +107,14 @@ impl Merger<'_> {
         if !is_space(&name) {
             let title = format!("cannot import \"{}\"", import.text);
             let diagnostic = Diagnostic::new(Code::NOT_IMPORTED, import.span, title)
-                .label("the name of an imported file ends in `.sesame`")
-                .note("files of other names are not even looked at, so that no message can show what is in them");
+                .label("the name of an imported file must end in `.sesame`")
+                .note("files with other names are never read, so that no message can show their content");
             self.diagnostics.push(diagnostic);
             return false;
         }
         let Some(id) = self.sources.find(&name) else {
             let title = format!("cannot import \"{}\"", import.text);
-            let why = self.sources.unreadable(&name).unwrap_or("this file was not handed in");
+            let why = self.sources.unreadable(&name).unwrap_or("this file was not provided");
             let diagnostic = Diagnostic::new(Code::NOT_IMPORTED, import.span, title).label(why);
             self.diagnostics.push(
                 diagnostic
@@ -131,8 +131,8 @@ impl Merger<'_> {
             return true;
         }
         if self.open.len() >= MAX_DEPTH {
-            let title = format!("files import each other more than {MAX_DEPTH} deep");
-            self.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, import.span, title).label("too deep"));
+            let title = format!("imports are nested more than {MAX_DEPTH} levels deep");
+            self.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, import.span, title).label("nested too deeply"));
             return false;
         }
         self.visit(id, imported_name(importing_name, &import.text));
@@ -190,7 +190,7 @@ mod tests {
         let mut diagnostics = Vec::new();
         merge(&sources, root, &mut diagnostics);
         assert_eq!(diagnostics.len(), 3, "{diagnostics:?}");
-        assert!(diagnostics.iter().all(|found| found.label.contains("ends in `.sesame`")), "{diagnostics:?}");
+        assert!(diagnostics.iter().all(|found| found.label.contains("must end in `.sesame`")), "{diagnostics:?}");
     }
 
     #[test]

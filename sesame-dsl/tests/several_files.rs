@@ -128,7 +128,7 @@ fn a_long_chain_of_imports_is_refused_and_not_followed_for_ever() {
     let files: Vec<(String, String)> =
         (0..200).map(|n| (format!("f{n}.sesame"), format!("import \"f{}.sesame\"", n + 1))).collect();
     let files: Vec<(&str, &str)> = files.iter().map(|(name, text)| (name.as_str(), text.as_str())).collect();
-    assert!(said(&files).contains("more than 64 deep"));
+    assert!(said(&files).contains("more than 64 levels deep"));
 }
 
 /// The campaign of a name, after some more text in the demo.

@@ -89,7 +89,7 @@ impl<'a> Resolver<'a> {
         }
         let (every, per) = (every?, per?);
         if depth(&aggregate).max(when.as_ref().map_or(0, Condition::depth)) > MAX_DEPTH {
-            let title = format!("this formula is nested more than {MAX_DEPTH} deep");
+            let title = format!("this formula is nested more than {MAX_DEPTH} levels deep");
             self.report(Diagnostic::new(Code::TOO_LARGE, whole, title).label("nested too deeply"));
             return None;
         }

@@ -99,7 +99,7 @@ impl<'a> Resolver<'a> {
     }
 
     fn too_deep(&mut self, span: Span) {
-        let title = format!("this formula is nested more than {MAX_DEPTH} deep");
+        let title = format!("this formula is nested more than {MAX_DEPTH} levels deep");
         self.report(Diagnostic::new(Code::TOO_LARGE, span, title).label("nested too deeply"));
     }
 
