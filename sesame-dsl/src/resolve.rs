@@ -38,6 +38,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::import::Merged;
+use crate::index::Kind;
 use crate::model::{self, Arena, Declaration, Id, Space};
 use crate::similar::most_similar;
 use crate::source::SourceMap;
@@ -115,45 +116,6 @@ fn declaration(sources: &SourceMap, head: &ast::Head) -> Declaration {
         span: head.name.span,
         line: sources.position(head.name.span).line,
         doc: head.doc.clone(),
-    }
-}
-
-/// What a name can stand for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Simulator,
-    Message,
-    Topic,
-    Node,
-    Metric,
-    Requirement,
-    Operation,
-    Test,
-    Campaign,
-    Eddi,
-    Physical,
-}
-
-impl Kind {
-    fn word(self) -> &'static str {
-        match self {
-            Kind::Simulator => "simulator",
-            Kind::Message => "message",
-            Kind::Topic => "topic",
-            Kind::Node => "node",
-            Kind::Metric => "metric",
-            Kind::Requirement => "requirement",
-            Kind::Operation => "operation",
-            Kind::Test => "test",
-            Kind::Campaign => "campaign",
-            Kind::Eddi => "monitor",
-            Kind::Physical => "lab",
-        }
-    }
-
-    fn with_article(self) -> String {
-        let article = if self == Kind::Operation { "an" } else { "a" };
-        format!("{article} {}", self.word())
     }
 }
 

@@ -11,16 +11,20 @@ use sesame_dsl::diagnostic::render;
 use files::{analyse_text, corpus};
 
 fn main() -> ExitCode {
-    let folders: [(&str, fn(&str, &str)); 2] = [("good", gives_its_model), ("bad", gives_its_diagnostics)];
-    let tests = folders.into_iter().flat_map(|(folder, check)| {
-        corpus(folder).into_iter().map(move |(name, text)| {
-            Trial::test(format!("{folder}::{name}"), move || {
-                check(&name, &text);
-                Ok(())
-            })
+    let mut tests = of_each("good", gives_its_model);
+    tests.extend(of_each("bad", gives_its_diagnostics));
+    libtest_mimic::run(&Arguments::from_args(), tests).exit_code()
+}
+
+/// A test for each file of a folder.
+fn of_each(folder: &'static str, check: fn(&str, &str)) -> Vec<Trial> {
+    let test = |(name, text): (String, String)| {
+        Trial::test(format!("{folder}::{name}"), move || {
+            check(&name, &text);
+            Ok(())
         })
-    });
-    libtest_mimic::run(&Arguments::from_args(), tests.collect()).exit_code()
+    };
+    corpus(folder).into_iter().map(test).collect()
 }
 
 fn gives_its_model(name: &str, text: &str) {

@@ -50,8 +50,8 @@ impl<'a> Resolver<'a> {
         add(Kind::Operation, file.operations.iter().map(|it| &it.head).collect());
         add(Kind::Test, file.tests.iter().map(|it| &it.head).collect());
         add(Kind::Campaign, file.campaigns.iter().map(|it| &it.head).collect());
-        add(Kind::Eddi, file.eddis.iter().map(|it| &it.head).collect());
-        add(Kind::Physical, file.physicals.iter().map(|it| &it.head).collect());
+        add(Kind::Monitor, file.eddis.iter().map(|it| &it.head).collect());
+        add(Kind::Lab, file.physicals.iter().map(|it| &it.head).collect());
         heads
     }
 

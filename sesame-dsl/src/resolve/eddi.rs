@@ -100,7 +100,7 @@ impl<'a> Resolver<'a> {
     /// A demand names a guarantee of another monitor.
     fn demand(&mut self, demand: &'a written::Demand) -> Option<Demand> {
         let name = &demand.head.name;
-        let index = self.find(&demand.eddi, Kind::Eddi)?;
+        let index = self.find(&demand.eddi, Kind::Monitor)?;
         let other = &self.file.eddis[index];
         let guarantees: Vec<&str> = other.guarantees.iter().map(|it| it.head.name.text.as_str()).collect();
         if !guarantees.contains(&name.text.as_str()) && !other.has_errors {
@@ -126,7 +126,7 @@ impl<'a> Resolver<'a> {
             let names = file.eddis[index].demands.iter().map(|demand| &demand.eddi);
             names.filter_map(|name| {
                 let definition = self.names.get(name.text.as_str())?;
-                (definition.kind == Kind::Eddi).then_some((definition.index, name.span))
+                (definition.kind == Kind::Monitor).then_some((definition.index, name.span))
             })
         };
         let edges: Vec<Vec<(usize, Span)>> = (0..file.eddis.len()).map(|index| demanded(index).collect()).collect();

@@ -14,6 +14,8 @@ pub(crate) struct Name {
 pub(crate) struct Head {
     pub(crate) name: Name,
     pub(crate) doc: String,
+    /// All of the declaration but its doc comment.
+    pub(crate) full_span: Span,
 }
 
 /// A quoted text without its quotes and escapes; the span includes the quotes.

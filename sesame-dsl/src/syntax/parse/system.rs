@@ -85,7 +85,11 @@ impl Reader<'_> {
         let has_errors = self.members(pair, |reader, field| {
             let name = expect_child(&field, Rule::field_name);
             fields.push(Field {
-                head: Head { name: reader.field_name(&name), doc: Self::doc(&field) },
+                head: Head {
+                    name: reader.field_name(&name),
+                    doc: Self::doc(&field),
+                    full_span: reader.full_span(&field),
+                },
                 ty: reader.type_of(&expect_child(&field, Rule::type_of)),
             });
         });

@@ -4,11 +4,17 @@ use sesame_grammar::Rule;
 
 use super::reader::{Pair, Reader, child, children, expect_child};
 use crate::diagnostic::{Code, Diagnostic};
+use crate::span::Span;
 use crate::syntax::ast::{Count, Head, Name, Path, Point, Quantity, Range, Text, UnitName};
 
 impl Reader<'_> {
     pub(super) fn head(&mut self, pair: &Pair<'_>) -> Head {
-        Head { name: self.name(&expect_child(pair, Rule::name)), doc: Self::doc(pair) }
+        Head { name: self.name(&expect_child(pair, Rule::name)), doc: Self::doc(pair), full_span: self.full_span(pair) }
+    }
+
+    /// All of a declaration but its doc comment.
+    pub(super) fn full_span(&self, pair: &Pair<'_>) -> Span {
+        self.keyword_span(pair).to(self.span(pair).end())
     }
 
     pub(super) fn doc(pair: &Pair<'_>) -> String {
