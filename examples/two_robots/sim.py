@@ -1,8 +1,8 @@
 """Two mobile robots on crossing corridors.
 
-`east` drives to and fro along x, `north` along y; both pass the crossing at the origin again and again. Each tells
-the other where it is. `east` has the right of way; `north` stops before the crossing while `east`, as far as it has
-heard, is in it or about to be. The simulator talks to Sesame in lines of JSON: see docs/process.md.
+`east` drives back and forth along x, `north` along y; both pass the crossing at the origin repeatedly. Each sends the
+other its pose. `east` has the right of way; `north` stops before the crossing while `east`, according to the last pose
+received, is in it or about to enter. The simulator exchanges lines of JSON with Sesame: see docs/process.md.
 """
 
 import json
@@ -14,8 +14,8 @@ TURN = 5.0  # metres from the crossing at which a corridor ends
 TRIPS = 4  # times that a robot drives from end to end
 TIMETABLE = 15.0  # seconds from one departure to the next
 STOP_LINE = 1.4  # metres from the crossing at which `north` waits
-CLEAR = 1.2  # metres behind the crossing from which on `east` is no concern
-REACTION = 2.6  # seconds that `north` needs to be across
+CLEAR = 1.2  # metres behind the crossing beyond which `east` can be ignored
+REACTION = 2.6  # seconds that `north` needs to cross
 
 POSES = {"east": "robots/east/pose", "north": "robots/north/pose"}
 COMPLETED = "crossing/completed"
@@ -45,7 +45,7 @@ class World:
             "east": Robot(-TURN, 1.0 + luck.uniform(-0.02, 0.02)),
             "north": Robot(-TURN, 0.95 + luck.uniform(-0.02, 0.02)),
         }
-        self.heard = None  # the last pose of `east` that reached `north`
+        self.heard = None  # the last pose of `east` that `north` received
 
     def poses(self):
         messages = []
@@ -75,7 +75,7 @@ class World:
 
 
 def answer(what):
-    """Says something and hears what is next; the end of the input is the end."""
+    """Sends an answer and returns the next request, or None at the end of the input."""
     print(json.dumps(what), flush=True)
     return json.loads(sys.stdin.readline() or "null")
 

@@ -4,22 +4,22 @@
 //! hangs takes nothing with it. Nothing here depends on how many workers there are: tests are numbered when they are
 //! asked for, and told in that order.
 
-mod again;
-mod alone;
 mod conduct;
-mod frames;
+mod confirmation;
 mod link;
 mod pool;
 #[cfg(any(not(unix), test))]
 mod port;
-mod traced;
+mod protocol;
+mod single;
+mod traces;
 mod worker;
 mod worker_process;
 
-pub use again::{Further, confirm_further};
-pub use alone::{AloneSettings, run_alone};
 pub use conduct::{CampaignError, Conducted, Progress, Settings, Unheard, conduct, patience};
+pub use confirmation::{Further, confirm_further};
 pub use link::Address;
 pub use pool::{Ended, Job, Pool, PoolError, PoolSettings};
-pub use traced::TraceOrder;
+pub use single::{AloneSettings, run_alone};
+pub use traces::TraceOrder;
 pub use worker::serve;

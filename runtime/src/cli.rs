@@ -4,31 +4,32 @@
 //! 3 done, but something is not as required where that was asked for, 130 stopped by the user.
 
 mod confirm;
+mod execution;
 mod export;
 mod gate;
 mod known;
 mod progress;
-mod recorded;
 mod repeat;
 mod replay;
 mod replay_recording;
-mod report_anew;
+mod report;
+mod results_folder;
 mod run;
 mod shrink;
 mod terminal;
-mod work;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
+use terminal::{print, print_json, say, text_options};
+
+use sesame_base::visible::visible_lines;
 use sesame_plan::CampaignPlan;
+use sesame_results::report as reports;
 
 use crate::campaign;
-use crate::report;
 use crate::runner::Runner;
-use crate::visible::visible_lines;
-use terminal::{print, print_json, say, text_options};
 
 /// Exit code of a command that did its work and found that something is not as required: what `--fail-on` names was found, a
 /// campaign says too little, or a test came out different.
@@ -74,7 +75,7 @@ enum Command {
     /// Print a recorded test as a `test` block for the `.sesame` file
     Export(export::Options),
     /// Write the page with pictures anew and print what was found, also of an unfinished run
-    Report(report_anew::Options),
+    Report(report::Options),
     /// List all tests of a run
     List(Which),
     /// Show one test whole: operations, effects, metrics, requirements
@@ -175,7 +176,7 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
         Some(Command::Shrink(options)) => shrink::shrink(runner, &plan, &results, &options),
         Some(Command::ReplayRecording(options)) => replay_recording::replay_recording(runner, &plan, &options),
         Some(Command::Export(options)) => export::export(&results, &options),
-        Some(Command::Report(options)) => report_anew::report_anew(&results, &options),
+        Some(Command::Report(options)) => report::report_anew(&results, &options),
         Some(Command::List(which)) => list(&results, &which),
         Some(Command::Show { test, which }) => show(&results, &which, &test),
         Some(Command::Digest(which)) => digest(&results, &which),
@@ -186,34 +187,34 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
         #[cfg(all(feature = "process", target_os = "linux"))]
         Some(Command::Simulator { worker, report, program }) => {
             let (program, arguments) = program.split_first().expect("the program is required");
-            Ok(crate::transport::keep_simulator(worker, &report, program, arguments))
+            Ok(sesame_relay::transport::keep_simulator(worker, &report, program, arguments))
         }
         #[cfg(all(feature = "process", target_os = "linux"))]
         Some(Command::Simulated { keeper, program }) => {
             let (program, arguments) = program.split_first().expect("the program is required");
-            Ok(crate::transport::become_simulator(keeper, program, arguments))
+            Ok(sesame_relay::transport::become_simulator(keeper, program, arguments))
         }
     }
 }
 
 fn list(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
-    let list = report::list(&recorded::open(results, which.results.as_deref())?)?;
+    let list = reports::list(&results_folder::open(results, which.results.as_deref())?)?;
     match which.format {
-        Format::Text => print(&report::list_text(&list, text_options())),
+        Format::Text => print(&reports::list_text(&list, text_options())),
         Format::Json => print_json(&list),
     }
 }
 
 fn show(results: &Path, which: &Which, test: &str) -> Result<ExitCode, Failure> {
-    let shown = report::show(&recorded::open(results, which.results.as_deref())?, test)?;
+    let shown = reports::show(&results_folder::open(results, which.results.as_deref())?, test)?;
     match which.format {
-        Format::Text => print(&report::test_text(&shown, text_options())),
+        Format::Text => print(&reports::test_text(&shown, text_options())),
         Format::Json => print_json(&shown),
     }
 }
 
 fn digest(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
-    let repository = recorded::open(results, which.results.as_deref())?;
+    let repository = results_folder::open(results, which.results.as_deref())?;
     let digest = repository.digest()?;
     match which.format {
         Format::Text => print(&format!("{digest}\n")),
@@ -224,9 +225,9 @@ fn digest(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
 /// What commands ask of recorded results beside what reports do: whether a gate closes, how a test is to be made smaller, and
 /// how long it may take when it is run again.
 #[cfg(test)]
-pub(crate) fn asked_beside_reports(repository: &crate::record::Repository, test: &str) -> Result<(), String> {
-    let words = |error: crate::record::RecordError| error.to_string();
-    drop(gate::every_objection(&report::summary(repository).map_err(words)?, repository.plan()));
+pub(crate) fn asked_beside_reports(repository: &sesame_results::record::Repository, test: &str) -> Result<(), String> {
+    let words = |error: sesame_results::record::RecordError| error.to_string();
+    drop(gate::every_objection(&reports::summary(repository).map_err(words)?, repository.plan()));
     let record = repository.find(test).and_then(|number| repository.test(number)).map_err(words)?;
     replay::limit(&record);
     drop(shrink::failing(repository, &record, &[]).map_err(|Failure(words)| words)?);

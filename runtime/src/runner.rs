@@ -2,9 +2,9 @@
 
 use std::process::ExitCode;
 
-use crate::fuzz::OperationEntry;
-use crate::metric::HookEntry;
-use crate::transport::Connect;
+use sesame_relay::fuzz::OperationEntry;
+use sesame_relay::metric::HookEntry;
+use sesame_relay::transport::Connect;
 
 /// A campaign's runner: everything that generated code knows.
 #[derive(Debug, Clone, Copy)]

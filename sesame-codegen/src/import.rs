@@ -23,7 +23,7 @@ mod xml;
 use std::path::Path;
 
 use sesame_plan::CampaignPlan;
-use sesame_runtime::record::RecordError;
+use sesame_results::record::RecordError;
 
 pub use dialect::Dialect;
 pub use notes::{Kind, Notes};

@@ -1,4 +1,4 @@
-//! What a correct space should be warned of.
+//! Warnings about a space without errors.
 
 mod system;
 mod unused;
@@ -7,8 +7,8 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{MetricSource, Space};
 use crate::span::FileId;
 
-/// Warnings about a space without errors. Of what it imports, only what is wrong in itself is said: a file that others
-/// share holds more than each of them uses.
+/// Warnings about a space without errors. Unused declarations are only reported in the file itself: a file that several
+/// spaces import contains more than each of them uses.
 pub(crate) fn check(space: &Space, root: FileId) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     unused::operations(space, root, &mut diagnostics);
@@ -34,9 +34,9 @@ fn objectives_without_default(space: &Space, diagnostics: &mut Vec<Diagnostic>) 
         let objective = space.campaigns.values().any(|campaign| campaign.objectives.contains(&id));
         if objective && metric.default.is_none() && metric.source != MetricSource::FuzzingTime {
             let name = &metric.declaration.name;
-            let title = format!("objective `{name}` may stay without a value");
+            let title = format!("objective `{name}` has no default");
             let diagnostic = Diagnostic::new(Code::OBJECTIVE_WITHOUT_DEFAULT, metric.declaration.span, title);
-            diagnostics.push(diagnostic.label("a test in which it is never set counts as unmeasured: add a `default`"));
+            diagnostics.push(diagnostic.label("a test that never sets it counts as unmeasured; add a `default`"));
         }
     }
 }

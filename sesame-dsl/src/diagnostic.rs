@@ -1,7 +1,7 @@
-//! What is wrong with a file, as data; [`render`] makes text of it.
+//! What is wrong with a file, as data; [`render`] turns it into text.
 //!
-//! A diagnostic stands for one mistake. Its title says what is wrong, the primary label adds what the title cannot know
-//! (what stands there, what would fit), and suggestions are patches that could be applied as they are.
+//! A diagnostic stands for one mistake. Its title says which rule is broken, the primary label adds what the title cannot
+//! know (what was found, what was expected), and suggestions are patches that can be applied as they are.
 
 mod code;
 pub mod render;
@@ -21,22 +21,23 @@ pub struct Diagnostic {
     pub title: String,
     /// Where.
     pub span: Span,
-    /// What stands there or was expected there; may be empty.
+    /// What was found or expected there; may be empty.
     pub label: String,
     /// Other places that matter, for example where a name was first defined.
     pub secondary: Vec<(Span, String)>,
-    /// What else helps to understand.
+    /// Further explanations.
     pub notes: Vec<String>,
-    /// Ways out, best first.
+    /// Possible fixes, best first.
     pub suggestions: Vec<Suggestion>,
 }
 
-/// A way out: a message, and the edit that does it.
+/// A possible fix: a message, and the edits that apply it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Suggestion {
-    /// What to do: begins with a verb, or says what exists.
+    /// What to do: an imperative or a question that makes sense without the diagnostic around it, because some renderers
+    /// print it alone.
     pub message: String,
-    /// What to replace by what. Spans do not overlap.
+    /// What to replace with what. Spans do not overlap.
     pub edits: Vec<(Span, String)>,
 }
 
@@ -60,7 +61,7 @@ impl Diagnostic {
         self
     }
 
-    /// With another place and what it has to do with the mistake.
+    /// With another place that is involved in the mistake.
     pub fn also(mut self, span: Span, label: impl Into<String>) -> Self {
         self.secondary.push((span, shortened(one_line(&label.into()))));
         self
@@ -91,7 +92,7 @@ impl Diagnostic {
     }
 }
 
-/// A text that quotes source text may hold its line ends; what is said of a place is one line.
+/// A text that quotes source text may contain its line breaks; titles and labels are one line.
 fn one_line(text: &str) -> String {
     if text.contains(['\n', '\r']) { text.split_whitespace().collect::<Vec<_>>().join(" ") } else { text.to_owned() }
 }
@@ -99,8 +100,8 @@ fn one_line(text: &str) -> String {
 /// The most characters of one sentence.
 const LONGEST: usize = 1000;
 
-/// A sentence of a length that can be read, whatever it quotes: one of more than a thousand characters is its beginning
-/// and its end.
+/// A sentence short enough to read, even if it quotes a long text: of more than a thousand characters, the beginning and
+/// the end are kept.
 pub fn shortened(text: String) -> String {
     if text.len() <= LONGEST {
         return text;
@@ -111,8 +112,8 @@ pub fn shortened(text: String) -> String {
     if from < to { format!("{} … {}", &text[..from], &text[to..]) } else { text }
 }
 
-/// A text without what a terminal takes for a command, or what turns the direction of what follows: control characters
-/// other than line ends and tabs, and marks of direction. Each is replaced by a sign that says that something was there.
+/// A text without characters that a terminal interprets or that change the direction of the text after them: control
+/// characters other than line feeds and tabs, and direction marks. Each is replaced by U+FFFD.
 pub fn visible(text: &str) -> Cow<'_, str> {
     if !text.contains(hidden) {
         return Cow::Borrowed(text);
@@ -120,7 +121,7 @@ pub fn visible(text: &str) -> Cow<'_, str> {
     Cow::Owned(text.chars().map(|c| if hidden(c) { '\u{fffd}' } else { c }).collect())
 }
 
-/// Whether a sign is a command to a terminal, or turns the direction of what follows.
+/// Whether a terminal interprets a character, or it changes the direction of the text after it.
 fn hidden(c: char) -> bool {
     (c.is_control() && !matches!(c, '\n' | '\t'))
         || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
@@ -132,12 +133,12 @@ mod tests {
 
     #[test]
     fn a_sentence_that_quotes_a_megabyte_is_short_and_keeps_both_ends() {
-        let text = format!("`{}` is no unit", "µ".repeat(1 << 20));
+        let text = format!("`{}` is not a unit", "µ".repeat(1 << 20));
         let short = shortened(text);
         assert_eq!(short.chars().count(), 666 + 3 + 334);
-        assert!(short.starts_with("`µµ") && short.contains("µ … µ") && short.ends_with("µ` is no unit"));
+        assert!(short.starts_with("`µµ") && short.contains("µ … µ") && short.ends_with("µ` is not a unit"));
         let long = "µ".repeat(600);
-        assert_eq!(shortened(long.clone()), long, "it is not so long, only its letters are");
+        assert_eq!(shortened(long.clone()), long, "the limit counts characters, not bytes");
     }
 
     #[test]

@@ -107,14 +107,14 @@ impl Merger<'_> {
         if !is_space(&name) {
             let title = format!("cannot import \"{}\"", import.text);
             let diagnostic = Diagnostic::new(Code::NOT_IMPORTED, import.span, title)
-                .label("the name of an imported file ends in `.sesame`")
-                .note("files of other names are not even looked at, so that no message can show what is in them");
+                .label("the name of an imported file must end in `.sesame`")
+                .note("files with other names are never read, so that no message can show their content");
             self.diagnostics.push(diagnostic);
             return false;
         }
         let Some(id) = self.sources.find(&name) else {
             let title = format!("cannot import \"{}\"", import.text);
-            let why = self.sources.unreadable(&name).unwrap_or("this file was not handed in");
+            let why = self.sources.unreadable(&name).unwrap_or("this file was not provided");
             let diagnostic = Diagnostic::new(Code::NOT_IMPORTED, import.span, title).label(why);
             self.diagnostics.push(
                 diagnostic
@@ -131,8 +131,8 @@ impl Merger<'_> {
             return true;
         }
         if self.open.len() >= MAX_DEPTH {
-            let title = format!("files import each other more than {MAX_DEPTH} deep");
-            self.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, import.span, title).label("too deep"));
+            let title = format!("imports are nested more than {MAX_DEPTH} levels deep");
+            self.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, import.span, title).label("nested too deeply"));
             return false;
         }
         self.visit(id, imported_name(importing_name, &import.text));
@@ -146,9 +146,9 @@ impl Merger<'_> {
             format!("{first} imports itself")
         } else {
             let by: Vec<&str> = self.open[at + 1..].iter().map(|&id| name(id)).collect();
-            format!("{first} imports itself by way of {}", by.join(", "))
+            format!("{first} imports itself through {}", by.join(", "))
         };
-        let diagnostic = Diagnostic::new(Code::CIRCLE, import.span, title).label("this import closes the circle");
+        let diagnostic = Diagnostic::new(Code::CIRCLE, import.span, title).label("this import closes the cycle");
         self.diagnostics.push(diagnostic);
     }
 }
@@ -190,7 +190,7 @@ mod tests {
         let mut diagnostics = Vec::new();
         merge(&sources, root, &mut diagnostics);
         assert_eq!(diagnostics.len(), 3, "{diagnostics:?}");
-        assert!(diagnostics.iter().all(|found| found.label.contains("ends in `.sesame`")), "{diagnostics:?}");
+        assert!(diagnostics.iter().all(|found| found.label.contains("must end in `.sesame`")), "{diagnostics:?}");
     }
 
     #[test]

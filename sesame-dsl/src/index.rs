@@ -51,7 +51,7 @@ pub struct Reference {
     pub within: DefinitionId,
 }
 
-/// What a name can be that of.
+/// What a name can stand for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
     /// The space itself.

@@ -1,16 +1,16 @@
 //! From syntax to model, in passes:
 //!
-//! 1. [`collect`] has who is called what, doubles, and what a space cannot do without
-//! 2. [`system`] has message types (in an order in which each follows those it contains), topics, nodes, the simulator
-//! 3. [`metrics`] has metrics (their formulas in [`formula`]) and requirements
-//! 4. [`fuzz`] has operations ([`disturbance`] what they disturb and permit, [`custom`] those in the user's code) and known
+//! 1. [`collect`] collects names, and reports duplicates and missing declarations
+//! 2. [`system`] resolves message types (ordered so that each follows those it contains), topics, nodes, the simulator
+//! 3. [`metrics`] resolves metrics (their formulas in [`formula`]) and requirements
+//! 4. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`custom`] those in the user's code) and
 //!    tests
-//! 5. [`campaign`] has campaigns, whose inherited clauses [`inherit`] has put in their places before all else;
-//!    [`condition`] the conditions of tests and what those of campaigns are made of
-//! 6. [`eddi`] has runtime monitors, [`physical`] labs, and [`lifecycle`] what a system says beside its simulator
+//! 5. [`campaign`] resolves campaigns, whose inherited clauses [`inherit`] has copied before all else; [`condition`]
+//!    resolves the conditions of tests and the building blocks of campaigns' conditions
+//! 6. [`eddi`] resolves runtime monitors, [`physical`] labs, and [`lifecycle`] the rest of a system's clauses
 //!
-//! Each pass reports all it finds. A declaration with a mistake is `None` from then on, and whoever mentions it says
-//! nothing: so one mistake is one diagnostic.
+//! Each pass reports all it finds. A declaration with a mistake is `None` from then on, and references to it are not
+//! reported again: one mistake is one diagnostic.
 
 mod boolean;
 mod campaign;
@@ -145,7 +145,7 @@ struct Resolver<'a> {
     file: &'a ast::File,
     diagnostics: &'a mut Vec<Diagnostic>,
     names: BTreeMap<&'a str, Definition>,
-    /// Names that nobody needs to hear of again: broken where they are declared, or already reported as unknown.
+    /// Names that are not reported again: broken where they are declared, or already reported as unknown.
     silent: BTreeSet<&'a str>,
     system: SystemPart,
     metrics: Vec<Option<model::Metric>>,
@@ -157,13 +157,13 @@ struct Resolver<'a> {
 /// The most names that are compared with unknown ones in all.
 const MOST_COMPARED: usize = 500_000;
 
-/// How many names were compared with unknown ones, to say what was meant.
+/// How many names were compared with unknown ones, to suggest what was meant.
 #[derive(Default)]
 struct Compared(usize);
 
 impl Compared {
-    /// Whether another unknown name may be compared with so many. Where there are many of both, the time would grow with
-    /// their product, and after so many suggestions nobody waits for one more.
+    /// Whether another unknown name may be compared with this many. With many of both, the time would grow with their
+    /// product, and after so many suggestions one more does not help.
     fn more(&mut self, with: usize) -> bool {
         self.0 = self.0.saturating_add(with);
         self.0 <= MOST_COMPARED
@@ -194,31 +194,32 @@ impl<'a> Resolver<'a> {
                 let title = format!("`{}` is {is}, not {}", name.text, kind.with_article());
                 let diagnostic = Diagnostic::new(Code::OTHER_KIND, name.span, title)
                     .label(format!("expected {}", kind.with_article()))
-                    .also(definition.span, format!("{is} by this declaration"));
+                    .also(definition.span, format!("declared as {is} here"));
                 self.report(diagnostic);
                 return None;
             }
             None => {}
         }
         self.silent.insert(&name.text);
-        // What an import that failed would have declared, nobody knows.
+        // An import that failed may have declared it.
         if self.file.incomplete {
             return None;
         }
         let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, format!("no {word} named `{}`", name.text))
-            .label(format!("not {} of this space", kind.with_article()));
+            .label("not found in this space");
         if !self.compared.more(self.names.len()) {
             self.report(diagnostic);
             return None;
         }
         let known = self.names_of(kind);
         if let Some(similar) = most_similar(&name.text, known.iter().copied()) {
-            diagnostic = diagnostic.suggest(format!("`{similar}` is"), name.span, similar);
+            diagnostic = diagnostic.did_you_mean(name.span, similar);
         } else if known.is_empty() {
-            diagnostic = diagnostic.note(format!("this space declares no {word}"));
+            diagnostic = diagnostic.note(format!("this space declares no {word}s"));
         } else if known.len() <= 8 {
+            let all = if known.len() == 1 { format!("the only {word}") } else { format!("the {word}s") };
             let verb = if known.len() == 1 { "is" } else { "are" };
-            diagnostic = diagnostic.note(format!("there {verb} {}", list(&known)));
+            diagnostic = diagnostic.note(format!("{all} of this space {verb} {}", list(&known)));
         }
         self.report(diagnostic);
         None
@@ -230,7 +231,7 @@ impl<'a> Resolver<'a> {
         known.into_iter().map(|(name, _)| *name).collect()
     }
 
-    /// Finds each name of a list, and reports those that stand in it twice.
+    /// Finds each name of a list, and reports those that are listed twice.
     fn find_all(&mut self, names: &'a [Name], kind: Kind) -> Option<Vec<usize>> {
         let mut found: Vec<usize> = Vec::new();
         let mut first: BTreeMap<&str, Span> = BTreeMap::new();
@@ -251,15 +252,17 @@ impl<'a> Resolver<'a> {
     }
 
     fn listed_twice(&mut self, again: Span, first: Span) {
-        let title = format!("`{}` stands twice in this list", self.text(again));
-        let diagnostic =
-            Diagnostic::new(Code::LISTED_TWICE, again, title).label("again here").also(first, "first here");
+        let title = format!("`{}` is listed twice", self.text(again));
+        let diagnostic = Diagnostic::new(Code::LISTED_TWICE, again, title)
+            .label("listed again here")
+            .also(first, "first listed here");
         self.report(diagnostic);
     }
 
     fn defined_twice(&mut self, title: String, again: Span, first: Span) {
-        let diagnostic =
-            Diagnostic::new(Code::DEFINED_TWICE, again, title).label("again here").also(first, "first defined here");
+        let diagnostic = Diagnostic::new(Code::DEFINED_TWICE, again, title)
+            .label("redefined here")
+            .also(first, "first defined here");
         self.report(diagnostic);
     }
 
@@ -272,15 +275,15 @@ impl<'a> Resolver<'a> {
 
     fn at_most_one(&mut self, spans: &[Span], what: &str) {
         for &again in spans.iter().skip(1) {
-            let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, again, format!("`{what}` stands twice"))
-                .label("remove this one or the other")
-                .also(spans[0], "first here");
+            let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, again, format!("duplicate `{what}`"))
+                .label("remove one of the two")
+                .also(spans[0], "first given here");
             self.report(diagnostic);
         }
     }
 
     fn missing(&mut self, at: &Name, what: &str, example: &str) {
-        let title = format!("`{}` lacks {what}", at.text);
+        let title = format!("`{}` is missing {what}", at.text);
         let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, at.span, title)
             .label(format!("add {what}"))
             .note(format!("for example `{example}`"));

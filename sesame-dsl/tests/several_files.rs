@@ -108,7 +108,7 @@ fn a_mistake_is_shown_in_the_file_it_is_in() {
     let cell = CELL.replace("hook on link0", "hook on lnk0");
     let (sources, analysis, _) = analyse_files(&[("demo.sesame", MAIN), ("shared/cell.sesame", &cell)]);
     let shown = render::short(&analysis.diagnostics, &sources);
-    assert_eq!(shown, "shared/cell.sesame:11:33: error[E0203]: no topic named `lnk0`: not a topic of this space\n");
+    assert_eq!(shown, "shared/cell.sesame:11:33: error[E0203]: no topic named `lnk0`: not found in this space\n");
     let json = render::json(&analysis.diagnostics, &sources);
     assert!(json.contains("shared/cell.sesame"), "{json}");
 }
@@ -128,7 +128,7 @@ fn a_long_chain_of_imports_is_refused_and_not_followed_for_ever() {
     let files: Vec<(String, String)> =
         (0..200).map(|n| (format!("f{n}.sesame"), format!("import \"f{}.sesame\"", n + 1))).collect();
     let files: Vec<(&str, &str)> = files.iter().map(|(name, text)| (name.as_str(), text.as_str())).collect();
-    assert!(said(&files).contains("more than 64 deep"));
+    assert!(said(&files).contains("more than 64 levels deep"));
 }
 
 /// The campaign of a name, after some more text in the demo.
@@ -247,5 +247,5 @@ fn what_inherited_conditions_cannot_contain_is_said_of_the_campaign_that_wrote_t
         "space demo import \"cell.sesame\" campaign more from base { end after 60s } campaign most from more { }";
     let said = said(&[("demo.sesame", main), ("cell.sesame", &cell)]);
     assert_eq!(said.matches("error[E0505]").count(), 1, "{said}");
-    assert!(said.contains("no variable of campaign `base`"), "{said}");
+    assert!(said.contains("not a variable of campaign `base`"), "{said}");
 }

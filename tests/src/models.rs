@@ -9,7 +9,7 @@ mod words;
 use std::fs;
 use std::path::Path;
 
-use sesame_runtime::rng::Stream;
+use sesame_rng::Stream;
 
 /// What stands in hostile texts and nowhere else: where it turns up as anything but text, a text became something.
 pub const MARK: &str = "injected";

@@ -8,9 +8,9 @@ use std::process::{Child, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use sesame_runtime::observation::Outcome;
-use sesame_runtime::record::{Repetition, Repository, TestRow, Verdict};
-use sesame_runtime::report::summary;
+use sesame_base::observation::Outcome;
+use sesame_results::record::{Repetition, Repository, TestRow, Verdict};
+use sesame_results::report::summary;
 use sesame_tests::{Done, Project, Runner, command, done, sesamec, workspace};
 
 /// The runner of a campaign in gusts.

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use nix::sys::signal::Signal;
-use sesame_runtime::record::Repository;
+
+use sesame_results::record::Repository;
 use sesame_tests::{Done, Project, Runner, command, done, sesamec};
 
 use crate::interruption::Running;

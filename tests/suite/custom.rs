@@ -8,9 +8,10 @@ use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+
+use sesame_base::observation::Counters;
 use sesame_plan::{Activation, Choice};
-use sesame_runtime::observation::Counters;
-use sesame_runtime::record::{Repository, TestRecord};
+use sesame_results::record::{Repository, TestRecord};
 use sesame_tests::{Project, Runner, workspace};
 
 const SPACE: &str = r#"

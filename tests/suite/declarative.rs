@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_runtime::record::Repository;
+use sesame_results::record::Repository;
 use sesame_tests::Project;
 
 const SPACE: &str = r#"

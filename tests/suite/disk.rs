@@ -6,7 +6,8 @@ use std::process::Command;
 
 use nix::sys::signal::Signal;
 use rusqlite::Connection;
-use sesame_runtime::record::Repository;
+
+use sesame_results::record::Repository;
 use sesame_tests::{Runner, done};
 
 use crate::faults::recording;

@@ -1,13 +1,14 @@
 //! A test that was found, written as a block of the language and read back, is the same test bit for bit.
 
 use proptest::prelude::*;
+
+use sesame_base::observation::{MetricObservation, Observation, Outcome, WallTime};
 use sesame_dsl::analyse;
 use sesame_dsl::source::SourceMap;
 use sesame_plan::{Activation, Bound, CampaignPlan, Choice, Domain, OperationId, Test, TestOperation};
-use sesame_runtime::observation::{MetricObservation, Observation, Outcome, WallTime};
-use sesame_runtime::record::{Origin, Recorder, TestRecord};
-use sesame_runtime::report::export;
-use sesame_runtime::search;
+use sesame_results::record::{Origin, Recorder, TestRecord};
+use sesame_results::report::export;
+use sesame_search as search;
 
 /// Every kind of parameter in units that are awkward to write.
 const SPACE: &str = r#"

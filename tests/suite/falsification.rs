@@ -4,15 +4,17 @@ use std::fmt::Write as _;
 
 use sesame_dsl::analyse;
 use sesame_dsl::source::SourceMap;
+use sesame_optimise::dominance::Fitness;
+use sesame_optimise::falsify::{Falsifier, Settings as FalsifierSettings, UnitBox};
+use sesame_optimise::nsga2::{Nsga2, Settings, Survival, Told};
+use sesame_optimise::published::FalsificationProblem;
+use sesame_optimise::real::RealVariation;
+use sesame_optimise::sobol::SobolPoints;
 use sesame_plan::{Activation, CampaignPlan, Choice, Test, TestOperation};
-use sesame_runtime::record::Repository;
-use sesame_runtime::rng::{Stream, keyed_unit};
-use sesame_runtime::search::falsify::{Falsifier, Settings as FalsifierSettings, UnitBox};
-use sesame_runtime::search::nsga2::{Nsga2, Settings, Survival, Told};
-use sesame_runtime::search::published::FalsificationProblem;
-use sesame_runtime::search::real::RealVariation;
-use sesame_runtime::search::sobol_points::SobolPoints;
-use sesame_runtime::search::{Evaluated, Fitness, Margin};
+use sesame_results::record::Repository;
+use sesame_rng::{Stream, keyed_unit};
+use sesame_search::margin::margin_to;
+use sesame_search::{Evaluated, Margin};
 use sesame_tests::Project;
 
 const BUDGET: u32 = 80;
@@ -283,7 +285,7 @@ fn run(problem: FalsificationProblem, plan: &CampaignPlan, test: &Test) -> (f64,
 
 /// Tests until the first violation of a requirement, of a campaign with this seed.
 fn tests_until_violated(problem: FalsificationProblem, plan: &CampaignPlan, seed: u64) -> Option<usize> {
-    let mut strategy = sesame_runtime::search::strategy(plan, seed).unwrap();
+    let mut strategy = sesame_search::strategy(plan, seed).unwrap();
     let mut number = 0;
     loop {
         let batch = strategy.ask();
@@ -303,7 +305,7 @@ fn tests_until_violated(problem: FalsificationProblem, plan: &CampaignPlan, seed
             let margins: Vec<Margin> = plan
                 .requirements
                 .iter()
-                .map(|requirement| Margin::of(requirement.bound, value(requirement.metric)))
+                .map(|requirement| margin_to(requirement.bound, value(requirement.metric)))
                 .collect();
             if margins.iter().any(|margin| margin.violated) {
                 return Some(number);

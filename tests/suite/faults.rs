@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 use std::fs;
 
-use sesame_runtime::observation::Outcome;
-use sesame_runtime::record::{Origin, Repository};
+use sesame_base::observation::Outcome;
+use sesame_results::record::{Origin, Repository};
 use sesame_tests::{Done, Project, Runner, workspace};
 
 /// The runner of a campaign on the faulty simulator, with its hook filled in.

@@ -4,15 +4,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::thread;
 use std::time::{Duration, Instant};
+use std::{fs, thread};
 
-use sesame_runtime::observation::Outcome;
-use sesame_runtime::record::{Origin, Repository};
+use sesame_base::observation::Outcome;
+use sesame_results::record::{Origin, Repository};
 use sesame_tests::{Done, Project, Runner, done};
 
 /// What is to come of a mode.

@@ -6,8 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use sesame_runtime::analysis::{self, Datum, Selection};
-use sesame_runtime::record::{DATABASE, Origin, Repository, Status};
+use sesame_results::analysis::{self, Datum, Selection};
+use sesame_results::record::{DATABASE, Origin, Repository, Status};
 use sesame_tests::{Done, Project, command, done, fresh_folder, sesamec, workspace};
 
 const LEGACY: &str = "SESAME_LEGACY_DIR";

@@ -12,8 +12,9 @@ use nix::sys::signal::{Signal, kill, killpg};
 use nix::unistd::Pid;
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
-use sesame_runtime::observation::Outcome;
-use sesame_runtime::record::{RecordError, Repository};
+
+use sesame_base::observation::Outcome;
+use sesame_results::record::{RecordError, Repository};
 use sesame_tests::{Done, Runner};
 
 use crate::faults::faulty;

@@ -14,8 +14,9 @@ use nix::sys::signal::{Signal, kill, killpg};
 use nix::unistd::Pid;
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
-use sesame_runtime::observation::Outcome;
-use sesame_runtime::record::{Repository, TestRow, Verdict};
+
+use sesame_base::observation::Outcome;
+use sesame_results::record::{Repository, TestRow, Verdict};
 use sesame_tests::{Done, Project, Runner, workspace};
 
 /// The runner of a campaign on the simulator that starts others; `None`, with the reason, without a Python.

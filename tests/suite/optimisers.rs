@@ -3,12 +3,13 @@
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
 use proptest::test_runner::TestRunner;
-use sesame_runtime::search::Fitness;
-use sesame_runtime::search::crowding::distances;
-use sesame_runtime::search::hypervolume::hypervolume;
-use sesame_runtime::search::igd::igd_plus;
-use sesame_runtime::search::problems::{Problem, approximate};
-use sesame_runtime::search::sorting::fronts;
+
+use sesame_optimise::crowding::distances;
+use sesame_optimise::dominance::Fitness;
+use sesame_optimise::hypervolume::hypervolume;
+use sesame_optimise::igd::igd_plus;
+use sesame_optimise::problems::{Problem, approximate};
+use sesame_optimise::sorting::fronts;
 use sesame_tests::optimisers::{Distance, Distant, PYTHON, Ran, Run, Sort, Sorted, ask};
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=5;

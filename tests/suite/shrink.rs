@@ -6,7 +6,8 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use serde_json::Value;
-use sesame_runtime::record::{Repository, Verdict, verdict};
+
+use sesame_results::record::{Repository, Verdict, verdict};
 use sesame_tests::{Project, Runner};
 
 /// Tests of the latest run that violate a requirement and had an effect, the one with most collisions first, then evenly

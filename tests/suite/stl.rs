@@ -11,10 +11,11 @@ use std::fmt::Write as _;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
 use proptest::test_runner::TestRunner;
+
+use sesame_base::time::SimTime;
 use sesame_plan::Comparison;
 use sesame_plan::stl::{Formula, Interval};
-use sesame_runtime::stl::Monitor;
-use sesame_runtime::time::SimTime;
+use sesame_relay::stl::Monitor;
 use sesame_tests::rtamt::{Case, PYTHON, answers};
 
 const CASES: usize = 1_000;

@@ -2,10 +2,11 @@
 
 use std::fmt::Write as _;
 
-use sesame_runtime::observation::Outcome;
-use sesame_runtime::record::Repository;
-use sesame_runtime::search::hypervolume::hypervolume;
-use sesame_runtime::search::{Front, fitness_of};
+use sesame_base::observation::Outcome;
+use sesame_optimise::front::Front;
+use sesame_optimise::hypervolume::hypervolume;
+use sesame_results::record::Repository;
+use sesame_search::fitness_of;
 use sesame_tests::{Project, Runner, command, done, sesamec};
 
 use crate::search::quartiles;

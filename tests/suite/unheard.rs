@@ -1,7 +1,7 @@
 //! Campaigns whose operations nobody hears: they end before they fuzz, and say why.
 
-use sesame_runtime::observation::Outcome;
-use sesame_runtime::record::{EventKind, Repository};
+use sesame_base::observation::Outcome;
+use sesame_results::record::{EventKind, Repository};
 use sesame_tests::Project;
 
 /// Hides what only metrics listen to: in the cell, no robot subscribes to its zones and its speed.

@@ -18,6 +18,8 @@ mod model;
 pub mod stl;
 mod stop;
 mod test;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
 mod validate;
 
 pub use confirmation::*;

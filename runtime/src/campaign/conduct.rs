@@ -8,24 +8,25 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use sesame_plan::{CampaignPlan, CoverageGoal, KnownTestId, OperationId, Recorded, Search, Test};
 use sha2::{Digest as _, Sha256};
 
-use super::again::{Again, LIKE_BEFORE};
-use super::pool::{Ended, Job, Pool, PoolError, PoolSettings};
-use super::traced::TraceOrder;
-use crate::coverage::{self, Coverage, Feasible, Grid, GridError};
-use crate::observation::{Observation, Outcome};
-use crate::record::{
+use sesame_base::observation::{Observation, Outcome};
+use sesame_optimise::front::Front;
+use sesame_plan::{CampaignPlan, CoverageGoal, KnownTestId, OperationId, Recorded, Search, Test};
+use sesame_results::record::{
     self, Difference, Event, EventKind, GenerationCoverage, Origin, RecordError, Recorder, Repetition, Repository,
     ResultSet, Status, TestRecord, Verdict, differences, verdict,
 };
-use crate::rng::derive_seed;
-use crate::search::indicators::Indicators;
-use crate::search::{
-    self, Candidate, Confirming, Course, Evaluated, Front, Judged, Neighbours, SearchError, StopRules,
-};
-use crate::sspr::{self, Point};
+use sesame_rng::derive_seed;
+use sesame_search as search;
+use sesame_search::coverage::{self, Coverage, Feasible, Grid, GridError};
+use sesame_search::indicators::Indicators;
+use sesame_search::sspr::{self, Point};
+use sesame_search::{Candidate, Confirming, Course, Evaluated, Judged, Neighbours, SearchError, StopRules};
+
+use crate::campaign::confirmation::{Again, LIKE_BEFORE};
+use crate::campaign::pool::{Ended, Job, Pool, PoolError, PoolSettings};
+use crate::campaign::traces::TraceOrder;
 
 /// A test that runs this many times as long as the undisturbed run is taken to hang.
 const PATIENCE: f64 = 20.0;
@@ -711,9 +712,9 @@ fn reference_warnings(plan: &CampaignPlan, reference: &Observation) -> Vec<Strin
 #[cfg(test)]
 mod tests {
     use sesame_plan::{Dimension, GridAxis};
+    use sesame_results::record::sample;
 
     use super::*;
-    use crate::record::sample;
 
     fn tracking(stop_at: f64) -> Tracking {
         let axis = |dimension, high, cells| GridAxis { dimension, low: 0.0, high, cells };

@@ -20,7 +20,7 @@ mod system {
     use std::time::Instant;
 
     use super::{Command, Duration, io};
-    use crate::campaign::frames::{self, Greeting, Hello};
+    use crate::campaign::protocol::{self, Greeting, Hello};
 
     /// The connection between supervisor and worker.
     pub(in crate::campaign) type Stream = UnixStream;
@@ -64,7 +64,7 @@ mod system {
                     }
                 }
             }
-            Err(frames::not_reported(limit))
+            Err(protocol::not_reported(limit))
         }
     }
 
@@ -75,7 +75,7 @@ mod system {
         let mut stream = UnixStream::from(io::stdin().as_fd().try_clone_to_owned()?);
         stream.peer_addr().map_err(not_started)?;
         rustix::stdio::dup2_stdin(File::open("/dev/null")?)?;
-        frames::send(&mut stream, &Hello { token: None })?;
+        protocol::send(&mut stream, &Hello { token: None })?;
         Ok(stream)
     }
 }

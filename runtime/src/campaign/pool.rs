@@ -14,15 +14,16 @@ use std::sync::{Arc, Mutex, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use super::frames::{self, Reply};
-use super::link::{self, Stream};
-use super::traced;
-use super::worker::{crashed, empty};
-use super::worker_process::WorkerProcess;
-use crate::observation::{Observation, Outcome};
-use crate::process_group::was_killed;
+use sesame_base::observation::{Observation, Outcome};
+use sesame_relay::process_group::was_killed;
 
-pub use super::frames::Job;
+use crate::campaign::link::{self, Stream};
+use crate::campaign::protocol::{self, Reply};
+use crate::campaign::traces;
+use crate::campaign::worker::{crashed, empty};
+use crate::campaign::worker_process::WorkerProcess;
+
+pub use crate::campaign::protocol::Job;
 
 /// How long a fresh worker may take to report.
 const START_LIMIT: Duration = Duration::from_secs(30);
@@ -224,7 +225,7 @@ impl Lane {
     /// Saves what a dead worker wrote of a trace that was asked for; why not, otherwise.
     fn save_trace(&self, job: &Job, outcome: &Outcome) -> Option<String> {
         let order = job.trace.as_ref().filter(|_| !self.stop.load(Ordering::Relaxed))?;
-        traced::save(order, &self.directory(), outcome).err()
+        traces::save(order, &self.directory(), outcome).err()
     }
 
     fn directory(&self) -> PathBuf {
@@ -286,7 +287,7 @@ impl Worker {
     /// Runs a test. The error is `TimedOut` when it took too long or the pool was told to stop.
     fn ask(&mut self, job: &Job, timeout: Duration, stop: &AtomicBool) -> io::Result<Reply> {
         let stream = &mut self.stream;
-        frames::send(stream, job)?;
+        protocol::send(stream, job)?;
         let asked = Instant::now();
         // Short waits for the first byte, so that a stop is noticed; then the frame is read in one go.
         stream.set_read_timeout(Some(Duration::from_millis(100)))?;
@@ -305,7 +306,7 @@ impl Worker {
             }
         }
         stream.set_read_timeout(Some(Duration::from_secs(60)))?;
-        frames::receive(&mut first.chain(stream))
+        protocol::receive(&mut first.chain(stream))
     }
 }
 

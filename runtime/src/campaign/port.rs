@@ -5,12 +5,11 @@
 //! all of them together. Whoever does not know the token can delay a worker by no more than that.
 
 use std::collections::VecDeque;
-use std::io;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
-use std::thread;
 use std::time::{Duration, Instant};
+use std::{io, thread};
 
-use super::frames::{self, Greeting, Hello};
+use crate::campaign::protocol::{self, Greeting, Hello};
 
 /// How many connections are listened to at the same time. With one more, the oldest is closed: a worker says all it has
 /// to say as soon as it is connected.
@@ -79,7 +78,7 @@ impl Port {
             strangers.drain(..strangers.len().saturating_sub(MOST_STRANGERS));
             thread::sleep(Duration::from_millis(2));
         }
-        Err(frames::not_reported(limit))
+        Err(protocol::not_reported(limit))
     }
 }
 
@@ -87,7 +86,7 @@ impl Port {
 pub(super) fn connect(port: SocketAddr, token: String) -> io::Result<TcpStream> {
     let mut stream = TcpStream::connect(port)?;
     stream.set_nodelay(true)?;
-    frames::send(&mut stream, &Hello { token: Some(token) })?;
+    protocol::send(&mut stream, &Hello { token: Some(token) })?;
     Ok(stream)
 }
 

@@ -1,24 +1,22 @@
 //! A worker process: runs the tests it is sent, one after another, until the supervisor is gone.
 
-use std::io;
 use std::path::Path;
 use std::sync::{Mutex, mpsc};
-use std::thread;
 use std::time::Duration;
+use std::{io, thread};
 
+use sesame_base::observation::{Observation, Outcome, WallTime};
 use sesame_plan::CampaignPlan;
+use sesame_relay::changed_files::ChangedFiles;
+use sesame_relay::evaluate::Custom;
+use sesame_relay::metric::MetricTable;
+use sesame_relay::wire::WireTable;
+use sesame_relay::{descendants, panic_capture as last_panic};
 
-use super::frames::{self, Job, Reply};
-use super::link::{self, Address, Stream};
-use super::traced;
-use crate::changed_files::ChangedFiles;
-use crate::descendants;
-use crate::evaluate::Custom;
-use crate::last_panic;
-use crate::metric::MetricTable;
-use crate::observation::{Observation, Outcome, WallTime};
+use crate::campaign::link::{self, Address, Stream};
+use crate::campaign::protocol::{self, Job, Reply};
+use crate::campaign::traces;
 use crate::runner::Runner;
-use crate::wire::WireTable;
 
 /// Serves the supervisor that started this process until it closes the connection, and then ends what was started for it.
 ///
@@ -42,12 +40,12 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
     for job in jobs {
         let simulator = transport.get_or_insert_with(|| runner.connect.transport(plan));
         let (observation, trace_failure) =
-            traced::run(plan, &wires, &metrics, simulator.as_mut(), &job, &directory, &mut custom);
+            traces::run(plan, &wires, &metrics, simulator.as_mut(), &job, &directory, &mut custom);
         let aside = simulator.aside();
         if matches!(observation.outcome, Outcome::Crash { .. }) {
             transport = None;
         }
-        let sent = frames::send(&mut stream, &Reply { number: job.number, observation, trace_failure, aside });
+        let sent = protocol::send(&mut stream, &Reply { number: job.number, observation, trace_failure, aside });
         if sent.is_err() {
             end_what_was_started();
             return sent;
@@ -61,7 +59,7 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
 fn read_jobs(mut stream: Stream) -> mpsc::Receiver<Job> {
     let (sender, jobs) = mpsc::channel();
     thread::spawn(move || {
-        while let Ok(job) = frames::receive(&mut stream) {
+        while let Ok(job) = protocol::receive(&mut stream) {
             if sender.send(job).is_err() {
                 break;
             }
@@ -79,7 +77,7 @@ fn end_what_was_started() {
     static TURN: Mutex<()> = Mutex::new(());
     let _turn = TURN.lock();
     #[cfg(feature = "process")]
-    crate::transport::end_simulators();
+    sesame_relay::transport::end_simulators();
     descendants::end_adopted(|_| false, Duration::ZERO);
 }
 

@@ -7,14 +7,14 @@
 //! ended, whichever it was, and can be ended without asking which: orphans of workers that live stay with them.
 
 use std::collections::BTreeSet;
-use std::io;
 use std::process::{Child, Command, ExitStatus};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::thread;
 use std::time::{Duration, Instant};
+use std::{io, thread};
 
-use super::pool::WORKER;
-use crate::{descendants, process_group};
+use sesame_relay::{descendants, process_group};
+
+use crate::campaign::pool::WORKER;
 
 /// How long a worker whose connection is closed may take to end what it started, and itself; and how long what outlives it
 /// may take after that.

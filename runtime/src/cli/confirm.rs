@@ -6,16 +6,17 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use sesame_plan::CampaignPlan;
 
-use super::gate::Gate;
-use super::recorded::{open, refuse_changed};
-use super::terminal::{print, print_json, say, text_options};
-use super::work::{Work, claim_files, interruptible, refuse_unfilled, shown};
-use super::{Failure, Format, STOPPED};
+use sesame_plan::CampaignPlan;
+use sesame_results::record::{Origin, Recorder, Repository, TestRow, Verdict};
+use sesame_results::report;
+
 use crate::campaign::{Further, confirm_further};
-use crate::record::{Origin, Recorder, Repository, TestRow, Verdict};
-use crate::report;
+use crate::cli::execution::{Work, claim_files, interruptible, refuse_unfilled, shown};
+use crate::cli::gate::Gate;
+use crate::cli::results_folder::{open, refuse_changed};
+use crate::cli::terminal::{print, print_json, say, text_options};
+use crate::cli::{Failure, Format, STOPPED};
 use crate::runner::Runner;
 
 /// How often a line is printed.

@@ -5,11 +5,12 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::recorded::open;
-use super::terminal::{print, print_json};
-use super::{Failure, Format, Which};
-use crate::report;
-use crate::visible::visible_lines;
+use sesame_base::visible::visible_lines;
+use sesame_results::report;
+
+use crate::cli::results_folder::open;
+use crate::cli::terminal::{print, print_json};
+use crate::cli::{Failure, Format, Which};
 
 /// Which test is written, and under which name.
 #[derive(Debug, Args)]

@@ -7,12 +7,13 @@ use std::collections::BTreeSet;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use sesame_plan::{CampaignPlan, Search};
 
-use super::NOT_AS_REQUIRED;
-use super::terminal::say;
-use crate::record::Verdict;
-use crate::report::Summary;
+use sesame_plan::{CampaignPlan, Search};
+use sesame_results::record::Verdict;
+use sesame_results::report::Summary;
+
+use crate::cli::NOT_AS_REQUIRED;
+use crate::cli::terminal::say;
 
 /// Which findings make a command end with exit code 3.
 #[derive(Debug, Default, Args)]
@@ -141,9 +142,10 @@ fn says_too_little(summary: &Summary, search: &Search) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
+    use sesame_results::record::{Standing, sample};
+    use sesame_results::report::{Failure, FindingAgain, NotFinite, summary};
+
     use super::*;
-    use crate::record::{Standing, sample};
-    use crate::report::{Failure, FindingAgain, NotFinite, summary};
 
     fn found() -> (Summary, CampaignPlan) {
         let folder = tempfile::tempdir().unwrap();

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+
 use sesame_plan::{CampaignPlan, KnownTestId, Search};
 
-use super::Failure;
-use super::work::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled};
+use crate::cli::Failure;
+use crate::cli::execution::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled};
 use crate::runner::Runner;
 
 /// Which known tests are run, and how.
@@ -73,8 +74,9 @@ fn chosen(plan: &CampaignPlan, names: &[String]) -> Result<Vec<KnownTestId>, Str
 
 #[cfg(test)]
 mod tests {
+    use sesame_results::record::sample;
+
     use super::*;
-    use crate::record::sample;
 
     #[test]
     fn known_tests_are_chosen_by_name() {

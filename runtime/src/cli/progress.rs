@@ -4,10 +4,11 @@ use std::io::IsTerminal as _;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
 use sesame_plan::{CampaignPlan, Direction, MetricSource};
 
-use super::terminal::say;
 use crate::campaign::Progress;
+use crate::cli::terminal::say;
 
 /// How often a line is printed where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use sesame_plan::{CampaignPlan, KnownTest, KnownTestId, Search, Test};
 
-use super::Failure;
-use super::recorded::{open, refuse_changed};
-use super::work::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled};
-use crate::rng::derive_seed;
+use sesame_plan::{CampaignPlan, KnownTest, KnownTestId, Search, Test};
+use sesame_rng::derive_seed;
+
+use crate::cli::Failure;
+use crate::cli::execution::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled};
+use crate::cli::results_folder::{open, refuse_changed};
 use crate::runner::Runner;
 
 /// Which test is repeated, and how.
@@ -103,9 +104,10 @@ fn repeating(plan: &mut CampaignPlan, name: &str, test: Test, times: u32) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::recorded::same_model;
+    use sesame_results::record::sample;
+
+    use super::super::results_folder::same_model;
     use super::*;
-    use crate::record::sample;
 
     #[test]
     fn a_found_test_joins_the_known_ones_and_the_model_stays_the_same() {

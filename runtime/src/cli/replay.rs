@@ -5,16 +5,17 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Args;
-use sesame_plan::CampaignPlan;
 
-use super::recorded::{open, refuse_changed};
-use super::terminal::{print, print_json, say, text_options};
-use super::work::{claim_files, interruptible, refuse_unfilled, seconds};
-use super::{Failure, Format, NOT_AS_REQUIRED, STOPPED, Which};
+use sesame_base::observation::Outcome;
+use sesame_plan::CampaignPlan;
+use sesame_results::record::{TestRecord, differences};
+use sesame_results::report::{Replay, replay_text};
+
 use crate::campaign::{AloneSettings, Ended, Job, patience, run_alone};
-use crate::observation::Outcome;
-use crate::record::{TestRecord, differences};
-use crate::report::{Replay, replay_text};
+use crate::cli::execution::{claim_files, interruptible, refuse_unfilled, seconds};
+use crate::cli::results_folder::{open, refuse_changed};
+use crate::cli::terminal::{print, print_json, say, text_options};
+use crate::cli::{Failure, Format, NOT_AS_REQUIRED, STOPPED, Which};
 use crate::runner::Runner;
 
 /// Which test is run once more.

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+
 use sesame_plan::CampaignPlan;
 
-use super::{Failure, Format};
+use crate::cli::{Failure, Format};
 use crate::runner::Runner;
 
 /// Which recording is fed.
@@ -35,14 +36,14 @@ pub(super) fn replay_recording(_: &Runner, plan: &CampaignPlan, options: &Option
 pub(super) fn replay_recording(runner: &Runner, plan: &CampaignPlan, options: &Options) -> Result<ExitCode, Failure> {
     use std::panic::{self, AssertUnwindSafe};
 
+    use sesame_relay::metric::MetricTable;
+    use sesame_relay::wire::WireTable;
+    use sesame_relay::{panic_capture as last_panic, trace};
+    use sesame_results::report::recording_text;
+
     use super::NOT_AS_REQUIRED;
+    use super::execution::refuse_unfilled;
     use super::terminal::{print, print_json, say, text_options};
-    use super::work::refuse_unfilled;
-    use crate::last_panic;
-    use crate::metric::MetricTable;
-    use crate::report::recording_text;
-    use crate::trace;
-    use crate::wire::WireTable;
 
     refuse_unfilled(runner, plan, true)?;
     let wires = WireTable::new(plan);
@@ -64,10 +65,14 @@ pub(super) fn replay_recording(runner: &Runner, plan: &CampaignPlan, options: &O
 
 /// What metrics are now beside what was recorded.
 #[cfg(feature = "mcap")]
-fn compared(plan: &CampaignPlan, options: &Options, fed: crate::trace::Fed) -> crate::report::RecordingReplay {
-    use crate::record::MetricValue;
-    use crate::report::{FedMetric, RecordingReplay, Sameness};
-    use crate::visible::visible;
+fn compared(
+    plan: &CampaignPlan,
+    options: &Options,
+    fed: sesame_relay::trace::Fed,
+) -> sesame_results::report::RecordingReplay {
+    use sesame_base::visible::visible;
+    use sesame_results::record::MetricValue;
+    use sesame_results::report::{FedMetric, RecordingReplay, Sameness};
 
     let recorded = fed.run.as_ref().map_or(&[][..], |run| &run.metrics);
     let metrics: Vec<FedMetric> = plan

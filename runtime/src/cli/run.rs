@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use sesame_plan::{CampaignPlan, Search};
 
-use super::Failure;
-use super::recorded::same_model;
-use super::work::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled, shown};
-use crate::record::{self, Recorder};
+use sesame_plan::{CampaignPlan, Search};
+use sesame_results::record::{self, Recorder};
+
+use crate::cli::Failure;
+use crate::cli::execution::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled, shown};
+use crate::cli::results_folder::same_model;
 use crate::runner::Runner;
 
 /// How a campaign is run. Nothing here but the seed and the number of evaluations changes results.

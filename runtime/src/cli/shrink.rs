@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use sesame_plan::{CampaignPlan, Failing, KnownTest, KnownTestId, RequirementId, Search};
 
-use super::Failure;
-use super::recorded::{open, refuse_changed};
-use super::work::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled};
-use crate::observation::{Observation, Outcome};
-use crate::record::{Origin, Repository, TestRecord, Verdict, verdict};
+use sesame_base::observation::{Observation, Outcome};
+use sesame_plan::{CampaignPlan, Failing, KnownTest, KnownTestId, RequirementId, Search};
+use sesame_results::record::{Origin, Repository, TestRecord, Verdict, verdict};
+
+use crate::cli::Failure;
+use crate::cli::execution::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled};
+use crate::cli::results_folder::{open, refuse_changed};
 use crate::runner::Runner;
 
 /// Which test is made smaller, and how.
@@ -147,9 +148,10 @@ fn shrinking(plan: &mut CampaignPlan, name: &str, record: &TestRecord, failing: 
 
 #[cfg(test)]
 mod tests {
-    use super::super::recorded::same_model;
+    use sesame_results::record::sample;
+
+    use super::super::results_folder::same_model;
     use super::*;
-    use crate::record::sample;
 
     fn found(name: &str, wanted: &[&str]) -> Result<Failing, String> {
         let folder = tempfile::tempdir().unwrap();

@@ -4,8 +4,9 @@ use std::fmt;
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
-use super::Failure;
-use crate::report::TextOptions;
+use sesame_results::report::TextOptions;
+
+use crate::cli::Failure;
 
 /// Says a line on standard error: progress, notes, warnings, errors. A full disk under a log, a reader that has gone away
 /// or a connection that is lost is no reason to end a run, so a line that cannot be written is dropped.

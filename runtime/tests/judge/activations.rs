@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use sesame_base::observation::Observation;
 use sesame_plan::condition::{Condition, Operand};
 use sesame_plan::{Activation, Copies, MetricId, MetricSource};
-use sesame_runtime::observation::Observation;
 
 use crate::case::{Case, topics_of, variables};
 use crate::formulas::{Judged, first_blank, hears_deliveries, judged};

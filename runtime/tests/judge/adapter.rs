@@ -4,20 +4,20 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use rusqlite::Connection;
+
+use sesame_base::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome};
 use sesame_plan::stl::{self, Robustness};
 use sesame_plan::{
-    ActivationMode, Aggregate, Campaign, CampaignPlan, Copies, Count, Drain, Field, MessageId, MessageType, Metric,
-    MetricSource, Operation, OperationKind, Requirement, SCHEMA, Search, Side, Simulator, Test, Topic, Transport,
-    Trend, Type,
+    ActivationMode, Aggregate, Campaign, CampaignPlan, Copies, Count, Drain, Expression, Field, Input, MessageId,
+    MessageType, Metric, MetricSource, Operation, OperationKind, Requirement, SCHEMA, Search, Side, Simulator, Test,
+    Topic, Transport, Trend, Type,
 };
-use sesame_plan::{Expression, Input};
-use sesame_runtime::evaluate::{Custom, Run, evaluate_tapped};
-use sesame_runtime::metric::MetricTable;
-use sesame_runtime::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome};
-use sesame_runtime::record::{DATABASE, MetricValue, Origin, Recorder, TestRecord, Verdict, verdict};
-use sesame_runtime::relay::Deed;
-use sesame_runtime::transport::in_process;
-use sesame_runtime::wire::WireTable;
+use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
+use sesame_relay::metric::MetricTable;
+use sesame_relay::relay::Deed;
+use sesame_relay::transport::in_process;
+use sesame_relay::wire::WireTable;
+use sesame_results::record::{DATABASE, MetricValue, Origin, Recorder, TestRecord, Verdict, verdict};
 
 use crate::hooks::{HookKind, entries};
 use crate::ledger::Ledger;
@@ -158,7 +158,7 @@ pub(crate) fn run(plan: &CampaignPlan, test: &Test, script: &Script) -> (Observa
     let observation =
         evaluate_tapped(plan, &wires, &metrics, transport.as_mut(), &run, &mut Custom::none(), Some(&mut ledger));
     let observation = observation.expect("made-up tests fit their plans");
-    ledger.end = sesame_runtime::time::SimTime::from_seconds(observation.end).nanos();
+    ledger.end = sesame_base::time::SimTime::from_seconds(observation.end).nanos();
     (observation, ledger)
 }
 
@@ -177,7 +177,7 @@ pub(crate) fn lost(outcome: Outcome) -> Observation {
         metrics: Vec::new(),
         messages: 0,
         warnings: Vec::new(),
-        wall: sesame_runtime::observation::WallTime::default(),
+        wall: sesame_base::observation::WallTime::default(),
     }
 }
 
@@ -263,7 +263,7 @@ pub(crate) fn record(folder: &Path, plan: &CampaignPlan, test: &Test, observatio
 
 /// The digest of the results in a folder.
 pub(crate) fn digest(folder: &Path) -> String {
-    sesame_runtime::record::digest(&folder.join(DATABASE)).expect("what was recorded can be read")
+    sesame_results::record::digest(&folder.join(DATABASE)).expect("what was recorded can be read")
 }
 
 /// Takes all that a wider plan added out of the results in a folder, row by row: what is left is to be what the plan

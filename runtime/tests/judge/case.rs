@@ -1,13 +1,13 @@
 //! Random cases: a space, a test and a robot, made of a number and of nothing else.
 
-use sesame_plan::condition as switch;
 use sesame_plan::stl::{self, Interval, Robustness};
 use sesame_plan::{
     Activation, Aggregate, Bound, CampaignPlan, Choice, Comparison, Condition, Copies, Distribution, Domain, Drain,
     Expression, FieldRef, Formula, Input, Members, Metric, MetricId, MetricSource, NotFinite, Operation, OperationId,
     OperationKind, Parameter, Requirement, Shape, Side, Span, Step, Test, TestOperation, Topic, TopicId, ValueMode,
+    condition as switch,
 };
-use sesame_runtime::rng::Stream;
+use sesame_rng::Stream;
 
 use crate::adapter;
 use crate::hooks::HookKind;

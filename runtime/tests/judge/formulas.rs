@@ -5,7 +5,7 @@ use sesame_plan::{
     Aggregate, CampaignPlan, Condition, Expression, FieldRef, Formula, Input, Members, Metric, MetricSource, Side,
     TopicId,
 };
-use sesame_runtime::value::Value;
+use sesame_relay::value::Value;
 
 use crate::hooks::HookKind;
 use crate::ledger::{Ledger, Message};

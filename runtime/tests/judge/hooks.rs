@@ -1,7 +1,7 @@
 //! Metrics of the user's own code: one that only rises, one that only falls, one that does neither.
 
-use sesame_runtime::metric::{Context, Hook, HookEntry};
-use sesame_runtime::value::Value;
+use sesame_relay::metric::{Context, Hook, HookEntry};
+use sesame_relay::value::Value;
 
 use crate::robot::number_of;
 

@@ -1,9 +1,9 @@
 //! All messages of a run, as they were published and as they were delivered.
 
-use sesame_runtime::relay::{Deed, Tap};
-use sesame_runtime::time::SimTime;
-use sesame_runtime::value::Value;
-use sesame_runtime::wire::{Wire, WireTable};
+use sesame_base::time::SimTime;
+use sesame_relay::relay::{Deed, Tap};
+use sesame_relay::value::Value;
+use sesame_relay::wire::{Wire, WireTable};
 
 /// A message on a wire.
 #[derive(Debug, Clone)]

@@ -1,21 +1,20 @@
 //! The properties themselves.
 
+use sesame_base::observation::{Observation, Outcome};
 use sesame_plan::{
     Activation, Aggregate, Bound, Copies, Drain, Metric, MetricSource, OperationKind, Requirement, Span,
 };
-use sesame_runtime::observation::{Observation, Outcome};
-use sesame_runtime::record::Verdict;
-use sesame_runtime::rng::Stream;
-use sesame_runtime::value::{Fields, Record, Value};
+use sesame_relay::value::{Fields, Record, Value};
+use sesame_results::record::Verdict;
+use sesame_rng::Stream;
 
-use crate::activations;
 use crate::adapter::{self, STEP, declares_trend, hung, lost, said};
 use crate::case::{Case, topics_of};
 use crate::formulas::{Judged, first_blank, heard as heard_by, judged};
 use crate::hooks::HookKind;
 use crate::ledger::{Ledger, Message};
 use crate::robot::{Carries, Script};
-use crate::words;
+use crate::{activations, words};
 
 /// Futures of a run that are tried out.
 const FUTURES: u64 = 4;

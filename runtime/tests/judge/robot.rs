@@ -6,9 +6,9 @@
 
 use std::cell::RefCell;
 
-use sesame_runtime::rng::keyed_unit;
-use sesame_runtime::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError};
-use sesame_runtime::value::{Fields, Record, Value};
+use sesame_relay::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError};
+use sesame_relay::value::{Fields, Record, Value};
+use sesame_rng::keyed_unit;
 
 /// What a robot does in one run.
 #[derive(Debug, Clone)]

@@ -6,12 +6,13 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, bail};
 use clap::{Args, Subcommand, ValueEnum};
+
 use sesame_plan::Dimension;
-use sesame_runtime::analysis::{self, Dataset, Run, Selection, regions};
-use sesame_runtime::coverage::Grid;
-use sesame_runtime::record::{DATABASE, Repository};
-use sesame_runtime::report::TextOptions;
-use sesame_runtime::sspr::Convention;
+use sesame_results::analysis::{self, Dataset, Run, Selection, regions};
+use sesame_results::record::{DATABASE, Repository};
+use sesame_results::report::TextOptions;
+use sesame_search::coverage::Grid;
+use sesame_search::sspr::Convention;
 
 use super::shell::{self, Shell};
 

@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace};
 use sesame_plan::{CampaignPlan, Confirmation, Copies, Dimension, Search, Shape};
-use sesame_runtime::coverage::{Feasible, Grid};
-use sesame_runtime::search::Permitted;
-use sesame_runtime::search::choice::PermittedChoice;
-use sesame_runtime::search::permitted::{PermittedActivation, PermittedOperation};
-use sesame_runtime::sspr::extent;
+use sesame_search::Permitted;
+use sesame_search::coverage::{Feasible, Grid};
+use sesame_search::space::choice::PermittedChoice;
+use sesame_search::space::permitted::{PermittedActivation, PermittedOperation};
+use sesame_search::sspr::extent;
 
 /// A number that may be anything in a range counts as so many values.
 const STEPS: f64 = 100.0;

@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use sesame_plan::condition as plan_condition;
-use sesame_plan::{CampaignPlan, Choice, MetricId, OperationId, Span, TestOperation};
-use sesame_runtime::observation::{MetricObservation, Observation, OperationEffect, Outcome, WallTime};
-use sesame_runtime::record::{Origin, RecordError, Recorder, ResultSet, Status, TestRecord};
+use sesame_base::observation::{MetricObservation, Observation, OperationEffect, Outcome, WallTime};
+use sesame_plan::{CampaignPlan, Choice, MetricId, OperationId, Span, TestOperation, condition as plan_condition};
+use sesame_results::record::{Origin, RecordError, Recorder, ResultSet, Status, TestRecord};
 
 use super::notes::{Kind, Notes};
 use super::original::{

@@ -1,13 +1,14 @@
 //! Small files of our own in the place of the original platform's, which are not ours to keep.
 
-use crate::cli::Look;
 use std::path::PathBuf;
 
-use sesame_runtime::record::Repository;
-use sesame_runtime::sspr::Convention;
 use tempfile::TempDir;
 
+use sesame_results::record::Repository;
+use sesame_search::sspr::Convention;
+
 use super::*;
+use crate::cli::Look;
 
 /// A space in a dialect: its head, and names of elements and attributes that changed over the years.
 fn space(head: &str, body: &str) -> String {

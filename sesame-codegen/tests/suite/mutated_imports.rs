@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use sesame_codegen::cli::{Shell, run};
 use sesame_codegen::language::SESAME;
-use sesame_runtime::record::Repository;
+use sesame_results::record::Repository;
 
 const WHOLE: &str = include_str!("../originals/arm.model");
 

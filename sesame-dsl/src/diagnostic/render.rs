@@ -1,4 +1,4 @@
-//! Text from diagnostics: for people, for one-line tools, for programs, for GitHub.
+//! Diagnostics as text: for people, for line-based tools, for programs, for GitHub.
 
 mod github;
 mod human;

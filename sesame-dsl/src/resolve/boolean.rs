@@ -1,4 +1,4 @@
-//! Conditions of formulas: what holds at one moment, or does not.
+//! Conditions in formulas: true or false at one moment.
 
 use std::cmp::Ordering;
 
@@ -49,7 +49,7 @@ impl<'a> Resolver<'a> {
                 None
             }
             _ => {
-                // What is wrong with the number itself comes first.
+                // Mistakes in the number itself come first.
                 let before = self.diagnostics.len();
                 self.number(inputs, expression);
                 if self.diagnostics.len() == before {
@@ -62,11 +62,11 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    /// A comparison that nothing heard can change.
+    /// Warns of a comparison whose outcome no message can change.
     fn one_outcome(&mut self, whole: &ast::Expression, left: &Expression, by: Comparison, right: &Expression) {
         let (order, why) = match (left, right) {
-            (Expression::Constant(left), Expression::Constant(right)) => (left.partial_cmp(right), "two numbers"),
-            _ if left == right => (Some(Ordering::Equal), "something with itself"),
+            (Expression::Constant(left), Expression::Constant(right)) => (left.partial_cmp(right), "two constants"),
+            _ if left == right => (Some(Ordering::Equal), "a value with itself"),
             _ => return,
         };
         let holds = order.is_some_and(|order| match by {
@@ -78,20 +78,20 @@ impl<'a> Resolver<'a> {
             Comparison::NotEqual => order.is_ne(),
         });
         let title = format!("`{}` compares {why}", self.text(whole.span));
-        let label = if holds { "always holds" } else { "never holds" };
+        let label = if holds { "always true" } else { "always false" };
         self.report(Diagnostic::new(Code::ONE_OUTCOME, whole.span, title).label(label));
     }
 
     fn of_one_moment(&mut self, word: Span) {
         let word_text = self.text(word);
-        let title = format!("`{word_text}` speaks of a stretch of time, a condition of one moment");
+        let title = format!("temporal operator `{word_text}` outside `robustness(…)`");
         let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, word, title)
-            .label("can only stand in `robustness(…)`")
+            .label("only allowed inside `robustness(…)`")
             .note("for example `robustness(always zones.level > 0mm)`");
         self.report(diagnostic);
     }
 
-    /// The position of an input that is true or false, which [`Self::is_condition`] says the expression is.
+    /// The position of a `bool` input, which the expression is according to [`Self::is_condition`].
     pub(super) fn truth(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<usize> {
         let (path, members) = match &expression.kind {
             ExpressionKind::Field(path) => (path, None),
@@ -100,7 +100,7 @@ impl<'a> Resolver<'a> {
         };
         let (field, _) = self.field(path)?;
         if matches!(members, Some((ast::Members::Sum, _))) {
-            let title = format!("`{}` is true or false, which have no sum", self.text(path.span));
+            let title = format!("`{}` is a `bool`, which cannot be summed", self.text(path.span));
             let label = "expected a number after `sum of`";
             self.report(Diagnostic::new(Code::WRONG_TYPE, expression.span, title).label(label));
             return None;
@@ -113,7 +113,7 @@ impl<'a> Resolver<'a> {
         conditions.into_iter().collect()
     }
 
-    /// Whether an expression holds or does not, rather than being a number. Reports nothing.
+    /// Whether an expression is a condition rather than a number. Reports nothing.
     pub(super) fn is_condition(&self, expression: &ast::Expression) -> bool {
         match &expression.kind {
             ExpressionKind::Truth(_)

@@ -1,4 +1,4 @@
-//! What a system says beside its simulator: launching, ending, the budget of a relay.
+//! The clauses of a system beside its simulator: launching, terminating, the budget of the relay.
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
@@ -66,8 +66,9 @@ impl<'a> Resolver<'a> {
         let jitter = self.single(&budget.jitter, "jitter");
         if latency.is_none() && jitter.is_none() {
             if !budget.has_errors {
-                let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, span, "this `relay budget` limits nothing");
-                self.report(diagnostic.label("add `latency` or `jitter`").note("for example `latency 5ms`"));
+                let diagnostic =
+                    Diagnostic::new(Code::CLAUSE_MISSING, span, "`relay budget` needs `latency` or `jitter`");
+                self.report(diagnostic.label("add at least one of them").note("for example `latency 5ms`"));
             }
             return None;
         }

@@ -30,7 +30,7 @@ impl<'a> Resolver<'a> {
         if !matches!(metric.source, ast::MetricSource::Hook { .. }) {
             self.only_of_hooks(metric);
         }
-        // Both are looked at, so that a mistake in one does not hide one in the other or in the default.
+        // Both are resolved, so that a mistake in one does not hide one in the other or in the default.
         let (source, ty): (Option<MetricSource>, Option<Type>) = match &metric.source {
             ast::MetricSource::Hook { hooks, has_errors } => {
                 (self.hook(name, hooks, *has_errors), self.hook_type(metric.ty.as_ref()))
@@ -38,14 +38,17 @@ impl<'a> Resolver<'a> {
             ast::MetricSource::FuzzingTime => {
                 self.no_type(metric.ty.as_ref(), "`fuzzing_time()` is in seconds");
                 if let Some((word, initial)) = metric.initials.first() {
-                    let title = "`initial` changes nothing: `fuzzing_time()` is 0s at the beginning";
+                    let title = "`initial` has no effect, because `fuzzing_time()` starts at 0s";
                     let span = word.to(initial.span);
-                    self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("leave it out"));
+                    self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("remove this"));
                 }
                 (Some(MetricSource::FuzzingTime), Some(Type::Real(Some(Unit::seconds()))))
             }
             ast::MetricSource::Formula(formula) => {
-                self.no_type(metric.ty.as_ref(), "its unit follows from those of the topics and numbers in it");
+                self.no_type(
+                    metric.ty.as_ref(),
+                    "its unit follows from the units of the topics and numbers in the formula",
+                );
                 match self.formula(formula) {
                     Some((source, unit)) => (Some(source), Some(Type::Real(unit))),
                     None => (None, None),
@@ -71,20 +74,20 @@ impl<'a> Resolver<'a> {
         })
     }
 
-    /// What a hook has to declare follows from a formula by itself.
+    /// Reports clauses that only a hook needs; for a formula they follow from the formula.
     fn only_of_hooks(&mut self, metric: &ast::Metric) {
         let trends = metric.trends.iter().map(|(span, trend)| {
             let word = match trend {
                 ast::Trend::Rising => "rising",
                 ast::Trend::Falling => "falling",
             };
-            (*span, word, "how the value of a formula changes follows from its kind: `max` rises, `min` falls")
+            (*span, word, "for a formula this is known: `max` rises, `min` falls")
         });
-        let note = "a number that is not finite has no place in arithmetic; a hook can make sense of it";
+        let note = "a formula cannot compute with numbers that are not finite, but a hook can handle them";
         let accepts = metric.accepts.iter().map(|span| (*span, "accepts non_finite", note));
         for (span, word, note) in trends.chain(accepts).collect::<Vec<_>>() {
-            let title = format!("`{word}` is for metrics with a hook");
-            self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("leave it out").note(note));
+            let title = format!("`{word}` is only allowed for a metric with a hook");
+            self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("remove this").note(note));
         }
     }
 
@@ -96,7 +99,7 @@ impl<'a> Resolver<'a> {
     ) -> Option<MetricSource> {
         let Some(topics) = self.single(hooks, "hook on") else {
             if !has_errors {
-                self.missing(name, "the topics its hook hears", "hook on zones");
+                self.missing(name, "the topics that its hook reads", "hook on zones");
             }
             return None;
         };
@@ -104,16 +107,16 @@ impl<'a> Resolver<'a> {
         Some(MetricSource::Hook(topics.into_iter().map(TopicId::from_index).collect()))
     }
 
-    /// The type of a hook's metric, which is `Type::Real`.
+    /// The type of a hook's metric, always `Type::Real`.
     fn hook_type(&mut self, ty: Option<&'a ast::Type>) -> Option<Type> {
         let Some(ty) = ty else { return Some(Type::Real(None)) };
         match self.type_of(ty)? {
             real @ Type::Real(_) => Some(real),
             other => {
-                let title = format!("a metric is a real number, not {}", super::system::type_in_words(&other));
+                let title = format!("a metric must be a real number, not {}", super::system::type_in_words(&other));
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, ty.span, title)
-                    .label("expected `real`, with a unit if it has one")
-                    .suggest("make it `real`", ty.span, "real");
+                    .label("expected `real` or, with a unit, for example `real[m]`")
+                    .suggest("use `real`", ty.span, "real");
                 self.report(diagnostic);
                 None
             }
@@ -122,8 +125,8 @@ impl<'a> Resolver<'a> {
 
     fn no_type(&mut self, ty: Option<&'a ast::Type>, why: &str) {
         if let Some(ty) = ty {
-            let title = "this metric's type is given by its formula";
-            self.report(Diagnostic::new(Code::WRONG_TYPE, ty.span, title).label("leave it out").note(why));
+            let title = "the type of this metric follows from its formula";
+            self.report(Diagnostic::new(Code::WRONG_TYPE, ty.span, title).label("remove this").note(why));
         }
     }
 

@@ -26,11 +26,11 @@ pub(crate) fn parse(file: FileId, text: &str, diagnostics: &mut Vec<Diagnostic>)
     let mut reader = Reader { file, text, diagnostics, out: File::default(), mistake: None };
     if text.len() > MAX_BYTES {
         let span = Span { file, lo: 0, hi: 0 };
-        let title = format!("the file has {} bytes, more than the {MAX_BYTES} that are read", text.len());
+        let title = format!("the file has {} bytes, but the limit is {MAX_BYTES}", text.len());
         reader.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, span, title));
     } else if let Some((at, title)) = too_deep(text) {
         let span = reader.span_of(at, at + 1);
-        reader.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, span, title).label("this one is too deep"));
+        reader.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, span, title).label("nested too deeply"));
     } else {
         match parse_bounded(Rule::file, text) {
             Ok(mut pairs) => {

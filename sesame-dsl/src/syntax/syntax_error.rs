@@ -45,12 +45,12 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, block: &Block, pre
     }
     if first.kind == TokenKind::Doc || first.lo >= hi {
         let doc = token_at(text, lo);
-        return Diagnostic::new(Code::SYNTAX, span_of(doc), "this doc comment belongs to nothing")
-            .label("no declaration follows it")
-            .suggest("make it a plain comment", Span { hi: region.lo + 3, ..region }, "//");
+        return Diagnostic::new(Code::SYNTAX, span_of(doc), "this doc comment documents nothing")
+            .label("expected a declaration after it")
+            .suggest("use a plain comment", Span { hi: region.lo + 3, ..region }, "//");
     }
     if first.text == "}" {
-        let title = "this `}` closes nothing";
+        let title = "unmatched `}`";
         return Diagnostic::new(Code::NOT_CLOSED, span_of(first), title).label("no block is open here");
     }
 
@@ -76,18 +76,18 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, block: &Block, pre
     let after = text[found.hi()..].chars().next();
     let joins = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
     if found.text == "-" && joins(before) && joins(after) {
-        return Diagnostic::new(Code::NOT_A_NAME, span, "a name cannot hold `-`")
-            .label("names are letters, digits and `_`")
+        return Diagnostic::new(Code::NOT_A_NAME, span, "a name cannot contain `-`")
+            .label("names consist of letters, digits and `_`")
             .suggest("use `_`", span, "_");
     }
     if found.kind == TokenKind::OpenText {
         let title = "this text does not end on its line";
-        return Diagnostic::new(Code::BAD_TEXT, span, title).label("no closing `\"`");
+        return Diagnostic::new(Code::BAD_TEXT, span, title).label("missing closing `\"`");
     }
     if found.kind == TokenKind::Doc {
-        return Diagnostic::new(Code::SYNTAX, span, "a doc comment cannot stand here")
+        return Diagnostic::new(Code::SYNTAX, span, "a doc comment is not allowed here")
             .label(format!("expected {expected}"))
-            .note("`///` belongs above a declaration; `//` may stand anywhere");
+            .note("`///` documents the declaration after it; use `//` for any other comment");
     }
     let next = token_at(text, found.hi());
     // A keyword that begins the next declaration is in its place: what lacks is the name before it.
@@ -100,7 +100,7 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, block: &Block, pre
             format!("`{}` is a keyword and cannot be a name", found.text),
         )
         .label("choose another name")
-        .suggest("add to it", span, format!("{}_1", found.text));
+        .suggest(format!("use `{}_1`", found.text), span, format!("{}_1", found.text));
     }
 
     let title = match found.kind {
@@ -124,14 +124,14 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, block: &Block, pre
         if number_before && Unit::parse(found.text).is_ok() {
             let gap = text[..found.lo].trim_end().len();
             let gap = Span { lo: u32::try_from(gap).expect("files are small"), hi: span.lo, ..span };
-            diagnostic = diagnostic.suggest("glue the unit to its number", gap, "");
+            diagnostic = diagnostic.suggest("remove the space before the unit", gap, "");
         }
         if block.rule == Rule::file && in_system {
-            diagnostic = diagnostic.note(format!("`{}` is declared inside of `system {{ … }}`", found.text));
+            diagnostic = diagnostic.note(format!("`{}` is declared inside `system {{ … }}`", found.text));
         }
     }
     if found.kind == TokenKind::Sign && found.text == "=" && failure.expected.contains(&Rule::equal_to) {
-        diagnostic = diagnostic.suggest("compare with `==`", span, "==");
+        diagnostic = diagnostic.suggest("use `==` to compare", span, "==");
     }
     diagnostic
 }
@@ -253,10 +253,10 @@ fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::accepts => &["`accepts non_finite`"],
         Rule::custom => &["`custom`"],
         Rule::domain | Rule::number_domain | Rule::point_domain | Rule::text_domain | Rule::file_domain => {
-            &["what is permitted, such as `int [3, 20]`"]
+            &["the permitted values, such as `int [3, 20]`"]
         }
         Rule::point => &["a point such as `(1, 0, -0.5)m`"],
-        Rule::coordinate => &["a number without unit"],
+        Rule::coordinate => &["a number without a unit"],
         Rule::draw_seed => &["`seed`"],
         Rule::dimension => &["a dimension such as `T1 [0, 1] cells 6`"],
         Rule::within => &["`within`"],

@@ -4,15 +4,16 @@
 use std::path::PathBuf;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+
+use sesame_base::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
 use sesame_plan::{Activation, Dimension, Span};
-use sesame_runtime::analysis::{self, Selection};
-use sesame_runtime::coverage::Grid;
-use sesame_runtime::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
-use sesame_runtime::record::{Origin, Recorder, Repository, TestRecord};
-use sesame_runtime::rng::Stream;
-use sesame_runtime::search::Permitted;
-use sesame_runtime::search::initial::fresh_test;
-use sesame_runtime::sspr::Convention;
+use sesame_results::analysis::{self, Selection};
+use sesame_results::record::{Origin, Recorder, Repository, TestRecord};
+use sesame_rng::Stream;
+use sesame_search::Permitted;
+use sesame_search::coverage::Grid;
+use sesame_search::space::initial::fresh_test;
+use sesame_search::sspr::Convention;
 
 /// A test with random operations, observed as planned, and random values.
 fn record(permitted: &Permitted, metrics: usize, number: u32) -> TestRecord {

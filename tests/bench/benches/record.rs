@@ -1,9 +1,10 @@
 //! What it costs to record a test, by the length of its time series.
 
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
+
+use sesame_base::observation::{MetricObservation, Observation, Outcome, WallTime};
 use sesame_plan::Test;
-use sesame_runtime::observation::{MetricObservation, Observation, Outcome, WallTime};
-use sesame_runtime::record::{Origin, Recorder, TestRecord};
+use sesame_results::record::{Origin, Recorder, TestRecord};
 
 /// A test in which both metrics changed this often.
 fn test(number: u32, points: u32) -> TestRecord {

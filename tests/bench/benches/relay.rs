@@ -3,13 +3,14 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+
+use sesame_base::time::SimTime;
 use sesame_plan::condition::{Comparison, Condition, Operand};
 use sesame_plan::{Activation, CampaignPlan, Choice, Domain, MetricId, OperationId, Shape, Test, TestOperation};
-use sesame_runtime::metric::MetricTable;
-use sesame_runtime::relay::{Exchange as _, Relay};
-use sesame_runtime::time::SimTime;
-use sesame_runtime::value::{Fields, Record, Value};
-use sesame_runtime::wire::WireTable;
+use sesame_relay::metric::MetricTable;
+use sesame_relay::relay::{Exchange as _, Relay};
+use sesame_relay::value::{Fields, Record, Value};
+use sesame_relay::wire::WireTable;
 
 const MESSAGES: u32 = 10_000;
 

@@ -6,9 +6,10 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use sesame_runtime::rng::Stream;
-use sesame_runtime::search::hypervolume::{WORK, hypervolume, measured};
-use sesame_runtime::search::problems::{Problem, approximate};
+
+use sesame_optimise::hypervolume::{WORK, hypervolume, measured};
+use sesame_optimise::problems::{Problem, approximate};
+use sesame_rng::Stream;
 use sesame_tests::optimisers::{Ran, Run, ask};
 
 const POPULATION: u32 = 100;

@@ -5,11 +5,12 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+
+use sesame_base::time::SimTime;
 use sesame_plan::Comparison;
 use sesame_plan::stl::{Formula, Interval};
-use sesame_runtime::rng::Stream;
-use sesame_runtime::stl::Monitor;
-use sesame_runtime::time::SimTime;
+use sesame_relay::stl::Monitor;
+use sesame_rng::Stream;
 use sesame_tests::rtamt::{Case, answers};
 
 const WINDOWS: [u32; 4] = [20, 200, 2_000, 20_000];

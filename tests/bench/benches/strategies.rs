@@ -3,16 +3,17 @@
 
 use std::time::{Duration, Instant};
 
+use sesame_base::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
+use sesame_optimise::front::Front;
 use sesame_plan::condition::{ConditionEnd, ConditionSpace, Integers, Variable};
 use sesame_plan::{
     Activation, ActivationMode, BoostedChildren, Bound, CampaignPlan, CoverageGoal, Dimension, Exploration, MetricId,
     Requirement, Search, Span, StopRule,
 };
-use sesame_runtime::coverage::{Coverage, Grid};
-use sesame_runtime::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
-use sesame_runtime::rng::Stream;
-use sesame_runtime::search::{self, Candidate, Course, Evaluated, Front, StopRules};
-use sesame_runtime::sspr;
+use sesame_rng::Stream;
+use sesame_search as search;
+use sesame_search::coverage::{Coverage, Grid};
+use sesame_search::{Candidate, Course, Evaluated, StopRules, sspr};
 
 const FIXED: Exploration =
     Exploration::Boost { every_generations: 2, children: BoostedChildren::Every { iterations: 2 }, tries: 10 };

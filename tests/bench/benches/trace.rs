@@ -3,13 +3,14 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+
+use sesame_base::time::SimTime;
 use sesame_plan::Test;
-use sesame_runtime::metric::MetricTable;
-use sesame_runtime::relay::{Exchange as _, Relay};
-use sesame_runtime::time::SimTime;
-use sesame_runtime::trace::{Subject, TraceWriter};
-use sesame_runtime::value::{Fields, Record};
-use sesame_runtime::wire::WireTable;
+use sesame_relay::metric::MetricTable;
+use sesame_relay::relay::{Exchange as _, Relay};
+use sesame_relay::trace::{Subject, TraceWriter};
+use sesame_relay::value::{Fields, Record};
+use sesame_relay::wire::WireTable;
 
 const MESSAGES: u32 = 100_000;
 

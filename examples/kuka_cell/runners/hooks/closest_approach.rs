@@ -6,7 +6,7 @@ use crate::generated::messages::SafetyZone;
 use crate::generated::metrics::ClosestApproachHook;
 use sesame_runtime::metric::Context;
 
-/// The value so far is all there is to remember, and the context does.
+/// Stateless: the context keeps the value so far.
 #[derive(Default)]
 pub struct ClosestApproach;
 

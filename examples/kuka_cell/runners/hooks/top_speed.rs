@@ -5,7 +5,7 @@
 use crate::generated::metrics::TopSpeedHook;
 use sesame_runtime::metric::Context;
 
-/// The value so far is all there is to remember, and the context does.
+/// Stateless: the context keeps the value so far.
 #[derive(Default)]
 pub struct TopSpeed;
 

@@ -9,7 +9,7 @@ use crate::geometry::Vector;
 use crate::kinematics::{self, ArmGeometry, Base, Joints, Posture};
 use crate::servo::{AxisLimits, Servo};
 
-/// What is known of an arm before it moves.
+/// The constants of an arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmModel {
     /// Its name on the wire, as in `joints/NAME/Link0/R/position`.
@@ -37,8 +37,8 @@ const fn joint(degrees: (f64, f64), degrees_per_second: f64, acceleration: f64) 
 }
 
 /// The joints of an arm of 3.2 m reach and about 120 kg payload. Ranges and rated speeds are typical of the class, in
-/// our zero positions (see [`crate::kinematics`]); `Link0` is kept to half a turn either way, as the cell's cabling
-/// asks. A joint reaches its rated speed in a little less than half a second, the wrist sooner.
+/// our zero positions (see [`crate::kinematics`]); the cell's cabling limits `Link0` to half a turn either way. A joint
+/// reaches its rated speed in a little less than half a second, the wrist sooner.
 const LONG_ARM_JOINTS: [AxisLimits; 6] = [
     joint((-180.0, 180.0), 105.0, 4.2),
     joint((-50.0, 85.0), 101.0, 3.6),
@@ -126,7 +126,7 @@ impl Arm {
         }
     }
 
-    /// Takes the targets that have arrived, the last one of each joint. What is not a number is not taken.
+    /// Takes the targets that have arrived, the last one of each joint. Values that are not numbers are ignored.
     pub fn receive(&mut self, bus: &mut Bus<'_>) {
         for (servo, &port) in self.servos.iter_mut().zip(&self.targets) {
             while let Some(message) = bus.receive(port) {
@@ -157,7 +157,7 @@ impl Arm {
         bus.publish(self.state, Record::new(&self.state_fields, values));
     }
 
-    /// What is known of it.
+    /// Its constants.
     pub fn model(&self) -> &'static ArmModel {
         self.model
     }

@@ -1,4 +1,4 @@
-//! The cell as a simulator: PLC, arms, conveyors and the watch over zones, talking over the bus.
+//! The cell as a simulator: PLC, arms, conveyors and zones, which communicate over the bus.
 
 use sesame_runtime::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError};
 use sesame_runtime::time::SimTime;
@@ -19,7 +19,7 @@ const LONGEST_STEP: SimTime = SimTime::from_nanos(50_000_000);
 /// The servos are integrated in parts of a step no longer than this.
 const LONGEST_PART: SimTime = SimTime::from_nanos(4_000_000);
 
-/// The gearbox cell, free of randomness: the same messages give the same run, whatever the seed.
+/// The gearbox cell without randomness: the same messages give the same run for every seed.
 #[derive(Debug, Clone)]
 pub struct Cell(World);
 
@@ -70,7 +70,7 @@ impl NoisyCell {
     }
 }
 
-/// All that is in the cell.
+/// Everything in the cell.
 #[derive(Debug, Clone)]
 struct World {
     plc: Plc,

@@ -4,7 +4,7 @@ use sesame_runtime::simulator::{Bus, Port};
 
 use crate::servo::{AxisLimits, Servo};
 
-/// What is known of a conveyor before it moves.
+/// The constants of a conveyor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConveyorModel {
     /// Its name on the wire, as in `conveyors/NAME/position`.

@@ -1,12 +1,12 @@
 //! The KUKA gearbox cell of the SESAME examples, as a simulator to fuzz.
 //!
 //! Three six-axis arms and two sliding conveyors carry gearboxes through a cell with people in it. A PLC sends joint
-//! targets every step; the arms follow them as their drives can; zones tell how near the grippers come. See `README.md`
-//! for the topics, the layout and what disturbances do.
+//! targets every step; the arms follow them within the limits of their drives; zones measure how near the grippers
+//! come. `README.md` describes the topics, the layout and the effects of disturbances.
 //!
-//! What is modelled: kinematics, drives with their limits and lags, the PLC's sequence with its interlocks, distances.
-//! What is not: contact (an arm driven into a conveyor or a neighbour passes through it, and the distance tells), the
-//! dynamics that couple joints, and payload.
+//! The model includes kinematics, drives with their limits and lags, the PLC's sequence with its interlocks, distances.
+//! It does not include contact (an arm that is driven into a conveyor or a neighbour passes through it, which the
+//! distance shows), the dynamics that couple joints, and payload.
 
 pub mod arm;
 mod cell;

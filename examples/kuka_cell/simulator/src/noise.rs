@@ -8,7 +8,7 @@ use crate::kinematics::Joints;
 /// Strength of the noise: its standard deviation as a part of a joint's highest acceleration.
 const STRENGTH: f64 = 0.05;
 
-/// How long the noise remembers, in s: friction and ripple change as fast as the arm turns, not from step to step.
+/// The correlation time of the noise, in s: friction and ripple change as fast as the arm turns, not from step to step.
 const CORRELATION_SECONDS: f64 = 0.2;
 
 /// Coloured noise on the torque of each joint of an arm.

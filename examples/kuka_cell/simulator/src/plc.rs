@@ -1,4 +1,4 @@
-//! The PLC of the cell: works through the motion programmes, sends the targets, hears what the axes measure.
+//! The PLC of the cell: executes the motion programmes, sends the targets, receives the measurements of the axes.
 
 use sesame_runtime::simulator::{Bus, Port};
 use sesame_runtime::time::SimTime;
@@ -56,7 +56,7 @@ impl Plc {
         }
     }
 
-    /// One PLC cycle: reads what the axes measured, goes on with the sequences, sends all targets.
+    /// One PLC cycle: reads the measurements of the axes, advances the sequences, sends all targets.
     pub fn scan(&mut self, bus: &mut Bus<'_>) {
         let now = bus.now();
         if self.cycle_done && now - self.cycle_begun >= SimTime::from_seconds(TAKT_SECONDS) {
@@ -110,5 +110,5 @@ fn listening<const N: usize>(station: Station<N>, bus: &mut Bus<'_>) -> Station<
     station
 }
 
-/// The topic on which the time of each completed cycle is told, in s.
+/// The topic on which the time of each completed cycle is published, in s.
 pub const CYCLE_TIME_TOPIC: &str = "cell/cycle_time";

@@ -1,4 +1,4 @@
-//! The motion programmes of the cell's PLC: which stations the arms and conveyors go to, when, and after whom.
+//! The motion programmes of the cell's PLC: which stations the arms and conveyors go to, when, and in which order.
 //!
 //! Stations are places of the gripper's centre in the cell, in m; the gripper hangs straight down at each of them.
 
@@ -9,7 +9,7 @@ use crate::geometry::Vector;
 use crate::kinematics::{Joints, hanging_at};
 use crate::sequence::{Sequence, Signal, Step};
 
-/// How often the cell wants to start a gearbox, in s: a cycle that is done sooner waits.
+/// The period at which the cell starts gearboxes, in s: a cycle that finishes earlier waits.
 pub const TAKT_SECONDS: f64 = 70.0;
 
 /// Where the infeed's carriage stands between the assembly arms, and where the R3200 picks from it, in m.

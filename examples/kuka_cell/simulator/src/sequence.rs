@@ -14,8 +14,8 @@ pub enum Step<const N: usize> {
     },
     /// Waits until every measured axis is within the tolerance of its set point; at most [`IN_POSITION_MONITORING`].
     Arrive,
-    /// Waits until every measured axis is within the tolerance, however long it takes: the end switch that must be made
-    /// before anyone else may go on.
+    /// Waits without limit until every measured axis is within the tolerance: the end switch that must be made before
+    /// other sequences may continue.
     AwaitSwitch,
     /// Waits for this time.
     Hold {
@@ -24,11 +24,11 @@ pub enum Step<const N: usize> {
     },
     /// Tells the other sequences that something is done.
     Raise(Signal),
-    /// Waits until another sequence has said so.
+    /// Waits until another sequence has raised the signal.
     Await(Signal),
 }
 
-/// What sequences tell each other. Each is raised at most once in a cycle.
+/// The signals that sequences exchange. Each is raised at most once in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Signal {
     /// The infeed holds an assembled gearbox at the pick station.
@@ -62,11 +62,11 @@ impl Signals {
 /// How far a measured axis may be from its set point and still count as arrived: rad for joints, m for conveyors.
 pub const IN_POSITION_TOLERANCE: f64 = 0.03;
 
-/// How long a PLC waits for an arm to arrive. After it the PLC goes on, for the fixtures of the cell centre what
-/// arrives off its place: an arm that is off costs the cycle this time at each station, it does not stop the line.
+/// How long a PLC waits for an arm to arrive. Then the PLC continues, because the fixtures of the cell centre parts
+/// that arrive slightly off: an arm that is off costs the cycle this time at each station but does not stop the line.
 pub const IN_POSITION_MONITORING: SimTime = SimTime::from_nanos(1_500_000_000);
 
-/// A sequence being worked through.
+/// A sequence in progress.
 #[derive(Debug, Clone)]
 pub struct Sequence<const N: usize> {
     steps: Vec<Step<N>>,
@@ -99,7 +99,7 @@ impl<const N: usize> Sequence<N> {
         &self.set_points
     }
 
-    /// Goes on to `now`: as many steps as are due, and the set points of the one under way.
+    /// Advances to `now`: completes the steps that are due, and updates the set points of the current one.
     pub fn advance(&mut self, now: SimTime, measured: &[f64; N], signals: &mut Signals) {
         while let Some(&step) = self.steps.get(self.current) {
             let elapsed = now - self.begun;
@@ -128,7 +128,7 @@ impl<const N: usize> Sequence<N> {
     }
 
     fn has_arrived(&self, measured: &[f64; N]) -> bool {
-        // A measured value that is no number is never within the tolerance.
+        // A measured value of NaN is never within the tolerance.
         self.set_points.iter().zip(measured).all(|(wanted, is)| (wanted - is).abs() <= IN_POSITION_TOLERANCE)
     }
 }

@@ -9,7 +9,7 @@ use sesame_runtime::value::{Fields, Record, Text, Value};
 use crate::arm::{Arm, GRIPPER_RADIUS};
 use crate::geometry::{Vector, distance_between_chains, sphere_to_cuboid};
 
-/// A region of the cell that grippers are watched for.
+/// A region of the cell whose distance from the grippers is measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Zone {
     /// Its name, also the end of its topic `safetyzones/NAME`.
@@ -43,7 +43,7 @@ pub const ZONES: [Zone; 9] = [
     Zone { name: "ZTRIG3", lowest: [-2.25, -1.30, 0.40], highest: [-1.95, -1.0, 0.70] },
 ];
 
-/// The pairs of arms whose distance is watched, by position in the cell's arms, with the end of the topic.
+/// The pairs of arms whose distance is measured, by position in the cell's arms, with the end of the topic.
 const PAIRS: [(usize, usize, &str); 3] = [(0, 1, "ZR270073"), (0, 2, "ZR270072"), (1, 2, "ZR270073R270072")];
 
 /// The names of arms in messages about pairs of arms.
@@ -101,7 +101,7 @@ impl ZoneMonitor {
         }
     }
 
-    /// A safety zone message; `level` is given in m and told in mm.
+    /// A safety zone message; `level` is given in m and published in mm.
     fn message(&self, zone: &Text, level: f64, object1: &Text, object2: &Text) -> Record {
         let values = vec![
             Value::Text(zone.clone()),

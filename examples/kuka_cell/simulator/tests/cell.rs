@@ -1,4 +1,4 @@
-//! What the cell does undisturbed, and how disturbances break its requirements.
+//! The cell without disturbance, and how disturbances violate its requirements.
 
 #[path = "../examples/landscape/disturbed.rs"]
 mod disturbed;
@@ -20,12 +20,12 @@ fn jittered(link: usize, offset: (f64, f64), window: (f64, f64)) -> Outcome {
     outcome(&run::<Cell>(0, &[Jitter { link, offset, window }]))
 }
 
-/// The times at which something holds.
+/// The times at which a condition holds.
 fn times(messages: &[Published], holds: impl Fn(&Published) -> bool) -> Vec<f64> {
     messages.iter().filter(|message| holds(message)).map(|message| message.time.seconds()).collect()
 }
 
-/// Asserts that these times are all within a span, and reach from about its one end to its other.
+/// Asserts that these times are all within a span, and extend approximately from one end to the other.
 fn assert_during(times: &[f64], span: (f64, f64), what: &str) {
     let first = times.first().unwrap_or_else(|| panic!("{what}: never"));
     let last = times.last().expect("there is a first");
@@ -113,15 +113,15 @@ fn a_known_bias_of_link1_brings_the_gripper_into_zones_for_some_of_the_time() {
 #[test]
 fn it_matters_when_and_which_way_a_joint_is_off() {
     let collisions = |link, offset, from| jittered(link, offset, (from, from + 5.0)).collisions;
-    // At the infeed Z1 lies on the one side, at the workers' station Z3 on the other.
+    // At the infeed Z1 lies on one side, at the workers' station Z3 on the other.
     assert!(collisions(0, UP, 10.0) > 10);
     assert_eq!(collisions(0, DOWN, 10.0), 0);
     assert!(collisions(0, DOWN, 45.0) > 10);
     assert_eq!(collisions(0, UP, 45.0), 0);
-    // Leaning forward stretches a high arm out, over the inspection surface into Z2; leaning back harms nobody.
+    // Leaning forward stretches a high arm out, over the inspection surface into Z2; leaning back enters no zone.
     assert!(collisions(1, UP, 30.0) > 5);
     assert_eq!(collisions(1, DOWN, 30.0), 0);
-    // Drawn in for carrying, the arm is far from all.
+    // Drawn in for carrying, the arm is far from every zone.
     for (link, offset) in [(0, UP), (0, DOWN), (1, UP), (1, DOWN)] {
         assert_eq!(collisions(link, offset, 20.0), 0, "Link{link}");
     }

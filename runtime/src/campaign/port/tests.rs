@@ -133,9 +133,9 @@ fn a_worker_that_speaks_slowly_is_understood() {
     let (address, token) = (port.address().unwrap(), port.token().to_owned());
     let worker = thread::spawn(move || {
         let mut whole = Vec::new();
-        frames::send(&mut whole, &Hello { token: Some(token) }).unwrap();
+        protocol::send(&mut whole, &Hello { token: Some(token) }).unwrap();
         // What follows the greeting is not taken with it.
-        frames::send(&mut whole, &"what follows").unwrap();
+        protocol::send(&mut whole, &"what follows").unwrap();
         let mut stream = TcpStream::connect(address).unwrap();
         for part in whole.chunks(7) {
             stream.write_all(part).unwrap();
@@ -143,7 +143,7 @@ fn a_worker_that_speaks_slowly_is_understood() {
         }
     });
     let mut stream = port.accept(LIMIT, &mut || Ok(())).unwrap();
-    let follows: String = frames::receive(&mut stream).unwrap();
+    let follows: String = protocol::receive(&mut stream).unwrap();
     assert_eq!(follows, "what follows");
     worker.join().unwrap();
 }

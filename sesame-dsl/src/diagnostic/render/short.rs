@@ -1,4 +1,4 @@
-//! For one-line tools: `file:line:column: error[E0203]: title: label`.
+//! For line-based tools: `file:line:column: error[E0203]: title: label`.
 
 use super::terminal::for_terminals;
 use crate::diagnostic::{Diagnostic, Severity, visible};

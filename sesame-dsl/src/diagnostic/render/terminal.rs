@@ -1,10 +1,10 @@
-//! What no renderer for terminals prints as it is.
+//! What renderers for terminals have in common: nothing that a terminal interprets is printed as it is.
 
 use std::borrow::Cow;
 
 use crate::diagnostic::{Diagnostic, visible};
 
-/// A diagnostic for a terminal, whatever it quotes.
+/// A diagnostic whose texts contain nothing that a terminal interprets.
 pub(super) fn for_terminals(diagnostic: &Diagnostic) -> Diagnostic {
     let mut shown = diagnostic.clone();
     let texts = [&mut shown.title, &mut shown.label].into_iter();

@@ -197,12 +197,8 @@ impl Reader<'_> {
         };
         self.undeclared_names(self.span(pair));
         self.report(
-            Diagnostic::new(
-                Code::NOT_SUPPORTED,
-                span,
-                format!("{what} is not supported yet by this version of sesamec"),
-            )
-            .label("part of the language, but not of this version"),
+            Diagnostic::new(Code::NOT_SUPPORTED, span, format!("{what} is not supported yet"))
+                .label("part of the language, but not supported by this version of sesamec"),
         );
     }
 }

@@ -116,7 +116,7 @@ impl Reader<'_> {
         let span = self.span(pair);
         let lists = children(pair, Rule::list_of).count();
         if lists > MAX_LISTS {
-            let title = format!("lists are nested {lists} deep, more than the {MAX_LISTS} that are supported");
+            let title = format!("lists are nested {lists} levels deep, but the limit is {MAX_LISTS}");
             self.report(Diagnostic::new(Code::TOO_LARGE, span, title));
         }
         (0..lists.min(MAX_LISTS)).fold(Type { kind, unit, span }, |of, _| Type {

@@ -35,7 +35,7 @@ impl Reader<'_> {
         let name = Name { text: pair.as_str().to_owned(), span: self.span(pair) };
         let starts = name.text.starts_with(|first: char| first.is_ascii_alphabetic());
         if !starts || !name.text.is_ascii() {
-            self.bad_name(&name, "names begin with a letter and go on with letters, digits and `_`, all ASCII");
+            self.bad_name(&name, "a name begins with an ASCII letter and continues with ASCII letters, digits and `_`");
         }
         name
     }
@@ -43,13 +43,16 @@ impl Reader<'_> {
     pub(super) fn field_name(&mut self, pair: &Pair<'_>) -> Name {
         let name = Name { text: pair.as_str().to_owned(), span: self.span(pair) };
         if !name.text.is_ascii() || !name.text.contains(|c: char| c.is_ascii_alphanumeric()) {
-            self.bad_name(&name, "names of fields are ASCII letters, digits and `_`, not `_` alone");
+            self.bad_name(
+                &name,
+                "the name of a field consists of ASCII letters, digits and `_`, with at least one letter or digit",
+            );
         }
         name
     }
 
     fn bad_name(&mut self, name: &Name, rule: &str) {
-        let title = format!("`{}` cannot be a name", name.text);
+        let title = format!("`{}` is not a valid name", name.text);
         let label = match name.text.chars().find(|c| !c.is_ascii()) {
             Some(c) => format!("`{c}` is not ASCII"),
             None => "begins with `_`".to_owned(),
@@ -85,11 +88,11 @@ impl Reader<'_> {
         let mut coordinates = [next(), next(), next()];
         drop(written);
         if let Some(own) = coordinates.iter().find_map(|coordinate| coordinate.unit.clone()) {
-            let title = "a unit stands after the parenthesis, once for all three";
+            let title = "the unit of a point is given once, after the `)`";
             let diagnostic = Diagnostic::new(Code::WRONG_UNIT, own.span, title);
             self.report(match unit {
-                Some(_) => diagnostic.label("here it is one too many").suggest("leave it out", own.span, ""),
-                None => diagnostic.label("expected behind the `)`").note("for example `(1, 0, -0.5)m`"),
+                Some(_) => diagnostic.label("unexpected unit").suggest("remove the unit", own.span, ""),
+                None => diagnostic.label("move the unit after the `)`").note("for example `(1, 0, -0.5)m`"),
             });
             unit = unit.or(Some(own));
         }
@@ -113,9 +116,9 @@ impl Reader<'_> {
         let number = expect_child(quantity, Rule::number);
         let mut value: f64 = number.as_str().parse().expect("the grammar's numbers are Rust's");
         if !value.is_finite() {
-            let title = format!("`{}` is too large for a number", number.as_str());
+            let title = format!("`{}` is too large", number.as_str());
             let diagnostic = Diagnostic::new(Code::BAD_NUMBER, self.span(&number), title);
-            self.report(diagnostic.label("beyond 1.8e308"));
+            self.report(diagnostic.label("greater than 1.8e308"));
             value = f64::NAN;
         }
         Quantity { value, unit: child(quantity, Rule::unit).map(|unit| self.unit(&unit)), span }
@@ -125,8 +128,8 @@ impl Reader<'_> {
         let span = self.span(pair);
         let value = pair.as_str().parse::<u64>().ok();
         if value.is_none() {
-            let title = format!("`{}` is not a whole number that fits here", pair.as_str());
-            let label = "expected a whole number up to 18446744073709551615";
+            let title = format!("`{}` is not a valid count or seed", pair.as_str());
+            let label = "expected a whole number of at most 18446744073709551615";
             self.report(Diagnostic::new(Code::BAD_NUMBER, span, title).label(label));
         }
         Count { value, span }
@@ -149,12 +152,13 @@ impl Reader<'_> {
                 let span = self.span_of(at, at + 1 + escaped.len_utf8());
                 let title = format!("unknown escape `\\{escaped}` in a text");
                 let diagnostic =
-                    Diagnostic::new(Code::BAD_TEXT, span, title).label("`\\\"` and `\\\\` are the only ones");
-                self.report(diagnostic.suggest("double the backslash to mean one", span, format!("\\\\{escaped}")));
+                    Diagnostic::new(Code::BAD_TEXT, span, title).label("the only escapes are `\\\"` and `\\\\`");
+                self.report(diagnostic.suggest("write `\\\\` for a backslash", span, format!("\\\\{escaped}")));
             }
         }
         if text.trim().is_empty() {
-            let diagnostic = Diagnostic::new(Code::BAD_TEXT, span, "this text is empty").label("say something here");
+            let diagnostic = Diagnostic::new(Code::BAD_TEXT, span, "this text is empty")
+                .label("expected at least one visible character");
             self.report(diagnostic);
         }
         Text { text, span }

@@ -1,4 +1,5 @@
-//! A run of the cell under joint jitter, and what it broke. Shared by the sweep beside it and by the crate's tests.
+//! A run of the cell under joint jitter, and the requirements that it violated. Shared by the sweep beside it and by the
+//! crate's tests.
 
 use kuka_cell_sim::arm::target_topic;
 use kuka_cell_sim::zones::zone_topic;
@@ -20,7 +21,7 @@ pub(crate) struct Jitter {
     pub(crate) window: (f64, f64),
 }
 
-/// What a run came to.
+/// The results of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Outcome {
     /// R1: intervals of 0.2 s with a gripper inside Z1, Z2 or Z3.
@@ -60,7 +61,7 @@ pub(crate) fn run<S: Simulator>(seed: u64, jitters: &[Jitter]) -> Bench<S> {
     bench
 }
 
-/// Reads the requirements off a run.
+/// Computes the metrics of the requirements from a run.
 pub(crate) fn outcome<S: Simulator>(bench: &Bench<S>) -> Outcome {
     let mut inside: Vec<SimTime> = ["Z1", "Z2", "Z3"]
         .iter()
@@ -91,7 +92,7 @@ pub(crate) fn level(message: &Published) -> f64 {
     message.value.number_at(&["level"]).expect("safety zone messages have a level")
 }
 
-/// The number in a message that is nothing but a number.
+/// The number in a message that is a plain number.
 pub(crate) fn real(message: &Published) -> f64 {
     message.value.number_at::<&str>(&[]).expect("the message is a number")
 }

@@ -1,4 +1,4 @@
-//! Prints what the undisturbed cell does and what jitter does to it, as the tables of the crate's README.
+//! Prints the behaviour of the cell without disturbance and under jitter, as the tables of the crate's README.
 //!
 //! `cargo run --release -p kuka_cell_sim --example landscape`
 
@@ -80,7 +80,7 @@ fn undisturbed() {
     println!("\none run of 70 s: {:.1} ms", begun.elapsed().as_secs_f64() * 1000.0 / f64::from(n_runs));
 }
 
-/// When something holds, as a list of spans of time.
+/// The times at which a condition holds, as a list of spans.
 fn spans(course: impl Iterator<Item = (f64, bool)>) -> String {
     let mut spans: Vec<(f64, f64)> = Vec::new();
     let mut held = false;

@@ -1,0 +1,258 @@
+//! What was observed in one run of a test: what a worker reports and the results repository keeps.
+
+use std::fmt::Write as _;
+
+use serde::{Deserialize, Serialize};
+
+use sesame_plan::{Span, Trend};
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Outcome {
+    /// It ran to its end, and what it disturbs was disturbed (or it disturbs nothing by design).
+    Completed,
+    /// It ran to its end, but no operation had any effect.
+    Void,
+    /// It ran to its end in another program, which did not count what operations did: whether they had any effect is not
+    /// known, and its counters are all zero. Only imported tests end so.
+    Unknown,
+    /// The simulator or a hook failed or panicked, or the worker process died.
+    Crash {
+        /// What is known of the cause.
+        message: String,
+    },
+    /// It took longer than its wall-clock limit and was stopped.
+    Timeout {
+        /// The limit, in seconds of wall time.
+        limit: f64,
+    },
+}
+
+/// How much of what is known of a crash is kept, in bytes.
+const CAUSE_BYTES: usize = 4096;
+
+impl Outcome {
+    /// A crash for this cause. One that is longer than anybody reads, as simulators and panics may have it, is shortened, and
+    /// says by how much.
+    pub fn crash(mut cause: String) -> Self {
+        if cause.len() > CAUSE_BYTES {
+            let whole = cause.len();
+            let kept = (0..=CAUSE_BYTES).rev().find(|&at| cause.is_char_boundary(at)).unwrap_or(0);
+            cause.truncate(kept);
+            write!(cause, "… ({} bytes more)", whole - kept).expect("text grows as needed");
+        }
+        Outcome::Crash { message: cause }
+    }
+
+    /// Whether the run came to its planned end.
+    pub fn is_whole(&self) -> bool {
+        matches!(self, Outcome::Completed | Outcome::Void | Outcome::Unknown)
+    }
+
+    /// One word for tables and the database.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Outcome::Completed => "completed",
+            Outcome::Void => "void",
+            Outcome::Unknown => "unknown",
+            Outcome::Crash { .. } => "crash",
+            Outcome::Timeout { .. } => "timeout",
+        }
+    }
+
+    /// What the word leaves out.
+    pub fn detail(&self) -> Option<String> {
+        match self {
+            Outcome::Completed | Outcome::Void | Outcome::Unknown => None,
+            Outcome::Crash { message } => Some(message.clone()),
+            Outcome::Timeout { limit } => Some(format!("stopped after {limit} s of wall time")),
+        }
+    }
+}
+
+/// What one run of a test showed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Observation {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Simulation time at which it ended, in seconds.
+    pub end: f64,
+    /// Per operation of the test, in its order; empty after a crash of the worker.
+    pub operations: Vec<OperationEffect>,
+    /// Of a run that came to its end: names on the wire that operations of the campaign act on and that nobody heard, in
+    /// order of declaration. Neither did the simulator subscribe to them, nor reads them an outbound metric.
+    pub unheard: Vec<String>,
+    /// Per metric of the plan, in its order; empty after a crash of the worker.
+    pub metrics: Vec<MetricObservation>,
+    /// Messages the relay handled.
+    pub messages: u64,
+    /// What should be brought to the user's attention; ordered, bounded by whoever writes it.
+    pub warnings: Vec<String>,
+    /// Wall time in seconds spent in the run; never part of the digest.
+    pub wall: WallTime,
+}
+
+/// Where the wall time of a run went, in seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct WallTime {
+    /// The whole run as its worker saw it, simulator and relay together.
+    pub run: f64,
+}
+
+/// What one operation of a test did.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct OperationEffect {
+    /// Observed active intervals in seconds, clipped to the run, in order, none overlapping.
+    pub intervals: Vec<Span>,
+    /// Intervals in which it was not active and still held messages back, likewise.
+    pub tails: Vec<Span>,
+    /// What it counted.
+    pub counters: Counters,
+    /// Simulation time of its first effect, in seconds.
+    pub first_touch: Option<f64>,
+    /// Simulation time of its last effect, in seconds.
+    pub last_touch: Option<f64>,
+}
+
+impl OperationEffect {
+    /// When it was active or held messages back, in no particular order: what `fuzzing_time()` adds up.
+    pub fn busy(&self) -> impl Iterator<Item = Span> + use<'_> {
+        self.intervals.iter().chain(&self.tails).copied()
+    }
+}
+
+/// What an operation counted. An operation had an effect when any but `seen` and `unheard` is above zero.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Counters {
+    /// Messages that reached it while it was active.
+    pub seen: u64,
+    /// Messages it changed.
+    pub changed: u64,
+    /// Messages it dropped.
+    pub dropped: u64,
+    /// Messages it held back while it was active; never more than `seen`.
+    pub delayed: u64,
+    /// Messages that came while it was not active and waited behind those it still held.
+    pub queued: u64,
+    /// Messages it made up.
+    pub injected: u64,
+    /// Side effects it had beside messages.
+    pub side_effects: u64,
+    /// Messages it changed, dropped, held back or made up on wires that nobody heard. They are in none of the others, and
+    /// no effect.
+    pub unheard: u64,
+}
+
+impl Counters {
+    /// Whether the operation had any effect.
+    pub fn any_effect(&self) -> bool {
+        self.changed + self.dropped + self.delayed + self.queued + self.injected + self.side_effects > 0
+    }
+}
+
+/// What a metric showed in one run.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct MetricObservation {
+    /// Its value: the last one at or before the end, or its default; `None` where there is neither.
+    pub value: Option<f64>,
+    /// Whether the value is one that was set, not the default.
+    pub set: bool,
+    /// The values that it could have had at the end of the run.
+    pub reach: Reach,
+    /// Simulation time, in seconds, of the first number that was not finite in what it reads.
+    pub not_finite: Option<f64>,
+    /// Change points `(seconds, value)` in time order; the value holds until the next point. Always finite.
+    pub series: Vec<(f64, f64)>,
+}
+
+impl MetricObservation {
+    /// Of a run that came to its end, with nothing in it that was not finite.
+    pub fn whole(value: Option<f64>, set: bool, series: Vec<(f64, f64)>) -> Self {
+        MetricObservation { value, set, reach: Reach::of_whole_run(value), not_finite: None, series }
+    }
+}
+
+/// The values that a metric could have had at the end of a run: of a run that came to its end, its value; of one that broke
+/// off, all that the rest of the run might have made of it. It is never too narrow.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Reach {
+    /// The least of them, finite; `None` where there is no least.
+    pub low: Option<f64>,
+    /// The greatest of them, finite; `None` where there is no greatest.
+    pub high: Option<f64>,
+}
+
+impl Reach {
+    /// All values.
+    pub const ANY: Reach = Reach { low: None, high: None };
+
+    /// This value only.
+    pub fn only(value: f64) -> Self {
+        Reach { low: Some(value), high: Some(value) }
+    }
+
+    /// That of a metric with this value in a run that came to its end. Without a value nothing is known.
+    pub fn of_whole_run(value: Option<f64>) -> Self {
+        value.map_or(Reach::ANY, Reach::only)
+    }
+
+    /// What is left for a metric that only goes one way and has come to this value; without a value, or where it may go
+    /// both ways, everything.
+    pub fn onwards(trend: Option<Trend>, value: Option<f64>) -> Self {
+        match trend {
+            Some(Trend::Rising) => Reach { low: value, high: None },
+            Some(Trend::Falling) => Reach { low: None, high: value },
+            None => Reach::ANY,
+        }
+    }
+}
+
+/// The value of a metric in one run.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct MetricValue {
+    /// The last value set, or the default; `None` where there is neither.
+    pub value: Option<f64>,
+    /// Whether the value is one that was set, not the default.
+    pub set: bool,
+    /// The values that it could have had at the end of the run.
+    pub reach: Reach,
+    /// Simulation time, in seconds, of the first number that was not finite in what it reads.
+    pub not_finite: Option<f64>,
+}
+
+impl MetricValue {
+    /// Of a run that came to its end, with nothing in it that was not finite.
+    pub fn whole(value: Option<f64>, set: bool) -> Self {
+        MetricValue { value, set, reach: Reach::of_whole_run(value), not_finite: None }
+    }
+}
+
+impl From<&MetricObservation> for MetricValue {
+    fn from(shown: &MetricObservation) -> Self {
+        let MetricObservation { value, set, reach, not_finite, series: _ } = *shown;
+        MetricValue { value, set, reach, not_finite }
+    }
+}
+
+impl Observation {
+    /// The value of the plan's metric at this position; unmeasured when the run reported none.
+    pub fn value(&self, metric: sesame_plan::MetricId) -> MetricValue {
+        self.metrics.get(metric.index()).map(MetricValue::from).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cause_of_a_crash_is_shortened_between_two_characters() {
+        let short = "ä".repeat(CAUSE_BYTES / 2);
+        assert_eq!(Outcome::crash(short.clone()), Outcome::Crash { message: short });
+        let long = format!("x{}", "ä".repeat(5 << 20));
+        let kept = format!("x{}", "ä".repeat(CAUSE_BYTES / 2 - 1));
+        let left = long.len() - kept.len();
+        assert_eq!(Outcome::crash(long), Outcome::Crash { message: format!("{kept}… ({left} bytes more)") });
+    }
+}

@@ -1,0 +1,207 @@
+//! NSGA-II (Deb et al. 2002) by ask and tell, over any genome.
+//!
+//! Generation 0 is fresh; each later one is as large as the population, bred from it by binary tournaments and the
+//! genome's own [`Variation`], and the best of both together survive. What is asked depends on the seed and on what
+//! was told, never on how long an evaluation took or in which order the evaluations of a generation were done.
+
+use sesame_rng::Stream;
+
+use crate::dominance::Fitness;
+use crate::selection::{Standing, distinct_survivors, parents, survivors};
+
+/// How genomes of a kind are made and changed. Randomness comes from streams of the given coordinates only.
+pub trait Variation {
+    /// What is evolved.
+    type Genome: Clone;
+
+    /// The `index`th genome of generation 0.
+    fn initial(&mut self, index: u64) -> Self::Genome;
+
+    /// The two children of the `pair`th pair of parents in a generation. The last one's second child is not evaluated
+    /// when the generation is odd.
+    fn offspring(&mut self, parents: [&Self::Genome; 2], generation: u64, pair: u64) -> [Child<Self::Genome>; 2];
+}
+
+/// A new genome, and where it comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Child<G> {
+    /// The genome.
+    pub genome: G,
+    /// Whose genes it has.
+    pub heritage: Heritage,
+}
+
+/// Which of two parents a child has genes of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Heritage {
+    /// Of the first alone.
+    First,
+    /// Of the second alone.
+    Second,
+    /// Of both.
+    Both,
+}
+
+/// The sizes of a run, and what decides in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// Members of the population, and of each generation; at least 1.
+    pub population: u32,
+    /// Genomes evaluated in total; the last generation is cut short to meet it exactly.
+    pub evaluations: u32,
+    /// The seed of selection.
+    pub seed: u64,
+    /// Who survives.
+    pub survival: Survival,
+}
+
+/// Who survives of a population and its offspring.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Survival {
+    /// The best by the crowded comparison, as in the paper.
+    Crowded,
+    /// Of equal objective values one, as long as there are others: where many solutions come to the same, the paper's way
+    /// fills the population with them.
+    Distinct,
+}
+
+/// A genome to be evaluated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Asked<G> {
+    /// The genome.
+    pub genome: G,
+    /// The numbers, as told, of the genomes it descends from; none in generation 0, else one or two.
+    pub parents: Vec<u32>,
+}
+
+/// An evaluated genome.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Told<G> {
+    /// The caller's number for it; what [`Asked::parents`] refers to.
+    pub number: u32,
+    /// The genome, as asked.
+    pub genome: G,
+    /// What came out.
+    pub fitness: Fitness,
+}
+
+/// A run of NSGA-II.
+#[derive(Debug, Clone)]
+pub struct Nsga2<V: Variation> {
+    settings: Settings,
+    variation: V,
+    /// The generation that [`Nsga2::ask`] gives next.
+    generation: u32,
+    /// Genomes asked so far.
+    asked: u32,
+    /// How many of them still have to be told.
+    awaited: usize,
+    population: Vec<Told<V::Genome>>,
+    standings: Vec<Standing>,
+}
+
+impl<V: Variation> Nsga2<V> {
+    /// A run before its first generation.
+    pub fn new(settings: Settings, variation: V) -> Self {
+        assert!(settings.population > 0, "a population has at least one member");
+        Nsga2 {
+            settings,
+            variation,
+            generation: 0,
+            asked: 0,
+            awaited: 0,
+            population: Vec::new(),
+            standings: Vec::new(),
+        }
+    }
+
+    /// The generation that [`Nsga2::ask`] gives next, from 0.
+    pub fn generation(&self) -> u32 {
+        self.generation
+    }
+
+    /// How its genomes are varied.
+    pub fn variation(&self) -> &V {
+        &self.variation
+    }
+
+    /// How its genomes are varied, to be told what else came of them.
+    pub fn variation_mut(&mut self) -> &mut V {
+        &mut self.variation
+    }
+
+    /// The surviving genomes, by the order in which they were asked.
+    pub fn population(&self) -> &[Told<V::Genome>] {
+        &self.population
+    }
+
+    /// Judges the surviving genomes anew, for fitness that depends on what else was found. They are ranked again when the
+    /// next generation is told.
+    pub fn reappraise(&mut self, mut fitness: impl FnMut(&Told<V::Genome>) -> Fitness) {
+        for member in &mut self.population {
+            member.fitness = fitness(member);
+        }
+    }
+
+    /// The next generation; empty when all evaluations are used up.
+    pub fn ask(&mut self) -> Vec<Asked<V::Genome>> {
+        assert!(self.awaited == 0, "a generation is told before the next is asked");
+        let size = self.settings.population.min(self.settings.evaluations - self.asked);
+        let batch = if self.generation == 0 {
+            let fresh = |index| Asked { genome: self.variation.initial(u64::from(index)), parents: Vec::new() };
+            (0..size).map(fresh).collect()
+        } else {
+            self.breed(size)
+        };
+        self.asked += size;
+        self.awaited = batch.len();
+        self.generation += 1;
+        batch
+    }
+
+    /// Takes the results of exactly the generation asked last, in its order.
+    pub fn tell(&mut self, results: impl IntoIterator<Item = Told<V::Genome>>) {
+        let before = self.population.len();
+        self.population.extend(results);
+        assert!(self.population.len() - before == self.awaited, "exactly the generation asked last is told");
+        self.awaited = 0;
+        let size = self.settings.population as usize;
+        let survivors = match self.settings.survival {
+            Survival::Crowded => survivors(&self.fitness(), size),
+            Survival::Distinct => distinct_survivors(&self.fitness(), size),
+        };
+        let mut chosen = survivors.iter().map(|(position, _)| *position).peekable();
+        let mut position = 0;
+        self.population.retain(|_| {
+            position += 1;
+            chosen.next_if_eq(&(position - 1)).is_some()
+        });
+        self.standings = survivors.into_iter().map(|(_, standing)| standing).collect();
+    }
+
+    fn breed(&mut self, size: u32) -> Vec<Asked<V::Genome>> {
+        let generation = u64::from(self.generation);
+        let pairs = size.div_ceil(2);
+        let mut stream = Stream::derive(self.settings.seed, "mating", &[generation]);
+        let mating = parents(&self.standings, 2 * pairs as usize, &mut stream);
+        let mut batch = Vec::with_capacity(size as usize + 1);
+        for (pair, couple) in (0u64..).zip(mating.chunks_exact(2)) {
+            let [first, second] = [&self.population[couple[0]], &self.population[couple[1]]];
+            for child in self.variation.offspring([&first.genome, &second.genome], generation, pair) {
+                let parents = match child.heritage {
+                    Heritage::First => vec![first.number],
+                    Heritage::Second => vec![second.number],
+                    Heritage::Both if first.number == second.number => vec![first.number],
+                    Heritage::Both => vec![first.number, second.number],
+                };
+                batch.push(Asked { genome: child.genome, parents });
+            }
+        }
+        batch.truncate(size as usize);
+        batch
+    }
+
+    fn fitness(&self) -> Vec<&Fitness> {
+        self.population.iter().map(|member| &member.fitness).collect()
+    }
+}

@@ -1,0 +1,359 @@
+//! Fuzzing operations: what an active operation does to one message.
+//!
+//! Draws are keyed by the operation's draw seed and the message's index on its wire, so they do not depend on what
+//! happened before: repeating a test repeats its disturbance, and a shorter window disturbs its messages just the same.
+
+mod bias;
+mod burst_loss;
+mod change;
+mod custom;
+mod drift;
+mod freeze;
+mod latency;
+mod noise;
+mod not_finite;
+mod packet_loss;
+mod places;
+mod probe;
+mod random_value;
+mod rate_limit;
+mod reorder;
+mod scale;
+mod stale;
+mod stuck_at;
+
+use sesame_base::time::SimTime;
+use sesame_plan::{Activation, Choice, Domain, Drain, Operation, OperationKind, Shape, TestOperation, ValueMode};
+use sesame_rng as rng;
+
+use crate::value::{Text, Value};
+
+pub use bias::Bias;
+pub use burst_loss::BurstLoss;
+pub use change::Amount;
+pub(crate) use custom::custom_operations;
+pub use custom::{
+    Custom, FromChoice, MessageCall, OperationContext, OperationEntry, OperationHook, RunContext, chosen,
+};
+pub use drift::Drift;
+pub use freeze::Freeze;
+pub use latency::Latency;
+pub use noise::Noise;
+pub use not_finite::MakeNotFinite;
+pub use packet_loss::PacketLoss;
+pub use places::Places;
+pub use probe::unimplemented_operations;
+pub use random_value::{RandomText, RandomValue};
+pub use rate_limit::RateLimit;
+pub use reorder::Reorder;
+pub use scale::Scale;
+pub use stale::Stale;
+pub use stuck_at::{Stuck, StuckAt};
+
+/// An operation with the choices of one test, and what it remembers in one run.
+#[derive(Debug)]
+pub enum Disturbance {
+    /// Replaces or shifts numbers and points by draws.
+    RandomValue(RandomValue),
+    /// Replaces texts by draws.
+    RandomText(RandomText),
+    /// Replaces values by one and the same.
+    StuckAt(StuckAt),
+    /// Adds one and the same.
+    Bias(Bias),
+    /// Adds what grows with time.
+    Drift(Drift),
+    /// Adds normal draws.
+    Noise(Noise),
+    /// Multiplies.
+    Scale(Scale),
+    /// Replaces numbers by what is none.
+    NotFinite(MakeNotFinite),
+    /// Repeats old values.
+    Freeze(Freeze),
+    /// Gives values of some time ago.
+    Stale(Stale),
+    /// Drops some messages.
+    PacketLoss(PacketLoss),
+    /// Drops messages in bursts.
+    BurstLoss(BurstLoss),
+    /// Drops messages that come too soon.
+    RateLimit(RateLimit),
+    /// Delays messages, order kept.
+    Latency(Latency),
+    /// Delays messages, order not kept.
+    Reorder(Reorder),
+    /// Sends this many copies after each message.
+    Duplicate(u32),
+    /// Drops all messages.
+    Blackhole,
+    /// Calls the user's code.
+    Custom(Custom),
+}
+
+/// What an operation remembers for each wire of its topic; by the wire's position in it.
+#[derive(Debug)]
+pub struct PerWire<T>(Vec<T>);
+
+impl<T> Default for PerWire<T> {
+    fn default() -> Self {
+        PerWire(Vec::new())
+    }
+}
+
+impl<T: Default> PerWire<T> {
+    /// What is remembered for a wire; at first the default.
+    pub fn of(&mut self, member: u64) -> &mut T {
+        let at = usize::try_from(member).expect("a topic has fewer wires than memory has places");
+        if at >= self.0.len() {
+            self.0.resize_with(at + 1, T::default);
+        }
+        &mut self.0[at]
+    }
+}
+
+/// When and on which wire of its topic an operation meets a message.
+#[derive(Debug, Clone, Copy)]
+pub struct Encounter {
+    /// The time.
+    pub now: SimTime,
+    /// How long the operation has been on.
+    pub active: SimTime,
+    /// The wire's position in the topic.
+    pub member: u64,
+    /// The operation's draws for the message.
+    pub draws: Draws,
+}
+
+/// What becomes of a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fate {
+    /// It goes on as it is.
+    Unchanged,
+    /// It goes on, changed.
+    Changed,
+    /// It is gone.
+    Dropped,
+    /// It goes on this much later; under latency not before messages held earlier.
+    Delayed(SimTime),
+    /// It goes on, and this many copies of it after it.
+    Duplicated(u32),
+}
+
+/// The draws of one operation for one message.
+#[derive(Debug, Clone, Copy)]
+pub struct Draws {
+    seed: u64,
+    message: u64,
+}
+
+impl Draws {
+    /// The draws for the `index`th message on the `member`th wire of the operation's topic.
+    pub fn new(draw_seed: u64, member: u64, index: u64) -> Self {
+        let seed = if member == 0 { draw_seed } else { rng::derive_seed(draw_seed, "member", &[member]) };
+        Draws { seed, message: index }
+    }
+
+    /// The `n`th draw, uniform in `[0, 1)`.
+    pub fn unit(self, n: u64) -> f64 {
+        rng::keyed_unit(self.seed, self.message, n)
+    }
+
+    /// A standard normal number (Box–Muller) of the `n`th draw and the one after it.
+    pub fn normal(self, n: u64) -> f64 {
+        let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.unit(n)));
+        radius * libm::cos(std::f64::consts::TAU * self.unit(n + 1))
+    }
+}
+
+impl Disturbance {
+    /// Applies a test's choices to an operation of the space, with the user's code for custom ones. A plan guarantees
+    /// that they fit; choices read from elsewhere are refused with a reason.
+    pub fn new(operation: &Operation, test: &TestOperation, hooks: &[OperationEntry]) -> Result<Self, ChoiceError> {
+        let refuse = |reason: String| Err(ChoiceError { operation: operation.name.clone(), reason });
+        if operation.parameters.len() != test.parameters.len() {
+            return refuse(format!("has {} parameters, not {}", operation.parameters.len(), test.parameters.len()));
+        }
+        for (parameter, choice) in operation.parameters.iter().zip(&test.parameters) {
+            if let Some(reason) = misfit(&parameter.domain, choice) {
+                return refuse(format!("`{}` {reason}", parameter.name));
+            }
+        }
+        if operation.kind.is_offline() != (test.activation == Activation::Offline) {
+            let (what, when) = if operation.kind.is_offline() { ("has no", "beside") } else { ("lacks an", "during") };
+            return refuse(format!("{what} activation: it acts {when} the run"));
+        }
+        let chosen = |name: &str| {
+            let position = operation.parameters.iter().position(|parameter| parameter.name == name);
+            position.map(|at| &test.parameters[at])
+        };
+        let lacks = |name: &str| ChoiceError {
+            operation: operation.name.clone(),
+            reason: format!("has no parameter `{name}`, or of another kind: run `sesamec generate` again"),
+        };
+        let number = |name: &str| match chosen(name) {
+            Some(Choice::Value { value }) => Ok(*value),
+            _ => Err(lacks(name)),
+        };
+        let range = |name: &str| match chosen(name) {
+            Some(choice @ (Choice::Value { .. } | Choice::Range { .. })) => Ok(bounds(choice)),
+            _ => Err(lacks(name)),
+        };
+        let amount = |name: &str| chosen(name).and_then(Amount::of).ok_or_else(|| lacks(name));
+        let places = Places::new(&operation.places);
+        Ok(match &operation.kind {
+            OperationKind::RandomValue { mode, integer } => {
+                let ranges = if chosen("x").is_some() {
+                    [range("x")?, range("y")?, range("z")?]
+                } else {
+                    [range(if *mode == ValueMode::Offset { "offset" } else { "value" })?; 3]
+                };
+                Disturbance::RandomValue(RandomValue { places, mode: *mode, integer: *integer, ranges })
+            }
+            OperationKind::RandomText { texts } => {
+                let texts = texts.iter().map(|text| Text::from(text.as_str())).collect();
+                Disturbance::RandomText(RandomText { places, texts })
+            }
+            OperationKind::StuckAt { truth } => {
+                let at = match (truth, chosen("value")) {
+                    (Some(truth), _) => Stuck::Truth(*truth),
+                    (None, Some(Choice::Text { text })) => Stuck::Text(Text::from(text.as_str())),
+                    (None, _) => Stuck::Amount(amount("value")?),
+                };
+                Disturbance::StuckAt(StuckAt { places, at })
+            }
+            OperationKind::Bias => Disturbance::Bias(Bias { places, bias: amount("bias")? }),
+            OperationKind::ClockSkew => Disturbance::Bias(Bias { places, bias: amount("skew")? }),
+            OperationKind::Drift => Disturbance::Drift(Drift { places, rate: amount("rate")? }),
+            OperationKind::Noise => Disturbance::Noise(Noise { places, sigma: number("sigma")? }),
+            OperationKind::Scale => Disturbance::Scale(Scale { places, factor: number("factor")? }),
+            OperationKind::NotFinite { number } => Disturbance::NotFinite(MakeNotFinite { places, number: *number }),
+            OperationKind::Freeze => Disturbance::Freeze(Freeze::new(places)),
+            OperationKind::Stale => Disturbance::Stale(Stale::new(places, SimTime::from_seconds(number("age")?))),
+            OperationKind::PacketLoss => Disturbance::PacketLoss(PacketLoss { loss: number("loss")? }),
+            OperationKind::BurstLoss => Disturbance::BurstLoss(BurstLoss {
+                enter: number("enter")?,
+                leave: number("leave")?,
+                loss: if chosen("loss").is_some() { number("loss")? } else { 1.0 },
+                bursting: PerWire::default(),
+            }),
+            OperationKind::RateLimit => Disturbance::RateLimit(RateLimit {
+                period: SimTime::from_seconds(1.0 / number("rate")?),
+                passed: PerWire::default(),
+            }),
+            OperationKind::Latency { distribution, drain } => {
+                Disturbance::Latency(Latency { delay: range("delay")?, distribution: *distribution, drain: *drain })
+            }
+            OperationKind::Reorder { drain } => {
+                Disturbance::Reorder(Reorder { window: number("window")?, drain: *drain })
+            }
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` clamps")]
+            OperationKind::Duplicate => Disturbance::Duplicate(number("copies")? as u32),
+            OperationKind::Blackhole => Disturbance::Blackhole,
+            OperationKind::Custom { moment } => match Custom::new(operation, *moment, &test.parameters, hooks) {
+                Some(custom) => Disturbance::Custom(custom),
+                None => return refuse("has no hook in this runner: run `sesamec generate` again".to_owned()),
+            },
+        })
+    }
+
+    /// The operation goes on: what it makes of messages begins afresh. What it heard while it was off stays.
+    pub fn begin(&mut self) {
+        match self {
+            Disturbance::BurstLoss(operation) => operation.bursting = PerWire::default(),
+            Disturbance::RateLimit(operation) => operation.passed = PerWire::default(),
+            _ => {}
+        }
+    }
+
+    /// Whether it has to hear messages that pass while it is off.
+    pub fn listens(&self) -> bool {
+        matches!(self, Disturbance::Freeze(_) | Disturbance::Stale(_))
+    }
+
+    /// A message passes while the operation is off.
+    pub fn overhear(&mut self, now: SimTime, member: u64, message: &Value) {
+        match self {
+            Disturbance::Freeze(operation) => operation.overhear(member, message),
+            Disturbance::Stale(operation) => operation.overhear(now, member, message),
+            _ => {}
+        }
+    }
+
+    /// Whether messages that it holds back keep their order.
+    pub fn holds_order(&self) -> bool {
+        matches!(self, Disturbance::Latency(_))
+    }
+
+    /// What becomes of messages that it holds back when it goes off; `None` if it holds none.
+    pub fn drain(&self) -> Option<Drain> {
+        match self {
+            Disturbance::Latency(operation) => Some(operation.drain),
+            Disturbance::Reorder(operation) => Some(operation.drain),
+            _ => None,
+        }
+    }
+
+    /// What becomes of a message while the operation is active; the message may be changed in place. A custom operation
+    /// may do more than that, so the relay calls it itself.
+    pub fn apply(&mut self, at: Encounter, message: &mut Value) -> Fate {
+        match self {
+            Disturbance::RandomValue(operation) => operation.apply(at.draws, message),
+            Disturbance::RandomText(operation) => operation.apply(at.draws, message),
+            Disturbance::StuckAt(operation) => operation.apply(message),
+            Disturbance::Bias(operation) => operation.apply(message),
+            Disturbance::Drift(operation) => operation.apply(at.active, message),
+            Disturbance::Noise(operation) => operation.apply(at.draws, message),
+            Disturbance::Scale(operation) => operation.apply(message),
+            Disturbance::NotFinite(operation) => operation.apply(message),
+            Disturbance::Freeze(operation) => operation.apply(at.member, message),
+            Disturbance::Stale(operation) => operation.apply(at.now, at.member, message),
+            Disturbance::PacketLoss(operation) => operation.apply(at.draws),
+            Disturbance::BurstLoss(operation) => operation.apply(at.draws, at.member),
+            Disturbance::RateLimit(operation) => operation.apply(at.now, at.member),
+            Disturbance::Latency(operation) => operation.apply(at.draws),
+            Disturbance::Reorder(operation) => operation.apply(at.draws),
+            Disturbance::Duplicate(copies) => Fate::Duplicated(*copies),
+            Disturbance::Blackhole => Fate::Dropped,
+            Disturbance::Custom(_) => Fate::Unchanged,
+        }
+    }
+}
+
+/// Why a choice is not one that is permitted; `None` if it is.
+fn misfit(domain: &Domain, choice: &Choice) -> Option<String> {
+    match (domain, choice) {
+        (Domain::Number { low: least, high: most, shape, integer }, Choice::Value { .. } | Choice::Range { .. }) => {
+            let (low, high) = bounds(choice);
+            let fits = *least <= low && low <= high && high <= *most;
+            let whole = !integer || *shape == Shape::Range || libm::trunc(low) == low;
+            (!(fits && whole)).then(|| format!("permits [{least}, {most}], not [{low}, {high}]"))
+        }
+        (Domain::Point { low, high }, Choice::Point { point }) => {
+            let fits = (0..3).all(|axis| low[axis] <= point[axis] && point[axis] <= high[axis]);
+            (!fits).then(|| format!("permits points from {low:?} to {high:?}, not {point:?}"))
+        }
+        (Domain::Texts { texts: items } | Domain::Files { files: items }, Choice::Text { text }) => {
+            (!items.contains(text)).then(|| format!("permits {}, not {text:?}", items.join(", ")))
+        }
+        _ => Some("is of another kind than what is chosen".to_owned()),
+    }
+}
+
+fn bounds(choice: &Choice) -> (f64, f64) {
+    match *choice {
+        Choice::Value { value } => (value, value),
+        Choice::Range { low, high } => (low, high),
+        Choice::Point { .. } | Choice::Text { .. } => (0.0, 0.0),
+    }
+}
+
+/// A test whose choices do not fit the operation.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("operation `{operation}` {reason}")]
+pub struct ChoiceError {
+    /// The operation.
+    pub operation: String,
+    /// What does not fit.
+    pub reason: String,
+}

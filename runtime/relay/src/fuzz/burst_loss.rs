@@ -1,0 +1,30 @@
+//! Burst loss: drops messages in bursts (Gilbert 1960, Elliott 1963).
+//!
+//! A chain of two states per wire: in the good one messages pass, in the bad one each is dropped with probability `loss`.
+//! It begins in the good state when the operation goes on, and moves with each message before its fate is decided. In the
+//! long run `loss * enter / (enter + leave)` of all messages are dropped, and a burst is `1 / leave` messages long.
+
+use crate::fuzz::{Draws, Fate, PerWire};
+
+/// A burst loss operation.
+#[derive(Debug)]
+pub struct BurstLoss {
+    /// The probability per message that a burst begins, in `0..=1`.
+    pub enter: f64,
+    /// The probability per message that a burst ends, in `0..=1`.
+    pub leave: f64,
+    /// The probability that a message of a burst is dropped, in `0..=1`.
+    pub loss: f64,
+    /// Whether there is a burst on a wire.
+    pub bursting: PerWire<bool>,
+}
+
+impl BurstLoss {
+    /// Moves the chain and drops the message or lets it pass.
+    pub fn apply(&mut self, draws: Draws, member: u64) -> Fate {
+        let bursting = self.bursting.of(member);
+        let turns = draws.unit(0) < if *bursting { self.leave } else { self.enter };
+        *bursting ^= turns;
+        if *bursting && draws.unit(1) < self.loss { Fate::Dropped } else { Fate::Unchanged }
+    }
+}

@@ -1,0 +1,336 @@
+//! Custom operations: the user's Rust code, called with each message, before the start or after the end of a run.
+//!
+//! Generated code puts the user's typed hook behind [`OperationHook`]; every use of an operation in a test gets a hook
+//! of its own for each run. Draws come from the context alone, keyed like those of every other operation.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use sesame_base::time::SimTime;
+use sesame_plan::{CampaignPlan, Choice, Moment, Operation, OperationId, OperationKind};
+
+use crate::changed_files::ChangedFiles;
+use crate::fuzz::Draws;
+use crate::message::{FromValue, Mismatch, ToValue};
+use crate::value::{Text, Value};
+
+/// A user's operation hook as the runtime calls it. Generated code implements it around the typed hook trait.
+pub trait OperationHook {
+    /// A message on the operation's topic, which may be changed in place.
+    fn on_message(&mut self, message: &mut Value, call: &mut MessageCall<'_>) {
+        let _ = (message, call);
+    }
+    /// Before the start or after the end of a run, as the operation's declaration says.
+    fn beside_run(&mut self, ctx: &mut RunContext<'_>) {
+        let _ = ctx;
+    }
+}
+
+/// An operation hook that generated code registers.
+#[derive(Debug, Clone, Copy)]
+pub struct OperationEntry {
+    /// The operation's name in the space.
+    pub operation: &'static str,
+    /// A fresh hook with the choices of a test, which fit the operation's parameters.
+    pub build: fn(&[Choice]) -> Box<dyn OperationHook>,
+}
+
+/// A parameter's choice as generated code reads it.
+pub trait FromChoice: Sized {
+    /// The choice; `None` for one of another kind.
+    fn from_choice(choice: &Choice) -> Option<Self>;
+}
+
+impl FromChoice for f64 {
+    fn from_choice(choice: &Choice) -> Option<Self> {
+        match choice {
+            Choice::Value { value } => Some(*value),
+            _ => None,
+        }
+    }
+}
+
+impl FromChoice for i64 {
+    #[expect(clippy::cast_possible_truncation, reason = "choices of whole numbers are at most 2^53")]
+    fn from_choice(choice: &Choice) -> Option<Self> {
+        f64::from_choice(choice).map(|value| value as i64)
+    }
+}
+
+impl FromChoice for [f64; 3] {
+    fn from_choice(choice: &Choice) -> Option<Self> {
+        match choice {
+            Choice::Point { point } => Some(*point),
+            _ => None,
+        }
+    }
+}
+
+impl FromChoice for Text {
+    fn from_choice(choice: &Choice) -> Option<Self> {
+        match choice {
+            Choice::Text { text } => Some(Text::from(text.as_str())),
+            _ => None,
+        }
+    }
+}
+
+/// What a test chose for the parameter at this position.
+pub fn chosen<T: FromChoice>(choices: &[Choice], position: usize) -> T {
+    choices.get(position).and_then(T::from_choice).expect("choices are checked before a hook is built")
+}
+
+/// What a hook on messages is told, and what it may do beside changing its message, which is of type `M`.
+#[derive(Debug)]
+pub struct OperationContext<'a, M> {
+    now: SimTime,
+    topic: &'a str,
+    draws: Draws,
+    next_draw: u64,
+    dropped: bool,
+    injected: Vec<M>,
+    unimplemented: bool,
+}
+
+impl<M> OperationContext<'_, M> {
+    /// Simulation time in seconds.
+    pub fn now(&self) -> f64 {
+        self.now.seconds()
+    }
+
+    /// Name on the wire of the topic the message came on; a member when the operation is on a group.
+    pub fn topic(&self) -> &str {
+        self.topic
+    }
+
+    /// The next draw for this message, uniform in `[0, 1)`. Draws depend on the operation's draw seed, the message's
+    /// index and how many were made for this message before, so a test that is run again draws the same.
+    pub fn draw(&mut self) -> f64 {
+        self.next_draw += 1;
+        self.draws.unit(self.next_draw - 1)
+    }
+
+    /// The next draw, uniform in `[low, high)`.
+    pub fn draw_between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.draw()
+    }
+
+    /// The message is not to be delivered. What is injected still is.
+    pub fn drop_message(&mut self) {
+        self.dropped = true;
+    }
+
+    /// Publishes a further message on the same topic, right after this one. Operations that come later disturb it too.
+    pub fn inject(&mut self, message: M) {
+        self.injected.push(message);
+    }
+
+    /// Says that this hook is not filled in yet.
+    pub fn unimplemented(&mut self) {
+        self.unimplemented = true;
+    }
+}
+
+/// One message's way through a hook, without its type.
+#[derive(Debug)]
+pub struct MessageCall<'a> {
+    now: SimTime,
+    topic: &'a str,
+    draws: Draws,
+    pub(crate) changed: bool,
+    pub(crate) dropped: bool,
+    pub(crate) injected: Vec<Value>,
+    pub(crate) unimplemented: bool,
+    pub(crate) mismatch: Option<Mismatch>,
+}
+
+impl<'a> MessageCall<'a> {
+    pub(crate) fn new(now: SimTime, topic: &'a str, draws: Draws) -> Self {
+        MessageCall {
+            now,
+            topic,
+            draws,
+            changed: false,
+            dropped: false,
+            injected: Vec::new(),
+            unimplemented: false,
+            mismatch: None,
+        }
+    }
+
+    /// Reads the message, lets the hook at it, and writes it back. A message that is not of its declared type goes on
+    /// as it came, and the run is warned.
+    pub fn typed<M: FromValue + ToValue>(
+        &mut self,
+        value: &mut Value,
+        call: impl FnOnce(&mut M, &mut OperationContext<'_, M>),
+    ) {
+        let mut message = match M::from_value(value) {
+            Ok(message) => message,
+            Err(mismatch) => {
+                self.mismatch = Some(mismatch);
+                return;
+            }
+        };
+        let mut ctx = OperationContext {
+            now: self.now,
+            topic: self.topic,
+            draws: self.draws,
+            next_draw: 0,
+            dropped: false,
+            injected: Vec::new(),
+            unimplemented: false,
+        };
+        call(&mut message, &mut ctx);
+        self.dropped = ctx.dropped;
+        self.unimplemented |= ctx.unimplemented;
+        for injected in &ctx.injected {
+            // As the simulator sent it, but for what the hook says.
+            let mut copy = value.clone();
+            injected.write_to(&mut copy);
+            self.injected.push(copy);
+        }
+        self.changed = message.write_to(value);
+    }
+}
+
+/// What a hook before the start or after the end of a run is told, and what it may do.
+///
+/// Files are named by their path relative to the folder of the `.sesame` file, and put back after the run, whatever
+/// happens. What cannot be done makes the test a crash that says why; the hook goes on, and further changes are not
+/// made.
+#[derive(Debug)]
+pub struct RunContext<'a> {
+    /// `None` while it is only asked whether the hook is filled in.
+    files: Option<&'a mut ChangedFiles>,
+    draws: Draws,
+    next_draw: u64,
+    pub(crate) side_effects: u64,
+    pub(crate) failure: Option<String>,
+    pub(crate) unimplemented: bool,
+}
+
+impl<'a> RunContext<'a> {
+    pub(crate) fn new(files: &'a mut ChangedFiles, draws: Draws) -> Self {
+        RunContext { files: Some(files), draws, next_draw: 0, side_effects: 0, failure: None, unimplemented: false }
+    }
+
+    /// A context that changes nothing: a hook that asks anything of it is filled in, and stopped there.
+    pub(crate) fn probing() -> Self {
+        let draws = Draws::new(0, 0, 0);
+        RunContext { files: None, draws, next_draw: 0, side_effects: 0, failure: None, unimplemented: false }
+    }
+
+    /// The files, or the end of a probe.
+    fn files(&mut self) -> &mut ChangedFiles {
+        match &mut self.files {
+            Some(files) => files,
+            None => std::panic::resume_unwind(Box::new("a probe ends here")),
+        }
+    }
+
+    /// The folder of the `.sesame` file.
+    pub fn folder(&mut self) -> PathBuf {
+        self.files().folder().to_owned()
+    }
+
+    /// Replaces what a file holds until the run is over; a file that is not there is made, and removed again. It counts
+    /// as a side effect unless the file held just that.
+    pub fn replace_file(&mut self, path: impl AsRef<Path>, contents: impl AsRef<[u8]>) {
+        if self.failure.is_some() {
+            return;
+        }
+        match self.files().replace(path.as_ref(), contents.as_ref()) {
+            Ok(changed) => self.side_effects += u64::from(changed),
+            Err(error) => self.failure = Some(error.to_string()),
+        }
+    }
+
+    /// Changes the text of a file until the run is over: `edit` makes the new text of the old one.
+    pub fn edit_file(&mut self, path: impl AsRef<Path>, edit: impl FnOnce(&str) -> String) {
+        if self.failure.is_some() {
+            return;
+        }
+        match self.files().read_text(path.as_ref()) {
+            Ok(text) => {
+                let new = edit(&text);
+                self.replace_file(path, new);
+            }
+            Err(error) => self.failure = Some(error.to_string()),
+        }
+    }
+
+    /// Counts something else that the hook did, so that the test is not void. Undoing it is up to the hook.
+    pub fn count_side_effect(&mut self) {
+        self.files();
+        self.side_effects += 1;
+    }
+
+    /// The next draw, uniform in `[0, 1)`; a test that is run again draws the same.
+    pub fn draw(&mut self) -> f64 {
+        self.files();
+        self.next_draw += 1;
+        self.draws.unit(self.next_draw - 1)
+    }
+
+    /// The next draw, uniform in `[low, high)`.
+    pub fn draw_between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.draw()
+    }
+
+    /// Says that this hook is not filled in yet.
+    pub fn unimplemented(&mut self) {
+        self.unimplemented = true;
+    }
+}
+
+/// A custom operation with the choices of one test.
+pub struct Custom {
+    pub(crate) moment: Moment,
+    pub(crate) hook: Box<dyn OperationHook>,
+    /// The first message that was not of its declared type.
+    pub(crate) mismatch: Option<String>,
+}
+
+impl fmt::Debug for Custom {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Custom").field("moment", &self.moment).finish_non_exhaustive()
+    }
+}
+
+impl Custom {
+    pub(super) fn new(
+        operation: &Operation,
+        moment: Moment,
+        choices: &[Choice],
+        hooks: &[OperationEntry],
+    ) -> Option<Self> {
+        let entry = hooks.iter().find(|entry| entry.operation == operation.name)?;
+        Some(Custom { moment, hook: (entry.build)(choices), mismatch: None })
+    }
+
+    /// Lets the hook at a message.
+    pub(crate) fn on_message<'c>(
+        &mut self,
+        now: SimTime,
+        topic: &'c str,
+        draws: Draws,
+        message: &mut Value,
+    ) -> MessageCall<'c> {
+        let mut call = MessageCall::new(now, topic, draws);
+        self.hook.on_message(message, &mut call);
+        if let Some(mismatch) = &call.mismatch {
+            self.mismatch
+                .get_or_insert_with(|| format!("a message on `{topic}` is not of its declared type: {mismatch}"));
+        }
+        call
+    }
+}
+
+/// The custom operations of a plan, with what is permitted of them and their hooks.
+pub(crate) fn custom_operations(plan: &CampaignPlan) -> impl Iterator<Item = (OperationId, Moment, &Operation)> {
+    (0u32..).map(OperationId).zip(&plan.operations).filter_map(|(id, operation)| match operation.kind {
+        OperationKind::Custom { moment } => Some((id, moment, operation)),
+        _ => None,
+    })
+}

@@ -1,0 +1,17 @@
+//! Packet loss: drops each message independently (paper §3.8, `PacketLossNetworkOperation`).
+
+use crate::fuzz::{Draws, Fate};
+
+/// A packet loss operation.
+#[derive(Debug, Clone, Copy)]
+pub struct PacketLoss {
+    /// The probability to drop a message, in `0..=1`.
+    pub loss: f64,
+}
+
+impl PacketLoss {
+    /// Drops the message or lets it pass.
+    pub fn apply(self, draws: Draws) -> Fate {
+        if draws.unit(0) < self.loss { Fate::Dropped } else { Fate::Unchanged }
+    }
+}

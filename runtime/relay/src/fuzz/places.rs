@@ -1,0 +1,105 @@
+//! The values of a message that an operation changes.
+
+use sesame_plan::{Place, Step};
+
+use crate::fuzz::Fate;
+use crate::value::Value;
+
+/// How many draws each value of a message may make.
+const DRAWS_PER_VALUE: u64 = 8;
+
+/// The places of an operation in messages of its topic.
+#[derive(Debug, Clone)]
+pub struct Places(Vec<Place>);
+
+impl Places {
+    /// These places, or the whole message if there are none.
+    pub fn new(places: &[Place]) -> Self {
+        Places(if places.is_empty() { vec![Vec::new()] } else { places.to_vec() })
+    }
+
+    /// Visits the values at these places, in order, and says what became of the message. `change` says whether it changed
+    /// the value; it also gets the number of the value's first draw. That depends on the place and on the position in its
+    /// list alone, so that other places and longer lists shift nobody's draws.
+    ///
+    /// What a message does not have is left out: elements behind the end of a list, and whatever is not of its declared
+    /// type.
+    pub fn change(&self, message: &mut Value, mut change: impl FnMut(&mut Value, u64) -> bool) -> Fate {
+        let mut changed = false;
+        for (at, place) in (0u64..).zip(&self.0) {
+            let mut next = (at << 32) * DRAWS_PER_VALUE;
+            changed |= visit(message, place, &mut next, &mut change);
+        }
+        if changed { Fate::Changed } else { Fate::Unchanged }
+    }
+
+    /// Remembers the values at these places, in the place of what was remembered.
+    pub fn remember(&self, message: &Value, memory: &mut Memory) {
+        memory.0.clear();
+        for (at, place) in (0u64..).zip(&self.0) {
+            let mut next = (at << 32) * DRAWS_PER_VALUE;
+            collect(message, place, &mut next, memory);
+        }
+    }
+
+    /// Puts remembered values back into their places; elements that the list had not then stay as they are.
+    pub fn recall(&self, message: &mut Value, memory: &Memory) -> Fate {
+        let mut remembered = memory.0.iter().peekable();
+        self.change(message, |value, at| {
+            while remembered.next_if(|(before, _)| *before < at).is_some() {}
+            match remembered.next_if(|(same, _)| *same == at) {
+                Some((_, old)) if !value.is_same(old) => {
+                    value.clone_from(old);
+                    true
+                }
+                _ => false,
+            }
+        })
+    }
+}
+
+/// The values that were at the places of an operation in one message, by the numbers of their draws.
+#[derive(Debug, Clone, Default)]
+pub struct Memory(Vec<(u64, Value)>);
+
+fn visit(value: &mut Value, place: &[Step], next: &mut u64, change: &mut impl FnMut(&mut Value, u64) -> bool) -> bool {
+    let Some((step, rest)) = place.split_first() else {
+        let draw = *next;
+        *next += DRAWS_PER_VALUE;
+        return change(value, draw);
+    };
+    match (step, value) {
+        (Step::Field(name), Value::Record(record)) => {
+            record.get_mut(name).is_some_and(|field| visit(field, rest, next, change))
+        }
+        (Step::Element(at), Value::List(items)) => {
+            items.get_mut(*at as usize).is_some_and(|item| visit(item, rest, next, change))
+        }
+        (Step::Each, Value::List(items)) => {
+            items.iter_mut().fold(false, |changed, item| visit(item, rest, next, change) | changed)
+        }
+        _ => false,
+    }
+}
+
+fn collect(value: &Value, place: &[Step], next: &mut u64, memory: &mut Memory) {
+    let Some((step, rest)) = place.split_first() else {
+        memory.0.push((*next, value.clone()));
+        *next += DRAWS_PER_VALUE;
+        return;
+    };
+    match (step, value) {
+        (Step::Field(name), Value::Record(record)) => {
+            if let Some(field) = record.get(name) {
+                collect(field, rest, next, memory);
+            }
+        }
+        (Step::Element(at), Value::List(items)) => {
+            if let Some(item) = items.get(*at as usize) {
+                collect(item, rest, next, memory);
+            }
+        }
+        (Step::Each, Value::List(items)) => items.iter().for_each(|item| collect(item, rest, next, memory)),
+        _ => {}
+    }
+}

@@ -1,0 +1,64 @@
+//! Random value: replaces or shifts numbers, points and texts by a fresh uniform draw per message (paper §3.8,
+//! `RandomValueFromSetOperation`).
+
+use sesame_plan::ValueMode;
+
+use crate::fuzz::change::{add, map, put};
+use crate::fuzz::{Draws, Fate, Places};
+use crate::value::{Text, Value};
+
+/// A random value operation on numbers or points, with its sub-ranges.
+#[derive(Debug, Clone)]
+pub struct RandomValue {
+    /// What is changed.
+    pub places: Places,
+    /// Whether the draw replaces the number or is added to it.
+    pub mode: ValueMode,
+    /// Whether draws are whole numbers.
+    pub integer: bool,
+    /// What is drawn from on each axis of a point, in the field's unit; of numbers the first. Both ends are included for
+    /// whole numbers.
+    pub ranges: [(f64, f64); 3],
+}
+
+impl RandomValue {
+    /// Changes the numbers, where the message has them as the space says; whole numbers stay whole. A message that comes
+    /// out as it went in counts as unchanged.
+    pub fn apply(&self, draws: Draws, message: &mut Value) -> Fate {
+        self.places.change(message, |value, first| {
+            let draw = |axis: usize| self.draw(axis, draws.unit(first + axis as u64));
+            match self.mode {
+                ValueMode::Offset => add(value, draw),
+                ValueMode::Absolute => map(value, |axis, _| draw(axis)),
+            }
+        })
+    }
+
+    fn draw(&self, axis: usize, unit: f64) -> f64 {
+        let (low, high) = self.ranges[axis];
+        if self.integer { libm::floor(low + unit * (high - low + 1.0)).min(high) } else { low + unit * (high - low) }
+    }
+}
+
+/// A random value operation on texts.
+#[derive(Debug, Clone)]
+pub struct RandomText {
+    /// What is changed.
+    pub places: Places,
+    /// What is drawn from, each alike; at least one.
+    pub texts: Vec<Text>,
+}
+
+impl RandomText {
+    /// Replaces the texts.
+    pub fn apply(&self, draws: Draws, message: &mut Value) -> Fate {
+        self.places.change(message, |value, first| {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is below their number")]
+            let at = (draws.unit(first) * self.texts.len() as f64) as usize;
+            match (value, self.texts.get(at)) {
+                (Value::Text(text), Some(drawn)) => put(text, drawn.clone()),
+                _ => false,
+            }
+        })
+    }
+}

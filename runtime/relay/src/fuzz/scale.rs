@@ -1,0 +1,25 @@
+//! Scale: multiplies.
+
+use crate::fuzz::change::map;
+use crate::fuzz::{Fate, Places};
+use crate::value::Value;
+
+/// A scale operation.
+#[derive(Debug, Clone)]
+pub struct Scale {
+    /// What is changed.
+    pub places: Places,
+    /// What values are multiplied with.
+    pub factor: f64,
+}
+
+impl Scale {
+    /// Multiplies the values; points coordinate by coordinate.
+    #[expect(clippy::float_cmp, reason = "exactly one changes nothing, not even whole numbers beyond 2^53")]
+    pub fn apply(&self, message: &mut Value) -> Fate {
+        if self.factor == 1.0 {
+            return Fate::Unchanged;
+        }
+        self.places.change(message, |value, _| map(value, |_, x| x * self.factor))
+    }
+}

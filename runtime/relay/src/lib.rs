@@ -1,0 +1,30 @@
+//! One run of one test.
+//!
+//! Messages and simulation time go in, messages and an [`Observation`](sesame_base::observation::Observation) come out.
+//! The core is sans-IO: the [`relay`], the fuzzing operations ([`fuzz`]), the metrics ([`metric`], [`stl`]). Around it
+//! lie the adapters: [`transport`]s reach simulators, [`trace`]s are written to files, and [`evaluate`] puts one run
+//! together.
+
+// These macros panic where nothing can be written: on a full disk, or after the reader has gone.
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+pub mod changed_files;
+#[cfg(feature = "programs")]
+pub mod descendants;
+pub mod evaluate;
+pub mod fuzz;
+#[cfg(any(feature = "process", feature = "mcap"))]
+mod json;
+pub mod message;
+pub mod metric;
+pub mod panic_capture;
+#[cfg(feature = "programs")]
+pub mod process_group;
+pub mod relay;
+pub mod simulator;
+pub mod stl;
+#[cfg(feature = "mcap")]
+pub mod trace;
+pub mod transport;
+pub mod value;
+pub mod wire;

@@ -1,0 +1,288 @@
+//! Declarative metrics during a run: the last value of each input is held, and what the formula says becomes of the values
+//! over time is kept up.
+//!
+//! A formula over one topic is evaluated at each of its messages. One over several is evaluated once per instant of simulation
+//! time at which one of them had a message, when all messages of that instant are known: so it never sees the new value of one
+//! topic beside the old value of another that changes in the same instant. While the last value of an input is not finite, no
+//! formula is evaluated.
+
+use std::collections::BTreeMap;
+
+use sesame_base::time::SimTime;
+use sesame_plan::{Aggregate, CampaignPlan, Formula, Input, Members, TopicId};
+
+use crate::metric::Context;
+use crate::metric::expression::{Held, greatest, holds, least, number};
+use crate::metric::held::{HeldInputs, hear};
+use crate::value::{Text, Value};
+
+/// The most keys of one metric; messages of further ones are not heard, and the run is warned.
+const KEY_LIMIT: usize = 1_000;
+
+/// A formula in one run.
+pub(super) struct FormulaState<'p> {
+    formula: &'p Formula,
+    /// Whether its inputs are of several topics.
+    several: bool,
+    /// All there is without keys; with them, what a new key begins with.
+    common: Stream,
+    keys: BTreeMap<Key, Stream>,
+    /// What the message at hand holds, per input.
+    heard: Vec<(usize, Held)>,
+}
+
+/// A value that tells the messages of a topic apart.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+enum Key {
+    Int(i64),
+    Text(Text),
+}
+
+impl<'p> FormulaState<'p> {
+    /// Before the first message.
+    pub(super) fn new(formula: &'p Formula, plan: &CampaignPlan) -> Self {
+        let held = HeldInputs::new(&formula.inputs, plan);
+        let common = Stream { held, tally: Tally::default(), heard: false, members: Vec::new() };
+        let topics = || formula.inputs.iter().map(|input| input.field.topic);
+        let several = topics().any(|topic| Some(topic) != topics().next());
+        FormulaState { formula, several, common, keys: BTreeMap::new(), heard: Vec::new() }
+    }
+
+    /// A message on the `member`th path of a topic, at the context's time. Whether the formula waits for the end of the
+    /// instant, of which [`FormulaState::settle`] tells it.
+    pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) -> bool {
+        match hear(&self.formula.inputs, topic, value, &mut self.heard) {
+            Ok(true) => {}
+            Ok(false) => context.read_not_finite(),
+            Err(lacking) => {
+                context.note(format!("a message on `{}` has no value `{lacking}`", context.topic));
+                return false;
+            }
+        }
+        let wire = (topic, member);
+        match &self.formula.per {
+            None => {
+                self.common.held.hold(&self.formula.inputs, &self.heard, member);
+                self.common.take(self.formula, wire, self.several, context);
+            }
+            Some(per) if per.topic == topic => {
+                let key = match value.at(&per.path) {
+                    Some(Value::Int(n)) => Key::Int(*n),
+                    Some(Value::Text(text)) => Key::Text(text.clone()),
+                    _ => {
+                        context.note(format!("a message on `{}` has no key `{}`", context.topic, per.path.join(".")));
+                        return false;
+                    }
+                };
+                if self.keys.len() >= KEY_LIMIT && !self.keys.contains_key(&key) {
+                    context.note(format!(
+                        "`per {}` has more than {KEY_LIMIT} values; further ones are not heard",
+                        per.path.join(".")
+                    ));
+                    return false;
+                }
+                let stream = self.keys.entry(key).or_insert_with(|| self.common.clone());
+                stream.held.hold(&self.formula.inputs, &self.heard, member);
+                stream.take(self.formula, wire, self.several, context);
+            }
+            Some(_) => {
+                self.common.held.hold(&self.formula.inputs, &self.heard, member);
+                if self.several {
+                    // A key that begins in this instant counts what came before it in the same.
+                    self.common.take(self.formula, wire, true, context);
+                }
+                for stream in self.keys.values_mut() {
+                    stream.held.hold(&self.formula.inputs, &self.heard, member);
+                    stream.take(self.formula, wire, self.several, context);
+                }
+            }
+        }
+        if !self.several {
+            self.set(context);
+        }
+        self.several
+    }
+
+    /// All messages of the instant at the context's time are known.
+    pub(super) fn settle(&mut self, context: &mut Context) {
+        if self.formula.per.is_none() {
+            self.common.settle(self.formula, context);
+        }
+        self.common.forget();
+        for stream in self.keys.values_mut() {
+            stream.settle(self.formula, context);
+        }
+        self.set(context);
+    }
+
+    /// The value that is certain to count in a run in which every number had been finite: what came after the first that was
+    /// not counts too, unless a rate limit might have left it out.
+    pub(super) fn certain(&self, context: &Context) -> Option<f64> {
+        match (self.formula.every, context.not_finite) {
+            (Some(_), Some((_, before))) => before,
+            _ => context.value,
+        }
+    }
+
+    /// The run has come to its end, at the context's time: what holds has held until now.
+    pub(super) fn end(&mut self, context: &mut Context) {
+        if !matches!(self.formula.aggregate, Aggregate::Duration { .. }) {
+            return;
+        }
+        for tally in std::iter::once(&mut self.common.tally).chain(self.keys.values_mut().map(|it| &mut it.tally)) {
+            if tally.holds_since.is_some() {
+                tally.hold(context.now, false);
+            }
+        }
+        self.set(context);
+    }
+
+    /// The value over all keys: what is counted adds up, the greatest is the greatest, and of all others it is the least.
+    fn set(&self, context: &mut Context) {
+        let tallies = || std::iter::once(&self.common).chain(self.keys.values()).map(|stream| &stream.tally);
+        let values = tallies().filter_map(|tally| tally.value);
+        let value = match self.formula.aggregate {
+            // In whole nanoseconds, so that what held equally long is equal.
+            Aggregate::Duration { .. } => tallies()
+                .filter(|tally| tally.value.is_some())
+                .map(|tally| tally.held)
+                .reduce(|a, b| a + b)
+                .map(SimTime::seconds),
+            Aggregate::Count { .. } => values.reduce(|a, b| a + b),
+            Aggregate::Max { .. } => values.reduce(greatest),
+            Aggregate::Last { .. } | Aggregate::Min { .. } | Aggregate::Mean { .. } => values.reduce(least),
+        };
+        if let Some(value) = value {
+            context.set(value);
+        }
+    }
+}
+
+/// What is held of the inputs, and what has become of the values so far; one for each key.
+#[derive(Clone)]
+struct Stream {
+    held: HeldInputs,
+    tally: Tally,
+    /// Whether a message came in the instant at hand that is still to be taken into account.
+    heard: bool,
+    /// The members of groups it came from, where the formula is that of each: each once, the latest last.
+    members: Vec<(TopicId, usize)>,
+}
+
+impl Stream {
+    /// Takes a message into account whose values are held: now, or when its instant is over.
+    fn take(&mut self, formula: &Formula, wire: (TopicId, usize), wait: bool, context: &mut Context) {
+        if !wait {
+            return self.step(formula, context);
+        }
+        self.heard = true;
+        let each = |input: &Input| input.members == Members::Each && input.field.topic == wire.0;
+        if formula.inputs.iter().any(each) {
+            self.members.retain(|&member| member != wire);
+            self.members.push(wire);
+        }
+    }
+
+    /// The instant is over, and nothing of it is to be taken into account any more.
+    fn forget(&mut self) {
+        self.heard = false;
+        self.members.clear();
+    }
+
+    /// The instant is over: each member of a group that had a message counts, or what is held, where none had.
+    fn settle(&mut self, formula: &Formula, context: &mut Context) {
+        if !std::mem::take(&mut self.heard) {
+            return;
+        }
+        if self.members.is_empty() {
+            return self.step(formula, context);
+        }
+        let mut members = std::mem::take(&mut self.members);
+        for (topic, member) in members.drain(..) {
+            self.held.turn_to(&formula.inputs, topic, member);
+            self.step(formula, context);
+        }
+        self.members = members;
+    }
+
+    /// Takes the values into account as they are now, once all are known.
+    fn step(&mut self, formula: &Formula, context: &mut Context) {
+        let now = context.now;
+        let Some(inputs) = self.held.values() else {
+            // Of what holds while a value is not finite nothing is known.
+            if self.tally.holds_since.is_some() {
+                self.tally.hold(now, false);
+            }
+            return;
+        };
+        let due = |tally: &mut Tally| formula.every.is_none_or(|period| tally.due(now, SimTime::from_seconds(period)));
+        let counts = formula.when.as_ref().is_none_or(|when| holds(when, inputs));
+        let of = match &formula.aggregate {
+            Aggregate::Duration { of } => {
+                return self.tally.hold(now, counts && holds(of, inputs));
+            }
+            Aggregate::Count { of } => {
+                let count = self.tally.value.get_or_insert(0.0);
+                let before = *count;
+                if counts && holds(of, inputs) && due(&mut self.tally) {
+                    self.tally.value = Some(before + 1.0);
+                }
+                return;
+            }
+            Aggregate::Last { of } | Aggregate::Min { of } | Aggregate::Max { of } | Aggregate::Mean { of } => of,
+        };
+        if !counts {
+            return;
+        }
+        let value = number(of, inputs);
+        if !value.is_finite() {
+            context.note(format!("refused the value {value} at {now}"));
+            return;
+        }
+        if due(&mut self.tally) {
+            let tally = &mut self.tally;
+            tally.messages += 1.0;
+            tally.sum += value;
+            tally.value = Some(match (&formula.aggregate, tally.value) {
+                (Aggregate::Min { .. }, Some(before)) => least(before, value),
+                (Aggregate::Max { .. }, Some(before)) => greatest(before, value),
+                (Aggregate::Mean { .. }, _) => tally.sum / tally.messages,
+                _ => value,
+            });
+        }
+    }
+}
+
+/// What has become of a formula's values.
+#[derive(Debug, Clone, Default)]
+struct Tally {
+    value: Option<f64>,
+    /// For a mean.
+    messages: f64,
+    sum: f64,
+    /// When the last message counted.
+    counted: Option<SimTime>,
+    /// For a duration: how long it has held, and since when it does.
+    held: SimTime,
+    holds_since: Option<SimTime>,
+}
+
+impl Tally {
+    /// Whether a message counts that comes now.
+    fn due(&mut self, now: SimTime, period: SimTime) -> bool {
+        let due = self.counted.is_none_or(|counted| now - counted >= period);
+        if due {
+            self.counted = Some(now);
+        }
+        due
+    }
+
+    /// What held before has held until now; whether it does from now on.
+    fn hold(&mut self, now: SimTime, holds: bool) {
+        if let Some(since) = self.holds_since {
+            self.held = self.held + (now - since);
+        }
+        self.holds_since = holds.then_some(now);
+        self.value = Some(self.held.seconds());
+    }
+}

@@ -1,0 +1,387 @@
+//! All metrics of one run: which message goes to which, and what comes out.
+
+use sesame_base::observation::{MetricObservation, Reach};
+use sesame_base::time::SimTime;
+use sesame_plan::stl::Robustness;
+use sesame_plan::{CampaignPlan, Formula, MetricId, MetricSource, Side, Span, TopicId};
+
+use crate::metric::aggregate::FormulaState;
+use crate::metric::robustness::RobustnessState;
+use crate::metric::{Context, Hook, HookEntry};
+use crate::stl::FormulaError;
+use crate::value::{Text, Value};
+use crate::wire::{Wire, WireTable};
+
+/// The metrics of a plan with their wiring; shared by all runs.
+pub struct MetricTable<'p> {
+    plan: &'p CampaignPlan,
+    hooks: Vec<Option<HookEntry>>,
+    /// Per wire: the metrics that want its messages as they were published, with the position of its topic among their
+    /// inputs.
+    taps: Vec<Vec<(usize, usize)>>,
+    /// Per wire: the metrics that want its messages as they are delivered.
+    delivered: Vec<Vec<usize>>,
+    /// Per wire: its path, its topic, and the position among the topic's paths.
+    wires: Vec<(Text, TopicId, usize)>,
+}
+
+/// Why a runner cannot measure what its plan wants.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MetricError {
+    /// A hook that the runner does not have.
+    #[error("metric `{0}` has no hook in this runner: run `sesamec generate` again")]
+    MissingHook(String),
+    /// A temporal formula that is none.
+    #[error("metric `{metric}`: {error}; the plan was not written by sesamec: run `sesamec generate` again")]
+    Formula {
+        /// The metric.
+        metric: String,
+        /// What is wrong with it.
+        error: FormulaError,
+    },
+}
+
+impl<'p> MetricTable<'p> {
+    /// Wires the metrics of a plan to its topics and to the runner's hooks, and checks its temporal formulas.
+    pub fn new(plan: &'p CampaignPlan, wires: &WireTable, hooks: &[HookEntry]) -> Result<Self, MetricError> {
+        let mut found = Vec::with_capacity(plan.metrics.len());
+        let mut taps = vec![Vec::new(); wires.len()];
+        let mut delivered = vec![Vec::new(); wires.len()];
+        for (at, metric) in plan.metrics.iter().enumerate() {
+            let topics: Vec<TopicId> = match &metric.source {
+                MetricSource::Hook { topics } => topics.clone(),
+                MetricSource::FuzzingTime => Vec::new(),
+                MetricSource::Last { input } => vec![input.topic],
+                MetricSource::Robustness { robustness: Robustness { inputs, .. } }
+                | MetricSource::Formula { formula: Formula { inputs, .. } } => {
+                    inputs.iter().map(|input| input.field.topic).collect()
+                }
+            };
+            let outbound = match &metric.source {
+                MetricSource::Robustness { robustness } => robustness.side == Side::Outbound,
+                MetricSource::Formula { formula } => formula.side == Side::Outbound,
+                _ => false,
+            };
+            if let MetricSource::Robustness { robustness } = &metric.source {
+                let refused = |error| MetricError::Formula { metric: metric.name.clone(), error };
+                RobustnessState::new(robustness, plan).map_err(refused)?;
+            }
+            for wire in wires.iter() {
+                let input = topics.iter().position(|&topic| topic == wires.topic(wire));
+                if outbound {
+                    delivered[wire.index()].extend(input.map(|_| at));
+                    continue;
+                }
+                taps[wire.index()].extend(input.map(|input| (at, input)));
+            }
+            found.push(match metric.source {
+                MetricSource::Hook { .. } => {
+                    let entry = hooks.iter().find(|hook| hook.metric == metric.name);
+                    Some(*entry.ok_or_else(|| MetricError::MissingHook(metric.name.clone()))?)
+                }
+                _ => None,
+            });
+        }
+        let mut members = vec![0; plan.topics.len()];
+        let wires = wires.iter().map(|wire| {
+            let topic = wires.topic(wire);
+            let member = members[topic.index()];
+            members[topic.index()] += 1;
+            (Text::from(wires.path(wire)), topic, member)
+        });
+        Ok(MetricTable { plan, hooks: found, taps, delivered, wires: wires.collect() })
+    }
+
+    /// Fresh metrics for one run.
+    pub fn start(&self) -> Metrics<'_> {
+        let states = self
+            .hooks
+            .iter()
+            .zip(&self.plan.metrics)
+            .map(|(hook, metric)| State {
+                hook: hook.map(|hook| (hook.build)()),
+                formula: match &metric.source {
+                    MetricSource::Formula { formula } => Some(FormulaState::new(formula, self.plan)),
+                    _ => None,
+                },
+                robustness: match &metric.source {
+                    MetricSource::Robustness { robustness } => Some(
+                        RobustnessState::new(robustness, self.plan)
+                            .expect("the table was made of formulas that are sound"),
+                    ),
+                    _ => None,
+                },
+                context: Context { trend: metric.trend, ..Context::default() },
+                waits: false,
+                ended: false,
+            })
+            .collect();
+        Metrics { table: self, states, now: SimTime::ZERO, waiting: Vec::new() }
+    }
+}
+
+/// The metrics of one run.
+pub struct Metrics<'p> {
+    table: &'p MetricTable<'p>,
+    states: Vec<State<'p>>,
+    /// The time that was last told.
+    now: SimTime,
+    /// The metrics whose formulas wait for the end of the instant at hand.
+    waiting: Vec<usize>,
+}
+
+struct State<'p> {
+    hook: Option<Box<dyn Hook>>,
+    formula: Option<FormulaState<'p>>,
+    robustness: Option<RobustnessState<'p>>,
+    context: Context,
+    /// Whether it is among those that wait.
+    waits: bool,
+    /// Whether it was told of the end of the run.
+    ended: bool,
+}
+
+impl Metrics<'_> {
+    /// Tells the hooks that the run begins.
+    pub fn begin(&mut self) {
+        for State { hook, context, .. } in &mut self.states {
+            if let Some(hook) = hook {
+                hook.on_start(context);
+            }
+        }
+    }
+
+    /// Time has come to `now`: all messages of the instants before are known. Formulas over several topics have their values of
+    /// those instants from here on, for conditions too. Messages tell their time themselves; whoever weighs conditions, or
+    /// knows that time has passed without a message, calls this first.
+    pub fn follow_time(&mut self, now: SimTime) {
+        if now > self.now {
+            self.settle();
+            self.now = now;
+        }
+    }
+
+    /// The instant at hand is over: all its messages are known. Whether a formula waited for that.
+    pub fn settle(&mut self) -> bool {
+        let waited = !self.waiting.is_empty();
+        for at in self.waiting.drain(..) {
+            let State { formula, context, waits, .. } = &mut self.states[at];
+            *waits = false;
+            context.now = self.now;
+            if let Some(formula) = formula {
+                formula.settle(context);
+            }
+        }
+        waited
+    }
+
+    /// Tells hooks and formulas that the run has come to its end. After a failure nobody does.
+    pub fn end(&mut self, now: SimTime) {
+        self.follow_time(now);
+        self.settle();
+        for State { hook, formula, robustness, context, ended, .. } in &mut self.states {
+            context.now = now;
+            if let Some(formula) = formula {
+                formula.end(context);
+            }
+            if let Some(robustness) = robustness {
+                robustness.end(context);
+            }
+            if let Some(hook) = hook {
+                hook.on_end(context);
+            }
+            *ended = true;
+        }
+    }
+
+    /// A message, as the simulator sent it.
+    pub fn message(&mut self, now: SimTime, wire: Wire, value: &Value) {
+        self.follow_time(now);
+        for &(at, input) in &self.table.taps[wire.index()] {
+            let State { hook, formula, robustness, context, waits, .. } = &mut self.states[at];
+            if let Some(robustness) = robustness {
+                let (path, topic, member) = &self.table.wires[wire.index()];
+                context.now = now;
+                context.topic.clone_from(path);
+                robustness.message(*topic, *member, value, context);
+                continue;
+            }
+            let (path, topic, member) = &self.table.wires[wire.index()];
+            context.now = now;
+            context.topic.clone_from(path);
+            match (&self.table.plan.metrics[at].source, hook, formula) {
+                (MetricSource::Hook { .. }, Some(hook), _) => {
+                    let accepts = self.table.plan.metrics[at].accepts_not_finite || context.not_finite.is_some();
+                    if !accepts && !value.is_finite() {
+                        context.read_not_finite();
+                    }
+                    hook.on_message(input, value, context);
+                }
+                (MetricSource::Formula { .. }, _, Some(formula)) => {
+                    let wait = formula.message(*topic, *member, value, context);
+                    if wait && !std::mem::replace(waits, true) {
+                        self.waiting.push(at);
+                    }
+                }
+                (MetricSource::Last { input }, ..) => match value.number_at(&input.path) {
+                    Some(number) if number.is_finite() => context.set(number),
+                    Some(_) => context.read_not_finite(),
+                    None => context.note(format!(
+                        "a message on `{}` has no number `{}`",
+                        context.topic,
+                        input.path.join(".")
+                    )),
+                },
+                _ => {}
+            }
+        }
+    }
+
+    /// The value that a metric has for conditions at this moment: its last one, or its initial one before that. The fuzzing
+    /// time so far, in seconds, is what the relay knows and a metric of it shows.
+    pub fn value(&self, metric: MetricId, fuzzing_time: f64) -> Option<f64> {
+        let declared = self.table.plan.metric(metric);
+        match declared.source {
+            MetricSource::FuzzingTime => Some(fuzzing_time),
+            _ => self.states[metric.index()].context.value.or(declared.initial),
+        }
+    }
+
+    /// Whether messages of this wire, as they are published or as they are delivered, may change this metric.
+    pub(crate) fn hears(&self, metric: MetricId, wire: Wire, side: Side) -> bool {
+        let at = metric.index();
+        match side {
+            Side::Inbound => self.table.taps[wire.index()].iter().any(|&(tapping, _)| tapping == at),
+            Side::Outbound => self.table.delivered[wire.index()].contains(&at),
+        }
+    }
+
+    /// Whether a metric hears this wire's messages as they are delivered.
+    pub(crate) fn delivers(&self, wire: Wire) -> bool {
+        !self.table.delivered[wire.index()].is_empty()
+    }
+
+    /// A message, as it is delivered.
+    pub fn delivered(&mut self, now: SimTime, wire: Wire, value: &Value) {
+        self.follow_time(now);
+        for &at in &self.table.delivered[wire.index()] {
+            let State { formula, robustness, context, waits, .. } = &mut self.states[at];
+            let (path, topic, member) = &self.table.wires[wire.index()];
+            context.now = now;
+            context.topic.clone_from(path);
+            if let Some(formula) = formula
+                && formula.message(*topic, *member, value, context)
+                && !std::mem::replace(waits, true)
+            {
+                self.waiting.push(at);
+            }
+            if let Some(robustness) = robustness {
+                robustness.message(*topic, *member, value, context);
+            }
+        }
+    }
+
+    /// What the run showed, as far as it went: a metric never set takes its default, one whose hook is not filled in has
+    /// no value. Also what the user should know, one line per metric. No hook is called any more.
+    ///
+    /// `busy` has the intervals in which each operation that counts in `fuzzing_time()` was active or held messages back.
+    pub fn finish(mut self, busy: &[Span]) -> (Vec<MetricObservation>, Vec<String>) {
+        let mut warnings = Vec::new();
+        let mut observations = Vec::with_capacity(self.states.len());
+        for (state, metric) in self.states.iter_mut().zip(&self.table.plan.metrics) {
+            let context = &mut state.context;
+            if let Some(robustness) = &mut state.robustness {
+                robustness.break_off(self.now, context);
+            }
+            if matches!(metric.source, MetricSource::FuzzingTime) {
+                for (time, total) in fuzzing_time(busy) {
+                    context.now = time;
+                    context.set(total.seconds());
+                }
+            }
+            warnings.extend(context.problem.take().map(|problem| format!("metric `{}`: {problem}", metric.name)));
+            let set = context.value.is_some();
+            let value = if context.unimplemented { None } else { context.value.or(metric.default) };
+            let set = set && value.is_some();
+            let reach = match (&state.robustness, &state.formula) {
+                _ if context.unimplemented => Reach::ANY,
+                _ if state.ended && context.not_finite.is_none() => Reach::of_whole_run(value),
+                (Some(robustness), _) => robustness.reach(metric.default),
+                (_, Some(formula)) => context.onwards(formula.certain(context)),
+                _ => context.onwards(context.not_finite.map_or(context.value, |(_, before)| before)),
+            };
+            observations.push(MetricObservation {
+                value,
+                set,
+                reach,
+                not_finite: context.not_finite.map(|(time, _)| time.seconds()),
+                series: std::mem::take(&mut context.series),
+            });
+        }
+        (observations, warnings)
+    }
+}
+
+/// The fuzzing time so far, at the end of each interval. It is summed in whole nanoseconds, so that tests which disturbed
+/// equally long are equal, however their intervals lie.
+fn fuzzing_time(busy: &[Span]) -> Vec<(SimTime, SimTime)> {
+    let mut intervals: Vec<(SimTime, SimTime)> =
+        busy.iter().map(|span| (SimTime::from_seconds(span.start), SimTime::from_seconds(span.end))).collect();
+    intervals.sort_by_key(|&(_, end)| end);
+    let mut total = SimTime::ZERO;
+    std::iter::once((SimTime::ZERO, total))
+        .chain(intervals.into_iter().map(|(start, end)| {
+            total = total + (end - start);
+            (end, total)
+        }))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// The last of it, in seconds.
+    fn total(intervals: &[(f64, f64)]) -> f64 {
+        fuzzing_time(&spans(intervals)).last().unwrap().1.seconds()
+    }
+
+    fn spans(intervals: &[(f64, f64)]) -> Vec<Span> {
+        intervals.iter().map(|&(start, end)| Span { start, end }).collect()
+    }
+
+    #[test]
+    fn fuzzing_time_adds_up_over_operations_even_where_they_overlap() {
+        let points = fuzzing_time(&spans(&[(1.0, 5.0), (6.0, 7.0), (2.0, 3.5)]));
+        let points: Vec<(f64, f64)> = points.iter().map(|(time, total)| (time.seconds(), total.seconds())).collect();
+        assert_eq!(points, [(0.0, 0.0), (3.5, 1.5), (5.0, 5.5), (7.0, 6.5)]);
+    }
+
+    proptest! {
+        #[test]
+        fn equal_activity_is_equal_fuzzing_time(
+            mut intervals in prop::collection::vec((0i64..70_000_000_000, 0i64..9_000_000_000), 1..20),
+            moved in prop::collection::vec(0i64..70_000_000_000, 20),
+        ) {
+            let seconds = |intervals: &[(i64, i64)]| {
+                let of = |nanos| SimTime::from_nanos(nanos).seconds();
+                intervals.iter().map(|&(start, length)| (of(start), of(start + length))).collect::<Vec<_>>()
+            };
+            let before = total(&seconds(&intervals));
+            let nanos: i64 = intervals.iter().map(|(_, length)| length).sum();
+            prop_assert_eq!(before, SimTime::from_nanos(nanos).seconds());
+            for (interval, start) in intervals.iter_mut().zip(moved) {
+                interval.0 = start;
+            }
+            prop_assert_eq!(total(&seconds(&intervals)), before);
+        }
+    }
+
+    #[test]
+    fn intervals_that_seconds_cannot_hold_exactly_add_up_all_the_same() {
+        assert_ne!((0.3 - 0.2) + (0.6 - 0.5), 0.2, "floating point would tell them apart");
+        assert_eq!(total(&[(0.2, 0.3), (0.5, 0.6)]), total(&[(0.0, 0.2)]));
+    }
+}

@@ -1,0 +1,367 @@
+//! Metrics that are the robustness of a temporal formula: the values of its signals, held, go to a monitor, and the run's
+//! end tells what comes of them.
+
+use sesame_base::observation::Reach;
+use sesame_base::time::SimTime;
+use sesame_plan::stl::{Formula, Interval, Robustness};
+use sesame_plan::{CampaignPlan, Members, TopicId};
+
+use crate::metric::Context;
+use crate::metric::expression::{Held, least, number};
+use crate::metric::held::{HeldInputs, hear};
+use crate::stl::{FormulaError, Monitor};
+use crate::value::Value;
+
+/// A robustness in one run.
+pub(super) struct RobustnessState<'p> {
+    robustness: &'p Robustness,
+    /// The group of which each member has a formula of its own.
+    each: Option<TopicId>,
+    /// One for each member of that group; one for a formula without.
+    instances: Vec<Instance>,
+    /// When the last message came.
+    last: SimTime,
+    heard: Vec<(usize, Held)>,
+}
+
+struct Instance {
+    held: HeldInputs,
+    /// None once the run is over, or a number was not finite: then there is what came out.
+    monitor: Option<Monitor>,
+    /// None as long as there is a monitor, and where the formula said nothing.
+    said: Option<Said>,
+}
+
+/// What came of one monitor.
+#[derive(Clone, Copy)]
+struct Said {
+    /// The robustness of what was heard; none where the trace had not begun.
+    robustness: Option<f64>,
+    /// The least and the greatest robustness that the whole run may have.
+    reach: (f64, f64),
+}
+
+impl Instance {
+    /// Nothing more is known from `now` on: what was heard is judged up to the `last` message before.
+    fn break_off(&mut self, now: SimTime, last: SimTime) {
+        if let Some(monitor) = self.monitor.take() {
+            let reach = monitor.reach(now);
+            self.said = Some(Said { robustness: monitor.finish(last), reach });
+        }
+    }
+}
+
+impl<'p> RobustnessState<'p> {
+    /// Before the first message. Fails for a formula that the generator would not write.
+    pub(super) fn new(robustness: &'p Robustness, plan: &CampaignPlan) -> Result<Self, FormulaError> {
+        let monitor = Monitor::new(&robustness.formula, robustness.signals.len())?;
+        let monitor = if robustness.whole_windows { monitor.over_whole_windows() } else { monitor };
+        let each = robustness.inputs.iter().find(|input| input.members == Members::Each).map(|input| input.field.topic);
+        let count = each.map_or(1, |topic| plan.topic(topic).paths.len());
+        let instance =
+            || Instance { held: HeldInputs::new(&robustness.inputs, plan), monitor: Some(monitor.clone()), said: None };
+        let instances = (0..count).map(|_| instance()).collect();
+        Ok(RobustnessState { robustness, each, instances, last: SimTime::ZERO, heard: Vec::new() })
+    }
+
+    /// A message on the `member`th path of a topic, at the context's time.
+    pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) {
+        let Robustness { inputs, signals, .. } = self.robustness;
+        match hear(inputs, topic, value, &mut self.heard) {
+            Ok(true) => {}
+            Ok(false) => context.read_not_finite(),
+            Err(lacking) => {
+                context.note(format!("a message on `{}` has no value `{lacking}`", context.topic));
+                return;
+            }
+        }
+        let before = std::mem::replace(&mut self.last, context.now);
+        for (at, instance) in self.instances.iter_mut().enumerate() {
+            let Instance { held, monitor, .. } = instance;
+            // Where each member has a formula, what is said of all of them goes to all, and what is said of one to its own.
+            let own = self.each != Some(topic) || at == member;
+            let mut finite = true;
+            for &(input, value) in &self.heard {
+                if own || inputs[input].members != Members::Each {
+                    finite &= value.iter().all(|x| x.is_finite());
+                    held.hold(inputs, &[(input, value)], member);
+                }
+            }
+            if !finite {
+                instance.break_off(context.now, before);
+                continue;
+            }
+            let (Some(values), Some(monitor)) = (held.values(), monitor) else { continue };
+            for (at, signal) in signals.iter().enumerate() {
+                let value = number(signal, values);
+                // As with other formulas: arithmetic that comes to no number says nothing, and what was known goes on.
+                if value.is_finite() {
+                    monitor.push(context.now, at, value);
+                } else {
+                    context.note(format!("refused the value {value} at {}", context.now));
+                }
+            }
+        }
+    }
+
+    /// The run is over, at the context's time: by how much the formula was kept.
+    pub(super) fn end(&mut self, context: &mut Context) {
+        let end = context.now.max(self.last);
+        for instance in &mut self.instances {
+            if let Some(monitor) = instance.monitor.take() {
+                // One without a trace says nothing of the run, as far as it is known.
+                let robustness = monitor.finish(end);
+                instance.said = robustness.map(|it| Said { robustness, reach: (it, it) });
+            }
+        }
+        self.set(context);
+    }
+
+    fn set(&self, context: &mut Context) {
+        let robustness = self.instances.iter().filter_map(|instance| instance.said?.robustness).reduce(least);
+        match robustness {
+            Some(robustness) if robustness.is_finite() => context.set(robustness),
+            Some(_) => context.note("the run ended before the formula says anything of it".to_owned()),
+            None => {}
+        }
+    }
+
+    /// The run broke off at `now`, and the end was not told: it is judged up to its last message.
+    pub(super) fn break_off(&mut self, now: SimTime, context: &mut Context) {
+        if self.instances.iter().any(|instance| instance.monitor.is_some()) {
+            for instance in &mut self.instances {
+                instance.break_off(now.max(self.last), self.last);
+            }
+            context.now = self.last;
+            self.set(context);
+        }
+    }
+
+    /// The values that it may have at the end of the run, once that is over: of all instances the least counts. Where
+    /// nothing may be left to judge, its default is one of them.
+    pub(super) fn reach(&self, default: Option<f64>) -> Reach {
+        let unset = default.filter(|_| looks_ahead(&self.robustness.formula, self.robustness.whole_windows));
+        let ends = |end: fn((f64, f64)) -> f64| {
+            let ends = self.instances.iter().filter_map(|instance| instance.said).map(|said| end(said.reach));
+            ends.reduce(least).filter(|end| end.is_finite())
+        };
+        let (low, high) = (ends(|reach| reach.0), ends(|reach| reach.1));
+        let with_unset =
+            |end: Option<f64>, join: fn(f64, f64) -> f64| end.map(|end| unset.map_or(end, |it| join(end, it)));
+        Reach { low: with_unset(low, f64::min), high: with_unset(high, f64::max) }
+    }
+}
+
+/// Whether a formula has an interval that may lie behind the end of a run altogether, or where only whole windows count, may be
+/// cut by it, so that nothing is left to judge.
+fn looks_ahead(formula: &Formula, whole: bool) -> bool {
+    let ahead = |interval: &Interval| interval.from > 0.0 || (whole && interval.to.is_some());
+    match formula {
+        Formula::Predicate { .. } => false,
+        Formula::Not { of } => looks_ahead(of, whole),
+        Formula::And { left, right } | Formula::Or { left, right } | Formula::Implies { left, right } => {
+            looks_ahead(left, whole) || looks_ahead(right, whole)
+        }
+        Formula::Always { interval, of } | Formula::Eventually { interval, of } => {
+            ahead(interval) || looks_ahead(of, whole)
+        }
+        Formula::Until { interval, left, right } => {
+            ahead(interval) || looks_ahead(left, whole) || looks_ahead(right, whole)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use sesame_base::observation::MetricObservation;
+    use sesame_plan::testing::plan;
+    use sesame_plan::{Comparison, Expression, FieldRef, Input, MetricSource, Side};
+
+    use super::*;
+    use crate::metric::MetricTable;
+    use crate::value::{Fields, Record};
+    use crate::wire::WireTable;
+
+    /// A message: milliseconds, path, number.
+    type Sent = (i64, usize, f64);
+
+    const PATHS: [&str; 3] = ["arm/command", "zones/Z1", "zones/Z2"];
+
+    fn payload(path: usize, number: f64) -> Value {
+        match path {
+            0 => Value::Real(number),
+            _ => Record::new(&Fields::new(["level"]), vec![Value::Real(number)]).into(),
+        }
+    }
+
+    fn command() -> Input {
+        Input { field: FieldRef { topic: TopicId(0), path: Vec::new() }, members: Members::Min }
+    }
+
+    fn level(members: Members) -> Input {
+        Input { field: FieldRef { topic: TopicId(1), path: vec!["level".into()] }, members }
+    }
+
+    fn above(signal: u32) -> Formula {
+        Formula::Predicate { signal, comparison: Comparison::Above, constant: 0.0 }
+    }
+
+    fn always(of: Formula) -> Formula {
+        Formula::Always { interval: Interval::UNBOUNDED, of: Box::new(of) }
+    }
+
+    fn eventually(from: f64, to: f64, of: Formula) -> Formula {
+        Formula::Eventually { interval: Interval { from, to: Some(to) }, of: Box::new(of) }
+    }
+
+    /// The robustness of a formula the signals of which are the inputs.
+    fn of(inputs: Vec<Input>, formula: Formula) -> Robustness {
+        let signals = (0..inputs.len()).map(|at| Expression::Input(u32::try_from(at).unwrap()));
+        Robustness { signals: signals.collect(), inputs, formula, side: Side::Inbound, whole_windows: false }
+    }
+
+    /// Value and warnings of a run that ends at this time in milliseconds, or breaks off after its last message.
+    fn measured(robustness: Robustness, sent: &[Sent], end: Option<i64>) -> (Option<f64>, Vec<String>) {
+        let (observed, warnings) = observed(robustness, sent, end);
+        (observed.value, warnings)
+    }
+
+    fn observed(robustness: Robustness, sent: &[Sent], end: Option<i64>) -> (MetricObservation, Vec<String>) {
+        let mut plan = plan(Vec::new());
+        plan.metrics.truncate(1);
+        plan.metrics[0].source = MetricSource::Robustness { robustness };
+        let wires = WireTable::new(&plan);
+        let table = MetricTable::new(&plan, &wires, &[]).unwrap();
+        let mut metrics = table.start();
+        metrics.begin();
+        for &(time, path, number) in sent {
+            let wire = wires.find(PATHS[path]).unwrap();
+            metrics.message(SimTime::from_nanos(time * 1_000_000), wire, &payload(path, number));
+        }
+        if let Some(end) = end {
+            metrics.end(SimTime::from_nanos(end * 1_000_000));
+        }
+        let (mut observed, warnings) = metrics.finish(&[]);
+        (observed.remove(0), warnings)
+    }
+
+    fn value(robustness: Robustness, sent: &[Sent]) -> Option<f64> {
+        measured(robustness, sent, Some(10_000)).0
+    }
+
+    #[test]
+    fn a_signal_of_two_topics_jumps_once_where_both_do() {
+        let apart = Expression::Sum(vec![Expression::Input(0), Expression::Negate(Box::new(Expression::Input(1)))]);
+        let mut robustness = of(vec![command(), level(Members::Min)], always(above(0)));
+        robustness.signals = vec![apart];
+        // Between the two messages at 100 ms the difference is 1, for no time at all.
+        let sent = [(0, 0, 9.0), (0, 1, 4.0), (100, 0, 5.0), (100, 1, -1.0)];
+        assert_eq!(value(robustness, &sent), Some(5.0));
+    }
+
+    #[test]
+    fn nothing_is_judged_before_every_topic_had_a_message() {
+        let both = || {
+            let both = Formula::And { left: Box::new(above(0)), right: Box::new(above(1)) };
+            of(vec![command(), level(Members::Min)], always(both))
+        };
+        assert_eq!(value(both(), &[(0, 0, -9.0), (100, 0, 3.0), (200, 1, 7.0)]), Some(3.0));
+        assert_eq!(value(both(), &[(0, 0, -9.0), (100, 0, 3.0)]), None);
+    }
+
+    #[test]
+    fn a_group_is_its_minimum_or_each_member_has_a_formula_of_its_own() {
+        let soon = |members| of(vec![level(members)], always(eventually(0.0, 1.0, above(0))));
+        // Each zone is left by one of them at any time, but both are clear at one time only for a moment.
+        let sent = [(0, 1, 4.0), (0, 2, -2.0), (5_000, 1, -3.0), (5_000, 2, 6.0), (9_900, 2, 1.0)];
+        assert_eq!(value(soon(Members::Max), &sent), Some(1.0));
+        assert_eq!(value(soon(Members::Min), &sent), Some(-3.0));
+        assert_eq!(value(soon(Members::Each), &sent), Some(-3.0));
+        let turns = [
+            (0, 1, 4.0),
+            (0, 2, -2.0),
+            (500, 1, -3.0),
+            (500, 2, 6.0),
+            (1_000, 1, 4.0),
+            (1_000, 2, -2.0),
+            (1_500, 2, 6.0),
+        ];
+        assert_eq!(value(soon(Members::Min), &turns), Some(-2.0));
+        assert_eq!(value(soon(Members::Each), &turns), Some(4.0));
+    }
+
+    #[test]
+    fn a_run_that_breaks_off_is_judged_up_to_its_last_message() {
+        let robustness = || of(vec![level(Members::Min)], always(above(0)));
+        assert_eq!(measured(robustness(), &[(0, 1, 4.0), (100, 1, -2.0)], None).0, Some(-2.0));
+        let answer = || of(vec![level(Members::Min)], eventually(2.0, 3.0, above(0)));
+        assert_eq!(measured(answer(), &[(0, 1, 4.0), (2_000, 1, 1.0)], None).0, Some(1.0));
+    }
+
+    #[test]
+    fn what_the_run_was_too_short_for_is_not_set_and_said() {
+        let late = of(vec![level(Members::Min)], eventually(20.0, 30.0, above(0)));
+        let (value, warnings) = measured(late, &[(0, 1, 4.0)], Some(10_000));
+        assert_eq!(value, None);
+        assert_eq!(warnings, ["metric `fuzzing_time`: the run ended before the formula says anything of it"]);
+    }
+
+    #[test]
+    fn from_a_value_that_is_not_finite_on_a_formula_is_judged_as_if_the_run_had_broken_off() {
+        let robustness = |members| of(vec![level(members)], always(above(0)));
+        let stream = [(0, 1, 4.0), (100, 1, f64::NAN), (200, 1, -3.0)];
+        let gap = observed(robustness(Members::Min), &stream, Some(300)).0;
+        assert_eq!((gap.value, gap.not_finite), (Some(4.0), Some(0.1)));
+        assert_eq!(gap.reach, Reach { low: None, high: Some(4.0) });
+        let violated = observed(robustness(Members::Min), &[(0, 1, -1.0), (100, 1, f64::NAN)], Some(300)).0;
+        assert_eq!(violated.reach, Reach { low: None, high: Some(-1.0) });
+        // The other member goes on.
+        let stream = [(0, 1, 4.0), (0, 2, 5.0), (100, 1, f64::NAN), (200, 2, -3.0)];
+        let each = observed(robustness(Members::Each), &stream, Some(300)).0;
+        assert_eq!((each.value, each.reach), (Some(-3.0), Reach { low: None, high: Some(-3.0) }));
+    }
+
+    #[test]
+    fn after_a_run_that_broke_off_the_reach_is_what_no_continuation_can_leave() {
+        let reach = |formula, end| {
+            observed(of(vec![level(Members::Min)], formula), &[(0, 1, 4.0), (100, 1, -2.0)], end).0.reach
+        };
+        assert_eq!(reach(always(above(0)), Some(300)), Reach::only(-2.0));
+        // The instant of the last message is not over as long as nobody says so.
+        assert_eq!(reach(always(above(0)), None), Reach { low: None, high: Some(4.0) });
+        assert_eq!(reach(eventually(0.0, 5.0, above(0)), None), Reach { low: Some(4.0), high: None });
+        assert_eq!(reach(eventually(2.0, 5.0, above(0)), None), Reach::ANY);
+    }
+
+    #[test]
+    fn a_formula_that_no_generator_writes_is_refused_before_any_run() {
+        let mut plan = plan(Vec::new());
+        let robustness = of(vec![command()], always(above(7)));
+        plan.metrics[0].source = MetricSource::Robustness { robustness };
+        let refused = MetricTable::new(&plan, &WireTable::new(&plan), &[]).err().unwrap().to_string();
+        assert!(refused.starts_with("metric `fuzzing_time`: the formula names signal 7 of 1"), "{refused}");
+    }
+
+    proptest! {
+        // With each message at a time of its own, the least over time is the least over messages.
+        #[test]
+        fn always_is_the_least_of_all_messages(
+            steps in proptest::collection::vec((1..300i64, 1..3usize, -9..9i32), 1..30),
+        ) {
+            let mut now = 0;
+            let sent: Vec<Sent> = steps
+                .into_iter()
+                .map(|(step, path, number)| {
+                    now += step;
+                    (now, path, f64::from(number))
+                })
+                .collect();
+            let least = sent.iter().map(|sent| sent.2).reduce(f64::min);
+            for members in [Members::Min, Members::Each] {
+                prop_assert_eq!(value(of(vec![level(members)], always(above(0))), &sent), least);
+            }
+        }
+    }
+}

@@ -1,0 +1,668 @@
+//! The relay: the man in the middle, for one run of one test.
+//!
+//! Sans-IO. Messages and time go in, deliveries come out; a transport feeds it and carries out what it says. Within one
+//! event the order is: due releases, inbound metrics, conditions, operations (the triggering message included), outbound
+//! metrics, then delivery. A message on a wire that no operation of the test touches is handed on as it came.
+//!
+//! Conditions are weighed when a metric that they read may have changed: after the inbound metrics of a message and
+//! before its operations, once a message is through, and when an instant is over, for what is known only then. They are
+//! weighed at edges too, and when the fuzzing time comes to a number that it is compared with. To weigh the same values
+//! again changes nothing, so no message that a condition does not read, and no step of time, switches an operation. A test
+//! without conditions pays nothing for them.
+//!
+//! What an operation does to a message has an effect only where somebody hears the message's wire: a subscriber, or an
+//! outbound metric. What it does on other wires is counted apart.
+
+mod fuzzing_time;
+mod release;
+mod tap;
+
+use release::{Held, ReleaseQueue, Why};
+
+use sesame_base::activation::{Activity, Edge, TICK};
+use sesame_base::observation::{Counters, OperationEffect};
+use sesame_base::time::SimTime;
+use sesame_plan::condition::Operand;
+use sesame_plan::{CampaignPlan, Copies, Drain, Moment, OperationId, Side, Span, Test, TopicId};
+
+use crate::changed_files::ChangedFiles;
+use crate::fuzz::{ChoiceError, Disturbance, Draws, Encounter, Fate, OperationEntry, RunContext};
+use crate::metric::Metrics;
+use crate::value::Value;
+use crate::wire::{Wire, WireTable};
+
+pub use tap::{Deed, Tap, Touched};
+
+/// A message that is to reach its subscribers now.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Delivery {
+    /// On which wire.
+    pub wire: Wire,
+    /// What.
+    pub value: Value,
+}
+
+/// The relay as a transport sees it.
+pub trait Exchange {
+    /// The wires it knows; messages of other topics are none of its business.
+    fn wires(&self) -> &WireTable;
+    /// Whether messages of this wire must pass through it, because an operation may disturb them.
+    fn intercepts(&self, wire: Wire) -> bool;
+    /// From now on the simulator subscribes to this wire, so that what is done to its messages has an effect.
+    fn subscribed(&mut self, wire: Wire);
+    /// Time has come to `now`; it never goes back.
+    fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>);
+    /// A message was published at `now`.
+    fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>);
+}
+
+/// The most messages that operations may hold back at once; beyond it, the oldest is let go early and the run warned.
+pub const HELD_LIMIT: usize = 100_000;
+
+/// The most copies that operations may make in one event; beyond it, no more are made and the run is warned.
+pub const COPIES_LIMIT: u32 = 10_000;
+
+/// The relay of one run.
+pub struct Relay<'a> {
+    wires: &'a WireTable,
+    operations: Vec<Stage>,
+    /// Their positions by priority, then declaration.
+    order: Vec<usize>,
+    /// Per wire: the stages a message passes, in order, with the wire's position in the operation's topic.
+    pipelines: Vec<Vec<(usize, u64)>>,
+    /// Per wire: messages published so far.
+    published: Vec<u64>,
+    queue: ReleaseQueue,
+    metrics: Metrics<'a>,
+    /// Per wire: whether somebody hears it.
+    heard: Vec<bool>,
+    /// The topics that operations of the plan act on, whether this test has them or not.
+    acted_on: Vec<TopicId>,
+    conditions: Conditions,
+    /// The instant at hand.
+    now: SimTime,
+    phase: Phase,
+    messages: u64,
+    overflowed: bool,
+    /// Copies made in the event at hand.
+    copies: u32,
+    flooded: bool,
+    tap: Option<&'a mut dyn Tap>,
+}
+
+/// What switches operations by condition.
+struct Conditions {
+    /// The operations that conditions switch.
+    operations: Vec<usize>,
+    /// Those of them that have just gone off; here so that weighing does not allocate.
+    ended: Vec<usize>,
+    /// Per wire: whether a condition reads a metric of its messages as they are published.
+    read: Vec<bool>,
+    /// Whether a condition reads a metric of messages as they are delivered.
+    reads_delivered: bool,
+    /// What conditions compare the fuzzing time with.
+    compared: Vec<Operand>,
+    /// Whether copies of one operation wait for each other.
+    apart: bool,
+}
+
+/// How far a run is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// Nothing has happened, not even the edges at time zero.
+    New,
+    Running,
+    /// Nothing is delivered any more.
+    Over,
+}
+
+/// One operation of the test.
+struct Stage {
+    operation: OperationId,
+    name: String,
+    disturbance: Disturbance,
+    /// Whether it has to hear messages while it is off.
+    listens: bool,
+    holds_order: bool,
+    activity: Activity,
+    /// When it last went on.
+    since: SimTime,
+    draw_seed: u64,
+    /// Whether it counts in `fuzzing_time()`.
+    timed: bool,
+    /// Since when it holds messages back without being active.
+    tail_since: Option<SimTime>,
+    /// When it did so before.
+    tails: Vec<(SimTime, SimTime)>,
+    counters: Counters,
+    first_touch: Option<SimTime>,
+    last_touch: Option<SimTime>,
+}
+
+impl Stage {
+    /// Counts what it did to so many messages on a wire that somebody hears, or nobody.
+    fn count(&mut self, heard: bool, now: SimTime, messages: u64, count: impl FnOnce(&mut Counters) -> &mut u64) {
+        if messages == 0 {
+            return;
+        }
+        if !heard {
+            self.counters.unheard += messages;
+            return;
+        }
+        *count(&mut self.counters) += messages;
+        self.first_touch.get_or_insert(now);
+        self.last_touch = Some(now);
+    }
+}
+
+impl<'a> Relay<'a> {
+    /// A relay for a test of this plan, at time zero.
+    pub fn new(
+        plan: &CampaignPlan,
+        wires: &'a WireTable,
+        test: &Test,
+        metrics: Metrics<'a>,
+        hooks: &[OperationEntry],
+    ) -> Result<Self, ChoiceError> {
+        let mut order: Vec<usize> = (0..test.operations.len()).collect();
+        order.sort_by_key(|&at| {
+            let id = test.operations[at].operation;
+            (std::cmp::Reverse(plan.operation(id).priority), id, at)
+        });
+        let mut operations = Vec::with_capacity(test.operations.len());
+        for choice in &test.operations {
+            let operation = plan.operation(choice.operation);
+            let disturbance = Disturbance::new(operation, choice, hooks)?;
+            operations.push(Stage {
+                operation: choice.operation,
+                name: operation.name.clone(),
+                listens: disturbance.listens(),
+                holds_order: disturbance.holds_order(),
+                disturbance,
+                activity: Activity::new(&choice.activation, operation.within),
+                since: SimTime::ZERO,
+                draw_seed: choice.draw_seed,
+                timed: operation.timed,
+                tail_since: None,
+                tails: Vec::new(),
+                counters: Counters::default(),
+                first_touch: None,
+                last_touch: None,
+            });
+        }
+        let mut pipelines = vec![Vec::new(); wires.len()];
+        let mut members = vec![0u64; plan.topics.len()];
+        for wire in wires.iter() {
+            let topic = wires.topic(wire);
+            let member = members[topic.index()];
+            members[topic.index()] += 1;
+            let touched =
+                order.iter().filter(|&&at| plan.operation(test.operations[at].operation).topic == Some(topic));
+            pipelines[wire.index()].extend(touched.map(|&at| (at, member)));
+        }
+        let conditional = (0..operations.len()).filter(|&at| operations[at].activity.is_conditional()).collect();
+        let (variables, compared) = fuzzing_time::read_by(plan, test);
+        let reads = |wire, side| variables.iter().any(|&metric| metrics.hears(metric, wire, side));
+        Ok(Relay {
+            wires,
+            heard: wires.iter().map(|wire| metrics.delivers(wire)).collect(),
+            acted_on: plan.operations.iter().filter_map(|operation| operation.topic).collect(),
+            conditions: Conditions {
+                ended: Vec::with_capacity(operations.len()),
+                operations: conditional,
+                read: wires.iter().map(|wire| reads(wire, Side::Inbound)).collect(),
+                reads_delivered: wires.iter().any(|wire| reads(wire, Side::Outbound)),
+                compared,
+                apart: plan.campaign.copies != Copies::MayOverlap,
+            },
+            phase: Phase::New,
+            operations,
+            order,
+            pipelines,
+            published: vec![0; wires.len()],
+            queue: ReleaseQueue::new(test.operations.len(), wires.len()),
+            metrics,
+            now: SimTime::ZERO,
+            messages: 0,
+            overflowed: false,
+            copies: 0,
+            flooded: false,
+            tap: None,
+        })
+    }
+
+    /// The same relay, telling this tap what happens.
+    pub fn tapped(self, tap: &'a mut dyn Tap) -> Self {
+        Relay { tap: Some(tap), ..self }
+    }
+
+    /// The same relay with a simulator that subscribes to everything.
+    #[cfg(test)]
+    pub(crate) fn heard_everywhere(mut self) -> Self {
+        self.heard.fill(true);
+        self
+    }
+
+    fn tell(&mut self, now: SimTime, operation: usize, deed: Deed) {
+        if let Some(tap) = &mut self.tap {
+            tap.operated(now, operation, deed);
+        }
+    }
+
+    /// Tells the metrics' hooks that the run begins.
+    pub fn begin(&mut self) {
+        self.metrics.begin();
+    }
+
+    /// Tells the metrics that the run has come to its end.
+    pub fn end(&mut self, now: SimTime) {
+        self.metrics.end(now);
+    }
+
+    /// Closes the books at `end`, where the run ended or broke off: what is still held is lost, open intervals are closed.
+    pub fn finish(mut self, end: SimTime) -> Finished {
+        self.begin_time();
+        self.phase = Phase::Over;
+        self.follow_time(end, &mut Vec::new());
+        // Whether a message came at the end or not: what a metric may still come to is asked for this time.
+        self.metrics.follow_time(end);
+        let operations: Vec<OperationEffect> = self
+            .operations
+            .iter()
+            .map(|stage| OperationEffect {
+                intervals: stage.activity.intervals(end),
+                tails: stage.tails(end),
+                counters: stage.counters,
+                first_touch: stage.first_touch.map(SimTime::seconds),
+                last_touch: stage.last_touch.map(SimTime::seconds),
+            })
+            .collect();
+        let timed = self.operations.iter().zip(&operations).filter(|(stage, _)| stage.timed);
+        let busy: Vec<Span> = timed.flat_map(|(_, operation)| operation.busy()).collect();
+        let (metrics, mut warnings) = self.metrics.finish(&busy);
+        for stage in &self.operations {
+            if let Disturbance::Custom(custom) = &stage.disturbance
+                && let Some(mismatch) = &custom.mismatch
+            {
+                warnings.push(format!("operation `{}`: {mismatch}", stage.name));
+            }
+        }
+        if self.overflowed {
+            warnings
+                .push(format!("more than {HELD_LIMIT} messages were held back at once; the oldest were let go early"));
+        }
+        if self.flooded {
+            warnings.push(format!("copies of copies: more than {COPIES_LIMIT} in one event are not made"));
+        }
+        let unheard = self
+            .wires
+            .iter()
+            .filter(|&wire| !self.heard[wire.index()] && self.acted_on.contains(&self.wires.topic(wire)))
+            .map(|wire| self.wires.path(wire).to_owned())
+            .collect();
+        Finished { operations, unheard, metrics, warnings, messages: self.messages }
+    }
+
+    /// Carries out, in order of time, every activation edge and every release up to `now`; at one instant edges come
+    /// first, since an operation is active for `start <= t < end`.
+    fn follow_time(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
+        self.begin_time();
+        loop {
+            self.release_due(deliveries);
+            if self.now >= now {
+                return;
+            }
+            self.leave();
+            let edges = self.operations.iter().filter_map(|stage| stage.activity.next_edge());
+            let moments = edges.chain(self.queue.next_release()).chain(self.next_comparison());
+            let Some(moment) = moments.min().filter(|&moment| moment <= now) else {
+                self.now = now;
+                self.metrics.follow_time(now);
+                return;
+            };
+            self.now = moment;
+            self.metrics.follow_time(moment);
+            self.arrive();
+        }
+    }
+
+    /// Carries out the edges at time zero, once.
+    fn begin_time(&mut self) {
+        if self.phase == Phase::New {
+            self.phase = Phase::Running;
+            self.arrive();
+        }
+    }
+
+    /// What an instant begins with, if something is due then: its edges.
+    fn arrive(&mut self) {
+        for at in 0..self.operations.len() {
+            match self.operations[at].activity.follow(self.now) {
+                Edge::None => {}
+                Edge::Started => self.begin_activity(at, self.now),
+                Edge::Ended => self.end_activity(at, self.now),
+            }
+        }
+        self.weigh_conditions();
+    }
+
+    /// What an instant ends with, once time moves on: values that are known only now. What they switch on or off, they do a
+    /// nanosecond later, since the instant they are of is over.
+    fn leave(&mut self) {
+        if self.metrics.settle() {
+            self.now = self.now + TICK;
+            self.metrics.follow_time(self.now);
+        }
+        self.weigh_conditions();
+    }
+
+    /// Weighs the conditions of all operations on the same values: first which go off, then which go on, so that one may
+    /// begin where its copy ends.
+    fn weigh_conditions(&mut self) {
+        if self.conditions.operations.is_empty() {
+            return;
+        }
+        let now = self.now;
+        loop {
+            let fuzzing_time = self.fuzzing_time().seconds();
+            let metrics = &self.metrics;
+            let value = |metric| metrics.value(metric, fuzzing_time);
+            for &at in &self.conditions.operations {
+                if self.operations[at].activity.weigh_end(now, &value) == Edge::Ended {
+                    self.conditions.ended.push(at);
+                }
+            }
+            for next in 0..self.conditions.operations.len() {
+                let at = self.conditions.operations[next];
+                let free = !self.conditions.apart || !self.copy_is_active(at);
+                let value = |metric| self.metrics.value(metric, fuzzing_time);
+                if self.operations[at].activity.weigh_start(now, free, &value) == Edge::Started {
+                    self.begin_activity(at, now);
+                }
+            }
+            if self.conditions.ended.is_empty() {
+                return;
+            }
+            for next in 0..self.conditions.ended.len() {
+                self.end_activity(self.conditions.ended[next], now);
+            }
+            self.conditions.ended.clear();
+        }
+    }
+
+    /// Lets go of what is due: each message by itself, since conditions may read what is delivered.
+    fn release_due(&mut self, deliveries: &mut Vec<Delivery>) {
+        while self.queue.next_release().is_some_and(|release| release <= self.now) {
+            if let Some(held) = self.release() {
+                self.pass(self.now, held, deliveries);
+                if self.conditions.reads_delivered {
+                    self.weigh_conditions();
+                }
+            }
+        }
+    }
+
+    /// Whether another copy of this operation is active.
+    fn copy_is_active(&self, at: usize) -> bool {
+        let operation = self.operations[at].operation;
+        let others = self.operations.iter().enumerate().filter(|&(other, _)| other != at);
+        others.into_iter().any(|(_, stage)| stage.operation == operation && stage.activity.is_active())
+    }
+
+    /// The next message that is held back, due or not, taken out of the queue.
+    fn release(&mut self) -> Option<Held> {
+        let (operation, held) = self.queue.pop()?;
+        if self.queue.holds(operation) == 0 {
+            self.operations[operation].end_tail(self.now);
+        }
+        Some(held)
+    }
+
+    /// What happens when an operation goes on: it begins afresh.
+    fn begin_activity(&mut self, at: usize, now: SimTime) {
+        let stage = &mut self.operations[at];
+        stage.since = now;
+        stage.end_tail(now);
+        stage.disturbance.begin();
+        self.tell(now, at, Deed::Started);
+    }
+
+    /// What happens when an operation goes off: it is told, and the messages it holds become what they are to become.
+    fn end_activity(&mut self, at: usize, now: SimTime) {
+        self.tell(now, at, Deed::Ended);
+        match self.operations[at].disturbance.drain() {
+            None | Some(Drain::Finish) => {}
+            Some(Drain::Flush) => return self.queue.release_all(at, now),
+            Some(Drain::Drop) => {
+                let lost = self.queue.take_all(at);
+                let counters = &mut self.operations[at].counters;
+                for (why, _) in &lost {
+                    match why {
+                        Why::Delayed => counters.delayed -= 1,
+                        Why::Queued => counters.queued -= 1,
+                        Why::Unheard => continue,
+                    }
+                    counters.dropped += 1;
+                }
+                for (_, held) in lost {
+                    self.tell(now, at, Deed::Dropped(held.touched()));
+                }
+            }
+        }
+        if self.queue.holds(at) > 0 {
+            self.operations[at].tail_since = Some(now);
+        }
+    }
+
+    /// Takes a message through the rest of its pipeline.
+    fn pass(&mut self, now: SimTime, mut message: Held, deliveries: &mut Vec<Delivery>) {
+        while let Some(&(at, member)) = self.pipelines[message.wire.index()].get(message.next_stage) {
+            message.next_stage += 1;
+            let heard = self.heard[message.wire.index()];
+            let stage = &mut self.operations[at];
+            let queued_until = if stage.holds_order { self.queue.last_release(at, message.wire) } else { None };
+            let active = stage.activity.is_active();
+            if active {
+                stage.counters.seen += 1;
+            } else if stage.listens {
+                stage.disturbance.overhear(now, member, &message.value);
+            }
+            if active && matches!(stage.disturbance, Disturbance::Custom(_)) {
+                return self.pass_custom(now, at, member, message, deliveries);
+            }
+            let fate = if active {
+                let draws = Draws::new(stage.draw_seed, member, message.index);
+                let encounter = Encounter { now, active: now - stage.since, member, draws };
+                stage.disturbance.apply(encounter, &mut message.value)
+            } else {
+                Fate::Unchanged
+            };
+            if let Fate::Duplicated(copies) = fate {
+                return self.pass_copies(now, at, message, copies, deliveries);
+            }
+            let release = match fate {
+                Fate::Delayed(delay) => now + delay,
+                _ => now,
+            }
+            .max(queued_until.unwrap_or(now));
+            if fate == Fate::Dropped {
+                stage.count(heard, now, 1, |counters| &mut counters.dropped);
+                self.tell(now, at, Deed::Dropped(message.touched()));
+                return;
+            }
+            if fate == Fate::Changed {
+                stage.count(heard, now, 1, |counters| &mut counters.changed);
+                self.tell(now, at, Deed::Changed(message.touched()));
+            }
+            if release > now {
+                let stage = &mut self.operations[at];
+                let why = match (heard, active) {
+                    (false, _) => Why::Unheard,
+                    (true, true) => Why::Delayed,
+                    (true, false) => Why::Queued,
+                };
+                stage.count(
+                    heard,
+                    now,
+                    1,
+                    |counters| if active { &mut counters.delayed } else { &mut counters.queued },
+                );
+                self.tell(now, at, Deed::Delayed(message.touched(), release));
+                self.queue.push(release, at, why, message);
+                if self.queue.len() > HELD_LIMIT {
+                    self.overflowed = true;
+                    if let Some(oldest) = self.release() {
+                        self.pass(now, oldest, deliveries);
+                    }
+                }
+                return;
+            }
+        }
+        if self.phase != Phase::Over {
+            self.metrics.delivered(now, message.wire, &message.value);
+            if let Some(tap) = &mut self.tap {
+                tap.delivered(now, message.wire, message.published, &message.value);
+            }
+        }
+        deliveries.push(Delivery { wire: message.wire, value: message.value });
+    }
+}
+
+/// What the user's code does.
+impl Relay<'_> {
+    /// Calls the custom operations of the test before the start, or those after the end, in priority, then declaration
+    /// order. The error says which could not do what.
+    pub fn beside_run(&mut self, moment: Moment, files: &mut ChangedFiles) -> Result<(), String> {
+        for at in self.order.clone() {
+            let stage = &mut self.operations[at];
+            let Disturbance::Custom(custom) = &mut stage.disturbance else { continue };
+            if custom.moment != moment {
+                continue;
+            }
+            let mut ctx = RunContext::new(files, Draws::new(stage.draw_seed, 0, 0));
+            custom.hook.beside_run(&mut ctx);
+            stage.counters.side_effects += ctx.side_effects;
+            if let Some(failure) = ctx.failure {
+                return Err(format!("operation `{}`: {failure}", stage.name));
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes a message through a custom operation and on, then what the operation made up.
+    fn pass_custom(&mut self, now: SimTime, at: usize, member: u64, mut message: Held, deliveries: &mut Vec<Delivery>) {
+        let heard = self.heard[message.wire.index()];
+        let stage = &mut self.operations[at];
+        let Disturbance::Custom(custom) = &mut stage.disturbance else {
+            unreachable!("only custom operations come here")
+        };
+        let draws = Draws::new(stage.draw_seed, member, message.index);
+        let call = custom.on_message(now, self.wires.path(message.wire), draws, &mut message.value);
+        stage.count(heard, now, call.injected.len() as u64, |counters| &mut counters.injected);
+        stage.count(heard, now, u64::from(call.changed && !call.dropped), |counters| &mut counters.changed);
+        stage.count(heard, now, u64::from(call.dropped), |counters| &mut counters.dropped);
+        if call.dropped {
+            self.tell(now, at, Deed::Dropped(message.touched()));
+        } else if call.changed {
+            self.tell(now, at, Deed::Changed(message.touched()));
+        }
+        for _ in &call.injected {
+            self.tell(now, at, Deed::Injected(message.touched()));
+        }
+        let injected = (0u64..).zip(call.injected);
+        let injected: Vec<Held> = injected.map(|(number, value)| message.beside(at, number, value)).collect();
+        if !call.dropped {
+            self.pass(now, message, deliveries);
+        }
+        for message in injected {
+            self.pass(now, message, deliveries);
+        }
+    }
+}
+
+/// Copies of messages.
+impl Relay<'_> {
+    /// Takes a message on, then copies of it: as many as the operation makes, and no more than one event may bring.
+    fn pass_copies(&mut self, now: SimTime, at: usize, message: Held, copies: u32, deliveries: &mut Vec<Delivery>) {
+        let room = COPIES_LIMIT - self.copies;
+        self.flooded |= copies > room;
+        let copies = copies.min(room);
+        self.copies += copies;
+        let heard = self.heard[message.wire.index()];
+        self.operations[at].count(heard, now, u64::from(copies), |counters| &mut counters.injected);
+        let made: Vec<Held> =
+            (0..u64::from(copies)).map(|number| message.beside(at, number, message.value.clone())).collect();
+        for copy in &made {
+            self.tell(now, at, Deed::Injected(copy.touched()));
+        }
+        self.pass(now, message, deliveries);
+        for copy in made {
+            self.pass(now, copy, deliveries);
+        }
+    }
+}
+
+impl Exchange for Relay<'_> {
+    fn wires(&self) -> &WireTable {
+        self.wires
+    }
+
+    fn intercepts(&self, wire: Wire) -> bool {
+        !self.pipelines[wire.index()].is_empty()
+    }
+
+    fn subscribed(&mut self, wire: Wire) {
+        self.heard[wire.index()] = true;
+    }
+
+    fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
+        self.copies = 0;
+        self.follow_time(now, deliveries);
+    }
+
+    fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>) {
+        if now > self.now || self.phase == Phase::New {
+            self.follow_time(now, deliveries);
+        }
+        self.messages += 1;
+        self.copies = 0;
+        let index = self.published[wire.index()];
+        self.published[wire.index()] += 1;
+        if let Some(tap) = &mut self.tap {
+            tap.published(self.now, wire, index, &value);
+        }
+        self.metrics.message(self.now, wire, &value);
+        if self.conditions.read[wire.index()] {
+            self.weigh_conditions();
+            self.release_due(deliveries);
+        }
+        self.pass(self.now, Held { wire, published: index, index, value, next_stage: 0 }, deliveries);
+        if self.conditions.reads_delivered {
+            self.weigh_conditions();
+            self.release_due(deliveries);
+        }
+    }
+}
+
+/// What a run left behind.
+pub struct Finished {
+    /// Per operation of the test, in its order.
+    pub operations: Vec<OperationEffect>,
+    /// Names on the wire that operations of the plan act on and nobody heard, in order of declaration.
+    pub unheard: Vec<String>,
+    /// Per metric of the plan.
+    pub metrics: Vec<sesame_base::observation::MetricObservation>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// Messages handled.
+    pub messages: u64,
+}
+
+#[cfg(test)]
+mod activations;
+#[cfg(test)]
+mod behaviour;
+#[cfg(test)]
+mod matrix;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,145 @@
+//! The time in which operations disturb: how much of it has passed, and when it comes to what conditions compare it with.
+//!
+//! It grows while an operation is active and while it still holds messages back. A condition over it changes between two
+//! events, so the relay computes when, to the nanosecond, instead of looking at every event.
+
+use sesame_base::time::SimTime;
+use sesame_plan::condition::{Condition, Operand};
+use sesame_plan::{Activation, CampaignPlan, MetricId, MetricSource, Span, Test};
+
+use crate::relay::{Relay, Stage};
+
+impl Stage {
+    /// How long it has disturbed until now.
+    fn busy_time(&self, now: SimTime) -> SimTime {
+        let tails = self.tails.iter().copied().chain(self.tail_since.map(|since| (since, now)));
+        tails.fold(self.activity.active_time(now), |sum, (from, to)| sum + (to - from))
+    }
+
+    fn is_busy(&self) -> bool {
+        self.activity.is_active() || self.tail_since.is_some()
+    }
+
+    /// It holds nothing back any more, or is active again.
+    pub(super) fn end_tail(&mut self, now: SimTime) {
+        if let Some(since) = self.tail_since.take().filter(|&since| since < now) {
+            self.tails.push((since, now));
+        }
+    }
+
+    /// When it held messages back without being active, in seconds, clipped to a run that ended at `end`.
+    pub(super) fn tails(&self, end: SimTime) -> Vec<Span> {
+        let all = self.tails.iter().copied().chain(self.tail_since.map(|since| (since, end)));
+        let clipped = all.map(|(from, to)| (from, to.min(end))).filter(|(from, to)| from < to);
+        clipped.map(|(from, to)| Span { start: from.seconds(), end: to.seconds() }).collect()
+    }
+}
+
+impl Relay<'_> {
+    /// The time in which operations that count in `fuzzing_time()` have disturbed until now, added up.
+    pub(super) fn fuzzing_time(&self) -> SimTime {
+        let timed = self.operations.iter().filter(|stage| stage.timed);
+        timed.fold(SimTime::ZERO, |sum, stage| sum + stage.busy_time(self.now))
+    }
+
+    /// When the fuzzing time next comes to a number that a condition compares it with, or goes beyond it, if nothing else
+    /// happens before.
+    pub(super) fn next_comparison(&self) -> Option<SimTime> {
+        if self.conditions.compared.is_empty() {
+            return None;
+        }
+        let busy = self.operations.iter().filter(|stage| stage.timed && stage.is_busy()).count();
+        let pace = i64::try_from(busy).ok().filter(|&pace| pace > 0)?;
+        let total = self.fuzzing_time().nanos();
+        let numbers = self.conditions.compared.iter().filter_map(|operand| match *operand {
+            Operand::Number(number) => Some(number),
+            Operand::Variable(metric) => self.metrics.value(metric, 0.0),
+        });
+        let marks = numbers.flat_map(|number| [reaching(number), beyond(number)]).filter(|&mark| mark > total);
+        // The least number of nanoseconds after which so many operations have added up enough.
+        marks.min().map(|mark| self.now + SimTime::from_nanos((mark - total - 1) / pace + 1))
+    }
+}
+
+/// The first nanosecond whose seconds are at least this number.
+fn reaching(number: f64) -> i64 {
+    first(number, |seconds| seconds >= number)
+}
+
+/// The first nanosecond whose seconds are above this number.
+fn beyond(number: f64) -> i64 {
+    first(number, |seconds| seconds > number)
+}
+
+/// The first nanosecond near a number of seconds for which something holds that goes on to hold.
+fn first(number: f64, holds: impl Fn(f64) -> bool) -> i64 {
+    // Even the largest times lie closer together than this when they are rounded to seconds.
+    const NEAR: i64 = 1 << 12;
+    let near = SimTime::from_seconds(number).nanos();
+    let (mut low, mut high) = (near.saturating_sub(NEAR), near.saturating_add(NEAR));
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if holds(SimTime::from_nanos(middle).seconds()) {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    low
+}
+
+/// The metrics that conditions of a test read, and what they compare the fuzzing time with.
+pub(super) fn read_by(plan: &CampaignPlan, test: &Test) -> (Vec<MetricId>, Vec<Operand>) {
+    let (mut variables, mut compared) = (Vec::new(), Vec::new());
+    for operation in &test.operations {
+        match &operation.activation {
+            Activation::Condition { start, end, .. } => {
+                collect(plan, start, &mut variables, &mut compared);
+                collect(plan, end, &mut variables, &mut compared);
+            }
+            Activation::ConditionFor { start, .. } => collect(plan, start, &mut variables, &mut compared),
+            Activation::Time { .. } | Activation::Offline => {}
+        }
+    }
+    (variables, compared)
+}
+
+fn collect(plan: &CampaignPlan, condition: &Condition, variables: &mut Vec<MetricId>, compared: &mut Vec<Operand>) {
+    match condition {
+        Condition::Compare { left, right, .. } => {
+            let is_fuzzing_time = |operand: Operand| match operand {
+                Operand::Variable(metric) => matches!(plan.metric(metric).source, MetricSource::FuzzingTime),
+                Operand::Number(_) => false,
+            };
+            for (one, other) in [(*left, *right), (*right, *left)] {
+                if let Operand::Variable(metric) = one {
+                    variables.push(metric);
+                }
+                if is_fuzzing_time(one) && !is_fuzzing_time(other) {
+                    compared.push(other);
+                }
+            }
+        }
+        Condition::And(a, b) | Condition::Or(a, b) => {
+            collect(plan, a, variables, compared);
+            collect(plan, b, variables, compared);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn the_first_nanosecond_is_the_first(number in prop_oneof![0.0..100.0f64, (0i64..2000).prop_map(|n| n as f64 * 0.05)]) {
+            let seconds = |nanos| SimTime::from_nanos(nanos).seconds();
+            let (reached, passed) = (reaching(number), beyond(number));
+            prop_assert!(seconds(reached) >= number && seconds(reached - 1) < number);
+            prop_assert!(seconds(passed) > number && seconds(passed - 1) <= number);
+        }
+    }
+}

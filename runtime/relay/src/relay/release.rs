@@ -1,0 +1,161 @@
+//! The release queue: messages that latency holds back, let go by time, then in the order they were held.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use sesame_base::time::SimTime;
+use sesame_rng::derive_seed;
+
+use crate::relay::Touched;
+use crate::value::Value;
+use crate::wire::Wire;
+
+/// A message on its way through its pipeline.
+#[derive(Debug)]
+pub(super) struct Held {
+    pub(super) wire: Wire,
+    /// Its index among the messages published on its wire; of an injected one, that of the message it came with.
+    pub(super) published: u64,
+    /// What its draws are keyed by: its index, or of an injected one a number of its own.
+    pub(super) index: u64,
+    pub(super) value: Value,
+    /// The position in its wire's pipeline at which it goes on.
+    pub(super) next_stage: usize,
+}
+
+impl Held {
+    /// Which message it is, for a tap.
+    pub(super) fn touched(&self) -> Touched {
+        Touched { wire: self.wire, index: self.published }
+    }
+
+    /// A message that an operation makes up beside this one, its `number`th. It goes on where this one does, with an index
+    /// of its own, so that later operations draw for it apart from this one.
+    pub(super) fn beside(&self, operation: usize, number: u64, value: Value) -> Held {
+        let index = derive_seed(self.index, "injected", &[operation as u64, number]);
+        Held { wire: self.wire, published: self.published, index, value, next_stage: self.next_stage }
+    }
+}
+
+/// Why a message is held back, as far as it is counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Why {
+    /// The operation delays it.
+    Delayed,
+    /// The operation is off, and it waits behind messages that are held.
+    Queued,
+    /// Either, on a wire that nobody hears.
+    Unheard,
+}
+
+struct Entry {
+    release: SimTime,
+    sequence: u64,
+    operation: usize,
+    why: Why,
+    message: Held,
+}
+
+impl Entry {
+    fn key(&self) -> (SimTime, u64) {
+        (self.release, self.sequence)
+    }
+}
+
+impl PartialEq for Entry {
+    fn eq(&self, other: &Self) -> bool {
+        self.key() == other.key()
+    }
+}
+impl Eq for Entry {}
+impl PartialOrd for Entry {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Entry {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.key().cmp(&other.key())
+    }
+}
+
+#[derive(Default)]
+pub(super) struct ReleaseQueue {
+    heap: BinaryHeap<Reverse<Entry>>,
+    sequence: u64,
+    /// Per operation and wire: how many are held, and when the last of them goes.
+    tails: Vec<Vec<Tail>>,
+    /// Per operation: how many are held on all wires.
+    held: Vec<usize>,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Tail {
+    held: usize,
+    last: SimTime,
+}
+
+impl ReleaseQueue {
+    pub(super) fn new(operations: usize, wires: usize) -> Self {
+        ReleaseQueue {
+            tails: vec![vec![Tail::default(); wires]; operations],
+            held: vec![0; operations],
+            ..ReleaseQueue::default()
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.heap.len()
+    }
+
+    /// How many messages an operation holds.
+    pub(super) fn holds(&self, operation: usize) -> usize {
+        self.held[operation]
+    }
+
+    /// When the last message that an operation holds on a wire goes; `None` when it holds none.
+    pub(super) fn last_release(&self, operation: usize, wire: Wire) -> Option<SimTime> {
+        let tail = self.tails[operation][wire.index()];
+        (tail.held > 0).then_some(tail.last)
+    }
+
+    pub(super) fn push(&mut self, release: SimTime, operation: usize, why: Why, message: Held) {
+        self.held[operation] += 1;
+        let tail = &mut self.tails[operation][message.wire.index()];
+        tail.held += 1;
+        tail.last = release;
+        self.sequence += 1;
+        self.heap.push(Reverse(Entry { release, sequence: self.sequence, operation, why, message }));
+    }
+
+    /// When the next message is due.
+    pub(super) fn next_release(&self) -> Option<SimTime> {
+        self.heap.peek().map(|entry| entry.0.release)
+    }
+
+    /// The next message, due or not, with the operation that held it.
+    pub(super) fn pop(&mut self) -> Option<(usize, Held)> {
+        let Reverse(entry) = self.heap.pop()?;
+        self.tails[entry.operation][entry.message.wire.index()].held -= 1;
+        self.held[entry.operation] -= 1;
+        Some((entry.operation, entry.message))
+    }
+
+    /// Makes everything that an operation holds due now, in the order in which it would have gone.
+    pub(super) fn release_all(&mut self, operation: usize, now: SimTime) {
+        for (why, message) in self.take_all(operation) {
+            self.push(now, operation, why, message);
+        }
+    }
+
+    /// Everything an operation holds, in the order it would have gone.
+    pub(super) fn take_all(&mut self, operation: usize) -> Vec<(Why, Held)> {
+        let (mut taken, kept): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.heap).into_vec().into_iter().partition(|entry| entry.0.operation == operation);
+        self.heap = kept.into();
+        self.tails[operation].fill(Tail::default());
+        self.held[operation] = 0;
+        taken.sort_unstable_by_key(|entry| entry.0.key());
+        taken.into_iter().map(|Reverse(entry)| (entry.why, entry.message)).collect()
+    }
+}

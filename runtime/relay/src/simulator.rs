@@ -1,0 +1,112 @@
+//! What a simulator written in Rust implements to run inside the runner (`simulator … = in_process "crate::Type"`).
+//!
+//! The simulator is a small distributed system in one type: its parts talk over named topics through a [`Bus`], and
+//! never around it. The relay sits inside the bus. A message that one part publishes is disturbed, if a test says so,
+//! and is there for its subscribers in the same step: a relay that changes nothing adds no step.
+
+use sesame_base::time::SimTime;
+
+use crate::value::Value;
+
+/// A simulator that is stepped in lock-step with the relay.
+///
+/// It must be deterministic: the same seed and the same received messages give the same published messages. All state
+/// belongs to the value, since several may exist at once; a new one is started for each test.
+pub trait Simulator: Sized {
+    /// Builds the world at time zero and opens its topics on the bus. It may publish first messages.
+    fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError>;
+
+    /// Advances the world by one step of [`Setup::step`]; afterwards the world is at [`Bus::now`].
+    fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError>;
+}
+
+/// What a simulator is told when it is started.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// Seed of the simulator's own randomness. It differs from test to test only where a campaign asks for it.
+    pub seed: u64,
+    /// Length of one step.
+    pub step: SimTime,
+}
+
+/// Whether there is more to simulate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Progress {
+    /// The world goes on.
+    Running,
+    /// The scenario has come to its own end; the test ends here.
+    Ended,
+}
+
+/// What went wrong in a simulator, in words for the user.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct SimulatorError(pub String);
+
+/// A topic opened on a bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Port(pub(crate) usize);
+
+/// The simulator's side of the message bus.
+///
+/// ```
+/// # use sesame_runtime::simulator::{Bus, Port};
+/// # fn controller(_: f64) -> f64 { 0.0 }
+/// struct Joint { command: Port, target: f64 }
+///
+/// impl Joint {
+///     fn open(bus: &mut Bus<'_>) -> Joint {
+///         let command = bus.open("arm/joint1/position");
+///         bus.subscribe(command);
+///         Joint { command, target: 0.0 }
+///     }
+///     fn step(&mut self, bus: &mut Bus<'_>) {
+///         bus.publish(self.command, controller(bus.now().seconds()));   // the controller's side
+///         while let Some(message) = bus.receive(self.command) {          // the joint's side, through the relay
+///             self.target = message.number_at::<&str>(&[]).unwrap_or(self.target);
+///         }
+///     }
+/// }
+/// ```
+pub struct Bus<'a> {
+    pub(crate) now: SimTime,
+    pub(crate) wires: &'a mut dyn Wires,
+}
+
+impl Bus<'_> {
+    /// Opens a topic by its name on the wire. Opening it again gives the same port. Topics that the space does not
+    /// name work just the same; nobody observes or disturbs them.
+    pub fn open(&mut self, path: &str) -> Port {
+        self.wires.open(path)
+    }
+
+    /// Says that messages of this topic are received here; without it they are not kept.
+    pub fn subscribe(&mut self, port: Port) {
+        self.wires.subscribe(port);
+    }
+
+    /// Publishes a message at the present time.
+    pub fn publish(&mut self, port: Port, value: impl Into<Value>) {
+        self.wires.publish(self.now, port, value.into());
+    }
+
+    /// The next message that has reached the subscribers of this topic.
+    pub fn receive(&mut self, port: Port) -> Option<Value> {
+        self.wires.receive(port)
+    }
+
+    /// The present: the time at the end of the step being simulated.
+    pub fn now(&self) -> SimTime {
+        self.now
+    }
+}
+
+/// What carries a bus: the in-process transport with its relay, or a plain loopback in a simulator's own tests.
+pub(crate) trait Wires {
+    fn open(&mut self, path: &str) -> Port;
+    fn subscribe(&mut self, port: Port);
+    fn publish(&mut self, now: SimTime, port: Port, value: Value);
+    fn receive(&mut self, port: Port) -> Option<Value>;
+}
+
+pub mod bench;

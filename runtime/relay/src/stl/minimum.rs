@@ -1,0 +1,81 @@
+//! The least value in a sliding window, on a monotonic deque (Lemire, "Streaming maximum-minimum filter using no more
+//! than three comparisons per element", 2006) of pieces instead of single elements.
+
+use std::collections::VecDeque;
+
+use crate::stl::piece::{Piece, Span, Window, put};
+
+/// The minimum of a signal over a window, at each time of a span. Constant time per piece, amortised: a piece enters
+/// and leaves the deque once.
+#[derive(Debug, Clone)]
+pub(super) struct SlidingMinimum {
+    window: Window,
+    /// The next time to be told, and the end of all that is asked.
+    asked: Span,
+    /// Values in strictly rising order: each is the least from the end of the one before it on.
+    rising: VecDeque<Piece>,
+}
+
+impl SlidingMinimum {
+    pub(super) fn new(window: Window, asked: Span) -> Self {
+        SlidingMinimum { window, asked, rising: VecDeque::new() }
+    }
+
+    /// Takes the next piece of the signal, and tells what follows for the minimum.
+    pub(super) fn push(&mut self, piece: Piece, out: &mut VecDeque<Piece>) {
+        if piece.end <= self.asked.start.saturating_add(self.window.from) {
+            return;
+        }
+        while self.rising.back().is_some_and(|last| last.value >= piece.value) {
+            self.rising.pop_back();
+        }
+        // A last value that is in every window still asked for hides all greater ones behind it.
+        let in_all = self.asked.end.saturating_add(self.window.from);
+        if self.rising.back().is_none_or(|last| last.end < in_all) {
+            self.rising.push_back(piece);
+        }
+        if let Some(to) = self.window.to {
+            self.tell(piece.end.saturating_sub(to), out);
+        }
+    }
+
+    /// Tells the rest for a trace of this length.
+    pub(super) fn finish(&mut self, length: i64, out: &mut VecDeque<Piece>) {
+        self.tell(length, out);
+    }
+
+    /// Whether the window has an end.
+    pub(super) fn is_bounded(&self) -> bool {
+        self.window.to.is_some()
+    }
+
+    /// Tells the rest of the times whose windows are not empty, of a signal that ends here. A window that has an end is whole, and
+    /// told, or does not count.
+    pub(super) fn finish_whole(&mut self, end: i64, out: &mut VecDeque<Piece>) {
+        if !self.is_bounded() {
+            self.tell(end.saturating_sub(self.window.from), out);
+        }
+    }
+
+    /// Tells the minimum for the times before `end`, the windows of which are known.
+    fn tell(&mut self, end: i64, out: &mut VecDeque<Piece>) {
+        let end = end.min(self.asked.end);
+        while self.asked.start < end {
+            let window_start = self.asked.start.saturating_add(self.window.from);
+            while self.rising.front().is_some_and(|first| first.end <= window_start) {
+                self.rising.pop_front();
+            }
+            let least = match self.rising.front() {
+                Some(first) => Piece { end: end.min(first.end - self.window.from), value: first.value },
+                None => Piece { end, value: f64::INFINITY },
+            };
+            put(out, least.end, least.value);
+            self.asked.start = least.end;
+        }
+    }
+
+    #[cfg(test)]
+    pub(super) fn held(&self) -> usize {
+        self.rising.len()
+    }
+}

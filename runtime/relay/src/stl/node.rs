@@ -1,0 +1,277 @@
+//! A formula as a tree of operators, each of which turns the robustness signals of its parts into its own.
+//!
+//! There are five kinds; the others follow by duality, which is exact, since negating a floating-point number is.
+
+use std::collections::VecDeque;
+
+use sesame_base::time::SimTime;
+use sesame_plan::Comparison;
+use sesame_plan::stl::{Formula, Interval};
+
+use crate::stl::FormulaError;
+use crate::stl::minimum::SlidingMinimum;
+use crate::stl::piece::{Pair, Piece, Span, Window, put};
+use crate::stl::until::SlidingUntil;
+
+/// The next part of the trace, on which no signal changes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stretch {
+    /// Where it ends, excluded.
+    pub(super) end: i64,
+    /// Whether the trace ends there too.
+    pub(super) last: bool,
+    /// Where nothing is known of the signals: what stands for the robustness of their predicates, negative or positive
+    /// infinity.
+    pub(super) unknown: Option<f64>,
+    /// Whether only windows count that lie in the trace as a whole.
+    pub(super) whole: bool,
+}
+
+impl Stretch {
+    /// The same for what is negated.
+    fn negated(self) -> Self {
+        Stretch { unknown: self.unknown.map(|extreme| -extreme), ..self }
+    }
+
+    /// Whether windows are cut here. Where nothing is known the trace goes on for ever, and has no end to cut them.
+    fn cuts(self) -> bool {
+        self.last && !self.whole && self.unknown.is_none()
+    }
+
+    /// What stands for all that depends on where the trace will end, where only whole windows count and nothing is known: the
+    /// end decides what belongs to the formula at all.
+    fn undecided(self) -> Option<f64> {
+        self.unknown.filter(|_| self.whole)
+    }
+}
+
+/// An operator, and what of it is asked.
+#[derive(Debug, Clone)]
+pub(super) struct Node {
+    asked: Span,
+    /// Up to where its robustness has been told.
+    told: i64,
+    operator: Operator,
+}
+
+#[derive(Debug, Clone)]
+enum Operator {
+    Predicate { signal: usize, comparison: Comparison, constant: f64 },
+    Not { of: Box<Node>, input: VecDeque<Piece> },
+    And { left: Box<Node>, right: Box<Node>, input: Pair },
+    Always { of: Box<Node>, input: VecDeque<Piece>, minimum: SlidingMinimum },
+    Until(Box<Until>),
+}
+
+/// `left until right` is computed as two parts that both hold: `left` holds up to the beginning of the window, and from
+/// there on it is an `until` with a window that begins at once.
+#[derive(Debug, Clone)]
+struct Until {
+    left: Node,
+    right: Node,
+    /// What came from the left.
+    lead: VecDeque<Piece>,
+    /// Both sides, from the beginning of the first window on.
+    input: Pair,
+    /// How far ahead the window begins.
+    delay: i64,
+    before: SlidingMinimum,
+    within: SlidingUntil,
+    /// The second part, at the times of its windows' beginnings.
+    ahead: VecDeque<Piece>,
+    /// Both parts.
+    parts: Pair,
+}
+
+impl Node {
+    /// The operators of a formula of which a span is asked. Marks the signals it names.
+    pub(super) fn new(formula: &Formula, asked: Span, used: &mut [bool]) -> Result<Self, FormulaError> {
+        let operator = match formula {
+            &Formula::Predicate { signal, comparison, constant } => {
+                if !constant.is_finite() {
+                    return Err(FormulaError::Constant { signal, constant });
+                }
+                let count = used.len();
+                let index = signal as usize;
+                *used.get_mut(index).ok_or(FormulaError::Signal { signal, count })? = true;
+                Operator::Predicate { signal: index, comparison, constant }
+            }
+            Formula::Not { of } => return Ok(Node::new(of, asked, used)?.negated()),
+            Formula::And { left, right } => and(Node::new(left, asked, used)?, Node::new(right, asked, used)?),
+            Formula::Or { left, right } => {
+                let (left, right) = (Node::new(left, asked, used)?, Node::new(right, asked, used)?);
+                return Ok(Node::of(asked, and(left.negated(), right.negated())).negated());
+            }
+            Formula::Implies { left, right } => {
+                let (left, right) = (Node::new(left, asked, used)?, Node::new(right, asked, used)?);
+                return Ok(Node::of(asked, and(left, right.negated())).negated());
+            }
+            Formula::Always { interval, of } => {
+                let window = window(*interval)?;
+                always(window, asked, Node::new(of, asked.seen_through(window), used)?)
+            }
+            Formula::Eventually { interval, of } => {
+                let window = window(*interval)?;
+                let of = Node::new(of, asked.seen_through(window), used)?;
+                return Ok(Node::of(asked, always(window, asked, of.negated())).negated());
+            }
+            Formula::Until { interval, left, right } => {
+                let window = window(*interval)?;
+                let seen = asked.seen_through(window);
+                let delay = Window { from: window.from, to: Some(window.from) };
+                Operator::Until(Box::new(Until {
+                    left: Node::new(left, Span { start: asked.start, end: seen.end }, used)?,
+                    right: Node::new(right, seen, used)?,
+                    lead: VecDeque::new(),
+                    input: Pair::default(),
+                    delay: window.from,
+                    before: SlidingMinimum::new(Window { from: 0, to: Some(window.from) }, asked),
+                    within: SlidingUntil::new(window.to.map(|to| to - window.from), asked.seen_through(delay)),
+                    ahead: VecDeque::new(),
+                    parts: Pair::default(),
+                }))
+            }
+        };
+        Ok(Node::of(asked, operator))
+    }
+
+    fn of(asked: Span, operator: Operator) -> Self {
+        Node { asked, told: asked.start, operator }
+    }
+
+    /// Its negation; that of a negation is what was negated.
+    fn negated(self) -> Self {
+        match self.operator {
+            Operator::Not { of, .. } => *of,
+            _ => Node::of(self.asked, Operator::Not { of: Box::new(self), input: VecDeque::new() }),
+        }
+    }
+
+    /// Follows the trace, on which the signals have these values, and tells what becomes known of the robustness.
+    pub(super) fn extend(&mut self, stretch: Stretch, values: &[f64], out: &mut VecDeque<Piece>) {
+        if self.told >= self.asked.end {
+            return;
+        }
+        match &mut self.operator {
+            &mut Operator::Predicate { signal, comparison, constant } => {
+                if stretch.end > self.told {
+                    let known = || margin(values[signal], comparison, constant);
+                    put(out, stretch.end, stretch.unknown.unwrap_or_else(known));
+                }
+            }
+            Operator::Not { of, input } => {
+                of.extend(stretch.negated(), values, input);
+                for piece in input.drain(..) {
+                    put(out, piece.end, -piece.value);
+                }
+            }
+            Operator::And { left, right, input } => {
+                left.extend(stretch, values, &mut input.left);
+                right.extend(stretch, values, &mut input.right);
+                let undecided = |value: &f64| Some(*value) == stretch.undecided();
+                while let Some((end, left, right)) = input.pop() {
+                    put(out, end, [left, right].into_iter().find(undecided).unwrap_or(left.min(right)));
+                }
+            }
+            Operator::Always { of, input, minimum } => {
+                if let Some(extreme) = stretch.undecided().filter(|_| minimum.is_bounded()) {
+                    put(out, stretch.end, extreme);
+                } else {
+                    of.extend(stretch, values, input);
+                    for piece in input.drain(..) {
+                        minimum.push(piece, out);
+                    }
+                    if stretch.cuts() {
+                        minimum.finish(stretch.end, out);
+                    } else if stretch.last {
+                        minimum.finish_whole(of.told, out);
+                    }
+                }
+            }
+            Operator::Until(until) => until.extend(stretch, values, out),
+        }
+        if let Some(last) = out.back() {
+            self.told = self.told.max(last.end);
+        }
+    }
+
+    /// How many pieces are held in all queues.
+    #[cfg(test)]
+    pub(super) fn held(&self) -> usize {
+        let pair = |pair: &Pair| pair.left.len() + pair.right.len();
+        match &self.operator {
+            Operator::Predicate { .. } => 0,
+            Operator::Not { of, input } => of.held() + input.len(),
+            Operator::And { left, right, input } => left.held() + right.held() + pair(input),
+            Operator::Always { of, input, minimum } => of.held() + input.len() + minimum.held(),
+            Operator::Until(until) => {
+                let Until { left, right, lead, input, before, within, ahead, parts, .. } = &**until;
+                let queues = lead.len() + pair(input) + before.held() + within.held() + ahead.len() + pair(parts);
+                left.held() + right.held() + queues
+            }
+        }
+    }
+}
+
+impl Until {
+    fn extend(&mut self, stretch: Stretch, values: &[f64], out: &mut VecDeque<Piece>) {
+        // Even without an end of its window it has no robustness before something is known of both sides.
+        if let Some(extreme) = stretch.undecided() {
+            return put(out, stretch.end, extreme);
+        }
+        self.left.extend(stretch, values, &mut self.lead);
+        for piece in self.lead.drain(..) {
+            self.before.push(piece, &mut self.parts.left);
+            if self.within.asks(piece.end) {
+                put(&mut self.input.left, piece.end, piece.value);
+            }
+        }
+        self.right.extend(stretch, values, &mut self.input.right);
+        while let Some((end, left, right)) = self.input.pop() {
+            self.within.push(end, left, right, &mut self.ahead);
+        }
+        if stretch.cuts() {
+            self.before.finish(stretch.end, &mut self.parts.left);
+            self.within.finish(stretch.end.saturating_add(self.delay), &mut self.ahead);
+        } else if stretch.last && !self.within.is_bounded() {
+            self.within.finish(self.left.told.min(self.right.told), &mut self.ahead);
+        }
+        for piece in self.ahead.drain(..) {
+            put(&mut self.parts.right, piece.end - self.delay, piece.value);
+        }
+        while let Some((end, before, within)) = self.parts.pop() {
+            put(out, end, before.min(within));
+        }
+    }
+}
+
+fn and(left: Node, right: Node) -> Operator {
+    Operator::And { left: Box::new(left), right: Box::new(right), input: Pair::default() }
+}
+
+fn always(window: Window, asked: Span, of: Node) -> Operator {
+    Operator::Always { of: Box::new(of), input: VecDeque::new(), minimum: SlidingMinimum::new(window, asked) }
+}
+
+fn window(interval: Interval) -> Result<Window, FormulaError> {
+    let Interval { from, to } = interval;
+    let sound = from.is_finite() && from >= 0.0 && to.is_none_or(|to| to.is_finite() && to >= from);
+    if !sound {
+        return Err(FormulaError::Interval { from, to: to.unwrap_or(f64::INFINITY) });
+    }
+    let nanos = |seconds| SimTime::from_seconds(seconds).nanos();
+    Ok(Window { from: nanos(from), to: to.map(nanos) })
+}
+
+/// By how much a value keeps a comparison; never NaN.
+fn margin(value: f64, comparison: Comparison, constant: f64) -> f64 {
+    if value.is_nan() {
+        return f64::NEG_INFINITY;
+    }
+    match comparison {
+        Comparison::Above | Comparison::AtLeast => value - constant,
+        Comparison::Below | Comparison::AtMost => constant - value,
+        Comparison::Equal => -(value - constant).abs(),
+        Comparison::NotEqual => (value - constant).abs(),
+    }
+}

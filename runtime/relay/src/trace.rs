@@ -1,0 +1,130 @@
+//! Traces: the messages of one run and what operations did to them, in a file of the MCAP format.
+//!
+//! A trace holds every message as it was published, on a channel of its topic's name; where an operation of the
+//! campaign may touch a topic, also every message as it was delivered, on a channel `TOPIC/delivered`. The operations'
+//! activity is on `sesame/operations`, the change points of each metric on `sesame/metrics/NAME`. Everything is JSON
+//! with a JSON Schema, numbers exact, at simulation time in nanoseconds. A metadata record `sesame` says which run it
+//! is, a metadata record `sesame.run` how it ended.
+//!
+//! A trace is written while the test runs, under a name that nobody takes for a trace, and gets its own name when it
+//! is complete. Of a run whose process died what was written until then is saved.
+
+mod recording;
+mod records;
+mod salvage;
+mod schema;
+mod writer;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use mcap::McapError;
+use mcap::records::Metadata;
+
+use sesame_base::observation::{Observation, Outcome};
+use sesame_plan::{CampaignPlan, Test};
+
+pub use recording::{Fed, RecordedMetric, RecordedRun, RecordingError, feed};
+pub use salvage::salvage;
+pub use writer::TraceWriter;
+
+/// Name of the metadata record that says which run a trace is of.
+const SUBJECT: &str = "sesame";
+
+/// Name of the metadata record that says how the run ended.
+const RUN: &str = "sesame.run";
+
+/// Key of a channel's metadata that says what it carries: one of the `ROLE_…`.
+const ROLE: &str = "sesame_role";
+const ROLE_PUBLISHED: &str = "published";
+const ROLE_DELIVERED: &str = "delivered";
+const ROLE_OPERATIONS: &str = "operations";
+const ROLE_METRIC: &str = "metric";
+
+/// Which run a trace is of.
+#[derive(Debug, Clone, Copy)]
+pub struct Subject<'a> {
+    /// Its campaign.
+    pub plan: &'a CampaignPlan,
+    /// The test's number.
+    pub number: u32,
+    /// The test.
+    pub test: &'a Test,
+    /// Seed of the simulator's own randomness.
+    pub simulator_seed: u64,
+}
+
+impl Subject<'_> {
+    fn metadata(&self) -> Metadata {
+        let Subject { plan, number, test, simulator_seed } = *self;
+        let json = |value: serde_json::Result<String>| value.expect("plans and tests are plain data with text keys");
+        let entries = [
+            ("runtime", env!("CARGO_PKG_VERSION").to_owned()),
+            ("space", plan.space.clone()),
+            ("campaign", plan.campaign.name.clone()),
+            ("test", format!("T{number}")),
+            ("simulator_seed", simulator_seed.to_string()),
+            ("definition", json(serde_json::to_string(test))),
+            ("plan", json(serde_json::to_string(plan))),
+        ];
+        Metadata { name: SUBJECT.to_owned(), metadata: owned(entries) }
+    }
+}
+
+/// How a run ended. The series of its metrics are on their channels.
+fn ending(plan: &CampaignPlan, observation: &Observation) -> Metadata {
+    let metrics: Vec<RecordedMetric> = plan
+        .metrics
+        .iter()
+        .zip(&observation.metrics)
+        .map(|(metric, observed)| RecordedMetric { name: metric.name.clone(), value: observed.value })
+        .collect();
+    let json = |value: serde_json::Result<String>| value.expect("observations are plain data with text keys");
+    let mut metadata = how_it_ended(&observation.outcome);
+    metadata.extend(owned([
+        ("end_s", observation.end.to_string()),
+        ("messages", observation.messages.to_string()),
+        ("operations", json(serde_json::to_string(&observation.operations))),
+        ("metrics", json(serde_json::to_string(&metrics))),
+    ]));
+    Metadata { name: RUN.to_owned(), metadata }
+}
+
+fn how_it_ended(outcome: &Outcome) -> BTreeMap<String, String> {
+    let mut entries = owned([("outcome", outcome.word().to_owned())]);
+    entries.extend(outcome.detail().map(|detail| ("outcome_detail".to_owned(), detail)));
+    entries
+}
+
+fn owned<const N: usize>(entries: [(&str, String); N]) -> BTreeMap<String, String> {
+    entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+}
+
+/// A trace that cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write the trace: {reason}: {}", path.display())]
+pub struct TraceError {
+    /// Why not.
+    pub reason: String,
+    /// The file.
+    pub path: PathBuf,
+}
+
+impl TraceError {
+    fn new(path: &Path, error: McapError) -> Self {
+        let reason = match error {
+            McapError::Io(error) => error.to_string(),
+            other => other.to_string(),
+        };
+        TraceError { reason, path: path.to_owned() }
+    }
+}
+
+/// Gives a complete trace its name; what was there under it is replaced.
+fn publish(unfinished: &Path, file: &Path) -> Result<(), TraceError> {
+    fs::rename(unfinished, file).map_err(|error| TraceError::new(file, error.into()))
+}
+
+#[cfg(test)]
+mod tests;

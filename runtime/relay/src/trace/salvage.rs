@@ -1,0 +1,76 @@
+//! Saving what was written of a trace whose process died.
+
+use std::fs::{self, File};
+use std::io::{BufWriter, Read as _};
+use std::path::Path;
+
+use mcap::records::{Metadata, Record};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{McapError, McapResult, Writer};
+
+use sesame_base::observation::Outcome;
+
+use crate::trace::records::records;
+use crate::trace::writer::{finish, options};
+use crate::trace::{RUN, TraceError, how_it_ended, publish};
+
+/// The largest record and chunk that is read; ours are far smaller.
+const LIMIT: usize = 1 << 28;
+
+/// Makes a trace of what was written into an unfinished one, up to its last whole chunk, and gives it this name, in a
+/// folder that exists. Without an unfinished one there is none. The unfinished one is gone then.
+pub fn salvage(unfinished: &Path, outcome: &Outcome, file: &Path) -> Result<(), TraceError> {
+    if !unfinished.exists() {
+        return Ok(());
+    }
+    let saved = unfinished.with_extension("saved");
+    copy(unfinished, outcome, &saved).map_err(|error| TraceError::new(&saved, error))?;
+    publish(&saved, file)?;
+    fs::remove_file(unfinished).map_err(|error| TraceError::new(unfinished, error.into()))
+}
+
+fn copy(unfinished: &Path, outcome: &Outcome, saved: &Path) -> McapResult<()> {
+    let mut writer = options().create(BufWriter::new(File::create(saved)?))?;
+    let mut file = File::open(unfinished)?;
+    // A chunk is looked at only when it is whole.
+    let reading =
+        LinearReaderOptions::default().with_skip_end_magic(true).with_emit_chunks(true).with_record_length_limit(LIMIT);
+    let mut reader = LinearReader::new_with_options(reading);
+    while let Some(event) = reader.next_event() {
+        match event {
+            Ok(LinearReadEvent::ReadRequest(wanted)) => {
+                let read = file.read(reader.insert(wanted))?;
+                reader.notify_read(read);
+            }
+            // What cannot be understood is where the process died.
+            Ok(LinearReadEvent::Record { opcode, data }) => match records(opcode, data) {
+                Ok(records) => records.iter().try_for_each(|record| copy_record(&mut writer, record))?,
+                Err(_) => break,
+            },
+            Err(McapError::Io(error)) => return Err(error.into()),
+            Err(_) => break,
+        }
+    }
+    writer.write_metadata(&Metadata { name: RUN.to_owned(), metadata: how_it_ended(outcome) })?;
+    finish(writer)
+}
+
+fn copy_record(writer: &mut Writer<BufWriter<File>>, record: &Record<'_>) -> McapResult<()> {
+    match record {
+        Record::Schema { header, data } => {
+            writer.add_schema_with_id(header.id, &header.name, &header.encoding, data).map(drop)
+        }
+        Record::Channel(channel) => writer
+            .add_channel_with_id(
+                channel.id,
+                channel.schema_id,
+                &channel.topic,
+                &channel.message_encoding,
+                &channel.metadata,
+            )
+            .map(drop),
+        Record::Message { header, data } => writer.write_to_known_channel(header, data),
+        Record::Metadata(metadata) => writer.write_metadata(metadata),
+        _ => Ok(()),
+    }
+}

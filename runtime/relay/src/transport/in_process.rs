@@ -1,0 +1,200 @@
+//! A simulator that is a Rust type inside the runner, stepped in lock-step.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use sesame_base::time::SimTime;
+use sesame_plan::CampaignPlan;
+
+use crate::message;
+use crate::relay::{Delivery, Exchange};
+use crate::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError, Wires};
+use crate::transport::{Capabilities, Connect, Place, Transport, TransportError, unknown_topic};
+use crate::value::Value;
+use crate::wire::Wire;
+
+/// Reaches a simulator that is a Rust type inside the runner.
+pub const fn in_process<S: Simulator + 'static>() -> Connect {
+    Connect { make: connect::<S>, place: Place { runner: "", space: "" } }
+}
+
+fn connect<S: Simulator + 'static>(plan: &CampaignPlan, _: Place) -> Box<dyn Transport> {
+    let sesame_plan::Transport::InProcess { step_ns, .. } = plan.simulator.transport else {
+        unreachable!("the generator connects each kind of simulator by its own transport")
+    };
+    Box::new(InProcess::<S> {
+        simulator: None,
+        bus: Switchboard::default(),
+        plan: plan.clone(),
+        now: SimTime::ZERO,
+        step: SimTime::from_nanos(i64::try_from(step_ns).unwrap_or(i64::MAX)),
+    })
+}
+
+/// Messages in one step beyond which a simulator is taken to have lost its mind; what is more is not kept.
+const STEP_LIMIT: u64 = 100_000;
+
+struct InProcess<S> {
+    simulator: Option<S>,
+    bus: Switchboard,
+    plan: CampaignPlan,
+    now: SimTime,
+    step: SimTime,
+}
+
+impl<S: Simulator> Transport for InProcess<S> {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities { lock_stepped: true, resets: true }
+    }
+
+    fn reset(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<(), TransportError> {
+        self.simulator = None;
+        self.now = SimTime::ZERO;
+        self.bus = Switchboard::new(relay.wires().len());
+        let mut linked = Linked { board: &mut self.bus, plan: &self.plan, relay };
+        let setup = Setup { seed, step: self.step };
+        let started = S::start(&setup, &mut Bus { now: SimTime::ZERO, wires: &mut linked });
+        self.simulator = Some(started.map_err(failed)?);
+        self.bus.every_wire_is_open(relay)?;
+        self.bus.every_message_fits()
+    }
+
+    fn advance(&mut self, until: SimTime, relay: &mut dyn Exchange) -> Result<Progress, TransportError> {
+        let Some(simulator) = &mut self.simulator else {
+            return Err(TransportError::Simulator("it was stepped before it was started".to_owned()));
+        };
+        if self.now + self.step > until {
+            return Ok(Progress::Ended);
+        }
+        self.now = self.now + self.step;
+        self.bus.published = 0;
+        relay.advance(self.now, &mut self.bus.deliveries);
+        self.bus.deliver();
+        let mut linked = Linked { board: &mut self.bus, plan: &self.plan, relay };
+        let progress = simulator.step(&mut Bus { now: self.now, wires: &mut linked });
+        self.bus.every_message_fits()?;
+        progress.map_err(failed)
+    }
+
+    fn now(&self) -> SimTime {
+        self.now
+    }
+
+    fn close(&mut self) {
+        self.simulator = None;
+    }
+}
+
+fn failed(error: SimulatorError) -> TransportError {
+    TransportError::Simulator(error.0)
+}
+
+/// The bus of one run: the simulator's topics, which of them the relay knows, and what has arrived on them.
+#[derive(Default)]
+struct Switchboard {
+    by_path: BTreeMap<String, usize>,
+    lines: Vec<Line>,
+    /// The line of each of the relay's wires.
+    by_wire: Vec<Option<usize>>,
+    deliveries: Vec<Delivery>,
+    misfit: Option<TransportError>,
+    /// Messages since the last step began.
+    published: u64,
+}
+
+/// One topic of the simulator.
+struct Line {
+    path: String,
+    wire: Option<Wire>,
+    /// What has arrived for the subscribers; `None` when there are none.
+    inbox: Option<VecDeque<Value>>,
+    /// Whether a message has been compared with the declared type.
+    checked: bool,
+}
+
+impl Switchboard {
+    fn new(wires: usize) -> Self {
+        Switchboard { by_wire: vec![None; wires], ..Switchboard::default() }
+    }
+
+    /// Puts the relay's deliveries into the inboxes of their subscribers.
+    fn deliver(&mut self) {
+        for Delivery { wire, value } in self.deliveries.drain(..) {
+            let line = self.by_wire[wire.index()].map(|line| &mut self.lines[line]);
+            if let Some(inbox) = line.and_then(|line| line.inbox.as_mut()) {
+                inbox.push_back(value);
+            }
+        }
+    }
+
+    fn every_wire_is_open(&self, relay: &dyn Exchange) -> Result<(), TransportError> {
+        let wires = relay.wires();
+        let Some(missing) = wires.iter().find(|wire| self.by_wire[wire.index()].is_none()) else { return Ok(()) };
+        Err(unknown_topic(wires.path(missing), self.by_path.keys()))
+    }
+
+    fn every_message_fits(&mut self) -> Result<(), TransportError> {
+        self.misfit.take().map_or(Ok(()), Err)
+    }
+}
+
+/// The bus with the relay inside it, as the simulator sees it during one call.
+struct Linked<'a> {
+    board: &'a mut Switchboard,
+    plan: &'a CampaignPlan,
+    relay: &'a mut dyn Exchange,
+}
+
+impl Wires for Linked<'_> {
+    fn open(&mut self, path: &str) -> Port {
+        if let Some(&line) = self.board.by_path.get(path) {
+            return Port(line);
+        }
+        let at = self.board.lines.len();
+        let wire = self.relay.wires().find(path);
+        if let Some(wire) = wire {
+            self.board.by_wire[wire.index()] = Some(at);
+        }
+        self.board.by_path.insert(path.to_owned(), at);
+        self.board.lines.push(Line { path: path.to_owned(), wire, inbox: None, checked: false });
+        Port(at)
+    }
+
+    fn subscribe(&mut self, port: Port) {
+        let line = &mut self.board.lines[port.0];
+        line.inbox.get_or_insert_default();
+        if let Some(wire) = line.wire {
+            self.relay.subscribed(wire);
+        }
+    }
+
+    fn publish(&mut self, now: SimTime, port: Port, value: Value) {
+        self.board.published += 1;
+        if self.board.published > STEP_LIMIT {
+            let flood = format!("it publishes more than {STEP_LIMIT} messages in the step to {now}");
+            self.board.misfit.get_or_insert(TransportError::Simulator(flood));
+            return;
+        }
+        let line = &mut self.board.lines[port.0];
+        let Some(wire) = line.wire else {
+            if let Some(inbox) = &mut line.inbox {
+                inbox.push_back(value);
+            }
+            return;
+        };
+        if !line.checked {
+            line.checked = true;
+            let declared = &self.plan.topic(self.relay.wires().topic(wire)).ty;
+            if let Err(mismatch) = message::fits(self.plan, declared, &value) {
+                let wrong = TransportError::WrongType { path: line.path.clone(), reason: mismatch.to_string() };
+                self.board.misfit.get_or_insert(wrong);
+                return;
+            }
+        }
+        self.relay.message(now, wire, value, &mut self.board.deliveries);
+        self.board.deliver();
+    }
+
+    fn receive(&mut self, port: Port) -> Option<Value> {
+        self.board.lines[port.0].inbox.as_mut()?.pop_front()
+    }
+}

@@ -1,0 +1,241 @@
+//! What runner and simulator say to each other: JSON, one message of the protocol a line. `docs/process.md` tells it to
+//! those who write simulators.
+
+use std::borrow::Cow;
+use std::io::{self, BufRead};
+
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use serde_json::value::RawValue;
+
+use sesame_base::time::SimTime;
+
+use crate::json::{number, quoted};
+use crate::transport::TransportError;
+
+/// The longest line either side may write, in bytes.
+pub(super) const LINE_LIMIT: usize = 16 << 20;
+
+/// What a simulator says.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub(super) enum Said<'a> {
+    /// It is at time zero: the answer to `reset`.
+    #[serde(borrow)]
+    Ready(Ready<'a>),
+    /// Messages of the present whose deliveries it waits for.
+    #[serde(borrow)]
+    Publish(Vec<Message<'a>>),
+    /// The step is over.
+    #[serde(borrow)]
+    Done(Done<'a>),
+    /// It cannot go on, in its own words.
+    Failed(String),
+}
+
+impl Said<'_> {
+    /// The word it is said with.
+    pub(super) fn word(&self) -> &'static str {
+        match self {
+            Said::Ready(_) => "ready",
+            Said::Publish(_) => "publish",
+            Said::Done(_) => "done",
+            Said::Failed(_) => "failed",
+        }
+    }
+}
+
+/// The answer to `reset`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Ready<'a> {
+    /// Topics it publishes.
+    #[serde(default)]
+    pub(super) publishes: Vec<String>,
+    /// Topics whose messages it wants delivered.
+    #[serde(default)]
+    pub(super) subscribes: Vec<String>,
+    /// Whether it can be reset again; if not, it is started anew for each test.
+    #[serde(default)]
+    pub(super) resets: bool,
+    /// Messages of time zero.
+    #[serde(default, borrow)]
+    pub(super) messages: Vec<Message<'a>>,
+}
+
+/// The end of a step.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Done<'a> {
+    /// Messages of the step for which no answer is needed.
+    #[serde(default, borrow)]
+    pub(super) messages: Vec<Message<'a>>,
+    /// Whether the scenario has come to its own end.
+    #[serde(default)]
+    pub(super) ended: bool,
+}
+
+/// A message on a topic.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Message<'a> {
+    /// The topic's name on the wire.
+    #[serde(borrow)]
+    pub(super) topic: Cow<'a, str>,
+    /// The payload.
+    #[serde(borrow)]
+    pub(super) value: &'a RawValue,
+}
+
+/// The simulator's lines, counted from its last reset.
+pub(super) struct Lines<R> {
+    reader: R,
+    line: Vec<u8>,
+    count: u64,
+    limit: usize,
+}
+
+impl<R: BufRead> Lines<R> {
+    pub(super) fn new(reader: R, limit: usize) -> Self {
+        Lines { reader, line: Vec::new(), count: 0, limit }
+    }
+
+    /// Where the lines come from.
+    pub(super) fn reader(&self) -> &R {
+        &self.reader
+    }
+
+    /// The beginning of the line that was read last, for a message.
+    pub(super) fn shown(&self) -> String {
+        shown(&String::from_utf8_lossy(&self.line))
+    }
+
+    /// Counts from one again.
+    pub(super) fn recount(&mut self) {
+        self.count = 0;
+    }
+
+    /// Reads the next line; `false` when there is none: the output was closed, be it in the middle of a line.
+    pub(super) fn read(&mut self) -> Result<bool, TransportError> {
+        self.line.clear();
+        self.count += 1;
+        loop {
+            let available = match self.reader.fill_buf() {
+                Ok(available) => available,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                // The other end is gone, whatever the system says of the way it went.
+                Err(_) => return Ok(false),
+            };
+            if available.is_empty() {
+                return Ok(false);
+            }
+            let end = available.iter().position(|&byte| byte == b'\n');
+            let taken = end.unwrap_or(available.len());
+            if self.line.len() + taken > self.limit {
+                let problem = format!("is longer than {} bytes", self.limit);
+                return Err(self.wrong(problem, "send less in one line, or several lines"));
+            }
+            self.line.extend_from_slice(&available[..taken]);
+            self.reader.consume(taken + usize::from(end.is_some()));
+            if end.is_some() {
+                return Ok(true);
+            }
+        }
+    }
+
+    /// What the line says that was read last.
+    pub(super) fn said(&self) -> Result<Said<'_>, TransportError> {
+        let Ok(text) = std::str::from_utf8(&self.line) else {
+            return Err(self.wrong("is not UTF-8".to_owned(), "the protocol is JSON in UTF-8"));
+        };
+        serde_json::from_str(text).map_err(|error| self.not_understood(text, &error))
+    }
+
+    fn not_understood(&self, text: &str, error: &serde_json::Error) -> TransportError {
+        let shown = shown(text);
+        if serde_json::from_str::<IgnoredAny>(text).is_ok() {
+            let why = error.to_string();
+            let why = why.split(" at line ").next().unwrap_or_default();
+            let remedy = "a simulator says `ready`, `publish`, `done` or `failed`, as docs/process.md has them";
+            return self.wrong(format!("is not of the protocol ({why}): {shown}"), remedy);
+        }
+        // What Python and JavaScript make of numbers that JSON does not have.
+        if ["NaN", "Infinity"].iter().any(|name| has_bare_word(text, name)) {
+            let remedy = "write such a number as the text \"NaN\", \"Infinity\" or \"-Infinity\"";
+            return self.wrong(format!("holds a number that JSON does not have: {shown}"), remedy);
+        }
+        let remedy = "standard output carries the protocol alone, print everything else to standard error";
+        self.wrong(format!("is not JSON: {shown}"), remedy)
+    }
+
+    /// An error about the line that was read last.
+    pub(super) fn wrong(&self, problem: String, remedy: impl Into<String>) -> TransportError {
+        TransportError::Protocol { line: self.count, problem, remedy: remedy.into() }
+    }
+}
+
+/// Whether a word stands in JSON outside of quotes, as far as an error message needs to know.
+fn has_bare_word(text: &str, word: &str) -> bool {
+    text.split('"').step_by(2).any(|outside| outside.contains(word))
+}
+
+/// The beginning of a line, for a message.
+fn shown(text: &str) -> String {
+    const LENGTH: usize = 100;
+    let start: String = text.chars().take(LENGTH).collect();
+    let rest = if start.len() < text.len() { "…" } else { "" };
+    let plain: String = start.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
+    format!("`{plain}`{rest}")
+}
+
+/// What the runner says, written to a line.
+pub(super) mod order {
+    use super::{SimTime, number, quoted};
+
+    /// `{"reset":{"seed":1,"step":0.02,"topics":["a"]}}`
+    pub(in super::super) fn reset<'a>(
+        line: &mut Vec<u8>,
+        seed: u64,
+        step: SimTime,
+        topics: impl Iterator<Item = &'a str>,
+    ) {
+        line.extend_from_slice(format!("{{\"reset\":{{\"seed\":{seed},\"step\":").as_bytes());
+        number(step.seconds(), line);
+        line.extend_from_slice(b",\"topics\":[");
+        for (at, topic) in topics.enumerate() {
+            if at > 0 {
+                line.push(b',');
+            }
+            quoted(topic, line);
+        }
+        line.extend_from_slice(b"]}}\n");
+    }
+
+    /// `{"step":{"time":0.02,"messages":[…]}}`, with messages as [`message`] wrote them.
+    pub(in super::super) fn step(line: &mut Vec<u8>, time: SimTime, messages: &[u8]) {
+        line.extend_from_slice(b"{\"step\":{\"time\":");
+        number(time.seconds(), line);
+        line.extend_from_slice(b",\"messages\":[");
+        line.extend_from_slice(messages);
+        line.extend_from_slice(b"]}}\n");
+    }
+
+    /// `{"deliver":[…]}`, with messages as [`message`] wrote them.
+    pub(in super::super) fn deliver(line: &mut Vec<u8>, messages: &[u8]) {
+        line.extend_from_slice(b"{\"deliver\":[");
+        line.extend_from_slice(messages);
+        line.extend_from_slice(b"]}\n");
+    }
+
+    /// Adds `{"topic":"a","value":…}` to messages.
+    pub(in super::super) fn message(messages: &mut Vec<u8>, topic: &str, value: impl FnOnce(&mut Vec<u8>)) {
+        if !messages.is_empty() {
+            messages.push(b',');
+        }
+        messages.extend_from_slice(b"{\"topic\":");
+        quoted(topic, messages);
+        messages.extend_from_slice(b",\"value\":");
+        value(messages);
+        messages.push(b'}');
+    }
+}

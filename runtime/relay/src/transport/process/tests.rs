@@ -1,0 +1,320 @@
+//! Simulators that are real processes, good and bad ones. They are written in Python.
+
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use sesame_base::observation::{Observation, Outcome};
+use sesame_plan::testing::{plan, test_of};
+use sesame_plan::{CampaignPlan, Transport as Declared};
+
+use super::*;
+use crate::evaluate::{Custom, evaluate};
+use crate::metric::MetricTable;
+use crate::wire::WireTable;
+
+/// Says what a simulator of the fixture's plan says first, and then does something else with each order.
+const FRAME: &str = r#"
+import json, sys
+def say(what): print(json.dumps(what), flush=True)
+TOPICS = ["arm/command", "zones/Z1", "zones/Z2"]
+for line in sys.stdin:
+    order = json.loads(line)
+    if "reset" in order:
+        count = order["reset"]["seed"]
+        say({"ready": {"publishes": TOPICS, "subscribes": TOPICS, "resets": RESETS}})
+        continue
+    time = order["step"]["time"]
+    count += 1
+"#;
+
+const STEP: &str = r#"
+    say({"publish": [{"topic": "arm/command", "value": count}]})
+    received = json.loads(sys.stdin.readline())["deliver"]
+    assert received == [{"topic": "arm/command", "value": count}], received
+    say({"done": {}})
+"#;
+
+/// Whether there is a Python here. In the pipeline there must be.
+fn python() -> bool {
+    let found = Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success());
+    assert!(found || std::env::var_os("CI").is_none(), "python3 is needed");
+    if !found {
+        eprintln!("skipped: there is no python3 here");
+    }
+    found
+}
+
+fn plan_of(program: &str, arguments: &[&str]) -> CampaignPlan {
+    let mut plan = plan(Vec::new());
+    plan.campaign.end_after = 1.0;
+    plan.simulator.transport = Declared::Process {
+        program: program.to_owned(),
+        arguments: arguments.iter().map(|&argument| argument.to_owned()).collect(),
+        step_ns: 100_000_000,
+    };
+    plan
+}
+
+fn run(transport: &mut Process, seed: u64) -> Observation {
+    let plan = transport.plan.clone();
+    let wires = WireTable::new(&plan);
+    let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+    evaluate(&plan, &wires, &metrics, transport, &test_of(Vec::new()), seed, &mut Custom::none()).unwrap()
+}
+
+/// A Python program as the simulator, in a folder of its own.
+struct Python {
+    folder: tempfile::TempDir,
+    transport: Process,
+}
+
+fn python_of(program: &str) -> Option<Python> {
+    if !python() {
+        return None;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("sim.py"), program.replace("RESETS", "True")).unwrap();
+    let transport = Process::new(&plan_of("python3", &["sim.py"]), folder.path().to_owned(), false);
+    Some(Python { folder, transport })
+}
+
+/// The cause of the crash of a simulator that steps like this.
+fn crash(step: &str) -> Option<String> {
+    let mut python = python_of(&format!("{FRAME}{step}"))?;
+    match run(&mut python.transport, 1).outcome {
+        Outcome::Crash { message } => Some(message),
+        other => panic!("{other:?} is no crash"),
+    }
+}
+
+#[test]
+fn a_run_goes_to_its_end_with_every_message_delivered_in_its_step() {
+    let Some(mut python) = python_of(&format!("{FRAME}{STEP}")) else { return };
+    let observation = run(&mut python.transport, 10);
+    assert_eq!(observation.outcome, Outcome::Completed);
+    assert_eq!((observation.end, observation.messages), (1.0, 10));
+    assert_eq!(observation.metrics[1].value, Some(20.0));
+}
+
+#[test]
+fn the_example_of_the_documentation_is_a_simulator() {
+    if !python() {
+        return;
+    }
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/transport/process");
+    let mut plan = plan_of("python3", &["minimal.py"]);
+    plan.topics.truncate(1);
+    plan.topics[0].paths = vec!["cart/target".to_owned()];
+    plan.topics.push(plan.topics[0].clone());
+    plan.topics[1].paths = vec!["cart/position".to_owned()];
+    plan.metrics[1].source = sesame_plan::MetricSource::Last {
+        input: sesame_plan::FieldRef { topic: sesame_plan::TopicId(1), path: vec![] },
+    };
+    let mut transport = Process::new(&plan, folder, false);
+    let first = run(&mut transport, 1);
+    assert_eq!(first.outcome, Outcome::Completed);
+    let position = (0..10).fold(0.0, |position: f64, _| position + (1.0 - position) * 0.1);
+    assert_eq!(first.metrics[1].value, Some(position));
+    assert_eq!(run(&mut transport, 1).metrics, first.metrics, "it begins anew");
+}
+
+#[test]
+fn a_simulator_that_resets_is_started_once_and_another_for_each_run() {
+    let program = format!("open('starts', 'a').write('x')\n{FRAME}{STEP}");
+    for (resets, starts) in [("True", 1), ("False", 3)] {
+        let Some(mut python) = python_of(&program.replace("RESETS", resets)) else { return };
+        let runs: Vec<_> = (0..3).map(|_| run(&mut python.transport, 10)).collect();
+        assert!(runs.iter().all(|run| run.outcome == Outcome::Completed && run.metrics == runs[0].metrics));
+        let started = std::fs::read(python.folder.path().join("starts")).unwrap();
+        assert_eq!(started.len(), starts, "resets: {resets}");
+    }
+}
+
+#[test]
+fn what_simulators_do_wrong_is_said_with_place_and_remedy() {
+    let steps = [
+        ("prints", "    print('hello')\n    say({'done': {}})"),
+        ("raises", "    if time > 0.25: raise ValueError('out of the world')\n    say({'done': {}})"),
+        ("exits", "    sys.exit(3)"),
+        ("fails in words", "    say({'failed': 'the map is missing'})"),
+        ("is killed", "    import os, signal\n    os.kill(os.getpid(), signal.SIGKILL)"),
+        ("floods a line", "    while True: sys.stdout.write('x' * 65536)"),
+    ];
+    let mut said = Vec::new();
+    for (what, step) in steps {
+        let Some(crash) = crash(step) else { return };
+        // How much a traceback shows differs from one Python to the next.
+        let lines = crash.lines().filter(|line| !line.trim_start().starts_with(['F', '^']));
+        said.push(format!("{what}: {}", lines.collect::<Vec<_>>().join("\n")));
+    }
+    insta::assert_snapshot!(said.join("\n"));
+}
+
+#[test]
+fn a_simulator_that_closes_its_output_and_stays_is_ended() {
+    let step = "    import os, time\n    os.close(1)\n    time.sleep(1000)";
+    let Some(crash) = crash(step) else { return };
+    assert!(
+        crash.contains("closed its standard output, but did not end, while the end of its step to 0.100 s"),
+        "{crash}"
+    );
+}
+
+#[test]
+fn the_next_run_begins_with_a_new_process_after_a_crash() {
+    let step = format!("    if count == 5: sys.exit(1)\n{STEP}");
+    let Some(mut python) = python_of(&format!("{FRAME}{step}")) else { return };
+    assert!(matches!(run(&mut python.transport, 1).outcome, Outcome::Crash { .. }));
+    assert_eq!(run(&mut python.transport, 10).outcome, Outcome::Completed);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_simulator_that_ends_has_ended_even_if_a_child_holds_its_output() {
+    let step = "    import subprocess\n    print('the last words', file=sys.stderr)\n    \
+                say({'publish': []})\n    subprocess.Popen(['sleep', '1000'])\n    sys.exit(3)";
+    let started = Instant::now();
+    let Some(crash) = crash(step) else { return };
+    assert_eq!(
+        crash,
+        "the simulator `python3 sim.py` ended (exit status: 3) while the end of its step to 0.100 s was awaited; its last \
+         words:\nthe last words"
+    );
+    assert!(started.elapsed() < Duration::from_secs(60), "and not only when the child ends");
+}
+
+#[cfg(unix)]
+#[test]
+fn that_a_simulator_was_killed_is_told_apart_from_other_ends() {
+    for (signal, killed) in [("SIGKILL", true), ("SIGTERM", false)] {
+        let step = format!("    import os, signal\n    os.kill(os.getpid(), signal.{signal})");
+        let Some(mut python) = python_of(&format!("{FRAME}{step}")) else { return };
+        assert!(matches!(run(&mut python.transport, 1).outcome, Outcome::Crash { .. }));
+        assert_eq!(python.transport.aside(), Aside { killed, notes: Vec::new() });
+        assert_eq!(python.transport.aside(), Aside::default(), "it is said once");
+    }
+}
+
+/// Runs a simulator three times that does this at the end of its first run; the crashes, and what is noted of the others.
+fn after_the_last_answer(what: &str) -> Option<(Vec<Option<String>>, Vec<String>)> {
+    let program = format!(
+        "from time import sleep\n{}",
+        FRAME
+            .replace("    if \"reset\" in order:", "    if AT_RESET: AT_RESET.pop()()\n    if \"reset\" in order:")
+            .replace("for line in", "AT_RESET = []\nfor line in")
+    );
+    let step = format!("{STEP}    if time > 0.99 and count == 11:\n        {what}\n");
+    let mut python = python_of(&format!("{program}{step}"))?;
+    let mut notes = Vec::new();
+    let crashes = [1, 20, 30].map(|seed| {
+        let outcome = run(&mut python.transport, seed).outcome;
+        // What it says late has come by then.
+        std::thread::sleep(Duration::from_millis(500));
+        notes.extend(python.transport.aside().notes);
+        match outcome {
+            Outcome::Crash { message } => Some(message),
+            Outcome::Completed => None,
+            other => panic!("{other:?}"),
+        }
+    });
+    Some((crashes.to_vec(), notes))
+}
+
+#[cfg(unix)]
+#[test]
+fn an_answer_too_many_is_the_crash_of_its_own_run_and_no_fault_of_the_next() {
+    let Some((crashes, notes)) = after_the_last_answer("say({'done': {}})") else { return };
+    let crash = "line 22 since the simulator's reset comes after everything was answered: `{\"done\": {}}`; give one \
+                 answer to each line; in this test there is one too many";
+    assert_eq!(crashes, [Some(crash.to_owned()), None, None]);
+    assert!(notes.is_empty(), "{notes:?}");
+}
+
+#[test]
+fn what_a_simulator_does_between_two_runs_is_noted_and_the_next_begins_with_a_new_process() {
+    let before = "the simulator was started anew before this test, for what it did after the one before: ";
+    for (what, noted) in [
+        ("sleep(0.3); say({'done': {}})", "comes after everything was answered"),
+        (
+            "sys.exit(4)",
+            "the simulator `python3 sim.py` ended (exit status: 4) while its answer to `reset` was awaited",
+        ),
+        ("AT_RESET.append(lambda: say({'done': {}}))", "says `done` while its answer to `reset` was awaited"),
+        ("AT_RESET.append(lambda: print('Loading map', flush=True))", "is not JSON: `Loading map`"),
+    ] {
+        let Some((crashes, notes)) = after_the_last_answer(what) else { return };
+        assert_eq!(crashes, [None, None, None], "{what}: {notes:?}");
+        let [note] = &notes[..] else { panic!("{what}: {notes:?}") };
+        assert!(note.starts_with(before) && note.contains(noted), "{what}: {note}");
+    }
+}
+
+#[test]
+fn a_program_that_is_not_there_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = |program: &str, folder: &Path| {
+        let mut transport = Process::new(&plan_of(program, &["a b", "c"]), folder.to_owned(), false);
+        match run(&mut transport, 1).outcome {
+            Outcome::Crash { message } => message.replace(&*folder.to_string_lossy(), "FOLDER"),
+            other => panic!("{other:?} is no crash"),
+        }
+    };
+    std::fs::write(folder.path().join("data"), "").unwrap();
+    let said = [
+        start("no_such_program", folder.path()),
+        start("./data", folder.path()),
+        start("sim", &folder.path().join("gone")).replace("FOLDER/gone", "FOLDER"),
+    ];
+    insta::assert_snapshot!(said.join("\n"));
+}
+
+#[cfg(unix)]
+#[test]
+fn closing_ends_what_the_simulator_started_too() {
+    let program = format!(
+        "import subprocess\nchild = subprocess.Popen(['sleep', '1000'])\nopen('child', 'w').write(str(child.pid))\n{FRAME}{STEP}"
+    );
+    let Some(mut python) = python_of(&program) else { return };
+    assert_eq!(run(&mut python.transport, 1).outcome, Outcome::Completed);
+    let id: i32 = std::fs::read_to_string(python.folder.path().join("child")).unwrap().parse().unwrap();
+    let id = rustix::process::Pid::from_raw(id).unwrap();
+    assert!(rustix::process::test_kill_process(id).is_ok(), "it lives as long as the simulator");
+    python.transport.close();
+    // Killed it is; whoever inherited it may take a moment to notice.
+    let gone = || {
+        let status = std::fs::read_to_string(format!("/proc/{}/stat", id.as_raw_pid())).unwrap_or_default();
+        rustix::process::test_kill_process(id).is_err() || status.contains(") Z ")
+    };
+    while !gone() {
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+fn the_simulator_knows_the_folder_of_its_worker_and_not_the_workers_secret() {
+    let step = "    import os\n    say({'failed': str([os.path.isdir(os.environ['SESAME_WORKER_FOLDER']), \
+                'SESAME_WORKER_TOKEN' in os.environ, os.path.isfile('sim.py')])})";
+    let Some(crash) = crash(step) else { return };
+    assert_eq!(crash, "the simulator failed: [True, False, True]");
+}
+
+#[test]
+fn connections_of_several_threads_do_not_meet() {
+    if !python() {
+        return;
+    }
+    let program = Arc::new(format!("{FRAME}{STEP}"));
+    let threads: Vec<_> = (0..3u64)
+        .map(|seed| {
+            let program = Arc::clone(&program);
+            std::thread::spawn(move || {
+                let mut python = python_of(&program).expect("Python is there");
+                run(&mut python.transport, seed).metrics[1].value
+            })
+        })
+        .collect();
+    let values: Vec<_> = threads.into_iter().map(|thread| thread.join().unwrap()).collect();
+    assert_eq!(values, [Some(10.0), Some(11.0), Some(12.0)]);
+}

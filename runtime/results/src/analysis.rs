@@ -1,0 +1,296 @@
+//! Analyses of a results file: what campaigns, tests, fronts, points and coverage there are in it, as tables.
+//!
+//! Any results file will do, whatever campaign wrote it and whether or not it is finished. Each analysis reads the file
+//! once from beginning to end, and gives a [`Dataset`], which prints as a table, as CSV and as JSON.
+
+mod compare;
+mod dataset;
+mod indicators;
+mod rank_sum;
+pub mod regions;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeSet;
+
+use sesame_optimise::dominance::lexicographic;
+use sesame_optimise::front::{Front, FrontMember};
+use sesame_plan::{CampaignPlan, Dimension, GridAxis, MetricId, Search};
+use sesame_search::coverage::{Coverage, CurvePoint, Feasible, Grid, curve};
+use sesame_search::in_unit;
+use sesame_search::sspr::Convention;
+
+use crate::record::{Origin, RecordError, Repository, ScannedTest};
+use crate::report::confirmed_tests;
+
+pub use compare::{CompareError, Comparison, Run, compare};
+pub use dataset::{Dataset, Datum};
+pub use indicators::{Indicator, IndicatorAnalysis, indicators};
+pub use rank_sum::{RankSum, rank_sum};
+
+/// Which tests are looked at.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Selection {
+    /// Numbers of tests; all for `None`.
+    tests: Option<BTreeSet<u32>>,
+}
+
+impl Selection {
+    /// All tests, or those of the result set of this name.
+    pub fn of(repository: &Repository, set: Option<&str>) -> Result<Selection, RecordError> {
+        let Some(name) = set else { return Ok(Selection::default()) };
+        let sets = repository.result_set_sizes()?;
+        if sets.iter().any(|(set, _)| set.name == name) {
+            return Ok(Selection { tests: Some(repository.members(name)?.into_iter().collect()) });
+        }
+        Err(RecordError::NoSuchSet {
+            name: name.to_owned(),
+            known: sets.into_iter().map(|(set, _)| set.name).collect(),
+            path: repository.path().to_owned(),
+        })
+    }
+
+    fn holds(&self, number: u32) -> bool {
+        self.tests.as_ref().is_none_or(|tests| tests.contains(&number))
+    }
+}
+
+/// What each file holds, one row per file, in their order.
+pub fn campaigns(repositories: &[Repository]) -> Result<Dataset, RecordError> {
+    let columns = ["file", "space", "campaign", "search", "seed", "tests", "front", "objectives", "sets", "ended"];
+    let mut dataset = Dataset::new(columns.map(str::to_owned));
+    for repository in repositories {
+        let facts = repository.campaign();
+        let plan = &facts.plan;
+        let sets = repository.result_set_sizes()?;
+        let objectives: Vec<&str> = plan.campaign.objectives.iter().map(|&id| plan.metric(id).name.as_str()).collect();
+        let names: Vec<&str> = sets.iter().map(|(set, _)| set.name.as_str()).collect();
+        dataset.row([
+            Datum::Text(repository.path().display().to_string()),
+            Datum::Text(plan.space.clone()),
+            Datum::Text(plan.campaign.name.clone()),
+            Datum::Text(search_word(&plan.campaign.search).to_owned()),
+            Datum::Text(facts.seed.to_string()),
+            Datum::count(repository.evaluated()?),
+            sets.last().map_or(Datum::Missing, |(_, size)| Datum::count(*size)),
+            Datum::Text(objectives.join(" ")),
+            Datum::Text(names.join(" ")),
+            facts.stop.clone().map_or(Datum::Missing, Datum::Text),
+        ]);
+    }
+    Ok(dataset)
+}
+
+fn search_word(search: &Search) -> &'static str {
+    match search {
+        Search::Nsga2 { .. } => "nsga2",
+        Search::MapElites { .. } => "map_elites",
+        Search::LatinHypercube { .. } => "latin_hypercube",
+        Search::Sobol { .. } => "sobol",
+        Search::Falsification { .. } => "falsification",
+        Search::Random { .. } => "random",
+        Search::Repeat { .. } => "repeat",
+        Search::Known { .. } => "known tests",
+        Search::Shrink { .. } => "shrink",
+    }
+}
+
+/// All tests but the reference runs: where each comes from, how it ended, and the value of each metric; of imported ones
+/// also what they were called.
+pub fn tests(repository: &Repository, selection: &Selection) -> Result<Dataset, RecordError> {
+    let plan = repository.plan();
+    let originals = repository.original_names()?;
+    let original = (!originals.is_empty()).then(|| "original_name".to_owned());
+    let columns = ["origin", "generation", "outcome", "duplicate_of", "operations"].map(str::to_owned);
+    let metrics = plan.metrics.iter().map(|metric| metric.name.clone());
+    let mut dataset =
+        Dataset::new(std::iter::once("test".to_owned()).chain(original.clone()).chain(columns).chain(metrics));
+    repository.scan(&mut |test| {
+        if test.origin == Origin::Reference || !selection.holds(test.number) {
+            return;
+        }
+        let called =
+            original.is_some().then(|| originals.get(&test.number).cloned().map_or(Datum::Missing, Datum::Text));
+        let head = [
+            Datum::Text(test.origin.word().to_owned()),
+            test.generation.map_or(Datum::Missing, |generation| Datum::Whole(i64::from(generation))),
+            Datum::Text(test.outcome.word().to_owned()),
+            test.duplicate_of.map_or(Datum::Missing, name),
+            Datum::Text(operations(plan, &test)),
+        ];
+        let values = (0u32..).map(MetricId).take(plan.metrics.len()).map(|id| Datum::real(test.value(id).value));
+        dataset.row(std::iter::once(name(test.number)).chain(called).chain(head).chain(values));
+    })?;
+    Ok(dataset)
+}
+
+fn name(number: u32) -> Datum {
+    Datum::Text(format!("T{number}"))
+}
+
+/// A test's operations in its order, apart by spaces.
+fn operations(plan: &CampaignPlan, test: &ScannedTest) -> String {
+    let names: Vec<&str> = test.operations.iter().map(|it| plan.operation(it.operation).name.as_str()).collect();
+    names.join(" ")
+}
+
+/// The tests of a selection that no other of it dominates, by their recorded values, or those of their repetitions where
+/// the campaign confirmed them. Equal tests are all there; `same_as` names the one that stands for them in the campaign's
+/// own fronts. Without a selection these are the tests of the whole file.
+///
+/// Where tests were run again, `finding` is what fresh runs show most often (a requirement, `crash` or `timeout`), `confirmed`
+/// is in how many of the `said` runs that say anything about it, of all `repetitions`. From `confirmed_low` to
+/// `confirmed_high` is the 95 % Wilson interval, and `standing` is `confirmed`, `flaky` or `not confirmed`.
+pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, RecordError> {
+    let plan = repository.plan();
+    let objectives = &plan.campaign.objectives;
+    let judge = repository.judge()?;
+    let mut judged = Vec::new();
+    repository.scan(&mut |test| {
+        if test.origin != Origin::Reference && selection.holds(test.number) {
+            judged.push((test.number, judge.fitness(&test)));
+        }
+    })?;
+    let names = objectives.iter().map(|&id| plan.metric(id).name.clone());
+    let confirmed = if judge.repetitions().is_empty() {
+        Vec::new()
+    } else {
+        confirmed_tests(plan, &judge, &repository.tests()?, &[])
+    };
+    let again: &[&str] = match confirmed.len() {
+        0 => &[],
+        _ => &["finding", "confirmed", "said", "repetitions", "confirmed_low", "confirmed_high", "standing"],
+    };
+    let again_columns = again.iter().map(|&column| column.to_owned());
+    let mut dataset =
+        Dataset::new(["test".to_owned()].into_iter().chain(names).chain(["same_as".to_owned()]).chain(again_columns));
+    if objectives.is_empty() {
+        return Ok(dataset);
+    }
+    let front = Front::of(judged.iter().map(|(number, fitness)| (*number, fitness)));
+    let mut members: Vec<&FrontMember> = front.members().iter().collect();
+    members.sort_by(|a, b| lexicographic(&a.objectives, &b.objectives));
+    for (number, fitness) in &judged {
+        let Some(oriented) = fitness.objectives() else { continue };
+        let Ok(at) = members.binary_search_by(|member| lexicographic(&member.objectives, oriented)) else { continue };
+        let values = objectives.iter().zip(oriented).map(|(&id, &value)| Datum::real(Some(in_unit(plan, id, value))));
+        let same = if members[at].number == *number { Datum::Missing } else { name(members[at].number) };
+        let of = confirmed.iter().find(|test| test.number == *number);
+        let surest = of.and_then(|test| test.surest());
+        let ends = surest.and_then(|finding| finding.interval);
+        let came_again = [
+            surest.map_or(Datum::Missing, |finding| Datum::Text(finding.finding.clone())),
+            surest.map_or(Datum::Missing, |finding| Datum::count(finding.again)),
+            surest.map_or(Datum::Missing, |finding| Datum::count(finding.said)),
+            of.map_or(Datum::Missing, |test| Datum::count(test.repetitions)),
+            Datum::real(ends.map(|[low, _]| low)),
+            Datum::real(ends.map(|[_, high]| high)),
+            surest.and_then(|finding| finding.standing).map_or(Datum::Missing, |it| Datum::Text(it.words().to_owned())),
+        ];
+        let came_again = came_again.into_iter().take(again.len());
+        dataset.row([name(*number)].into_iter().chain(values).chain([same]).chain(came_again));
+    }
+    Ok(dataset)
+}
+
+/// The point of each test in the reduced parameter space, from what was observed. Tests in which no operation was active
+/// are left out.
+pub fn sspr(
+    repository: &Repository,
+    selection: &Selection,
+    dimensions: &[Dimension],
+    convention: Convention,
+) -> Result<Dataset, RecordError> {
+    let plan = repository.plan();
+    let names = dimensions.iter().map(|dimension| dimension.name().to_owned());
+    let mut dataset = Dataset::new(["test".to_owned()].into_iter().chain(names));
+    repository.scan(&mut |test| {
+        if test.origin == Origin::Reference || !selection.holds(test.number) {
+            return;
+        }
+        if let Some(point) = test.point(plan, convention) {
+            let coordinates = dimensions.iter().map(|&dimension| Datum::real(point.get(dimension)));
+            dataset.row([name(test.number)].into_iter().chain(coordinates));
+        }
+    })?;
+    Ok(dataset)
+}
+
+/// How much of a grid the tests of a selection cover.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoverageAnalysis {
+    coverage: Coverage,
+    feasible: Feasible,
+    curve: Vec<CurvePoint>,
+}
+
+/// Counts the cells of a grid that the tests of a selection hit, in the order of their numbers; void tests and
+/// duplicates cover nothing.
+pub fn coverage(
+    repository: &Repository,
+    selection: &Selection,
+    grid: Grid,
+    hits: u32,
+    convention: Convention,
+) -> Result<CoverageAnalysis, RecordError> {
+    let plan = repository.plan();
+    let feasible = Feasible::of(plan, &grid);
+    let mut coverage = Coverage::new(grid, hits);
+    let mut points = Vec::new();
+    repository.scan(&mut |test| {
+        if test.origin != Origin::Reference && selection.holds(test.number) {
+            points.push(test.covering_point(plan, convention));
+        }
+    })?;
+    let curve = curve(&mut coverage, points);
+    Ok(CoverageAnalysis { coverage, feasible, curve })
+}
+
+impl CoverageAnalysis {
+    /// Coverage over evaluations: a row for each test that covered a cell, and for the last one.
+    pub fn curve(&self) -> Dataset {
+        let columns = ["evaluations", "covered", "cells", "coverage", "feasible", "feasible_coverage"];
+        let mut dataset = Dataset::new(columns.map(str::to_owned));
+        let (cells, feasible) = (self.coverage.grid().len(), self.coverage.feasible(&self.feasible));
+        for point in &self.curve {
+            dataset.row([
+                Datum::Whole(i64::from(point.evaluations)),
+                Datum::count(point.covered),
+                Datum::count(cells),
+                Datum::Real(point.coverage),
+                Datum::count(feasible),
+                Datum::real((feasible > 0).then(|| point.covered as f64 / feasible as f64)),
+            ]);
+        }
+        dataset
+    }
+
+    /// Each cell: where it lies on each axis, how often it was hit, and whether a test can reach it.
+    pub fn cells(&self) -> Dataset {
+        let grid = self.coverage.grid();
+        let ends = |axis: &GridAxis| ["low", "high"].map(|end| format!("{}_{end}", axis.dimension.name()));
+        let columns = grid.axes().iter().flat_map(ends);
+        let more = ["hits", "covered", "feasible"].map(str::to_owned);
+        let mut dataset = Dataset::new(columns.chain(more));
+        for (cell, &hits) in self.coverage.hits().iter().enumerate() {
+            let place = grid.place(cell);
+            let edges = grid
+                .axes()
+                .iter()
+                .zip(place)
+                .flat_map(|(axis, at)| [at, at + 1].map(|at| Datum::Real(sesame_search::coverage::edge(axis, at))));
+            let counted = [
+                Datum::Whole(i64::from(hits)),
+                Datum::Truth(self.coverage.is_covered(cell)),
+                Datum::Truth(self.feasible.reaches(cell)),
+            ];
+            dataset.row(edges.chain(counted));
+        }
+        dataset
+    }
+
+    /// Whether the feasible cells are exactly these; otherwise some of them perhaps cannot be reached.
+    pub fn feasible_is_exact(&self) -> bool {
+        self.feasible.is_exact()
+    }
+}

@@ -1,0 +1,116 @@
+//! What is known of a test that may tell whether it fails, in numbers: its point in the reduced space, and of each
+//! operation how often, when, how long and how strong.
+
+use sesame_plan::{CampaignPlan, Dimension, OperationId, Span};
+use sesame_search::sspr::{Convention, disturbance};
+
+use crate::analysis::regions::tree::Question;
+use crate::record::ScannedTest;
+use crate::report::number;
+
+/// One number of a test.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Feature {
+    /// A coordinate of its point, as observed.
+    Dimension(Dimension),
+    /// How many times an operation is in it.
+    Count(OperationId),
+    /// The mean start of an operation's windows in seconds, as planned; where conditions switch it, as observed.
+    Start(OperationId),
+    /// The mean length of an operation's windows in seconds, likewise.
+    Length(OperationId),
+    /// The mean of an operation's parameters, as shares of what is permitted (as P1 has them).
+    Share(OperationId),
+}
+
+/// All numbers of tests of a plan, in the order in which they are preferred.
+pub(super) fn features(plan: &CampaignPlan) -> Vec<Feature> {
+    let dimensions = Dimension::ALL.map(Feature::Dimension);
+    let mut used = plan.campaign.operations.clone();
+    used.sort_unstable();
+    let of_operation = |id: OperationId| {
+        let offline = plan.operation(id).kind.is_offline();
+        let timed = (!offline).then_some([Feature::Start(id), Feature::Length(id)]);
+        let strong = (!plan.operation(id).parameters.is_empty()).then_some(Feature::Share(id));
+        [Feature::Count(id)].into_iter().chain(timed.into_iter().flatten()).chain(strong)
+    };
+    dimensions.into_iter().chain(used.into_iter().flat_map(of_operation)).collect()
+}
+
+/// The numbers of a test, a NaN for one that it does not have.
+pub(super) fn numbers(plan: &CampaignPlan, features: &[Feature], test: &ScannedTest) -> Vec<f64> {
+    let point = test.point(plan, Convention::Ours);
+    let of = |id: OperationId| test.operations.iter().filter(move |it| it.operation == id);
+    let spans = |id: OperationId| {
+        of(id).flat_map(|it| match it.planned {
+            Some(planned) => vec![planned],
+            None => it.intervals.clone(),
+        })
+    };
+    let number = |feature: &Feature| match *feature {
+        Feature::Dimension(dimension) => point.and_then(|point| point.get(dimension)),
+        Feature::Count(id) => Some(of(id).count() as f64),
+        Feature::Start(id) => mean(spans(id).map(|span| span.start)),
+        Feature::Length(id) => mean(spans(id).map(Span::length)),
+        Feature::Share(id) => mean(of(id).flat_map(|it| {
+            let disturbance = disturbance(plan, id, &it.choices, Vec::new());
+            let class = disturbance.class;
+            disturbance.parameters.into_iter().filter_map(move |it| it.normalised(class, Convention::Ours))
+        })),
+    };
+    features.iter().map(|feature| number(feature).unwrap_or(f64::NAN)).collect()
+}
+
+fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = numbers.fold((0.0, 0u32), |(sum, count), number| (sum + number, count + 1));
+    (count > 0).then(|| sum / f64::from(count))
+}
+
+impl Feature {
+    /// What holds of a test of which this question holds, or does not; `missing` says whether tests may be meant that
+    /// have no such number. Thresholds have all their digits.
+    pub(super) fn words(self, plan: &CampaignPlan, question: Question, holds: bool, missing: bool) -> String {
+        let at = number::exact(question.threshold);
+        let at_most = question.at_most == holds;
+        let missing = missing && !holds;
+        let way = if at_most { "at most" } else { "above" };
+        match self {
+            Feature::Dimension(dimension) => {
+                let none = match (missing, dimension) {
+                    (false, _) => "",
+                    (true, Dimension::P1 | Dimension::P2) => " or no parameters",
+                    (true, _) => " or nothing active",
+                };
+                format!("{} {way} {at}{none}", dimension.name())
+            }
+            Feature::Count(id) => {
+                let name = &plan.operation(id).name;
+                match (at_most, question.threshold) {
+                    (true, 0.0) => format!("no {name}"),
+                    (false, 0.0) => name.clone(),
+                    (true, _) => format!("{name} at most {at}×"),
+                    (false, threshold) => format!("{name} at least {}×", number::exact(threshold + 1.0)),
+                }
+            }
+            Feature::Start(id) => {
+                self.of_operation(plan, id, &format!("starts {} {at} s", if at_most { "by" } else { "after" }), missing)
+            }
+            Feature::Length(id) => self.of_operation(
+                plan,
+                id,
+                &format!("lasts {} {at} s", if at_most { "at most" } else { "over" }),
+                missing,
+            ),
+            Feature::Share(id) => self.of_operation(plan, id, &format!("has parameters {way} {at}"), missing),
+        }
+    }
+
+    fn of_operation(self, plan: &CampaignPlan, id: OperationId, what: &str, missing: bool) -> String {
+        let name = &plan.operation(id).name;
+        match (missing, self) {
+            (false, _) => format!("{name} {what}"),
+            (true, Feature::Share(_)) => format!("{name} {what} or there is none"),
+            (true, _) => format!("{name} {what} or never"),
+        }
+    }
+}

@@ -1,0 +1,293 @@
+use sesame_plan::{CoverageGoal, GridAxis};
+
+use super::*;
+use crate::record::sample;
+use crate::report::TextOptions;
+
+fn repository() -> (tempfile::TempDir, Repository) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut plan = sample::plan();
+    let axis = |dimension, high, cells| GridAxis { dimension, low: 0.0, high, cells };
+    plan.campaign.coverage = Some(CoverageGoal {
+        axes: vec![axis(Dimension::T1, 1.0, 6), axis(Dimension::T2, 0.5, 6)],
+        hits: 1,
+        stop_at: None,
+    });
+    let repository = sample::campaign(folder.path(), &plan, 60);
+    (folder, repository)
+}
+
+fn all() -> Selection {
+    Selection::default()
+}
+
+fn names(dataset: &Dataset) -> Vec<String> {
+    let first = dataset.rows().iter().map(|row| match &row[0] {
+        Datum::Text(name) => name.clone(),
+        other => panic!("{other:?}"),
+    });
+    first.collect()
+}
+
+#[test]
+fn tests_are_listed_with_the_values_that_were_recorded() {
+    let (_folder, repository) = repository();
+    let dataset = tests(&repository, &all()).unwrap();
+    let rows = repository.tests().unwrap();
+    let searched: Vec<_> = rows.iter().filter(|row| row.origin != Origin::Reference).collect();
+    assert_eq!(dataset.rows().len(), searched.len());
+    for (row, found) in dataset.rows().iter().zip(searched) {
+        assert_eq!(row[0], Datum::Text(format!("T{}", found.number)));
+        assert_eq!(row[3], Datum::Text(found.outcome.word().to_owned()));
+        for (at, datum) in row[6..].iter().enumerate() {
+            let id = MetricId(u32::try_from(at).unwrap());
+            assert_eq!(*datum, Datum::real(found.value(id).value));
+        }
+    }
+    insta::assert_snapshot!("tests", dataset.text(TextOptions { width: None, colour: false }));
+}
+
+#[test]
+fn the_front_of_all_tests_is_that_of_the_campaign_and_equal_tests_say_so() {
+    let (_folder, repository) = repository();
+    let dataset = front(&repository, &all()).unwrap();
+    let standing: Vec<&Vec<Datum>> = dataset.rows().iter().filter(|row| row.last() == Some(&Datum::Missing)).collect();
+    let recorded = repository.latest_result_set().unwrap().unwrap().members;
+    let recorded: Vec<Datum> = recorded.into_iter().map(name).collect();
+    assert!(recorded.len() > 2);
+    assert_eq!(standing.iter().map(|row| row[0].clone()).collect::<Vec<_>>(), recorded);
+    // Values are those of the tests, whichever way they are optimised.
+    let listed = tests(&repository, &all()).unwrap();
+    for row in dataset.rows() {
+        let test = listed.rows().iter().find(|test| test[0] == row[0]).unwrap();
+        assert_eq!(row[1..3], [test[7].clone(), test[6].clone()], "fuzzing time and collisions");
+    }
+    let members = Selection::of(&repository, Some("front")).unwrap();
+    assert_eq!(front(&repository, &members).unwrap().rows().len(), standing.len());
+}
+
+#[test]
+fn a_set_that_is_not_there_is_refused_with_those_that_are() {
+    let (_folder, repository) = repository();
+    let error = Selection::of(&repository, Some("frond")).unwrap_err().to_string();
+    assert!(error.starts_with("no set of results `frond`; there are `generation-0` and `front`"), "{error}");
+}
+
+#[test]
+fn points_are_those_of_the_observed_intervals_in_the_convention_asked_for() {
+    let (_folder, repository) = repository();
+    let dataset = sspr(&repository, &all(), &Dimension::ALL, Convention::Original).unwrap();
+    assert_eq!(dataset.columns().len(), 10);
+    let mut compared = 0;
+    for row in dataset.rows() {
+        let Datum::Text(test) = &row[0] else { panic!("{row:?}") };
+        let record = repository.test(repository.find(test).unwrap()).unwrap();
+        let disturbances = sesame_search::sspr::observed(repository.plan(), &record.test, &record.observation);
+        let point = sesame_search::sspr::Point::of(&disturbances, Convention::Original).unwrap();
+        for (datum, dimension) in row[1..].iter().zip(Dimension::ALL) {
+            assert_eq!(*datum, Datum::real(point.get(dimension)), "{test} {dimension:?}");
+        }
+        compared += 1;
+    }
+    assert!(compared > 50);
+    let few = sspr(&repository, &all(), &[Dimension::P2, Dimension::T1], Convention::Ours).unwrap();
+    assert_eq!(few.columns(), ["test", "P2", "T1"]);
+    assert_eq!(names(&few), names(&dataset));
+}
+
+#[test]
+fn coverage_afterwards_is_what_the_campaign_reports() {
+    let (_folder, repository) = repository();
+    let reported = crate::report::summary(&repository).unwrap().coverage.unwrap();
+    let grid = Grid::parse("T1:0:1:6,T2:0:0.5:6").unwrap();
+    let analysis = coverage(&repository, &all(), grid.clone(), 1, Convention::Ours).unwrap();
+    let curve = analysis.curve();
+    let last = curve.rows().last().unwrap();
+    assert_eq!(last[1..3], [Datum::count(reported.covered), Datum::Whole(36)]);
+    assert_eq!(last[4], Datum::count(reported.feasible));
+    let cells = analysis.cells();
+    let covered = cells.rows().iter().filter(|row| row[5] == Datum::Truth(true)).count();
+    assert_eq!((cells.rows().len(), covered), (36, reported.covered));
+    assert_eq!(cells.columns(), ["T1_low", "T1_high", "T2_low", "T2_high", "hits", "covered", "feasible"]);
+    let twice = coverage(&repository, &all(), grid, 2, Convention::Ours).unwrap();
+    assert!(twice.curve().rows().len() < curve.rows().len());
+}
+
+#[test]
+fn campaigns_tell_what_a_file_holds() {
+    let (_folder, repository) = repository();
+    let dataset = campaigns(&[repository]).unwrap();
+    let row = &dataset.rows()[0];
+    assert_eq!(row[2], Datum::Text("coverage_experiment".to_owned()));
+    assert_eq!(row[5], Datum::Whole(61));
+    assert_eq!(row[8], Datum::Text("generation-0 front".to_owned()));
+}
+
+#[test]
+fn what_is_printed_for_programs_reads_back() {
+    let mut dataset = Dataset::new(["a".to_owned(), "b, \"c\"".to_owned(), "d".to_owned(), "e".to_owned()]);
+    let third = 0.1 + 0.2;
+    dataset.row([Datum::Text("x\ny".to_owned()), Datum::Real(third), Datum::Missing, Datum::Truth(true)]);
+    dataset.row([Datum::Whole(-3), Datum::Real(1e300), Datum::Text(String::new()), Datum::Whole(7)]);
+    let csv = dataset.csv();
+    assert!(csv.starts_with("a,\"b, \"\"c\"\"\",d,e\n\"x\ny\",0.30000000000000004,,true\n-3,1000000"), "{csv}");
+    let json: serde_json::Value = serde_json::from_str(&dataset.json()).unwrap();
+    assert_eq!(json[0]["b, \"c\""].as_f64(), Some(third));
+    assert_eq!(json[1]["b, \"c\""].as_f64(), Some(1e300));
+    assert!(json[0]["d"].is_null());
+    assert_eq!(Dataset::new(["a".to_owned()]).json(), "[]\n");
+    assert_eq!(Datum::real(Some(f64::NAN)), Datum::Missing);
+}
+
+#[test]
+fn numbers_of_unlike_things_in_one_column_have_digits_of_their_own() {
+    let mut dataset = Dataset::new(["measure".to_owned(), "median".to_owned()]);
+    for (name, value) in [("hypervolume", 19_852.6), ("igd_plus", 0.1346), ("p", 1.75e-4), ("tests", 210.0)] {
+        dataset.row([Datum::Text(name.to_owned()), Datum::lone(Some(value))]);
+    }
+    let text = dataset.text(crate::report::TextOptions { width: None, colour: false });
+    let shown: Vec<&str> = text.lines().skip(1).filter_map(|line| line.split_whitespace().last()).collect();
+    assert_eq!(shown, ["19853", "0.135", "1.75e-4", "210"], "{text}");
+    assert_eq!(Datum::lone(Some(f64::INFINITY)), Datum::Missing);
+}
+
+/// Numbers of a column, by its name.
+fn numbers(dataset: &Dataset, column: &str) -> Vec<Option<f64>> {
+    let at = dataset.columns().iter().position(|name| name == column).unwrap();
+    let number = |row: &Vec<Datum>| match row[at] {
+        Datum::Missing => None,
+        Datum::Real(number) | Datum::Lone(number) => Some(number),
+        Datum::Whole(number) => Some(number as f64),
+        ref other => panic!("{other:?} is no number"),
+    };
+    dataset.rows().iter().map(number).collect()
+}
+
+#[test]
+fn indicators_are_those_recorded_and_end_on_the_front() {
+    let (_folder, repository) = repository();
+    let analysis = indicators(&repository, None).unwrap();
+    let dataset = analysis.dataset();
+    let recorded = repository.indicators().unwrap();
+    assert_eq!(recorded.len(), 7);
+    let volumes: Vec<Option<f64>> = recorded.iter().map(|it| it.hypervolume).collect();
+    assert_eq!(numbers(&dataset, "hypervolume"), volumes);
+    assert!(volumes.is_sorted() && volumes[0] < volumes[6], "{volumes:?}");
+    let distances = numbers(&dataset, "igd_plus");
+    assert!(distances.iter().rev().is_sorted() && distances[0] > Some(0.0), "{distances:?}");
+    assert_eq!(distances[6], Some(0.0), "the last front is the front");
+    let reported = crate::report::summary(&repository).unwrap();
+    let last = &analysis.generations[6];
+    assert_eq!(last.covered, Some(reported.coverage.as_ref().unwrap().covered));
+    let counts = reported.counts;
+    assert_eq!((last.evaluations, last.unique), (Some(61), Some(60)));
+    assert_eq!(last.void, u32::try_from(counts.void).ok());
+    assert_eq!((last.crashes, last.timeouts), (Some(2), Some(1)));
+    assert_eq!(last.front as usize, reported.front.len());
+    insta::assert_snapshot!("indicators", dataset.text(TextOptions { width: None, colour: false }));
+}
+
+#[test]
+fn hypervolumes_are_measured_anew_from_the_point_given() {
+    let (_folder, repository) = repository();
+    let own = indicators(&repository, None).unwrap();
+    let point: Vec<f64> = own.reference.iter().map(|(_, value)| *value).collect();
+    let same = indicators(&repository, Some(&point)).unwrap();
+    assert_eq!((&same.generations, &same.reference), (&own.generations, &own.reference));
+    let farther = indicators(&repository, Some(&[point[0] + 10.0, point[1] - 1.0])).unwrap();
+    assert!(farther.generations[6].hypervolume > own.generations[6].hypervolume);
+}
+
+/// Runs of one campaign, so many tests long.
+fn runs(folder: &std::path::Path, groups: &[(&str, &[u32])]) -> Vec<Run> {
+    let mut plan = sample::plan();
+    let axis = GridAxis { dimension: Dimension::T1, low: 0.0, high: 1.0, cells: 6 };
+    plan.campaign.coverage = Some(CoverageGoal { axes: vec![axis], hits: 1, stop_at: None });
+    let mut runs = Vec::new();
+    for (group, lengths) in groups {
+        for &length in *lengths {
+            let folder = folder.join(format!("{group}-{length}"));
+            let repository = sample::campaign(&folder, &plan, length);
+            runs.push(Run { group: (*group).to_owned(), repository });
+        }
+    }
+    runs
+}
+
+#[test]
+fn runs_are_measured_from_one_point_to_one_front() {
+    let folder = tempfile::tempdir().unwrap();
+    let runs = runs(folder.path(), &[("short", &[30]), ("long", &[90])]);
+    let comparison = compare(&runs, None, None).unwrap();
+    assert!(!comparison.has_groups() && comparison.covers);
+    let table = comparison.runs();
+    let column = |name: &str| numbers(&table, name);
+    assert_eq!(column("tests"), [Some(31.0), Some(91.0)]);
+    // The longer run holds all tests of the shorter one, so its front is the joint one.
+    assert_eq!((column("igd_plus")[1], column("joint_share")[1]), (Some(0.0), Some(1.0)));
+    assert!(column("igd_plus")[0] > Some(0.0) && column("joint_share")[0] < Some(1.0));
+    assert!(column("hypervolume")[0] < column("hypervolume")[1]);
+    assert!(column("coverage")[0] <= column("coverage")[1]);
+    assert_eq!(numbers(&comparison.pairs(), "c")[1], Some(1.0), "the longer run's front covers the shorter one's");
+    // Brute force: the area below a staircase, by counting squares.
+    let point: Vec<f64> = comparison.reference.iter().map(|(_, value)| *value).collect();
+    let listed = front(&runs[0].repository, &all()).unwrap();
+    let members: Vec<(f64, f64)> = numbers(&listed, "fuzzing_time")
+        .into_iter()
+        .zip(numbers(&listed, "collision_occurrence"))
+        .map(|(x, y)| (x.unwrap(), y.unwrap()))
+        .collect();
+    let (mut area, steps) = (0.0, 20_000u32);
+    for step in 0..steps {
+        let x = point[0] * (f64::from(step) + 0.5) / f64::from(steps);
+        let best = members.iter().filter(|member| member.0 <= x).map(|member| member.1).fold(point[1], f64::max);
+        area += (best - point[1]) * point[0] / f64::from(steps);
+    }
+    let volume = column("hypervolume")[0].unwrap();
+    assert!((volume - area).abs() < 1e-3 * area, "{volume} {area}");
+}
+
+#[test]
+fn groups_are_compared_by_medians_and_ranks() {
+    let folder = tempfile::tempdir().unwrap();
+    let groups: [(&str, &[u32]); 2] = [("short", &[20, 24, 28, 32, 36]), ("long", &[120, 130, 140, 150, 160])];
+    let comparison =
+        compare(&runs(folder.path(), &groups), Some(&[200.0, 0.0]), Grid::parse("T2:0:0.5:4").ok()).unwrap();
+    assert!(comparison.has_groups());
+    assert_eq!(comparison.reference, [("fuzzing_time".to_owned(), 200.0), ("collision_occurrence".to_owned(), 0.0)]);
+    let table = comparison.groups();
+    insta::assert_snapshot!("compared_groups", table.text(TextOptions { width: None, colour: false }));
+    assert_eq!(numbers(&table, "median")[8..10], [Some(29.0), Some(141.0)], "tests, the known one included");
+    let p = numbers(&table, "p");
+    assert!((p[9].unwrap() - 2.0 / 252.0).abs() < 1e-12);
+    assert_eq!(comparison.runs().rows().len(), 10);
+}
+
+#[test]
+fn what_has_no_common_measure_is_refused_or_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut both = runs(folder.path(), &[("a", &[20])]);
+    let mut plan = sample::plan();
+    plan.campaign.objectives.reverse();
+    let repository = sample::campaign(&folder.path().join("other"), &plan, 20);
+    both.push(Run { group: "b".to_owned(), repository });
+    let error = compare(&both, None, None).unwrap_err().to_string();
+    let theirs = "has fuzzing_time [s] minimised, collision_occurrence maximised, ";
+    assert!(
+        error.starts_with("runs with different objectives cannot be compared: ") && error.contains(theirs),
+        "{error}"
+    );
+    let error = compare(&both[..1], Some(&[1.0]), None).unwrap_err().to_string();
+    assert!(error.starts_with("the reference point has 1 values for 2 objectives"), "{error}");
+
+    plan.campaign.objectives.clear();
+    let without = |name: &str| {
+        let repository = sample::campaign(&folder.path().join(name), &plan, 20);
+        Run { group: name.to_owned(), repository }
+    };
+    let table = compare(&[without("c"), without("d")], None, None).unwrap();
+    assert!(!table.covers && table.reference.is_empty());
+    for measure in ["hypervolume", "igd_plus", "joint_share", "coverage"] {
+        assert_eq!(numbers(&table.runs(), measure), [None, None], "{measure}");
+    }
+}

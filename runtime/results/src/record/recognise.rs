@@ -1,0 +1,147 @@
+//! Whether a database has the tables and views that this program makes.
+//!
+//! The file may come from anywhere, and SQLite runs what a schema says: a view under the name of a table can go on for ever,
+//! a trigger can change what is written. So each table and view that is read is compared with the words it was made by,
+//! before anything is asked of it. What others have added beside them, such as an index or a view of their own, is left
+//! alone.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use rusqlite::Connection;
+
+use sesame_plan::CampaignPlan;
+
+use crate::record::schema::{DDL, SCHEMA, wide_views};
+use crate::record::{RecordError, series};
+
+/// What a schema holds, by name: the kind of each object, and the words it was made by.
+type Objects = BTreeMap<String, (String, String)>;
+
+/// What turns the tables of this program into those of schema 5, whose series had a row per point.
+const TO_SCHEMA_5: &str = "
+DROP TABLE series_pieces;
+DROP INDEX events_by_test;
+CREATE TABLE change_points (
+    test            INTEGER NOT NULL REFERENCES tests,
+    metric          INTEGER NOT NULL REFERENCES metrics,
+    position        INTEGER NOT NULL,
+    time_s          REAL NOT NULL,
+    value           REAL NOT NULL,
+    PRIMARY KEY (test, metric, position)
+) STRICT, WITHOUT ROWID;
+CREATE VIEW series AS
+    SELECT t.number AS test, t.name AS test_name, m.name AS metric, m.unit AS unit, c.position AS position,
+           c.time_s AS time_s, c.value AS value
+      FROM tests t JOIN change_points c ON c.test = coalesce(t.duplicate_of, t.number) JOIN metrics m ON m.id = c.metric;
+";
+
+/// Makes sure of all that does not depend on the campaign, and that nothing happens by itself when something is written.
+/// Results may be of any schema that is read.
+pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Result<(), RecordError> {
+    static CURRENT: OnceLock<Objects> = OnceLock::new();
+    static SCHEMA_5: OnceLock<Objects> = OnceLock::new();
+    let sound = |made: rusqlite::Result<Objects>| {
+        made.unwrap_or_else(|error| unreachable!("the schema of this program is sound: {error}"))
+    };
+    let ours = if schema == SCHEMA {
+        CURRENT.get_or_init(|| sound(made_by(&[DDL, &series::views()])))
+    } else {
+        SCHEMA_5.get_or_init(|| sound(made_by(&[DDL, TO_SCHEMA_5])))
+    };
+    let found = objects(connection).map_err(|error| RecordError::database("read the results", path, error))?;
+    if let Some((name, _)) = found.iter().find(|(_, (kind, _))| kind == "trigger") {
+        return Err(RecordError::damaged(path, format!("there is a trigger `{name}`, which no run makes")));
+    }
+    same(ours, &found, path)
+}
+
+/// Makes sure of the views that have a column for each metric of the campaign.
+pub(super) fn views(connection: &Connection, path: &Path, plan: &CampaignPlan) -> Result<(), RecordError> {
+    let failed = |error| RecordError::database("read the results", path, error);
+    // SQLite cannot say what the views of a plan are without the tables that they are about.
+    let mut ours = made_by(&[DDL, &wide_views(plan)]).map_err(failed)?;
+    ours.retain(|name, _| ["results", "front"].contains(&name.as_str()));
+    same(&ours, &objects(connection).map_err(failed)?, path)
+}
+
+fn same(ours: &Objects, found: &Objects, path: &Path) -> Result<(), RecordError> {
+    for (name, (kind, words)) in ours {
+        let problem = match found.get(name) {
+            None => format!("the {kind} `{name}` is missing"),
+            Some((other, _)) if other != kind => format!("`{name}` is not a {kind}, but a {other}"),
+            Some((_, other)) if other != words => format!("the {kind} `{name}` is not the one that a run makes"),
+            Some(_) => continue,
+        };
+        return Err(RecordError::damaged(path, problem));
+    }
+    Ok(())
+}
+
+/// What these statements make.
+fn made_by(statements: &[&str]) -> rusqlite::Result<Objects> {
+    let connection = Connection::open_in_memory()?;
+    statements.iter().try_for_each(|sql| connection.execute_batch(sql))?;
+    objects(&connection)
+}
+
+/// All objects but those that SQLite makes by itself. The table that is read here is always SQLite's own.
+fn objects(connection: &Connection) -> rusqlite::Result<Objects> {
+    let mut statement = connection.prepare("SELECT name, type, sql FROM sqlite_schema WHERE sql IS NOT NULL")?;
+    let rows = statement.query_map([], |row| {
+        let sql: String = row.get(2)?;
+        Ok((row.get(0)?, (row.get(1)?, words(&sql))))
+    })?;
+    rows.collect()
+}
+
+/// The words of a statement, without comments: these may say something better in a later release of the same schema.
+fn words(sql: &str) -> String {
+    let lines = sql.lines().map(|line| line.split_once("--").map_or(line, |(code, _)| code));
+    lines.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{DATABASE, Repository, sample};
+
+    /// What opening results says after this was done to them; `None` where they are read.
+    fn said_after(sql: &str) -> Option<String> {
+        let folder = tempfile::tempdir().unwrap();
+        drop(sample::campaign(folder.path(), &sample::plan(), 12));
+        let connection = Connection::open(folder.path().join(DATABASE)).unwrap();
+        connection.execute_batch(&format!("PRAGMA foreign_keys = OFF; {sql}")).unwrap();
+        Repository::open(folder.path()).err().map(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_view_that_never_ends_in_the_place_of_a_table_is_refused_at_once() {
+        let endless = "WITH RECURSIVE n(number) AS (SELECT 1 UNION ALL SELECT number + 1 FROM n) SELECT * FROM n";
+        for name in ["tests", "campaign", "sessions"] {
+            let said = said_after(&format!("DROP TABLE {name}; CREATE VIEW {name} AS {endless}")).unwrap();
+            assert!(said.contains(&format!("`{name}` is not a table, but a view")), "{said}");
+        }
+        let said = said_after(&format!("DROP VIEW results; CREATE VIEW results AS {endless}")).unwrap();
+        assert!(said.contains("the view `results` is not the one that a run makes"), "{said}");
+    }
+
+    #[test]
+    fn tables_of_another_shape_and_triggers_are_refused() {
+        let said = said_after("ALTER TABLE tests ADD COLUMN more TEXT").unwrap();
+        assert!(said.contains("the table `tests` is not the one that a run makes"), "{said}");
+        let said = said_after("DROP TABLE wall_times").unwrap();
+        assert!(said.contains("the table `wall_times` is missing"), "{said}");
+        let trigger = "CREATE TRIGGER quiet AFTER INSERT ON tests BEGIN DELETE FROM tests; END";
+        let said = said_after(trigger).unwrap();
+        assert!(said.contains("there is a trigger `quiet`"), "{said}");
+    }
+
+    #[test]
+    fn what_others_have_added_is_left_alone() {
+        let added = "CREATE INDEX by_outcome ON tests (outcome); CREATE VIEW crashes AS SELECT * FROM tests; \
+                     CREATE TABLE notes (test INTEGER, note TEXT); ANALYZE";
+        assert_eq!(said_after(added), None);
+    }
+}

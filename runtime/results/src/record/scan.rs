@@ -1,0 +1,284 @@
+//! Going through all tests of a run, one after the other, without holding them all: what analyses do.
+
+use rusqlite::{Row, Rows};
+
+use sesame_base::observation::Outcome;
+use sesame_plan::{CampaignPlan, Choice, OperationId, Span};
+use sesame_search::coverage;
+use sesame_search::sspr::{Convention, Disturbance, Point, disturbance};
+
+use crate::record::repository::{choice, metric_value, perhaps_finite, position, span};
+use crate::record::{MetricValue, Origin, RecordError, Repository};
+
+/// One test as analyses see it: what it disturbed, when, and what came out; no time series.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScannedTest {
+    /// Its number in the campaign.
+    pub number: u32,
+    /// Where it comes from.
+    pub origin: Origin,
+    /// The generation of the search it belongs to.
+    pub generation: Option<u32>,
+    /// How its run ended.
+    pub outcome: Outcome,
+    /// The equal test whose result stands for this one.
+    pub duplicate_of: Option<u32>,
+    /// What it disturbed, in its order.
+    pub operations: Vec<ScannedOperation>,
+    /// Per metric of the plan, in its order; empty after a crash of the worker.
+    pub values: Vec<MetricValue>,
+}
+
+/// One operation of a scanned test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScannedOperation {
+    /// Which.
+    pub operation: OperationId,
+    /// When it was to be active; `None` where conditions switch it, and for one beside the run.
+    pub planned: Option<Span>,
+    /// What was chosen for its parameters.
+    pub choices: Vec<Choice>,
+    /// When it was seen to be active.
+    pub intervals: Vec<Span>,
+    /// Whether it had an effect, or the run cannot tell (it was imported).
+    pub acted: bool,
+}
+
+impl ScannedTest {
+    /// The value of the plan's metric at this position; unmeasured when the run reported none.
+    pub fn value(&self, metric: sesame_plan::MetricId) -> MetricValue {
+        self.values.get(metric.index()).copied().unwrap_or_default()
+    }
+
+    /// What this run says about a requirement.
+    pub fn verdict(&self, requirement: &sesame_plan::Requirement) -> super::Verdict {
+        super::verdict(requirement.bound, &self.outcome, self.value(requirement.metric))
+    }
+
+    /// Where it lies in the reduced parameter space; `None` where no operation was active with an effect.
+    pub fn point(&self, plan: &CampaignPlan, convention: Convention) -> Option<Point> {
+        let disturbances: Vec<Disturbance> = self
+            .operations
+            .iter()
+            .map(|it| {
+                let intervals = if it.acted { it.intervals.clone() } else { Vec::new() };
+                disturbance(plan, it.operation, &it.choices, intervals)
+            })
+            .collect();
+        Point::of(&disturbances, convention)
+    }
+
+    /// Its point, if it counts for coverage: it had an effect, and is no duplicate.
+    pub fn covering_point(&self, plan: &CampaignPlan, convention: Convention) -> Option<Point> {
+        coverage::counts(&self.outcome, self.duplicate_of.is_some()).then(|| self.point(plan, convention)).flatten()
+    }
+}
+
+/// Rows of a table that are in the order of tests, taken test by test.
+pub(super) struct Cursor<'s, T> {
+    rows: Rows<'s>,
+    read: fn(&Row<'_>) -> rusqlite::Result<T>,
+    next: Option<(u32, T)>,
+    /// A test that rows were passed over of: nobody asked for it.
+    passed_over: Option<u32>,
+}
+
+impl<'s, T> Cursor<'s, T> {
+    /// The first column of each row is its test.
+    pub(super) fn over(rows: Rows<'s>, read: fn(&Row<'_>) -> rusqlite::Result<T>) -> rusqlite::Result<Self> {
+        let mut cursor = Cursor { rows, read, next: None, passed_over: None };
+        cursor.step()?;
+        Ok(cursor)
+    }
+
+    fn step(&mut self) -> rusqlite::Result<()> {
+        self.next = match self.rows.next()? {
+            Some(row) => Some((row.get(0)?, (self.read)(row)?)),
+            None => None,
+        };
+        Ok(())
+    }
+
+    /// The rows of a test; tests are asked for in ascending order.
+    pub(super) fn of(&mut self, test: u32) -> rusqlite::Result<Vec<T>> {
+        let mut found = Vec::new();
+        while let Some((owner, item)) = self.next.take() {
+            if owner > test {
+                self.next = Some((owner, item));
+                break;
+            }
+            if owner == test {
+                found.push(item);
+            } else {
+                self.passed_over = Some(owner);
+            }
+            self.step()?;
+        }
+        Ok(found)
+    }
+
+    /// A test that has rows here, and that was not asked for.
+    pub(super) fn orphan(&self) -> Option<u32> {
+        self.passed_over.or(self.next.as_ref().map(|(owner, _)| *owner))
+    }
+}
+
+/// A row of `operations`: its position, the operation's name, when it was to be active, and whether it had an effect, or nobody counted.
+type PlannedRow = (usize, String, Option<Span>, bool);
+
+/// A row of `choices`: the position of its operation, and the choice; `None` where it is none.
+type ChoiceRow = (usize, Option<Choice>);
+
+impl Repository {
+    /// Shows every test to `each`, by number. Each table is read once from its beginning to its end, so that a large
+    /// file takes as long as reading it, and memory for one test.
+    pub fn scan(&self, each: &mut dyn FnMut(ScannedTest)) -> Result<(), RecordError> {
+        let failed = |e| RecordError::database("read the results", &self.path, e);
+        let damaged = |text: String| RecordError::damaged(&self.path, text);
+        let prepare = |sql: &str| self.connection.prepare(sql).map_err(failed);
+        // One read transaction, so that a run writing meanwhile is seen at one point.
+        let _transaction = self.connection.unchecked_transaction().map_err(failed)?;
+
+        let mut operations = prepare(
+            "SELECT test, position, operation, start_s, end_s, \
+             coalesce(changed + dropped + delayed + queued + injected + side_effects > 0, TRUE) \
+             FROM operations ORDER BY test, position",
+        )?;
+        let mut choices = prepare(
+            "SELECT test, operation, value, low, high, x, y, z, text FROM choices ORDER BY test, operation, position",
+        )?;
+        let mut intervals =
+            prepare("SELECT test, operation, start_s, end_s FROM intervals ORDER BY test, operation, position")?;
+        let mut values = prepare(
+            "SELECT test, metric, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values \
+             ORDER BY test, metric",
+        )?;
+        let mut tests = prepare(
+            "SELECT number, origin, known_test, generation, outcome, outcome_detail, time_limit_s, duplicate_of \
+             FROM tests ORDER BY number",
+        )?;
+        let mut operations =
+            Cursor::over(operations.query([]).map_err(failed)?, |row| -> rusqlite::Result<PlannedRow> {
+                let (start, end) = (perhaps_finite(row, 3)?, perhaps_finite(row, 4)?);
+                let planned = start.zip(end).map(|(start, end)| Span { start, end });
+                Ok((position(row, 1)?, row.get(2)?, planned, row.get(5)?))
+            })
+            .map_err(failed)?;
+        let mut choices = Cursor::over(choices.query([]).map_err(failed)?, |row| -> rusqlite::Result<ChoiceRow> {
+            Ok((position(row, 1)?, choice(row, 2)?))
+        })
+        .map_err(failed)?;
+        let mut intervals =
+            Cursor::over(intervals.query([]).map_err(failed)?, |row| Ok((position(row, 1)?, span(row, 2)?)))
+                .map_err(failed)?;
+        let mut values =
+            Cursor::over(values.query([]).map_err(failed)?, |row| Ok((position(row, 1)?, metric_value(row, 2)?)))
+                .map_err(failed)?;
+
+        let ids = self.operation_ids();
+        let mut rows = tests.query([]).map_err(failed)?;
+        while let Some(row) = rows.next().map_err(failed)? {
+            let number: u32 = row.get(0).map_err(failed)?;
+            let head = || -> rusqlite::Result<_> {
+                let origin: (String, Option<String>) = (row.get(1)?, row.get(2)?);
+                let outcome: (String, Option<String>, Option<f64>) =
+                    (row.get(4)?, row.get(5)?, perhaps_finite(row, 6)?);
+                Ok((origin, row.get(3)?, outcome, row.get(7)?))
+            };
+            let ((origin, known), generation, (outcome, detail, limit), duplicate_of) = head().map_err(failed)?;
+            let mut test = ScannedTest {
+                number,
+                origin: self.origin(&origin, known.as_deref())?,
+                generation,
+                outcome: self.outcome(&outcome, detail, limit)?,
+                duplicate_of,
+                operations: Vec::new(),
+                values: Vec::new(),
+            };
+            for (metric, value) in values.of(number).map_err(failed)? {
+                self.in_order(number, "values", metric, test.values.len())?;
+                test.values.push(value);
+            }
+            for (at, name, planned, acted) in operations.of(number).map_err(failed)? {
+                self.in_order(number, "operations", at, test.operations.len())?;
+                let operation = *ids
+                    .get(name.as_str())
+                    .ok_or_else(|| damaged(format!("T{number} has an operation `{name}` that the plan lacks")))?;
+                test.operations.push(ScannedOperation {
+                    operation,
+                    planned,
+                    choices: Vec::new(),
+                    intervals: Vec::new(),
+                    acted,
+                });
+            }
+            let stray = |what: &str| damaged(format!("T{number} has {what} without an operation"));
+            for (at, choice) in choices.of(number).map_err(failed)? {
+                let choice = choice.ok_or_else(|| {
+                    damaged(format!("T{number} has a choice that is neither value, range, point nor text"))
+                })?;
+                test.operations.get_mut(at).ok_or_else(|| stray("a choice"))?.choices.push(choice);
+            }
+            for (at, span) in intervals.of(number).map_err(failed)? {
+                test.operations.get_mut(at).ok_or_else(|| stray("an interval"))?.intervals.push(span);
+            }
+            for it in &test.operations {
+                let (needed, chosen) = (self.plan().operation(it.operation).parameters.len(), it.choices.len());
+                if needed != chosen {
+                    return Err(damaged(format!("T{number} has {chosen} choices for {needed} parameters")));
+                }
+            }
+            if !test.values.is_empty() && test.values.len() != self.plan().metrics.len() {
+                return Err(damaged(format!("T{number} has {} values", test.values.len())));
+            }
+            each(test);
+        }
+        let orphans = [operations.orphan(), choices.orphan(), intervals.orphan(), values.orphan()];
+        match orphans.into_iter().flatten().min() {
+            Some(orphan) => Err(self.without_test(orphan)),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::sample;
+
+    #[test]
+    fn a_scan_sees_what_reading_each_test_sees() {
+        let folder = tempfile::tempdir().unwrap();
+        let repository = sample::campaign(folder.path(), &sample::plan(), 150);
+        let mut scanned = Vec::new();
+        repository.scan(&mut |test| scanned.push(test)).unwrap();
+        let rows = repository.tests().unwrap();
+        assert_eq!(scanned.len(), rows.len());
+        assert!(rows.len() > 100);
+        for (test, row) in scanned.iter().zip(&rows) {
+            let record = repository.test(row.number).unwrap();
+            assert_eq!((test.number, test.origin, test.generation), (row.number, row.origin, row.generation));
+            assert_eq!((&test.outcome, test.duplicate_of), (&row.outcome, row.duplicate_of));
+            assert_eq!(test.values, row.values);
+            let operations: Vec<ScannedOperation> = record
+                .test
+                .operations
+                .iter()
+                .enumerate()
+                .map(|(at, it)| ScannedOperation {
+                    operation: it.operation,
+                    planned: match it.activation {
+                        sesame_plan::Activation::Time { start, end } => Some(Span { start, end }),
+                        _ => None,
+                    },
+                    choices: it.parameters.clone(),
+                    intervals: record.observation.operations.get(at).map_or(Vec::new(), |it| it.intervals.clone()),
+                    acted: record.observation.operations.get(at).is_none_or(|it| it.counters.any_effect()),
+                })
+                .collect();
+            assert_eq!(test.operations, operations);
+            let point = sesame_search::sspr::observed_point(repository.plan(), &record.test, &record.observation);
+            assert_eq!(test.point(repository.plan(), Convention::Ours), point);
+        }
+    }
+}

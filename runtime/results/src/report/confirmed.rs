@@ -1,0 +1,247 @@
+//! What running tests again says of what was found: how often each finding came again, and how sure that is.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use sesame_base::observation::Outcome;
+use sesame_plan::{CampaignPlan, Confirmation, Direction, Typical};
+
+use crate::record::{Judge, RecordError, Repetition, Repository, Standing, Tally, TestRow, Verdict, confirmed_fitness};
+use crate::report::number::{self, fixed, join_words, plural};
+use crate::report::repetition::wilson;
+
+/// What the repetitions of a test say. The run that selected it is none of them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ConfirmedTest {
+    /// Its name.
+    pub test: String,
+    /// Its number.
+    pub number: u32,
+    /// Whether it is on the front.
+    pub front: bool,
+    /// How often it was run again.
+    pub repetitions: usize,
+    /// Of these, crashes and timeouts.
+    pub failures: usize,
+    /// A value per objective by which the front takes the test, where the campaign confirms; `None` where too few
+    /// repetitions have one.
+    pub values: Option<Vec<f64>>,
+    /// All that its first run or a fresh one shows: violated requirements in the space's order, then a crash and a timeout.
+    pub findings: Vec<FindingAgain>,
+    /// Of its findings, how the surest one stands; `None` where nothing was found, or no fresh run says anything about it.
+    pub standing: Option<Standing>,
+}
+
+/// A finding, and how often it came again.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FindingAgain {
+    /// The name of the violated requirement, or `crash` or `timeout`.
+    pub finding: String,
+    /// Whether the first run shows it; otherwise it was first seen in a fresh one.
+    pub first: bool,
+    /// Fresh runs that show it.
+    pub again: usize,
+    /// Fresh runs that say whether it is there: these, and those that show that it is not.
+    pub said: usize,
+    /// Fresh runs that do not say: they broke off too early, or a value is missing.
+    pub unsaid: usize,
+    /// The 95 % Wilson interval of the probability that a run shows it; `None` where no fresh run says anything.
+    pub interval: Option<[f64; 2]>,
+    /// Whether it is to be believed; `None` where no fresh run says anything.
+    pub standing: Option<Standing>,
+}
+
+impl FindingAgain {
+    /// What fresh runs say of a finding; `None` where neither they nor the first run show it.
+    fn of(finding: &str, tally: Tally, first: Verdict) -> Option<FindingAgain> {
+        (first == Verdict::Violated || tally.violated > 0).then(|| FindingAgain {
+            finding: finding.to_owned(),
+            first: first == Verdict::Violated,
+            again: tally.violated,
+            said: tally.said(),
+            unsaid: tally.unsaid,
+            interval: wilson(tally.violated, tally.said()),
+            standing: tally.standing(first),
+        })
+    }
+
+    /// How often it came again, as in `4 of 5 (0.38–0.96) flaky`.
+    pub(crate) fn words(&self) -> String {
+        let silent = plural(self.unsaid, "run says nothing", "runs say nothing");
+        let Some(interval) = self.interval else { return silent };
+        let mut words = rate(self.again, self.said, interval);
+        if let Some(standing) = self.standing.filter(|&it| it != Standing::Confirmed) {
+            let _ = write!(words, " {}", standing.words());
+        }
+        if !self.first {
+            words.push_str(", not in its first run");
+        }
+        if self.unsaid > 0 {
+            let _ = write!(words, ", {silent}");
+        }
+        words
+    }
+}
+
+/// How often something was seen, as in `4 of 5 (0.38–0.96)`.
+fn rate(shown: usize, said: usize, [low, high]: [f64; 2]) -> String {
+    format!("{shown} of {said} ({}–{})", fixed(low, 2), fixed(high, 2))
+}
+
+/// What fresh runs say of a requirement, whichever it is, as in `0 of 5 (0.00–0.43)`.
+pub(crate) fn tally_words(tally: Tally) -> String {
+    let silent = plural(tally.unsaid, "run says nothing", "runs say nothing");
+    match wilson(tally.violated, tally.said()) {
+        None => silent,
+        Some(interval) if tally.unsaid == 0 => rate(tally.violated, tally.said(), interval),
+        Some(interval) => format!("{}, {silent}", rate(tally.violated, tally.said(), interval)),
+    }
+}
+
+/// The outcomes that are findings of their own, by their words.
+pub(crate) const FAILURES: [&str; 2] = ["crash", "timeout"];
+
+/// Whether a run ended with this outcome, said like a verdict: every run says whether it did.
+pub(crate) fn failed(outcome: &Outcome, word: &str) -> Verdict {
+    if outcome.word() == word { Verdict::Violated } else { Verdict::Kept }
+}
+
+/// What runs say of a crash or a timeout.
+pub(crate) fn failed_tally(runs: &[Repetition], word: &str) -> Tally {
+    Tally::of(runs.iter().map(|run| failed(&run.outcome, word)))
+}
+
+/// What the fresh runs of a test say of a crash or a timeout; `None` where it was run once only, or no run shows it.
+pub(crate) fn failed_again(judge: &Judge<'_>, row: &TestRow, word: &str) -> Option<FindingAgain> {
+    let runs = judge.runs(row.number);
+    let tally = failed_tally(runs, word);
+    FindingAgain::of(word, tally, failed(&row.outcome, word)).filter(|_| !runs.is_empty())
+}
+
+/// All tests that were run again, by number.
+pub(crate) fn confirmed_tests(
+    plan: &CampaignPlan,
+    judge: &Judge<'_>,
+    rows: &[TestRow],
+    front: &[u32],
+) -> Vec<ConfirmedTest> {
+    rows.iter().filter_map(|row| confirmed(plan, judge, row, front.contains(&row.number))).collect()
+}
+
+/// One test, if it was run again.
+pub(crate) fn confirmed_test(
+    repository: &Repository,
+    number: u32,
+    front: bool,
+) -> Result<Option<ConfirmedTest>, RecordError> {
+    Ok(confirmed(repository.plan(), &repository.judge()?, &repository.row(number)?, front))
+}
+
+fn confirmed(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow, front: bool) -> Option<ConfirmedTest> {
+    let runs = judge.runs(row.number);
+    if runs.is_empty() {
+        return None;
+    }
+    let requirements = plan.requirements.iter().filter_map(|requirement| {
+        FindingAgain::of(&requirement.name, judge.tally(row.number, requirement), row.verdict(requirement))
+    });
+    let failures = FAILURES.into_iter().filter_map(|word| failed_again(judge, row, word));
+    let findings: Vec<FindingAgain> = requirements.chain(failures).collect();
+    Some(ConfirmedTest {
+        test: format!("T{}", row.number),
+        number: row.number,
+        front,
+        repetitions: runs.len(),
+        failures: runs
+            .iter()
+            .filter(|run| matches!(run.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. }))
+            .count(),
+        values: confirmed_values(plan, runs),
+        standing: findings.iter().filter_map(|finding| finding.standing).min(),
+        findings,
+    })
+}
+
+/// The objective values by which a campaign's front takes a test that was run again, as its metrics have them.
+pub(crate) fn confirmed_values(plan: &CampaignPlan, runs: &[Repetition]) -> Option<Vec<f64>> {
+    let fitness = confirmed_fitness(plan, runs)?;
+    let values =
+        fitness.objectives()?.iter().zip(&plan.campaign.objectives).map(|(value, &id)| {
+            if plan.metric(id).direction == Some(Direction::Maximise) { 0.0 - value } else { *value }
+        });
+    Some(values.collect())
+}
+
+impl ConfirmedTest {
+    /// How often each finding came again, as in `R1 4 of 5 (0.38–0.96) flaky`.
+    pub(crate) fn words(&self) -> String {
+        if self.findings.is_empty() {
+            return format!("nothing in {}", plural(self.repetitions, "run", "runs"));
+        }
+        let words = self.findings.iter().map(|finding| format!("{} {}", finding.finding, finding.words()));
+        words.collect::<Vec<_>>().join("; ")
+    }
+
+    /// The finding that fresh runs show most often; of equal ones the first.
+    pub(crate) fn surest(&self) -> Option<&FindingAgain> {
+        let share = |finding: &FindingAgain| finding.again as f64 / finding.said as f64;
+        let said = self.findings.iter().filter(|finding| finding.said > 0);
+        said.reduce(|best, finding| if share(finding) > share(best) { finding } else { best })
+    }
+}
+
+/// How many of these tests' findings are how much to be believed, as in `4 confirmed, 1 flaky`; nothing for tests without
+/// findings.
+pub(crate) fn standings(tests: &[&ConfirmedTest]) -> String {
+    let words = [Standing::Confirmed, Standing::Flaky, Standing::NotConfirmed].into_iter().filter_map(|standing| {
+        let count = tests.iter().filter(|test| test.standing == Some(standing)).count();
+        (count > 0).then(|| format!("{count} {}", standing.words()))
+    });
+    join_words(&words.collect::<Vec<_>>())
+}
+
+/// How many runs confirmed what, in a sentence; nothing where no test was run again.
+pub(crate) fn confirmation_sentence(tests: &[ConfirmedTest]) -> Option<String> {
+    let runs: usize = tests.iter().map(|test| test.repetitions).sum();
+    if tests.is_empty() {
+        return None;
+    }
+    let mut sentence =
+        format!("{} of {}", plural(runs, "further run", "further runs"), plural(tests.len(), "test", "tests"));
+    let front = standings(&tests.iter().filter(|test| test.front).collect::<Vec<_>>());
+    let all = standings(&tests.iter().collect::<Vec<_>>());
+    if !all.is_empty() {
+        let _ = write!(sentence, " to confirm them: {all}");
+        if front.is_empty() {
+            sentence.push_str("; none of these on the front");
+        } else if front != all {
+            let _ = write!(sentence, "; on the front {front}");
+        }
+    }
+    let surprises = tests.iter().filter(|test| test.findings.iter().any(|finding| !finding.first)).count();
+    if surprises > 0 {
+        let tests = plural(surprises, "test shows", "tests show");
+        let _ = write!(sentence, "; {tests} something that its first run did not");
+    }
+    Some(sentence)
+}
+
+/// How many tests with violations nobody looked at again, in a sentence; nothing where there is none, and where the
+/// campaign does not confirm and nothing was run again.
+pub(crate) fn once_sentence(once: usize, confirms: bool) -> Option<String> {
+    let tests = plural(once, "test that violates a requirement was", "tests that violate a requirement were");
+    (confirms && once > 0).then(|| format!("{tests} run once only"))
+}
+
+/// What the values of a front of confirmed tests are, in a sentence.
+pub(crate) fn values_sentence(confirmation: Confirmation) -> String {
+    let runs = plural(confirmation.times as usize, "fresh run", "fresh runs");
+    match confirmation.by {
+        Typical::Mean => format!("Values are means of {runs} of each test."),
+        Typical::Median => format!("Values are medians of {runs} of each test."),
+        Typical::Quantile { share } => {
+            format!("Values are what {} % of {runs} of each test reach or go beyond.", number::number(100.0 * share))
+        }
+    }
+}

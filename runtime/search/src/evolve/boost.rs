@@ -1,0 +1,91 @@
+//! Coverage boosting (section 4.2.2 of the methodology's paper): some children are mutated until they lie in a cell that
+//! wants tests.
+//!
+//! A boosted child is made like every other. If it is not planned to fall into a cell that too few tests have hit, it is
+//! mutated again, and again, up to a number of tries; the first that does is taken. If none does, the child stays as it
+//! first was. The paper does not say what then becomes of it; the original platform keeps what the last try left, which
+//! costs fitness and gains nothing.
+//!
+//! A cell that an earlier child of the same generation is planned to fall into counts as hit already.
+
+use sesame_optimise::nsga2::{Child, Variation};
+use sesame_plan::{BoostedChildren, Test};
+use sesame_rng::Stream;
+
+use crate::evolve::cells::Cells;
+use crate::strategy::Learning;
+use crate::{Evaluated, TestVariation};
+
+/// When and how children are boosted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Boosting {
+    /// Only in every so-manieth generation; at least 1. Generation 0 has no children.
+    pub(crate) every_generations: u32,
+    /// Which children of such a generation.
+    pub(crate) children: BoostedChildren,
+    /// How often a child is mutated again at most.
+    pub(crate) tries: u32,
+}
+
+/// Variation of tests with coverage boosting.
+#[derive(Debug, Clone)]
+pub(crate) struct Boosted {
+    tests: TestVariation,
+    cells: Cells,
+    boosting: Boosting,
+    seed: u64,
+}
+
+impl Boosted {
+    pub(crate) fn new(tests: TestVariation, cells: Cells, boosting: Boosting, seed: u64) -> Self {
+        Boosted { tests, cells, boosting, seed }
+    }
+
+    fn boosts(&self, generation: u64, place: u64) -> bool {
+        let every = u64::from(self.boosting.every_generations.max(1));
+        // Boosted generations are the multiples of `every` from `every` on.
+        let [index, time] =
+            [place, (generation / every).saturating_sub(1)].map(|it| u32::try_from(it).unwrap_or(u32::MAX));
+        generation.is_multiple_of(every) && self.boosting.children.includes(index, time)
+    }
+
+    fn wants(&self, test: &Test) -> bool {
+        self.cells.cell_of(test).is_some_and(|cell| self.cells.wants(cell))
+    }
+}
+
+impl Variation for Boosted {
+    type Genome = Test;
+
+    fn initial(&mut self, index: u64) -> Test {
+        self.tests.initial(index)
+    }
+
+    fn offspring(&mut self, parents: [&Test; 2], generation: u64, pair: u64) -> [Child<Test>; 2] {
+        let mut place = 2 * pair;
+        self.tests.offspring(parents, generation, pair).map(|mut child| {
+            if self.boosts(generation, place) && !self.wants(&child.genome) {
+                let mut stream = Stream::derive(self.seed, "boost", &[generation, place]);
+                let mut test = child.genome.clone();
+                for _ in 0..self.boosting.tries {
+                    self.tests.mutate_again(&mut test, &mut stream);
+                    if self.wants(&test) && self.tests.claim(&test) {
+                        child.genome = test;
+                        break;
+                    }
+                }
+            }
+            if let Some(cell) = self.cells.cell_of(&child.genome) {
+                self.cells.promise(cell);
+            }
+            place += 1;
+            child
+        })
+    }
+}
+
+impl Learning for Boosted {
+    fn learn(&mut self, results: &[Evaluated]) {
+        self.cells.learn(results);
+    }
+}

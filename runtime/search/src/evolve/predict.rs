@@ -1,0 +1,357 @@
+//! Coverage by condition, by prediction.
+//!
+//! Where conditions switch operations, only a run tells when they are active, so a test cannot be put into a cell. But most
+//! of what conditions compare goes its own way, disturbed or not: so a test's conditions are weighed on what was recorded
+//! in earlier runs, and the intervals that come out say where the test would lie. Of several candidates for a place in a
+//! generation the one is taken that would most probably fall into a cell that wants tests.
+//!
+//! Each candidate is predicted from the undisturbed run and from the runs of its parents. How far each of these two kinds
+//! of source is to be believed is learned from outcomes: as often as its predictions came true, beginning at one of two.
+
+use std::collections::VecDeque;
+
+use sesame_base::activation::Activity;
+use sesame_base::observation::Observation;
+use sesame_base::time::SimTime;
+use sesame_optimise::nsga2::{Child, Variation};
+use sesame_plan::{ActivationMode, CampaignPlan, MetricId, Span, Test, TestOperation};
+use sesame_rng::Stream;
+
+use crate::evolve::cells::Cells;
+use crate::space::initial::fresh_test;
+use crate::sspr::{Convention, Point, disturbance};
+use crate::strategy::Learning;
+use crate::{Evaluated, Permitted, TestVariation};
+
+/// Moments at which a recorded run is looked at: more than enough to tell cells apart.
+const MOMENTS: u32 = 350;
+/// Runs remembered at most, the latest.
+const REMEMBERED: usize = 200;
+
+/// How the condition variables of a plan went in one run, looked at in even steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Course {
+    variables: Vec<MetricId>,
+    /// Per moment the values of the variables, each as of its last change; `None` where there was none yet.
+    values: Vec<Vec<Option<f64>>>,
+}
+
+impl Course {
+    /// The course of the variables in an observed run; `None` for a campaign by time, which has none.
+    pub fn of(plan: &CampaignPlan, observation: &Observation) -> Option<Course> {
+        let ActivationMode::Condition { space } = &plan.campaign.activation else { return None };
+        let variables: Vec<MetricId> = space.variables.iter().map(|variable| variable.metric).collect();
+        let values = (0..MOMENTS)
+            .map(|moment| {
+                let time = time_of(plan, moment);
+                let value = |&metric: &MetricId| {
+                    let series = &observation.metrics.get(metric.index())?.series;
+                    let before = series.partition_point(|(at, _)| *at <= time);
+                    before.checked_sub(1).map(|last| series[last].1).or(plan.metric(metric).initial)
+                };
+                variables.iter().map(value).collect()
+            })
+            .collect();
+        Some(Course { variables, values })
+    }
+
+    /// Where a test would lie if the variables went this way; `None` if no operation would be active.
+    pub fn predicted(&self, plan: &CampaignPlan, test: &Test) -> Option<Point> {
+        let operations = test.operations.iter();
+        let disturbances: Vec<_> =
+            operations.map(|it| disturbance(plan, it.operation, &it.parameters, self.intervals(plan, it))).collect();
+        Point::of(&disturbances, Convention::Ours)
+    }
+
+    /// When an operation would be active, in seconds.
+    fn intervals(&self, plan: &CampaignPlan, operation: &TestOperation) -> Vec<Span> {
+        let within = plan.operation(operation.operation).within;
+        let end = within.end.min(plan.campaign.end_after);
+        let mut activity = Activity::new(&operation.activation, Span { start: within.start, end });
+        let value_in = |values: &[Option<f64>], metric| {
+            self.variables.iter().position(|it| *it == metric).and_then(|at| values[at])
+        };
+        let mut before: Option<&Vec<Option<f64>>> = None;
+        for (moment, values) in (0u32..).zip(&self.values) {
+            let now = SimTime::from_seconds(time_of(plan, moment));
+            while let Some(edge) = activity.next_edge().filter(|&edge| edge <= now) {
+                activity.follow(edge);
+                activity.weigh(edge, &|metric| value_in(before.unwrap_or(values), metric));
+            }
+            if before.replace(values) != Some(values) {
+                activity.weigh(now, &|metric| value_in(values, metric));
+            }
+        }
+        activity.intervals(SimTime::from_seconds(end))
+    }
+}
+
+/// When a moment is, in seconds of simulation time.
+fn time_of(plan: &CampaignPlan, moment: u32) -> f64 {
+    plan.campaign.end_after * f64::from(moment) / f64::from(MOMENTS)
+}
+
+/// How often predictions from one kind of source came true.
+#[derive(Debug, Clone, Copy)]
+struct Trust {
+    right: u32,
+    all: u32,
+}
+
+impl Trust {
+    const NEW: Trust = Trust { right: 0, all: 0 };
+
+    /// The share that came true, by Laplace's rule of succession.
+    fn share(self) -> f64 {
+        (f64::from(self.right) + 1.0) / (f64::from(self.all) + 2.0)
+    }
+
+    fn learn(&mut self, right: bool) {
+        self.right += u32::from(right);
+        self.all += 1;
+    }
+}
+
+/// What was predicted of a test that was asked.
+#[derive(Debug, Clone)]
+struct Forecast {
+    from_reference: Option<usize>,
+    from_parents: Vec<Option<usize>>,
+}
+
+/// Variation of tests by condition that prefers those which would fall into cells that want tests.
+#[derive(Debug, Clone)]
+pub(crate) struct Predicting {
+    tests: TestVariation,
+    permitted: Permitted,
+    cells: Cells,
+    candidates: u32,
+    seed: u64,
+    reference: Option<Course>,
+    /// The latest tests that were run, each with its course, the oldest first.
+    remembered: VecDeque<(Test, Course)>,
+    reference_trust: Trust,
+    parents_trust: Trust,
+    /// Of the generation asked last.
+    forecasts: Vec<Forecast>,
+}
+
+impl Predicting {
+    pub(crate) fn new(tests: TestVariation, permitted: Permitted, cells: Cells, candidates: u32, seed: u64) -> Self {
+        Predicting {
+            tests,
+            permitted,
+            cells,
+            candidates: candidates.max(1),
+            seed,
+            reference: None,
+            remembered: VecDeque::new(),
+            reference_trust: Trust::NEW,
+            parents_trust: Trust::NEW,
+            forecasts: Vec::new(),
+        }
+    }
+
+    fn forecast(&self, test: &Test, parents: &[Course]) -> Forecast {
+        let cell = |course: &Course| self.cells.grid().cell_of(&course.predicted(self.cells.plan(), test)?);
+        Forecast {
+            from_reference: self.reference.as_ref().and_then(cell),
+            from_parents: parents.iter().map(cell).collect(),
+        }
+    }
+
+    /// The share of belief that a test falls into a cell that wants tests, and into any cell at all.
+    fn promise_of(&self, forecast: &Forecast) -> (f64, f64) {
+        let of_parents = self.parents_trust.share() / forecast.from_parents.len().max(1) as f64;
+        let sources = [(self.reference_trust.share(), forecast.from_reference)].into_iter();
+        let sources = sources.chain(forecast.from_parents.iter().map(|&cell| (of_parents, cell)));
+        let (mut all, mut wanted, mut active) = (0.0, 0.0, 0.0);
+        for (trust, cell) in sources {
+            all += trust;
+            if let Some(cell) = cell {
+                active += trust;
+                wanted += if self.cells.wants(cell) { trust } else { 0.0 };
+            }
+        }
+        (wanted / all, active / all)
+    }
+
+    /// The best of the test and other candidates: fresh tests in the first generation, else tests changed further.
+    fn chosen(&mut self, test: &Test, parents: &[Course], mut stream: Stream) -> Test {
+        let forecast = self.forecast(test, parents);
+        let mut changed = test.clone();
+        let mut best = (self.promise_of(&forecast), test.clone(), forecast);
+        for turn in 1..self.candidates {
+            // Nothing can be better.
+            if best.0 == (1.0, 1.0) {
+                break;
+            }
+            let candidate = if parents.is_empty() {
+                fresh_test(&self.permitted, &mut stream)
+            } else {
+                // Now and then back to where it began, so that most candidates keep much of their parents.
+                if turn % 4 == 0 {
+                    changed = test.clone();
+                }
+                self.tests.mutate_again(&mut changed, &mut stream);
+                changed.clone()
+            };
+            let forecast = self.forecast(&candidate, parents);
+            let promise = self.promise_of(&forecast);
+            if promise > best.0 && self.tests.claim(&candidate) {
+                best = (promise, candidate, forecast);
+            }
+        }
+        let (_, test, forecast) = best;
+        if let Some(cell) = forecast.from_reference.or(forecast.from_parents.first().copied().flatten()) {
+            self.cells.promise(cell);
+        }
+        self.forecasts.push(forecast);
+        test
+    }
+}
+
+impl Variation for Predicting {
+    type Genome = Test;
+
+    fn initial(&mut self, index: u64) -> Test {
+        let test = self.tests.initial(index);
+        self.chosen(&test, &[], Stream::derive(self.seed, "predict initial", &[index]))
+    }
+
+    fn offspring(&mut self, parents: [&Test; 2], generation: u64, pair: u64) -> [Child<Test>; 2] {
+        let mut place = 2 * pair;
+        let remembered = self.remembered.iter().rev();
+        let courses: Vec<Course> = parents
+            .iter()
+            .filter_map(|parent| remembered.clone().find(|(test, _)| test == *parent))
+            .map(|(_, course)| course.clone())
+            .collect();
+        self.tests.offspring(parents, generation, pair).map(|child| {
+            let stream = Stream::derive(self.seed, "predict", &[generation, place]);
+            let genome = self.chosen(&child.genome, &courses, stream);
+            place += 1;
+            Child { genome, ..child }
+        })
+    }
+}
+
+impl Learning for Predicting {
+    fn reference(&mut self, course: Course) {
+        self.reference = Some(course);
+    }
+
+    fn learn(&mut self, results: &[Evaluated]) {
+        for (forecast, result) in self.forecasts.drain(..).zip(results) {
+            let hit = result.point.as_ref().and_then(|point| self.cells.grid().cell_of(point));
+            self.reference_trust.learn(forecast.from_reference == hit);
+            for cell in forecast.from_parents {
+                self.parents_trust.learn(cell == hit);
+            }
+            if let Some(course) = &result.course {
+                self.remembered.push_back((result.test.clone(), course.clone()));
+            }
+        }
+        while self.remembered.len() > REMEMBERED {
+            self.remembered.pop_front();
+        }
+        self.cells.learn(results);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::condition::ConditionEnd;
+    use sesame_plan::{CoverageGoal, Exploration, Search};
+
+    use super::*;
+    use crate::coverage::{Coverage, Grid};
+    use crate::strategy;
+    use crate::testing::landscape::LANDSCAPES;
+
+    const NSGA2: Search = Search::Nsga2 { population: 10, evaluations: 80 };
+    const PREDICT: Exploration = Exploration::Predict { candidates: 8 };
+
+    fn grid() -> Grid {
+        Grid::parse("T1:0:1:6,T2:0:0.5:6,P1:0:1:3").unwrap()
+    }
+
+    fn plan(end: ConditionEnd, exploration: Option<Exploration>) -> CampaignPlan {
+        let mut plan = LANDSCAPES[0].plan_by_condition(NSGA2, end);
+        plan.campaign.coverage = Some(CoverageGoal { axes: grid().axes().to_vec(), hits: 1, stop_at: None });
+        plan.campaign.exploration = exploration;
+        plan
+    }
+
+    #[test]
+    fn a_test_is_predicted_where_it_falls_if_variables_go_as_they_did() {
+        for end in [ConditionEnd::Condition, ConditionEnd::Length { low: 1.0, high: 15.0 }] {
+            let plan = plan(end, None);
+            let permitted = Permitted::of(&plan).unwrap();
+            let course = Course::of(&plan, &crate::testing::landscape::Landscape::undisturbed(&plan)).unwrap();
+            let (mut same, mut active) = (0, 0);
+            for seed in 0..200 {
+                let test = fresh_test(&permitted, &mut Stream::derive(seed, "test", &[]));
+                let cell = |point: Option<Point>| point.and_then(|point| grid().cell_of(&point));
+                let (foreseen, ran) = (
+                    cell(course.predicted(&plan, &test)),
+                    cell(crate::testing::landscape::Landscape::point(&plan, &test)),
+                );
+                same += u32::from(foreseen == ran);
+                active += u32::from(ran.is_some());
+            }
+            // What is looked at in steps may fall to the other side of an edge between cells.
+            assert!(same >= 180 && active > 40, "{same} of 200, {active} active");
+        }
+    }
+
+    #[test]
+    fn prediction_covers_more_cells_and_makes_fewer_tests_without_effect() {
+        for end in [ConditionEnd::Condition, ConditionEnd::Length { low: 1.0, high: 15.0 }] {
+            let outcome = |exploration: Option<Exploration>| {
+                let plan = plan(end, exploration);
+                let (mut covered, mut void) = (0, 0);
+                for seed in 1..=3 {
+                    let run = LANDSCAPES[0].campaign_of(&plan, strategy(&plan, seed).unwrap().as_mut());
+                    let mut coverage = Coverage::new(grid(), 1);
+                    for result in &run.tests {
+                        void += usize::from(result.point.is_none());
+                        result.point.iter().for_each(|point| {
+                            coverage.add(point);
+                        });
+                    }
+                    covered += coverage.covered();
+                }
+                (covered, void)
+            };
+            let (plain, predicted) = (outcome(None), outcome(Some(PREDICT)));
+            assert!(predicted.0 > plain.0 && predicted.1 * 3 < plain.1, "{plain:?} and {predicted:?}");
+        }
+    }
+
+    #[test]
+    fn the_seed_decides_and_results_told_again_bring_a_search_back_to_where_it_was() {
+        let plan = plan(ConditionEnd::Condition, Some(PREDICT));
+        let run = |seed| LANDSCAPES[0].campaign_of(&plan, strategy(&plan, seed).unwrap().as_mut()).tests;
+        let whole = run(4);
+        assert_eq!(whole, run(4));
+        assert_ne!(whole, run(5));
+        let mut resumed = strategy(&plan, 4).unwrap();
+        resumed.reference(whole[0].course.clone().unwrap());
+        for stored in whole.chunks(10).take(5) {
+            let asked: Vec<Test> = resumed.ask().into_iter().map(|candidate| candidate.test).collect();
+            assert_eq!(asked, stored.iter().map(|result| result.test.clone()).collect::<Vec<_>>());
+            resumed.tell(stored);
+        }
+    }
+
+    #[test]
+    fn trust_grows_with_what_came_true() {
+        let mut trust = Trust::NEW;
+        assert_eq!(trust.share(), 0.5);
+        trust.learn(true);
+        trust.learn(true);
+        trust.learn(false);
+        assert_eq!(trust.share(), 0.6);
+    }
+}

@@ -1,0 +1,131 @@
+//! Margins: how far the requirements of a space are from their violation in one run.
+
+use sesame_base::observation::Observation;
+use sesame_base::verdict::{Verdict, verdict};
+use sesame_plan::{Bound, CampaignPlan, Requirement};
+
+pub use sesame_optimise::falsify::Margin;
+
+/// The margin to a bound of which a metric has this value, which is not NaN.
+pub fn margin_to(bound: Bound, value: f64) -> Margin {
+    Margin { value: Some(to_bound(bound, value)), violated: !bound.holds(value) }
+}
+
+/// The margin of each requirement of the plan, in its order. One is violated exactly where the requirement's [`verdict`] is.
+///
+/// A margin is in the unit of the requirement's metric: how far the metric may still move before it breaks the bound, and
+/// negative by how far it has moved beyond. Where the verdict is unsaid there is none. Of a run that broke off, a violation is
+/// as large as it is at least, whatever the rest of the run had brought.
+pub fn margins(plan: &CampaignPlan, observation: &Observation) -> Vec<Margin> {
+    let margin = |requirement: &Requirement| {
+        let shown = observation.value(requirement.metric);
+        let verdict = verdict(requirement.bound, &observation.outcome, shown);
+        let value = match verdict {
+            Verdict::Kept => shown.value.map(|value| to_bound(requirement.bound, value)),
+            Verdict::Violated => {
+                let ends = [shown.reach.low, shown.reach.high].into_iter().flatten();
+                ends.map(|end| to_bound(requirement.bound, end)).reduce(f64::max)
+            }
+            Verdict::Unsaid => None,
+        };
+        Margin { value, violated: verdict == Verdict::Violated }
+    };
+    plan.requirements.iter().map(margin).collect()
+}
+
+/// How far a value is from breaking a bound.
+fn to_bound(bound: Bound, x: f64) -> f64 {
+    // Infinite values at infinite bounds are as far as can be.
+    let ahead = |difference: f64| if difference.is_nan() { f64::INFINITY } else { difference };
+    match bound {
+        Bound::AtMost { value } | Bound::Below { value } => ahead(value - x),
+        Bound::AtLeast { value } | Bound::Above { value } => ahead(x - value),
+        Bound::Equal { value } => -(x - value).abs(),
+        Bound::Within { low, high } => ahead(x - low).min(ahead(high - x)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use sesame_base::observation::{MetricObservation, Outcome, Reach, WallTime};
+    use sesame_plan::{MetricId, Search};
+
+    use super::*;
+    use crate::testing::landscape::LANDSCAPES;
+
+    fn margin(outcome: Outcome, shown: MetricObservation) -> Margin {
+        let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+        plan.requirements = vec![Requirement {
+            name: "in_time".to_owned(),
+            text: String::new(),
+            metric: MetricId(0),
+            bound: Bound::AtMost { value: 70.0 },
+        }];
+        let observation = Observation {
+            outcome,
+            end: 70.0,
+            operations: Vec::new(),
+            unheard: Vec::new(),
+            metrics: vec![shown],
+            messages: 0,
+            warnings: Vec::new(),
+            wall: WallTime::default(),
+        };
+        margins(&plan, &observation).remove(0)
+    }
+
+    #[test]
+    fn a_crash_is_no_violation_by_the_default_of_a_metric_that_was_never_set() {
+        let crash = || Outcome::Crash { message: "gone".to_owned() };
+        let never_set = MetricObservation { value: Some(999.0), ..MetricObservation::default() };
+        assert_eq!(margin(crash(), never_set), Margin { value: None, violated: false });
+        let whole = MetricObservation::whole(Some(999.0), false, Vec::new());
+        assert_eq!(margin(Outcome::Completed, whole), Margin { value: Some(-929.0), violated: true });
+        let reach = Reach::onwards(Some(sesame_plan::Trend::Rising), Some(75.0));
+        let risen = MetricObservation { value: Some(75.0), set: true, reach, ..MetricObservation::default() };
+        assert_eq!(margin(crash(), risen), Margin { value: Some(-5.0), violated: true });
+    }
+
+    proptest! {
+        #[test]
+        fn a_margin_is_violated_exactly_where_the_verdict_is(
+            x in prop::option::of(60i32..80), low in prop::option::of(60i32..80), more in prop::option::of(0i32..10),
+            whole in any::<bool>(), finite in any::<bool>(),
+        ) {
+            let outcome = if whole { Outcome::Completed } else { Outcome::Timeout { limit: 1.0 } };
+            let reach = if whole && finite {
+                Reach::of_whole_run(x.map(f64::from))
+            } else {
+                Reach { low: low.map(f64::from), high: more.map(|more| f64::from(low.unwrap_or(70) + more)) }
+            };
+            let not_finite = (!finite).then_some(1.0);
+            let shown = MetricObservation { value: x.map(f64::from), set: true, reach, not_finite, series: Vec::new() };
+            let verdict = verdict(Bound::AtMost { value: 70.0 }, &outcome, (&shown).into());
+            let margin = margin(outcome, shown);
+            prop_assert_eq!(margin.violated, verdict == Verdict::Violated);
+            prop_assert_eq!(margin.value.is_none(), verdict == Verdict::Unsaid);
+            prop_assert!(margin.value.is_none_or(|value| (value < 0.0) == margin.violated));
+        }
+
+        #[test]
+        fn margins_are_negative_where_a_bound_is_broken_and_positive_where_it_is_kept(
+            x in -5i32..5, at in -5i32..5, width in 0i32..5,
+        ) {
+            let (x, value, high) = (f64::from(x), f64::from(at), f64::from(at + width));
+            let bounds = [
+                Bound::AtMost { value }, Bound::Below { value }, Bound::AtLeast { value }, Bound::Above { value },
+                Bound::Equal { value }, Bound::Within { low: value, high },
+            ];
+            for bound in bounds {
+                let margin = to_bound(bound, x);
+                prop_assert!(if bound.holds(x) { margin >= 0.0 } else { margin <= 0.0 }, "{bound:?} of {x}: {margin}");
+                // The way to the violation is that long: what moves less stays on its side.
+                for nearer in [x - margin.abs() / 2.0, x + margin.abs() / 2.0] {
+                    prop_assert!(margin == 0.0 || bound.holds(nearer) == bound.holds(x), "{bound:?} of {x}");
+                }
+            }
+        }
+    }
+}

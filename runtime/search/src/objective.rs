@@ -1,0 +1,89 @@
+//! The objectives of a campaign as a search sees them: smaller is better.
+
+use sesame_base::observation::{Observation, Outcome};
+use sesame_optimise::dominance::{Fitness, Unfit};
+use sesame_plan::{CampaignPlan, Direction, MetricId};
+
+/// The fitness of a run: its objective values in the campaign's order, negated where more is sought; or why it has none.
+pub fn fitness(plan: &CampaignPlan, observation: &Observation) -> Fitness {
+    fitness_of(plan, &observation.outcome, |id| observation.metrics.get(id.index())?.value)
+}
+
+/// As [`fitness`], for a run of which only the outcome and the metrics' values are known.
+pub fn fitness_of(plan: &CampaignPlan, outcome: &Outcome, value: impl Fn(MetricId) -> Option<f64>) -> Fitness {
+    match outcome {
+        // What was imported stands in fronts as it did there.
+        Outcome::Completed | Outcome::Unknown => {}
+        Outcome::Void => return Fitness::Unfit(Unfit::Void),
+        Outcome::Crash { .. } => return Fitness::Unfit(Unfit::Crash),
+        Outcome::Timeout { .. } => return Fitness::Unfit(Unfit::Timeout),
+    }
+    let oriented = plan.campaign.objectives.iter().map(|&id| {
+        let value = value(id).filter(|value| !value.is_nan())?;
+        // Subtracted from zero and added to it, so that no negative zero comes out.
+        match plan.metric(id).direction.expect("the generator gives every objective a direction") {
+            Direction::Minimise => Some(0.0 + value),
+            Direction::Maximise => Some(0.0 - value),
+        }
+    });
+    oriented.collect::<Option<Vec<f64>>>().map_or(Fitness::Unfit(Unfit::Unmeasured), Fitness::Measured)
+}
+
+/// An oriented value of an objective as the metric has it, in its unit. It undoes what [`fitness`] does.
+pub fn in_unit(plan: &CampaignPlan, objective: MetricId, oriented: f64) -> f64 {
+    if plan.metric(objective).direction == Some(Direction::Maximise) { 0.0 - oriented } else { 0.0 + oriented }
+}
+
+#[cfg(test)]
+mod tests {
+    use sesame_base::observation::{MetricObservation, WallTime};
+
+    use sesame_plan::Search;
+
+    use super::*;
+    use crate::testing::landscape;
+
+    fn observed(outcome: Outcome, values: &[Option<f64>]) -> Observation {
+        let metric = |&value: &Option<f64>| MetricObservation::whole(value, value.is_some(), Vec::new());
+        Observation {
+            outcome,
+            end: 70.0,
+            operations: Vec::new(),
+            unheard: Vec::new(),
+            metrics: values.iter().map(metric).collect(),
+            messages: 0,
+            warnings: Vec::new(),
+            wall: WallTime::default(),
+        }
+    }
+
+    #[test]
+    fn fitness_orients_objectives_in_the_order_of_the_campaign() {
+        let mut plan = landscape::LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+        let completed = observed(Outcome::Completed, &[Some(12.5), Some(3.0)]);
+        assert_eq!(fitness(&plan, &completed), Fitness::Measured(vec![12.5, -3.0]));
+        plan.campaign.objectives.reverse();
+        assert_eq!(fitness(&plan, &completed), Fitness::Measured(vec![-3.0, 12.5]));
+        plan.campaign.objectives = vec![MetricId(1)];
+        let Fitness::Measured(zero) = fitness(&plan, &observed(Outcome::Completed, &[None, Some(0.0)])) else {
+            panic!("only objectives need a value")
+        };
+        assert!(zero[0].is_sign_positive());
+    }
+
+    #[test]
+    fn only_completed_runs_with_all_objectives_have_a_fitness() {
+        let plan = landscape::LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+        let values = [Some(12.5), Some(3.0)];
+        let unfit = |outcome, values: &[Option<f64>]| match fitness(&plan, &observed(outcome, values)) {
+            Fitness::Unfit(why) => why,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(unfit(Outcome::Void, &values), Unfit::Void);
+        assert_eq!(unfit(Outcome::Crash { message: "x".to_owned() }, &[]), Unfit::Crash);
+        assert_eq!(unfit(Outcome::Timeout { limit: 9.0 }, &values), Unfit::Timeout);
+        assert_eq!(unfit(Outcome::Completed, &[Some(12.5), None]), Unfit::Unmeasured);
+        assert_eq!(unfit(Outcome::Completed, &[Some(12.5), Some(f64::NAN)]), Unfit::Unmeasured);
+        assert_eq!(unfit(Outcome::Completed, &[]), Unfit::Unmeasured);
+    }
+}

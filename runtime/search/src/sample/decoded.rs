@@ -1,0 +1,74 @@
+//! Tests made of numbers in `0..1`, one for each of their choices: what sampling along such numbers has in common.
+
+use sesame_plan::{Activation, Choice, Shape, Test, TestOperation};
+use sesame_rng::derive_seed;
+
+use crate::space::apart;
+use crate::space::choice::PermittedChoice;
+use crate::space::initial::{fresh_kinds, place};
+use crate::space::permitted::{Permitted, PermittedActivation};
+use crate::space::range::Range;
+
+/// The test of these numbers, given by the place of the choice: first how many operations there are and which, then of each
+/// in turn its window's length and place, and its parameters. Numbers that are uniform and independent give the distribution
+/// of [random tests](crate::space::initial). By condition there are no such choices: it is for campaigns by time.
+pub(super) fn decoded(permitted: &Permitted, seed: u64, index: u32, mut number: impl FnMut(usize) -> f64) -> Test {
+    let mut next = 0;
+    let mut value = || {
+        next += 1;
+        number(next - 1)
+    };
+    let operations = fresh_kinds(permitted, &mut value)
+        .into_iter()
+        .enumerate()
+        .map(|(slot, kind)| {
+            let activation = match kind.activation {
+                PermittedActivation::Time(window) => {
+                    let (start, end) = interval(window, [value(), value()]);
+                    Activation::Time { start, end }
+                }
+                _ => Activation::Offline,
+            };
+            let parameters = kind.parameters.iter().map(|it| choice(it, &mut value)).collect();
+            let draw_seed = derive_seed(seed, "draws", &[u64::from(index), slot as u64]);
+            TestOperation { operation: kind.operation, activation, parameters, draw_seed }
+        })
+        .collect();
+    let mut test = Test { operations };
+    permitted.settle_windows(&mut test, apart::spread);
+    test
+}
+
+/// The greatest number below 1.
+pub(super) const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
+
+/// An interval, uniform over all that fit: the first value decides its length, the second where it lies.
+fn interval(range: Range, [length, place]: [f64; 2]) -> (f64, f64) {
+    let room = range.high - range.low - range.shortest;
+    // Of all pairs of ends, the share that is longer than x is (1 - x)².
+    let length = range.shortest + room * (1.0 - libm::sqrt(1.0 - length));
+    let start = range.low + (range.high - range.low - length) * place;
+    (start.max(range.low), (start + length).min(range.high))
+}
+
+fn choice(permitted: &PermittedChoice, value: &mut impl FnMut() -> f64) -> Choice {
+    let number = |range: &Range, value: f64| {
+        if range.integer {
+            (range.low + libm::floor(value * (range.high - range.low + 1.0))).min(range.high)
+        } else {
+            (range.low + value * (range.high - range.low)).min(range.high)
+        }
+    };
+    match permitted {
+        PermittedChoice::Number(range, Shape::Value) => Choice::Value { value: number(range, value()) },
+        PermittedChoice::Number(range, Shape::Range) => {
+            let (low, high) = interval(*range, [value(), value()]);
+            let whole = |x: f64| if range.integer { libm::rint(x) } else { x };
+            Choice::Range { low: whole(low), high: whole(high) }
+        }
+        PermittedChoice::Point(axes) => {
+            Choice::Point { point: [0, 1, 2].map(|axis: usize| number(&axes[axis], value())) }
+        }
+        PermittedChoice::Items(items) => Choice::Text { text: items[place(value(), items.len())].clone() },
+    }
+}

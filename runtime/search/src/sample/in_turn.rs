@@ -1,0 +1,50 @@
+//! Tests that do not depend on results, handed out one after the other.
+
+use sesame_plan::Test;
+
+use crate::{Candidate, Evaluated, Strategy};
+
+/// Tests per generation: enough to keep many workers busy, few enough to see progress.
+const GENERATION: u32 = 50;
+
+/// Tests that are there before any is run.
+pub trait Sampling: Send {
+    /// The test of an index, from 0. It depends on the index alone.
+    fn test(&mut self, index: u32) -> Test;
+}
+
+/// A search that learns nothing: as many tests of a sampling as evaluations, in generations of 50.
+#[derive(Debug, Clone)]
+pub struct InTurn<S> {
+    sampling: S,
+    evaluations: u32,
+    asked: u32,
+    awaited: usize,
+}
+
+impl<S: Sampling> InTurn<S> {
+    /// The first so many tests of a sampling.
+    pub fn new(sampling: S, evaluations: u32) -> Self {
+        InTurn { sampling, evaluations, asked: 0, awaited: 0 }
+    }
+}
+
+impl<S: Sampling> Strategy for InTurn<S> {
+    fn ask(&mut self) -> Vec<Candidate> {
+        assert!(self.awaited == 0, "a generation is told before the next is asked");
+        let generation = self.asked / GENERATION;
+        let end = self.evaluations.min(self.asked + GENERATION);
+        let tests = (self.asked..end).map(|index| self.sampling.test(index));
+        let batch: Vec<Candidate> = tests
+            .map(|test| Candidate { test, parents: Vec::new(), generation, known: None, simulator_seed: None })
+            .collect();
+        self.asked = end;
+        self.awaited = batch.len();
+        batch
+    }
+
+    fn tell(&mut self, results: &[Evaluated]) {
+        assert!(results.len() == self.awaited, "exactly the generation asked last is told");
+        self.awaited = 0;
+    }
+}

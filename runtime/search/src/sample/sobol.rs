@@ -1,0 +1,61 @@
+//! Sobol' sampling: tests along Sobol' points, a baseline beside random and Latin hypercube tests.
+//!
+//! Every beginning of the search is spread evenly over each choice, not only the whole: so it may be stopped at any time.
+//! Campaigns by condition have no such choices and are not sampled so.
+
+use sesame_optimise::sobol::SobolPoints;
+use sesame_plan::Test;
+
+use crate::Permitted;
+use crate::sample::decoded::decoded;
+use crate::sample::in_turn::Sampling;
+
+/// Tests along scrambled Sobol' points. The nth depends on the seed and n alone.
+#[derive(Debug, Clone)]
+pub struct Sobol {
+    permitted: Permitted,
+    seed: u64,
+    points: SobolPoints,
+}
+
+impl Sobol {
+    /// Tests of what is permitted.
+    pub fn new(permitted: Permitted, seed: u64) -> Self {
+        Sobol { permitted, seed, points: SobolPoints::new(seed) }
+    }
+}
+
+impl Sampling for Sobol {
+    fn test(&mut self, index: u32) -> Test {
+        decoded(&self.permitted, self.seed, index, |choice| self.points.value(choice, index))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::space::permitted::tests::{any_timed_plan, broken_rule};
+    use crate::testing::landscape::LANDSCAPES;
+
+    #[test]
+    fn every_beginning_has_tests_of_all_lengths_alike() {
+        let plan = LANDSCAPES[0].plan(sesame_plan::Search::Random { evaluations: 1 });
+        let mut search = Sobol::new(Permitted::of(&plan).unwrap(), 3);
+        let mut lengths = [0; 6];
+        (0..64).for_each(|index| lengths[search.test(index).operations.len()] += 1);
+        // One to five operations follow from fifths of the first choice, of which 64ths are taken once each.
+        assert!(lengths[1..].iter().all(|n| (12..=14).contains(n)), "{lengths:?}");
+    }
+
+    proptest! {
+        #[test]
+        fn tests_are_permitted(plan in any_timed_plan(), seed: u64) {
+            let mut search = Sobol::new(Permitted::of(&plan).unwrap(), seed);
+            for index in 0..20 {
+                prop_assert_eq!(broken_rule(&plan, &search.test(index)), None);
+            }
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! Making a failing test smaller: fewest operations, then shortest windows, then simplest conditions, then mildest
+//! parameters, as long as it fails as it did.
+//!
+//! It guarantees: what comes out fails, or is the test that was given; it is permitted where that one is; it keeps the
+//! draw seeds, so that what is left of a disturbance is what it was; nothing in it can be made smaller by one step alone,
+//! unless the evaluations were used up; and no test is run for it twice. A step is one operation, one side of an `and` or
+//! `or` of a condition, one activation by condition, or [`RESOLUTION`] of what is permitted of a time or a parameter.
+//!
+//! Like every [`Strategy`] it is a function of what it was told, so a run that was stopped is taken up again.
+
+mod dial;
+mod space;
+#[cfg(test)]
+mod tests;
+mod walk;
+
+use std::collections::BTreeMap;
+
+use space::Space;
+use walk::{Answers, Arrived, Asked, walk};
+
+use sesame_plan::{CampaignPlan, Search, Test};
+use sesame_rng::derive_seed;
+
+use crate::{Candidate, Evaluated, Strategy};
+
+pub use space::{RESOLUTION, strength};
+
+/// What a test is tried for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// It is the test that was given.
+    Original,
+    /// Operations are left out.
+    Operations,
+    /// Windows and activations are shorter, activations fewer.
+    Windows,
+    /// Conditions are simpler.
+    Conditions,
+    /// Parameters are milder.
+    Parameters,
+    /// Whatever can be made smaller is, by one step.
+    LastSteps,
+}
+
+impl Phase {
+    /// What is tried, in a few words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Phase::Original => "original",
+            Phase::Operations => "operations",
+            Phase::Windows => "windows",
+            Phase::Conditions => "conditions",
+            Phase::Parameters => "parameters",
+            Phase::LastSteps => "last steps",
+        }
+    }
+}
+
+/// A test that was tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tried {
+    /// The test.
+    pub test: Test,
+    /// What it was tried for.
+    pub phase: Phase,
+    /// The test that it was made of: its position among those tried; `None` for the one that was given.
+    pub base: Option<usize>,
+    /// In how many of its runs it failed; `None` while they are not known.
+    pub failed: Option<u32>,
+    /// Number of the first of its runs in the campaign, from 1; the others follow.
+    pub number: u32,
+}
+
+/// Makes a test smaller, by ask and tell of which candidates [fail](Evaluated::failing).
+#[derive(Debug, Clone)]
+pub struct Shrink {
+    space: Space,
+    test: Test,
+    simulator_seed: u64,
+    runs: u32,
+    /// Candidates that can still be run.
+    left: u32,
+    tried: Vec<Tried>,
+    /// Positions among those tried, by content.
+    known: BTreeMap<String, usize>,
+    /// Position of the first test of the generation asked last.
+    asked: usize,
+    generation: u32,
+    /// How many runs of that generation are to be told.
+    awaited: usize,
+    arrived: Option<Arrived>,
+}
+
+impl Shrink {
+    /// Makes this test smaller, for one that fails by saying so, in so many runs each and so many runs in total.
+    pub fn new(plan: &CampaignPlan, test: Test, simulator_seed: u64, runs: u32, evaluations: u32) -> Shrink {
+        Shrink::with_resolution(plan, test, simulator_seed, (runs, evaluations), RESOLUTION)
+    }
+
+    /// The strategy of a plan whose search this is; `None` for another.
+    pub fn of(plan: &CampaignPlan) -> Option<Shrink> {
+        let &Search::Shrink { test, simulator_seed, runs, evaluations, failing: _ } = &plan.campaign.search else {
+            return None;
+        };
+        Some(Shrink::new(plan, plan.test(test).test.clone(), simulator_seed, runs, evaluations))
+    }
+
+    fn with_resolution(
+        plan: &CampaignPlan,
+        test: Test,
+        simulator_seed: u64,
+        (runs, evaluations): (u32, u32),
+        resolution: f64,
+    ) -> Shrink {
+        let runs = runs.max(1);
+        Shrink {
+            space: Space::of(plan, resolution),
+            test,
+            simulator_seed,
+            runs,
+            left: evaluations / runs,
+            tried: Vec::new(),
+            known: BTreeMap::new(),
+            asked: 0,
+            generation: 0,
+            awaited: 0,
+            arrived: None,
+        }
+    }
+
+    /// All tests that were tried, in the order in which they were asked for.
+    pub fn tried(&self) -> &[Tried] {
+        &self.tried
+    }
+
+    /// Positions among those tried of the tests that were gone to so far, the smallest last. Empty where the test that was
+    /// given does not fail, and as long as that is not known.
+    pub fn kept(&self) -> Vec<usize> {
+        let arrived = self.arrived.clone();
+        // With nothing more to be run the walk goes as far as what is known leads.
+        let arrived = arrived.or_else(|| walk(&self.space, &self.test, self, true).ok());
+        arrived.map_or_else(Vec::new, |arrived| arrived.kept)
+    }
+
+    /// Whether nothing of the smallest test can be made smaller by one step alone: all of that was run.
+    pub fn is_minimal(&self) -> bool {
+        self.arrived.as_ref().is_some_and(|arrived| arrived.minimal)
+    }
+
+    /// In how many runs each test is run.
+    pub fn runs(&self) -> u32 {
+        self.runs
+    }
+}
+
+impl Answers for Shrink {
+    fn find(&self, test: &Test) -> Option<(usize, bool)> {
+        let &at = self.known.get(&content(test))?;
+        Some((at, self.tried[at].failed? == self.runs))
+    }
+}
+
+/// What tells tests apart.
+fn content(test: &Test) -> String {
+    serde_json::to_string(test).unwrap_or_else(|error| unreachable!("a test is plain data: {error}"))
+}
+
+impl Strategy for Shrink {
+    fn ask(&mut self) -> Vec<Candidate> {
+        assert!(self.awaited == 0, "a generation is told before the next is asked");
+        if self.arrived.is_some() {
+            return Vec::new();
+        }
+        let Asked { phase, mut tests, base } = match walk(&self.space, &self.test, self, self.left == 0) {
+            Ok(arrived) => {
+                self.arrived = Some(arrived);
+                return Vec::new();
+            }
+            Err(asked) => asked,
+        };
+        tests.truncate(self.left as usize);
+        self.asked = self.tried.len();
+        let parents: Vec<u32> = base.map(|base| self.tried[base].number).into_iter().collect();
+        let mut candidates = Vec::with_capacity(tests.len() * self.runs as usize);
+        for test in tests {
+            self.left -= 1;
+            self.known.insert(content(&test), self.tried.len());
+            let number = u32::try_from(self.tried.len()).unwrap_or(u32::MAX).saturating_mul(self.runs) + 1;
+            self.tried.push(Tried { test: test.clone(), phase, base, failed: None, number });
+            candidates.extend((0..self.runs).map(|run| Candidate {
+                test: test.clone(),
+                parents: parents.clone(),
+                generation: self.generation,
+                known: None,
+                simulator_seed: Some(match run {
+                    0 => self.simulator_seed,
+                    run => derive_seed(self.simulator_seed, "shrink", &[u64::from(run)]),
+                }),
+            }));
+        }
+        self.awaited = candidates.len();
+        candidates
+    }
+
+    fn tell(&mut self, results: &[Evaluated]) {
+        assert!(results.len() == self.awaited, "exactly the generation asked last is told");
+        self.awaited = 0;
+        for (tried, runs) in self.tried[self.asked..].iter_mut().zip(results.chunks(self.runs as usize)) {
+            let failed = runs.iter().filter(|run| run.failing).count();
+            tried.failed = Some(u32::try_from(failed).unwrap_or(u32::MAX));
+            tried.number = runs[0].number;
+        }
+        self.generation += 1;
+    }
+
+    fn ended(&self) -> Option<String> {
+        let arrived = self.arrived.as_ref()?;
+        Some(if arrived.kept.is_empty() {
+            "the test did not fail again".to_owned()
+        } else if arrived.minimal {
+            "no single step is left that still fails".to_owned()
+        } else {
+            "all evaluations were used up".to_owned()
+        })
+    }
+}

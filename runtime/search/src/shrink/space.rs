@@ -1,0 +1,252 @@
+//! What is smaller: the shortest windows, the mild end of each parameter, and how far one step goes.
+
+use sesame_plan::condition::{Condition, ConditionEnd, ConditionSpace};
+use sesame_plan::{
+    Activation, ActivationMode, CampaignPlan, Choice, Domain, OperationId, OperationKind, Shape, Test, TestOperation,
+    ValueMode,
+};
+
+use crate::space::choice::PermittedChoice;
+use crate::space::condition::is_allowed;
+use crate::space::range::Range;
+
+/// One step as a share of what is permitted: of an operation's window, and of a parameter's range. Whole numbers go by
+/// the nearest whole number of this size, and by 1 at least.
+pub const RESOLUTION: f64 = 0.01;
+
+/// In what the tests of a campaign can be made smaller.
+#[derive(Debug, Clone)]
+pub(super) struct Space {
+    /// Operations that a test holds at least.
+    pub(super) fewest: usize,
+    resolution: f64,
+    operations: Vec<Bounds>,
+    conditions: Option<ConditionSpace>,
+}
+
+/// The bounds of one operation of the plan.
+#[derive(Debug, Clone)]
+struct Bounds {
+    window: Range,
+    constraints: Vec<sesame_plan::condition::Constraint>,
+    parameters: Vec<Option<Parameter>>,
+}
+
+/// A parameter that can be made milder.
+#[derive(Debug, Clone)]
+enum Parameter {
+    Number(Mild),
+    /// A point: its coordinates, each by itself.
+    Point([Mild; 3]),
+}
+
+/// A permitted range of numbers, and where in it a disturbance is mildest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Mild {
+    /// The number that disturbs least; `None` where no number is milder than another, so that only narrower sub-ranges
+    /// are milder.
+    pub(super) end: Option<f64>,
+    /// How far one step goes.
+    pub(super) step: f64,
+}
+
+impl Space {
+    /// That of a plan's campaign, in steps of this share of what is permitted.
+    pub(super) fn of(plan: &CampaignPlan, resolution: f64) -> Space {
+        let campaign = &plan.campaign;
+        let conditions = match &campaign.activation {
+            ActivationMode::Time => None,
+            ActivationMode::Condition { space } => Some(space.clone()),
+        };
+        let operations = plan.operations.iter().map(|operation| {
+            let end = operation.within.end.min(campaign.end_after).max(operation.within.start);
+            let parameters = operation.parameters.iter().map(|parameter| {
+                let mild = |range: Range, shape| {
+                    let step = (range.high - range.low) * resolution;
+                    let step = if range.integer { libm::round(step).max(1.0) } else { step };
+                    let end = mild_end(&operation.kind, &parameter.name).map(|end| end.clamp(range.low, range.high));
+                    // A value that is no stronger than another is left as it is.
+                    let known = end.is_some() || shape == Shape::Range;
+                    (known && !range.is_fixed()).then_some(Mild { end, step })
+                };
+                match PermittedChoice::of(&parameter.domain)? {
+                    PermittedChoice::Number(range, shape) => mild(range, shape).map(Parameter::Number),
+                    PermittedChoice::Point(axes) => {
+                        let fixed = |range: Range| Mild { end: Some(range.low), step: 0.0 };
+                        mild_end(&operation.kind, &parameter.name)?;
+                        Some(Parameter::Point(axes.map(|axis| mild(axis, Shape::Value).unwrap_or(fixed(axis)))))
+                    }
+                    PermittedChoice::Items(_) => None,
+                }
+            });
+            Bounds {
+                window: Range::window(operation.within.start, end),
+                constraints: operation.constraints.clone(),
+                parameters: parameters.collect(),
+            }
+        });
+        Space { fewest: campaign.count.min.max(1) as usize, resolution, operations: operations.collect(), conditions }
+    }
+
+    fn bounds(&self, operation: OperationId) -> &Bounds {
+        &self.operations[operation.index()]
+    }
+
+    /// The shortest window of an operation, in seconds.
+    pub(super) fn shortest(&self, operation: OperationId) -> f64 {
+        self.bounds(operation).window.shortest
+    }
+
+    /// The shortest activation by condition of an operation, in seconds.
+    pub(super) fn shortest_length(&self, operation: OperationId) -> f64 {
+        match &self.conditions {
+            Some(ConditionSpace { end: ConditionEnd::Length { low, .. }, .. }) => *low,
+            _ => self.shortest(operation),
+        }
+    }
+
+    /// How much of a window or length one step takes away, in seconds.
+    pub(super) fn time_step(&self, operation: OperationId) -> f64 {
+        let window = self.bounds(operation).window;
+        (window.high - window.low) * self.resolution
+    }
+
+    /// What is milder of a number; `None` where nothing is, and for a point.
+    pub(super) fn number(&self, operation: OperationId, parameter: usize) -> Option<Mild> {
+        match self.bounds(operation).parameters.get(parameter)? {
+            Some(Parameter::Number(mild)) => Some(*mild),
+            _ => None,
+        }
+    }
+
+    /// What is milder of a point's coordinates; `None` where nothing is, and for a number.
+    pub(super) fn point(&self, operation: OperationId, parameter: usize) -> Option<[Mild; 3]> {
+        match self.bounds(operation).parameters.get(parameter)? {
+            Some(Parameter::Point(axes)) => Some(*axes),
+            _ => None,
+        }
+    }
+
+    /// Simpler conditions of an operation: each `and` or `or` gives way to one of its sides. What the campaign demands of
+    /// conditions they keep, if the operation's own keep it.
+    pub(super) fn simpler(&self, used: &TestOperation) -> Vec<Activation> {
+        let constraints = &self.bounds(used.operation).constraints;
+        let may_start = |condition: &Condition| self.allows(condition, constraints);
+        let may_end = |condition: &Condition| self.allows(condition, &[]);
+        match &used.activation {
+            Activation::Time { .. } | Activation::Offline => Vec::new(),
+            Activation::ConditionFor { start, length, times } => {
+                let demanding = may_start(start);
+                let starts = parts_left_out(start).into_iter().filter(|it| !demanding || may_start(it));
+                starts.map(|start| Activation::ConditionFor { start, length: *length, times: *times }).collect()
+            }
+            Activation::Condition { start, end, times } => {
+                let (demanding_start, demanding_end) = (may_start(start), may_end(end));
+                let starts = parts_left_out(start).into_iter().filter(|it| !demanding_start || may_start(it));
+                let ends = parts_left_out(end).into_iter().filter(|it| !demanding_end || may_end(it));
+                let with_start = starts.map(|start| Activation::Condition { start, end: end.clone(), times: *times });
+                let with_end = ends.map(|end| Activation::Condition { start: start.clone(), end, times: *times });
+                with_start.chain(with_end).collect()
+            }
+        }
+    }
+
+    fn allows(&self, condition: &Condition, constraints: &[sesame_plan::condition::Constraint]) -> bool {
+        self.conditions.as_ref().is_some_and(|space| is_allowed(condition, space, constraints))
+    }
+}
+
+/// What makes one condition of two: `and` or `or`.
+type Join = fn(Box<Condition>, Box<Condition>) -> Condition;
+
+/// A condition with one `and` or `or` in it replaced by one of its sides, in each way; those that leave out most come
+/// first.
+fn parts_left_out(condition: &Condition) -> Vec<Condition> {
+    let (a, b, join): (_, _, Join) = match condition {
+        Condition::Compare { .. } => return Vec::new(),
+        Condition::And(a, b) => (a, b, Condition::And),
+        Condition::Or(a, b) => (a, b, Condition::Or),
+    };
+    let mut found = vec![(**a).clone(), (**b).clone()];
+    found.extend(parts_left_out(a).into_iter().map(|a| join(Box::new(a), b.clone())));
+    found.extend(parts_left_out(b).into_iter().map(|b| join(a.clone(), Box::new(b))));
+    found
+}
+
+/// The number at which a parameter disturbs nothing, or least: what is permitted and nearest to it is mildest.
+///
+/// | kind | mildest |
+/// |---|---|
+/// | random offset, bias, drift, noise, clock skew | 0 |
+/// | scale | factor 1 |
+/// | stale, latency, reorder | no delay |
+/// | packet loss; burst loss `enter` and `loss` | 0 |
+/// | burst loss `leave` | 1: a burst that ends at once |
+/// | rate limit | the highest rate |
+/// | duplicate | one copy |
+/// | custom | 0, as far as anybody can know |
+/// | random absolute, stuck at | none: of a sub-range only a narrower one is milder |
+fn mild_end(kind: &OperationKind, parameter: &str) -> Option<f64> {
+    match kind {
+        OperationKind::RandomValue { mode: ValueMode::Absolute, .. }
+        | OperationKind::StuckAt { .. }
+        | OperationKind::RandomText { .. }
+        | OperationKind::NotFinite { .. }
+        | OperationKind::Freeze
+        | OperationKind::Blackhole => None,
+        OperationKind::Scale | OperationKind::Duplicate => Some(1.0),
+        OperationKind::BurstLoss if parameter == "leave" => Some(1.0),
+        OperationKind::RateLimit => Some(f64::INFINITY),
+        OperationKind::RandomValue { mode: ValueMode::Offset, .. }
+        | OperationKind::Bias
+        | OperationKind::Drift
+        | OperationKind::Noise
+        | OperationKind::Stale
+        | OperationKind::ClockSkew
+        | OperationKind::PacketLoss
+        | OperationKind::BurstLoss
+        | OperationKind::Latency { .. }
+        | OperationKind::Reorder { .. }
+        | OperationKind::Custom { .. } => Some(0.0),
+    }
+}
+
+/// How strong a test is: the sum over its operations, of which each counts from 0 to 1. An operation counts the mean, over
+/// its numbers, of how far each is from where it is mildest, as a share of how far it may be; of a sub-range the end counts
+/// that is farther away, and where no number is milder than another its width. One without such a number counts 1.
+pub fn strength(plan: &CampaignPlan, test: &Test) -> f64 {
+    test.operations.iter().map(|used| strength_of(plan, used)).sum()
+}
+
+fn strength_of(plan: &CampaignPlan, used: &TestOperation) -> f64 {
+    let operation = plan.operation(used.operation);
+    let mut shares = Vec::new();
+    for (parameter, choice) in operation.parameters.iter().zip(&used.parameters) {
+        let end = mild_end(&operation.kind, &parameter.name);
+        let mut add = |(low, high): (f64, f64), (from, to): (f64, f64), shape| {
+            let share = match end.map(|end| end.clamp(low, high)) {
+                Some(end) => (from - end).abs().max((to - end).abs()) / (high - end).max(end - low),
+                None if shape == Shape::Range => (to - from) / (high - low),
+                None => return,
+            };
+            if low < high {
+                shares.push(share);
+            }
+        };
+        match (&parameter.domain, choice) {
+            (&Domain::Number { low, high, shape, .. }, &Choice::Value { value }) => {
+                add((low, high), (value, value), shape);
+            }
+            (&Domain::Number { low, high, shape, .. }, &Choice::Range { low: from, high: to }) => {
+                add((low, high), (from, to), shape);
+            }
+            (Domain::Point { low, high }, Choice::Point { point }) => {
+                for axis in 0..3 {
+                    add((low[axis], high[axis]), (point[axis], point[axis]), Shape::Value);
+                }
+            }
+            _ => {}
+        }
+    }
+    if shares.is_empty() { 1.0 } else { shares.iter().sum::<f64>() / shares.len() as f64 }
+}

@@ -1,0 +1,605 @@
+//! What a campaign permits its tests: which operations, how many, when, and how strong.
+//!
+//! Every strategy draws from these tests and from no others. Single operations are made of what [`PermittedOperation`]
+//! says; what holds of several copies of one operation, [`Permitted::settle`] brings about in a test that was put together,
+//! and [`Permitted::permits_copies`] tells:
+//!
+//! - no two copies have the same draw seed, so that each draws for itself;
+//! - [`Copies::Apart`], by time: their windows are disjoint;
+//! - [`Copies::Apart`], by condition: nothing, as the relay makes a copy wait while another is active;
+//! - [`Copies::Apart`], before the start or after the end: there is one, as all would act at the same moment;
+//! - [`Copies::Once`]: there is one.
+
+use std::collections::BTreeSet;
+
+use thiserror::Error;
+
+use sesame_plan::condition::{Condition, ConditionSpace, Constraint};
+use sesame_plan::{Activation, ActivationMode, CampaignPlan, Copies, Count, OperationId, Test, TestOperation};
+use sesame_rng::Stream;
+
+use crate::coverage::GridError;
+use crate::space::apart::{self, MOST_APART};
+use crate::space::choice::PermittedChoice;
+use crate::space::condition::grown;
+use crate::space::initial::fresh_operation;
+use crate::space::range::Range;
+
+/// How often a first condition is tried before a campaign is said to have none; so rarely does one try fail where there
+/// are any that this is certain enough.
+const FIRST_TRIES: u64 = 100;
+
+/// Why a plan cannot be searched. The generator refuses such campaigns, so a plan that is one was edited.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum SearchError {
+    /// No operation can be active in a test.
+    #[error("campaign `{campaign}` has no operation that may be active before its end; give it one, or end it later")]
+    NoOperation {
+        /// The campaign.
+        campaign: String,
+    },
+    /// The bounds on the number of operations leave none.
+    #[error("campaign `{campaign}` permits {min} to {max} operations per test; permit at least one, in rising order")]
+    Count {
+        /// The campaign.
+        campaign: String,
+        /// The lower bound.
+        min: u32,
+        /// The upper bound.
+        max: u32,
+    },
+    /// A test has to hold more operations than there are, and may hold each only so often.
+    #[error(
+        "campaign `{campaign}` demands {min} operations per test, and its tests can hold {most}; demand fewer, offer more \
+         operations, or let copies overlap"
+    )]
+    TooFew {
+        /// The campaign.
+        campaign: String,
+        /// The lower bound.
+        min: u32,
+        /// How many operations a test can hold.
+        most: usize,
+    },
+    /// A parameter must be whole, and no whole number is permitted.
+    #[error("operation `{operation}` permits no whole number for `{parameter}`; widen its range to include one")]
+    NoWholeNumber {
+        /// The operation.
+        operation: String,
+        /// The parameter.
+        parameter: String,
+    },
+    /// No condition could be grown that is neither always true nor never.
+    #[error(
+        "campaign `{campaign}` has no start condition for operation `{operation}` that could be true as well as false; \
+         offer more variables, wider integers or more depth, or demand less of it"
+    )]
+    NoCondition {
+        /// The campaign.
+        campaign: String,
+        /// The operation.
+        operation: String,
+    },
+    /// An exploration of cells that the campaign does not count.
+    #[error("campaign `{campaign}` explores cells but does not say which; give it a `coverage`")]
+    NoCoverage {
+        /// The campaign.
+        campaign: String,
+    },
+    /// A strategy that has to choose when operations are active, of a campaign in which conditions do.
+    #[error("campaign `{campaign}` is by condition: when its operations are active only a run can tell")]
+    NotByTime {
+        /// The campaign.
+        campaign: String,
+    },
+    /// A strategy that predicts when conditions hold, of a campaign that has none.
+    #[error("campaign `{campaign}` is by time: there are no conditions whose outcome could be predicted")]
+    NotByCondition {
+        /// The campaign.
+        campaign: String,
+    },
+    /// Cells that are no grid.
+    #[error("the coverage of campaign `{campaign}` cannot be counted: {reason}")]
+    Grid {
+        /// The campaign.
+        campaign: String,
+        /// Why not.
+        reason: GridError,
+    },
+    /// A falsification without anything to falsify.
+    #[error("campaign `{campaign}` has no requirement to violate; add a `requirement` to its space")]
+    NoRequirement {
+        /// The campaign.
+        campaign: String,
+    },
+    /// A population of nobody.
+    #[error("campaign `{campaign}` has a population of 0; give it at least 1")]
+    NoPopulation {
+        /// The campaign.
+        campaign: String,
+    },
+}
+
+/// All that a campaign's tests may be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Permitted {
+    operations: Vec<PermittedOperation>,
+    count: Count,
+    copies: Copies,
+    conditions: Option<ConditionSpace>,
+}
+
+/// One operation as far as a campaign permits it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PermittedOperation {
+    /// Which.
+    pub operation: OperationId,
+    /// When it may be active.
+    pub activation: PermittedActivation,
+    /// Its parameters, in the operation's order.
+    pub parameters: Vec<PermittedChoice>,
+    /// Probability that a fresh test includes it.
+    pub inclusion: f64,
+}
+
+/// When a campaign permits an operation to be active.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PermittedActivation {
+    /// Never, as it acts before the start or after the end: there is nothing to choose.
+    Offline,
+    /// In a window of time inside this range, which lies in `within` and the campaign.
+    Time(Range),
+    /// As conditions say.
+    Condition {
+        /// What they are grown from.
+        space: ConditionSpace,
+        /// What the start conditions contain.
+        constraints: Vec<Constraint>,
+        /// A start condition and an end condition that are permitted, for when many tries give no others.
+        first: Box<[Condition; 2]>,
+    },
+}
+
+impl PermittedActivation {
+    /// What the start conditions of an operation contain.
+    pub fn constraints(&self) -> &[Constraint] {
+        match self {
+            PermittedActivation::Condition { constraints, .. } => constraints,
+            PermittedActivation::Offline | PermittedActivation::Time(_) => &[],
+        }
+    }
+}
+
+impl Permitted {
+    /// What a plan's campaign permits. Operations that could only begin at or after its end are left out.
+    pub fn of(plan: &CampaignPlan) -> Result<Self, SearchError> {
+        let campaign = &plan.campaign;
+        let name = || campaign.name.clone();
+        let count = Count { min: campaign.count.min.max(1), max: campaign.count.max };
+        if count.min > count.max {
+            return Err(SearchError::Count { campaign: name(), min: campaign.count.min, max: campaign.count.max });
+        }
+        let conditions = match &campaign.activation {
+            ActivationMode::Time => None,
+            ActivationMode::Condition { space } => Some(space.clone()),
+        };
+        let mut operations = Vec::new();
+        for &id in &campaign.operations {
+            let operation = plan.operation(id);
+            let offline = operation.kind.is_offline();
+            let end = operation.within.end.min(campaign.end_after);
+            if !offline && operation.within.start >= end {
+                continue;
+            }
+            let mut parameters = Vec::new();
+            for parameter in &operation.parameters {
+                let permitted = PermittedChoice::of(&parameter.domain).ok_or_else(|| SearchError::NoWholeNumber {
+                    operation: operation.name.clone(),
+                    parameter: parameter.name.clone(),
+                })?;
+                parameters.push(permitted);
+            }
+            operations.push(PermittedOperation {
+                operation: id,
+                activation: match &conditions {
+                    _ if offline => PermittedActivation::Offline,
+                    None => PermittedActivation::Time(Range::window(operation.within.start, end)),
+                    Some(space) => {
+                        let none = || SearchError::NoCondition { campaign: name(), operation: operation.name.clone() };
+                        PermittedActivation::Condition {
+                            space: space.clone(),
+                            constraints: operation.constraints.clone(),
+                            first: Box::new(first_conditions(space, &operation.constraints).ok_or_else(none)?),
+                        }
+                    }
+                },
+                parameters,
+                inclusion: operation.inclusion,
+            });
+        }
+        if operations.is_empty() {
+            return Err(SearchError::NoOperation { campaign: name() });
+        }
+        let permitted = Permitted { operations, count, copies: campaign.copies, conditions };
+        let most = permitted.most();
+        if most < permitted.fewest() {
+            return Err(SearchError::TooFew { campaign: name(), min: count.min, most });
+        }
+        Ok(permitted)
+    }
+
+    /// What holds of several copies of one operation.
+    pub fn copies(&self) -> Copies {
+        self.copies
+    }
+
+    /// How many copies of an operation a test may hold.
+    pub fn most_copies(&self, kind: &PermittedOperation) -> usize {
+        match (self.copies, &kind.activation) {
+            (Copies::Once, _) | (Copies::Apart, PermittedActivation::Offline) => 1,
+            (Copies::Apart, PermittedActivation::Time(_)) => MOST_APART,
+            (Copies::Apart, PermittedActivation::Condition { .. }) | (Copies::MayOverlap, _) => usize::MAX,
+        }
+    }
+
+    /// Whether a test of these operations may hold one more copy of an operation.
+    pub fn has_room(&self, operations: &[TestOperation], kind: &PermittedOperation) -> bool {
+        operations.iter().filter(|it| it.operation == kind.operation).count() < self.most_copies(kind)
+    }
+
+    /// Whether the copies of each operation in a test of this campaign are permitted.
+    pub fn permits_copies(&self, test: &Test) -> bool {
+        let mut draws = BTreeSet::new();
+        let drawn_alone = test.operations.iter().all(|it| draws.insert((it.operation, it.draw_seed)));
+        drawn_alone
+            && self.operations.iter().all(|kind| {
+                let copies = places_of(test, kind.operation);
+                if copies.len() > self.most_copies(kind) {
+                    return false;
+                }
+                let Some(windows) = self.windows_apart(test, kind, &copies) else { return true };
+                let mut settled = windows.clone();
+                if let PermittedActivation::Time(range) = kind.activation {
+                    apart::nearest(range, &mut settled);
+                }
+                settled == windows
+            })
+    }
+
+    /// Makes the copies of each operation in a test what they have to be, and changes nothing else: too many copies leave
+    /// the test, each as likely as the others, and where too few operations remain fresh ones of other kinds come in;
+    /// windows are moved apart to the [nearest](apart::nearest) ones; a copy that draws like an earlier one gets a draw seed
+    /// of its own. A test that is permitted already stays as it is and takes nothing from the stream.
+    pub fn settle(&self, test: &mut Test, stream: &mut Stream) {
+        for kind in &self.operations {
+            let mut copies = places_of(test, kind.operation);
+            while copies.len() > self.most_copies(kind) {
+                test.operations.remove(copies[stream.below(copies.len())]);
+                copies = places_of(test, kind.operation);
+            }
+        }
+        while test.operations.len() < self.fewest() {
+            let kinds: Vec<_> = self.operations.iter().filter(|kind| self.has_room(&test.operations, kind)).collect();
+            let kind = kinds[stream.below(kinds.len())];
+            let place = stream.below(test.operations.len() + 1);
+            test.operations.insert(place, fresh_operation(kind, stream));
+        }
+        self.settle_windows(test, apart::nearest);
+        let mut draws = BTreeSet::new();
+        for operation in &mut test.operations {
+            while !draws.insert((operation.operation, operation.draw_seed)) {
+                operation.draw_seed = stream.bits();
+            }
+        }
+    }
+
+    /// Moves the windows of copies apart in this way, if they have to be.
+    pub fn settle_windows(&self, test: &mut Test, way: fn(Range, &mut [(f64, f64)])) {
+        for kind in &self.operations {
+            let copies = places_of(test, kind.operation);
+            let (Some(mut windows), PermittedActivation::Time(range)) =
+                (self.windows_apart(test, kind, &copies), &kind.activation)
+            else {
+                continue;
+            };
+            way(*range, &mut windows);
+            for (&place, (start, end)) in copies.iter().zip(windows) {
+                test.operations[place].activation = Activation::Time { start, end };
+            }
+        }
+    }
+
+    /// The windows of copies that must not overlap; `None` where they may, and where there is one.
+    fn windows_apart(&self, test: &Test, kind: &PermittedOperation, copies: &[usize]) -> Option<Vec<(f64, f64)>> {
+        let by_time = matches!(kind.activation, PermittedActivation::Time(_));
+        if self.copies != Copies::Apart || !by_time || copies.len() < 2 {
+            return None;
+        }
+        let window = |&place: &usize| match test.operations[place].activation {
+            Activation::Time { start, end } => Some((start, end)),
+            _ => None,
+        };
+        copies.iter().map(window).collect()
+    }
+
+    /// The operations, in the campaign's order; at least one.
+    pub fn operations(&self) -> &[PermittedOperation] {
+        &self.operations
+    }
+
+    /// What conditions are grown from; `None` where operations are active in windows of time.
+    pub fn conditions(&self) -> Option<&ConditionSpace> {
+        self.conditions.as_ref()
+    }
+
+    /// The least number of operations of a test, at least 1.
+    pub fn fewest(&self) -> usize {
+        self.count.min as usize
+    }
+
+    /// The greatest number of operations of a test, at least [`Permitted::fewest`].
+    pub fn most(&self) -> usize {
+        let copies = self.operations.iter().fold(0usize, |sum, kind| sum.saturating_add(self.most_copies(kind)));
+        copies.min(self.count.max as usize)
+    }
+
+    /// What is permitted of an operation; `None` for one that the campaign does not use.
+    pub fn find(&self, operation: OperationId) -> Option<&PermittedOperation> {
+        self.operations.iter().find(|permitted| permitted.operation == operation)
+    }
+}
+
+/// Where in a test the copies of an operation are.
+fn places_of(test: &Test, operation: OperationId) -> Vec<usize> {
+    (0..test.operations.len()).filter(|&at| test.operations[at].operation == operation).collect()
+}
+
+/// A start condition and an end condition that are permitted, if there are any. No seed decides them, since a campaign can
+/// be searched with every seed or with none.
+fn first_conditions(space: &ConditionSpace, constraints: &[Constraint]) -> Option<[Condition; 2]> {
+    let first = |constraints: &[Constraint]| {
+        (0..FIRST_TRIES).find_map(|at| grown(space, constraints, &mut Stream::derive(0, "first condition", &[at])))
+    };
+    Some([first(constraints)?, first(&[])?])
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use proptest::prelude::*;
+
+    use sesame_base::condition::constant::has_constant_part;
+    use sesame_plan::condition::{ConditionEnd, Integers};
+    use sesame_plan::{
+        Activation, Choice, Domain, Drain, Operation, OperationKind, Parameter, Search, Shape, Span, Test,
+    };
+
+    use super::*;
+    use crate::space::condition::contains;
+    use crate::space::condition::tests::{any_constraints, any_space, wrong};
+    use crate::testing::landscape::LANDSCAPES;
+
+    /// Plans by time with up to five operations of varied windows and parameters, and varied counts.
+    pub(crate) fn any_timed_plan() -> impl Strategy<Value = CampaignPlan> {
+        let ends = || (0.0..100.0f64, 0.0..100.0f64).prop_map(|(a, b)| (a.min(b), a.max(b)));
+        let parameter =
+            (ends(), any::<bool>(), any::<bool>(), any::<bool>()).prop_map(|((a, b), value, integer, fixed)| {
+                Domain::Number {
+                    low: if integer { libm::floor(a) - 50.0 } else { a - 50.0 },
+                    high: if fixed {
+                        if integer { libm::floor(a) - 50.0 } else { a - 50.0 }
+                    } else {
+                        b - 50.0 + f64::from(integer)
+                    },
+                    shape: if value { Shape::Value } else { Shape::Range },
+                    integer,
+                }
+            });
+        let point = (ends(), ends(), -9.0..9.0f64)
+            .prop_map(|(x, y, z)| Domain::Point { low: [x.0, y.0, z], high: [x.1, y.1, z] });
+        let items = |n: usize| (0..n).map(|item| format!("item {item}")).collect();
+        let texts = (1usize..4).prop_map(move |n| Domain::Texts { texts: items(n) });
+        let files = (1usize..3).prop_map(move |n| Domain::Files { files: items(n) });
+        let domain = prop_oneof![4 => parameter, 1 => point, 1 => texts, 1 => files];
+        let parameter = domain.prop_map(|domain| Parameter { name: "p".to_owned(), unit: None, domain });
+        let operation = (ends(), proptest::collection::vec(parameter, 0..4), 0.0..=1.0f64, 0u32..5).prop_map(
+            |((start, end), parameters, inclusion, kind)| Operation {
+                name: "o".to_owned(),
+                doc: String::new(),
+                topic: (kind > 0).then_some(sesame_plan::TopicId(0)),
+                // What is varied follows from the parameters, and from the kind only whether there is a window.
+                kind: if kind == 0 {
+                    OperationKind::Custom { moment: sesame_plan::Moment::BeforeStart }
+                } else {
+                    OperationKind::Latency { distribution: sesame_plan::Distribution::Fixed, drain: Drain::Finish }
+                },
+                parameters,
+                within: Span { start, end: end + 0.01 },
+                priority: 0,
+                inclusion,
+                places: Vec::new(),
+                timed: true,
+                constraints: Vec::new(),
+            },
+        );
+        let copies = prop_oneof![Just(Copies::Apart), Just(Copies::MayOverlap), Just(Copies::Once)];
+        let plans = (proptest::collection::vec(operation, 1..6), 1u32..4, 0u32..6, 0.5..120.0f64, copies).prop_map(
+            |(operations, min, more, end_after, copies)| {
+                let mut plan = LANDSCAPES[0].plan(Search::Nsga2 { population: 7, evaluations: 40 });
+                plan.campaign.operations = (0u32..).map(OperationId).take(operations.len()).collect();
+                plan.campaign.count = Count { min, max: min + more };
+                plan.campaign.end_after = end_after;
+                plan.operations = operations;
+                for operation in plan.operations.iter_mut().filter(|operation| operation.kind.is_offline()) {
+                    operation.within = Span { start: 0.0, end: end_after };
+                }
+                plan.operations[0].within.start = plan.operations[0].within.start.min(end_after / 2.0);
+                plan.campaign.copies = copies;
+                plan
+            },
+        );
+        plans.prop_filter("room for the least number of operations", |plan| Permitted::of(plan).is_ok())
+    }
+
+    /// Such plans, by time or by condition.
+    pub(crate) fn any_plan() -> impl Strategy<Value = CampaignPlan> {
+        let conditional =
+            (any_timed_plan(), any_space(), any_constraints()).prop_map(|(mut plan, space, constraints)| {
+                plan.operations[0].constraints = constraints;
+                plan.campaign.activation = ActivationMode::Condition { space };
+                plan
+            });
+        let grows = conditional.prop_filter("conditions to grow", |plan| Permitted::of(plan).is_ok());
+        prop_oneof![any_timed_plan(), grows]
+    }
+
+    /// What of an activation by condition the plan does not permit.
+    fn broken_condition(space: &ConditionSpace, constraints: &[Constraint], activation: &Activation) -> Option<String> {
+        let (start, times) = match (activation, space.end) {
+            (Activation::Condition { start, end, times }, ConditionEnd::Condition) => {
+                if has_constant_part(end, &space.variables) {
+                    return Some("a constant end".to_owned());
+                }
+                if let Some(wrong) = wrong(end, space, space.depth) {
+                    return Some(wrong);
+                }
+                (start, times)
+            }
+            (Activation::ConditionFor { start, length, times }, ConditionEnd::Length { low, high }) => {
+                if !(low..=high).contains(length) {
+                    return Some(format!("length {length}"));
+                }
+                (start, times)
+            }
+            _ => return Some("kind of activation".to_owned()),
+        };
+        if *times != space.times || has_constant_part(start, &space.variables) {
+            return Some(format!("{times} times from {start:?}"));
+        }
+        if !constraints.iter().all(|constraint| contains(start, constraint)) {
+            return Some(format!("{start:?} lacks one of {constraints:?}"));
+        }
+        wrong(start, space, space.depth)
+    }
+
+    /// Two copies of one operation in a test that the plan does not permit beside each other, if there are any.
+    pub(crate) fn broken_copies(plan: &CampaignPlan, test: &Test) -> Option<String> {
+        for (at, second) in test.operations.iter().enumerate() {
+            for first in test.operations[..at].iter().filter(|first| first.operation == second.operation) {
+                let offline = plan.operation(second.operation).kind.is_offline();
+                let overlap = match (&first.activation, &second.activation) {
+                    (Activation::Time { start: a, end: b }, Activation::Time { start: c, end: d }) => a < d && c < b,
+                    _ => false,
+                };
+                let wrong = match plan.campaign.copies {
+                    Copies::Apart => overlap || offline,
+                    Copies::MayOverlap => false,
+                    Copies::Once => true,
+                };
+                if wrong || first.draw_seed == second.draw_seed {
+                    return Some(format!("{first:?} and {second:?}"));
+                }
+            }
+        }
+        None
+    }
+
+    /// What of the plan a test breaks, if anything: read off the plan itself.
+    pub(crate) fn broken_rule(plan: &CampaignPlan, test: &Test) -> Option<String> {
+        let count = plan.campaign.count;
+        if !(count.min.max(1)..=count.max).contains(&u32::try_from(test.operations.len()).ok()?) {
+            return Some(format!("{} operations", test.operations.len()));
+        }
+        if let Some(broken) = broken_copies(plan, test) {
+            return Some(broken);
+        }
+        for applied in &test.operations {
+            let operation = plan.operation(applied.operation);
+            match (&applied.activation, &plan.campaign.activation) {
+                (Activation::Offline, _) if operation.kind.is_offline() => {}
+                (activation, _) if operation.kind.is_offline() => {
+                    return Some(format!("{activation:?} of an offline operation"));
+                }
+                (&Activation::Time { start, end }, ActivationMode::Time) => {
+                    let within = operation.within;
+                    let shortest = (within.end.min(plan.campaign.end_after) - within.start) * 0.000_999;
+                    if end - start < shortest {
+                        return Some(format!("window {start} to {end}"));
+                    }
+                    if !(within.start <= start && start < end && end <= within.end && start < plan.campaign.end_after) {
+                        return Some(format!("window {start} to {end}"));
+                    }
+                }
+                (activation, ActivationMode::Condition { space }) => {
+                    let broken = broken_condition(space, &operation.constraints, activation);
+                    if broken.is_some() {
+                        return broken;
+                    }
+                }
+                _ => return Some("kind of activation".to_owned()),
+            }
+            if applied.parameters.len() != operation.parameters.len() {
+                return Some("number of parameters".to_owned());
+            }
+            for (choice, parameter) in applied.parameters.iter().zip(&operation.parameters) {
+                let fits = match (&parameter.domain, choice) {
+                    (Domain::Point { low, high }, Choice::Point { point }) => {
+                        (0..3).all(|axis| (low[axis]..=high[axis]).contains(&point[axis]))
+                    }
+                    (Domain::Texts { texts: items } | Domain::Files { files: items }, Choice::Text { text }) => {
+                        items.contains(text)
+                    }
+                    (Domain::Number { low: least, high: most, shape, integer }, choice) => {
+                        let (low, high) = match (choice, shape) {
+                            (Choice::Value { value }, Shape::Value) => (*value, *value),
+                            (Choice::Range { low, high }, Shape::Range) => (*low, *high),
+                            _ => return Some("shape of a parameter".to_owned()),
+                        };
+                        let whole = !integer || (libm::trunc(low) == low && libm::trunc(high) == high);
+                        *least <= low && low <= high && high <= *most && whole
+                    }
+                    _ => false,
+                };
+                if !fits {
+                    return Some(format!("choice {choice:?} of {parameter:?}"));
+                }
+            }
+        }
+        None
+    }
+
+    #[test]
+    fn what_cannot_be_searched_is_refused_with_its_reason() {
+        let plan = || LANDSCAPES[0].plan(Search::Random { evaluations: 10 });
+        let refusal = |plan: &CampaignPlan| Permitted::of(plan).map_err(|e| e.to_string()).unwrap_err();
+
+        let mut ends_early = plan();
+        ends_early.operations.iter_mut().for_each(|op| op.within = Span { start: 70.0, end: 80.0 });
+        assert!(refusal(&ends_early).contains("no operation that may be active before its end"));
+
+        let mut none_allowed = plan();
+        none_allowed.campaign.count = Count { min: 0, max: 0 };
+        assert!(refusal(&none_allowed).contains("permits 0 to 0 operations per test"));
+
+        let mut no_number = plan();
+        let offset = &mut no_number.operations[1].parameters[0];
+        offset.domain = Domain::Number { low: 0.2, high: 0.8, shape: Shape::Range, integer: true };
+        assert!(refusal(&no_number).contains("`jitter1` permits no whole number for `offset`"));
+
+        let mut unreachable =
+            LANDSCAPES[0].plan_by_condition(Search::Random { evaluations: 10 }, ConditionEnd::Condition);
+        let bounds = Integers { lowest: 30, highest: 40 };
+        unreachable.operations[1].constraints = vec![Constraint::Integer { bounds }];
+        assert!(refusal(&unreachable).contains("has no start condition for operation `jitter1`"));
+    }
+
+    #[test]
+    fn operations_that_begin_after_the_campaign_are_left_out_and_others_are_clipped() {
+        let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 10 });
+        plan.operations[0].within = Span { start: 70.0, end: 80.0 };
+        plan.operations[1].within = Span { start: 60.0, end: 90.0 };
+        let permitted = Permitted::of(&plan).unwrap();
+        let [only] = permitted.operations() else { panic!("{permitted:?}") };
+        let PermittedActivation::Time(window) = only.activation else { panic!("{only:?}") };
+        assert_eq!((only.operation, window.low, window.high), (OperationId(1), 60.0, 70.0));
+    }
+}

@@ -1,0 +1,124 @@
+//! Between what a campaign's tests lie in the reduced parameter space.
+
+use sesame_plan::{ActivationMode, CampaignPlan, Dimension, Shape};
+
+use crate::space::choice::PermittedChoice;
+use crate::space::permitted::{Permitted, PermittedOperation};
+use crate::sspr::{Class, Window, class_of};
+
+/// The least and the greatest value of a dimension over all tests that a campaign permits; `None` where no test has one.
+///
+/// These are the ends of each dimension alone: not every combination of them can be had, which is what
+/// [`Feasible`](crate::coverage::Feasible) tells. Where conditions switch operations, any times inside their windows
+/// count as possible.
+pub fn extent(plan: &CampaignPlan, permitted: &Permitted, dimension: Dimension) -> Option<(f64, f64)> {
+    let timed: Vec<Timing> = permitted.operations().iter().filter_map(|it| Timing::of(plan, it)).collect();
+    if timed.is_empty() {
+        return None;
+    }
+    let by_condition = matches!(plan.campaign.activation, ActivationMode::Condition { .. });
+    let offline = timed.len() < permitted.operations().len();
+    let (fewest, most) = (permitted.fewest(), permitted.most());
+    // One that acts beside the run, or whose conditions never hold, counts in no dimension.
+    let fewest = if offline || by_condition { 1 } else { fewest };
+    let least = |of: fn(&Timing) -> f64| timed.iter().map(of).fold(f64::INFINITY, f64::min);
+    let greatest = |of: fn(&Timing) -> f64| timed.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+    let midpoints = (
+        least(|it| it.window.start + it.window.shortest / 2.0),
+        greatest(|it| it.window.end - it.window.shortest / 2.0),
+    );
+    let several = most > 1 || by_condition;
+    match dimension {
+        Dimension::T1 => Some(midpoints),
+        Dimension::T2 => Some((least(|it| it.window.shortest), greatest(|it| it.window.end - it.window.start))),
+        Dimension::T3 => Some((0.0, if several { (midpoints.1 - midpoints.0) / 2.0 } else { 0.0 })),
+        Dimension::P1 => shares(plan, permitted).into_iter().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))),
+        Dimension::P2 => {
+            let all = shares(plan, permitted);
+            let (low, high) = all.iter().copied().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+            let several = most > 1 || timed.iter().any(|it| it.numbers > 1);
+            Some((0.0, if several { (high - low) / 2.0 } else { 0.0 }))
+        }
+        Dimension::O0 => Some((fewest as f64, most as f64)),
+        Dimension::O1 => Some(counted(&timed, Class::Value, fewest, most)),
+        Dimension::O2 => Some(counted(&timed, Class::Loss, fewest, most)),
+        Dimension::O3 => Some(counted(&timed, Class::Delay, fewest, most)),
+    }
+}
+
+/// An operation that is active during the run: its window, its class, and how many numbers it has that count.
+struct Timing {
+    window: Window,
+    class: Class,
+    numbers: usize,
+}
+
+impl Timing {
+    fn of(plan: &CampaignPlan, it: &PermittedOperation) -> Option<Timing> {
+        let window = Window::of(plan, it)?;
+        let numbers = it.parameters.iter().map(|parameter| shares_of(parameter).len()).sum();
+        Some(Timing { window, class: class_of(&plan.operation(it.operation).kind), numbers })
+    }
+}
+
+/// Between what each number of the operations lies that are active during the run, as a share of what is permitted.
+fn shares(plan: &CampaignPlan, permitted: &Permitted) -> Vec<(f64, f64)> {
+    let active = permitted.operations().iter().filter(|it| !plan.operation(it.operation).kind.is_offline());
+    active.flat_map(|it| it.parameters.iter().flat_map(shares_of)).collect()
+}
+
+fn shares_of(parameter: &PermittedChoice) -> Vec<(f64, f64)> {
+    match parameter {
+        PermittedChoice::Number(range, Shape::Value | Shape::Range) if range.low < range.high => vec![(0.0, 1.0)],
+        PermittedChoice::Point(axes) => axes.iter().filter(|axis| axis.low < axis.high).map(|_| (0.0, 1.0)).collect(),
+        PermittedChoice::Number(..) | PermittedChoice::Items(_) => Vec::new(),
+    }
+}
+
+/// How many operations of a class a test can have.
+fn counted(timed: &[Timing], class: Class, fewest: usize, most: usize) -> (f64, f64) {
+    let of_class = timed.iter().filter(|it| it.class == class).count();
+    let least = if of_class == timed.len() { fewest } else { 0 };
+    let greatest = if of_class > 0 { most } else { 0 };
+    (least as f64, greatest as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use sesame_rng::Stream;
+
+    use super::*;
+    use crate::space::initial::fresh_test;
+    use crate::space::permitted::tests::any_timed_plan;
+    use crate::sspr::{Convention, Point, planned};
+
+    proptest! {
+        #[test]
+        fn every_test_lies_inside(plan in any_timed_plan(), seed: u64) {
+            let permitted = Permitted::of(&plan).unwrap();
+            for n in 0..60 {
+                let test = fresh_test(&permitted, &mut Stream::derive(seed, "test", &[n]));
+                let Some(point) = Point::of(&planned(&plan, &test).unwrap(), Convention::Ours) else { continue };
+                for dimension in Dimension::ALL {
+                    let Some(value) = point.get(dimension) else { continue };
+                    let (low, high) = extent(&plan, &permitted, dimension).unwrap();
+                    prop_assert!(low - 1e-9 <= value && value <= high + 1e-9, "{dimension:?}: {value} in {low}..{high}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_cells_of_the_papers_table_have_the_ends_that_table_gives_them() {
+        let plan = crate::testing::landscape::LANDSCAPES[0].plan(sesame_plan::Search::Random { evaluations: 1 });
+        let permitted = Permitted::of(&plan).unwrap();
+        let of = |dimension| extent(&plan, &permitted, dimension).unwrap();
+        assert_eq!(of(Dimension::P1), (0.0, 1.0));
+        assert_eq!(of(Dimension::P2), (0.0, 0.5));
+        assert_eq!(of(Dimension::O0), (1.0, 5.0));
+        let (t1, t3) = (of(Dimension::T1), of(Dimension::T3));
+        assert!(t1.0 < 0.001 && t1.1 > 0.999 && (t3.1 - 0.5).abs() < 0.001, "{t1:?} {t3:?}");
+    }
+}

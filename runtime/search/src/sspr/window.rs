@@ -1,0 +1,32 @@
+//! Where an operation's intervals may lie.
+
+use sesame_plan::CampaignPlan;
+
+use crate::space::permitted::{PermittedActivation, PermittedOperation};
+
+/// Where the intervals of an operation may lie, in shares of its permitted window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Window {
+    pub(crate) start: f64,
+    pub(crate) end: f64,
+    /// How long an interval is at least.
+    pub(crate) shortest: f64,
+}
+
+impl Window {
+    /// That of an operation in a campaign; `None` for one that acts before the start or after the end. Where conditions
+    /// switch an operation, its intervals may be as short as they like.
+    pub(crate) fn of(plan: &CampaignPlan, permitted: &PermittedOperation) -> Option<Window> {
+        let within = plan.operation(permitted.operation).within;
+        let share = |time: f64| (time - within.start) / within.length();
+        Some(match &permitted.activation {
+            PermittedActivation::Offline => return None,
+            PermittedActivation::Time(range) => {
+                Window { start: share(range.low), end: share(range.high), shortest: range.shortest / within.length() }
+            }
+            PermittedActivation::Condition { .. } => {
+                Window { start: 0.0, end: share(within.end.min(plan.campaign.end_after)), shortest: 0.0 }
+            }
+        })
+    }
+}

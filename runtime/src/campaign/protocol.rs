@@ -1,0 +1,122 @@
+//! What supervisor and worker say to each other: JSON in length-prefixed frames over a connection of their own.
+//!
+//! Standard output stays the worker's, so that a hook may print.
+
+use std::io::{self, Read, Write};
+use std::time::Duration;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use sesame_base::observation::Observation;
+use sesame_plan::Test;
+use sesame_relay::transport::Aside;
+
+use crate::campaign::traces::TraceOrder;
+
+/// The largest frame either side accepts; time series of a long test are the largest thing sent.
+const FRAME_LIMIT: u32 = 1 << 30;
+
+/// The largest frame that is taken from a connection before it is known whose it is.
+const GREETING_LIMIT: usize = 1 << 10;
+
+/// A worker's first words.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Hello {
+    /// Proves that the worker is the one the supervisor started, where anybody could have connected.
+    pub(super) token: Option<String>,
+}
+
+/// What the supervisor asks for.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Job {
+    /// The test's number, given back with the result.
+    pub number: u32,
+    /// The test.
+    pub test: Test,
+    /// Seed of the simulator's own randomness.
+    pub simulator_seed: u64,
+    /// The trace that is asked for, if any.
+    pub trace: Option<TraceOrder>,
+}
+
+/// What the worker answers.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Reply {
+    pub(super) number: u32,
+    pub(super) observation: Observation,
+    /// Why the trace that was asked for could not be written.
+    pub(super) trace_failure: Option<String>,
+    /// What befell the simulator meanwhile.
+    pub(super) aside: Aside,
+}
+
+pub(super) fn send(stream: &mut impl Write, message: &impl Serialize) -> io::Result<()> {
+    let body = serde_json::to_vec(message)?;
+    let length = u32::try_from(body.len()).ok().filter(|&length| length <= FRAME_LIMIT);
+    let length = length.ok_or_else(|| io::Error::other(format!("a frame of {} bytes is too large", body.len())))?;
+    stream.write_all(&length.to_le_bytes())?;
+    stream.write_all(&body)?;
+    stream.flush()
+}
+
+pub(super) fn receive<T: DeserializeOwned>(stream: &mut impl Read) -> io::Result<T> {
+    let mut length = [0; 4];
+    stream.read_exact(&mut length)?;
+    let length = u32::from_le_bytes(length);
+    if length > FRAME_LIMIT {
+        return Err(io::Error::other(format!("a frame of {length} bytes is too large")));
+    }
+    let mut body = Vec::new();
+    stream.take(u64::from(length)).read_to_end(&mut body)?;
+    if body.len() != length as usize {
+        return Err(io::ErrorKind::UnexpectedEof.into());
+    }
+    Ok(serde_json::from_slice(&body)?)
+}
+
+/// The first frame of a connection, as far as it has come.
+#[derive(Debug, Default)]
+pub(super) struct Greeting {
+    heard: Vec<u8>,
+}
+
+impl Greeting {
+    /// Takes what has come of it, and nothing that follows it; `None` while it is not whole and the stream has no more for
+    /// now. What is longer than a kilobyte, or is no greeting, is an error.
+    pub(super) fn hear(&mut self, stream: &mut impl Read) -> io::Result<Option<Hello>> {
+        loop {
+            let whole = match self.heard.first_chunk() {
+                None => size_of::<u32>(),
+                Some(length) => {
+                    let length = usize::try_from(u32::from_le_bytes(*length)).unwrap_or(usize::MAX);
+                    if length == 0 || length > GREETING_LIMIT {
+                        return Err(io::Error::other(format!("a greeting of {length} bytes is none")));
+                    }
+                    size_of::<u32>() + length
+                }
+            };
+            if self.heard.len() == whole && whole > size_of::<u32>() {
+                return Ok(Some(serde_json::from_slice(&self.heard[size_of::<u32>()..])?));
+            }
+            let mut more = [0; size_of::<u32>() + GREETING_LIMIT];
+            match stream.read(&mut more[..whole - self.heard.len()]) {
+                Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+                Ok(count) => self.heard.extend_from_slice(&more[..count]),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
+                    return Ok(None);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+}
+
+/// That nobody has reported in time.
+pub(super) fn not_reported(limit: Duration) -> io::Error {
+    io::Error::new(io::ErrorKind::TimedOut, format!("it did not report within {} s", limit.as_secs()))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,288 @@
+//! What all commands that run tests share: how they work, and how they end.
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use serde::Serialize;
+
+use sesame_plan::{CampaignPlan, Domain};
+use sesame_relay::changed_files::ChangedFiles;
+use sesame_relay::fuzz::unimplemented_operations;
+use sesame_relay::metric::unimplemented_hooks;
+use sesame_results::record::{self, Recorder, Repository};
+use sesame_results::report::{self, Summary};
+
+use crate::campaign::{Conducted, Settings, conduct};
+use crate::cli::gate::Gate;
+use crate::cli::progress::{Display, Waiting, wait};
+use crate::cli::terminal::{print, print_json, say, text_options};
+use crate::cli::{Failure, Format, STOPPED};
+use crate::runner::Runner;
+
+/// The most worker processes that may be asked for. Each is a process with a simulator of its own, and takes one of the
+/// supervisor's open files, of which systems permit 1024 by default. Results do not depend on how many there are, and more
+/// than a machine has processors gain something only where simulators wait.
+const MOST_WORKERS: usize = 512;
+
+/// How tests are run.
+#[derive(Debug, Default, Args)]
+pub(super) struct Work {
+    /// How many worker processes, at most 512; by default one per processor, and never more than tests
+    #[arg(long, value_name = "N", value_parser = workers)]
+    workers: Option<NonZeroUsize>,
+    /// Seconds of wall time after which a test is stopped; by default 20 times the undisturbed run, at least 60
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    timeout: Option<Duration>,
+    /// Go on although nobody hears what an operation disturbs: the simulator does not subscribe to its topic, and no outbound metric reads it
+    #[arg(long)]
+    allow_unheard: bool,
+}
+
+/// How a command says what was found.
+#[derive(Debug, Default, Args)]
+pub(super) struct Ending {
+    /// How to show what was found; as JSON there is nothing else on standard output
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+    /// Write requirements, expectations, crashes and timeouts as JUnit test cases into this file
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    #[command(flatten)]
+    gate: Gate,
+}
+
+/// A number of workers from the command line.
+fn workers(text: &str) -> Result<NonZeroUsize, String> {
+    let asked: NonZeroUsize = text.parse().map_err(|_| "not a number above 0".to_owned())?;
+    if asked.get() > MOST_WORKERS {
+        return Err(format!(
+            "at most {MOST_WORKERS}: each is a process with a simulator of its own. Leave the option out for one per processor; \
+             results are the same with any number"
+        ));
+    }
+    Ok(asked)
+}
+
+/// A length of wall time from the command line.
+pub(super) fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "not a number of seconds".to_owned())?;
+    Duration::try_from_secs_f64(seconds)
+        .ok()
+        .filter(|limit| !limit.is_zero())
+        .ok_or_else(|| "must be above 0".to_owned())
+}
+
+impl Work {
+    /// The number of workers, for the record.
+    pub(super) fn workers(&self) -> u32 {
+        u32::try_from(self.processes()).unwrap_or(u32::MAX)
+    }
+
+    /// What a campaign is told of it.
+    pub(super) fn settings(&self, seed: u64, files: &Files) -> Result<Settings, Failure> {
+        // A file that is changed is changed for every simulator.
+        let workers = if files.may_change { 1 } else { self.processes() };
+        if self.workers.is_some_and(|asked| asked.get() > workers) {
+            say(format_args!("note: tests run one at a time, since operations may change files"));
+        }
+        let (timeout, allow_unheard) = (self.timeout, self.allow_unheard);
+        Ok(Settings { seed, workers, timeout, program: std::env::current_exe()?, allow_unheard })
+    }
+
+    fn processes(&self) -> usize {
+        let processors = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get).min(MOST_WORKERS);
+        self.workers.map_or_else(processors, NonZeroUsize::get)
+    }
+}
+
+/// Names hooks that are not filled in; an objective among them ends the run before it starts.
+pub(super) fn refuse_unfilled(runner: &Runner, plan: &CampaignPlan, allowed: bool) -> Result<(), Failure> {
+    let unfilled = unimplemented_hooks(plan, runner.hooks);
+    let mut objectives = Vec::new();
+    for id in unfilled {
+        let name = &plan.metric(id).name;
+        if plan.campaign.objectives.contains(&id) && !allowed {
+            objectives.push(format!("`{name}`"));
+        } else {
+            say(format_args!("warning: the hook of metric `{name}` is not filled in yet"));
+        }
+    }
+    for id in unimplemented_operations(plan, runner.operations) {
+        say(format_args!(
+            "warning: the hook of operation `{}` is not filled in yet: it disturbs nothing",
+            plan.operation(id).name
+        ));
+    }
+    if objectives.is_empty() {
+        return Ok(());
+    }
+    let hooks = Path::new(runner.directory).join("../hooks");
+    let hooks = hooks.canonicalize().unwrap_or(hooks);
+    Err(Failure(format!(
+        "the hook of {} is not filled in yet, and the campaign is to optimise it\n  \
+         fill it in: {}\n  or pass --allow-unimplemented to see everything else work",
+        objectives.join(" and "),
+        shown(&hooks)
+    )))
+}
+
+/// Puts back files of the space that an earlier run left changed, and keeps other runners of the space out if tests may
+/// change files. A file that a test may choose and that is not there ends the run before it starts.
+pub(super) fn claim_files(runner: &Runner, plan: &CampaignPlan) -> Result<Files, Failure> {
+    let space = Path::new(runner.directory).join(runner.space);
+    let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
+    let (files, put_back) = ChangedFiles::for_supervisor(&space, may_change)?;
+    for path in put_back {
+        say(format_args!("note: an earlier run was ended while {} was changed; it is put back", path.display()));
+    }
+    for operation in &plan.operations {
+        for parameter in &operation.parameters {
+            let Domain::Files { files: paths } = &parameter.domain else { continue };
+            for path in paths {
+                if !files.resolve(Path::new(path))?.is_file() {
+                    return Err(Failure(format!(
+                        "operation `{}` may choose the file `{path}`, which is not in {}: put it there, or leave it out",
+                        operation.name,
+                        shown(files.folder())
+                    )));
+                }
+            }
+        }
+    }
+    Ok(Files { files, may_change })
+}
+
+/// The files of the space while a command runs tests.
+#[derive(Debug)]
+pub(super) struct Files {
+    files: ChangedFiles,
+    may_change: bool,
+}
+
+impl Files {
+    /// Puts back what the last worker could not; workers have ended by then.
+    pub(super) fn finish(mut self) -> Result<(), Failure> {
+        if self.may_change {
+            self.files.put_back()?;
+        }
+        Ok(())
+    }
+}
+
+/// Begins the results of a run in a fresh folder of this name.
+pub(super) fn begin(
+    results: &Path,
+    name: &str,
+    plan: &CampaignPlan,
+    seed: u64,
+    work: &Work,
+) -> Result<(Recorder, PathBuf), Failure> {
+    let claim = record::claim_folder(results, name)?;
+    if let Some(unfinished) = &claim.unfinished {
+        say(format_args!("note: an earlier run is unfinished: `resume {}` goes on with it", shown(unfinished)));
+    }
+    let folder = claim.folder.clone();
+    Ok((Recorder::create_in(claim, plan, seed, work.workers())?, folder))
+}
+
+/// Runs a campaign to its end and says what was found.
+pub(super) fn carry_out(
+    plan: &CampaignPlan,
+    recorder: Recorder,
+    folder: &Path,
+    seed: u64,
+    work: &Work,
+    ending: &Ending,
+    files: Files,
+) -> Result<ExitCode, Failure> {
+    let settings = work.settings(seed, &files)?;
+    let interrupted = interruptible()?;
+    let started = Instant::now();
+    let mut display = Display::new(plan, seed);
+    let conducted = conduct(plan, recorder, &settings, &folder.join("workers"), &interrupted, &mut |progress| {
+        display.update(progress);
+    });
+    display.finish();
+    files.finish()?;
+    match conducted? {
+        Conducted::Finished(repository) => {
+            let code = conclude(&repository, folder, &folder.join("report.html"), ending)?;
+            let repetitions: usize = repository.repetitions()?.values().map(Vec::len).sum();
+            let (took, tests) = (started.elapsed(), repository.numbers()?.len() + repetitions);
+            let took =
+                if took.as_secs() < 90 { format!("{:.1} s", took.as_secs_f64()) } else { wait(took.as_secs_f64()) };
+            say(format_args!("      Took {took} for {tests} runs"));
+            Ok(code)
+        }
+        Conducted::Interrupted => {
+            say(format_args!(
+                "stopped; what was measured is kept. `resume {}` goes on to the same results",
+                shown(folder)
+            ));
+            Ok(ExitCode::from(STOPPED))
+        }
+    }
+}
+
+/// A flag that Ctrl-C sets. The first stops in good order; who insists is obeyed.
+pub(super) fn interruptible() -> Result<Arc<AtomicBool>, Failure> {
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&interrupted);
+    ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(i32::from(STOPPED));
+        }
+    })?;
+    Ok(interrupted)
+}
+
+/// A run's results for programs.
+#[derive(Serialize)]
+struct Concluded<'a> {
+    /// Folder of the results.
+    results: &'a Path,
+    /// The page with pictures.
+    report: &'a Path,
+    digest: String,
+    #[serde(flatten)]
+    summary: &'a Summary,
+}
+
+/// Writes the page and the JUnit file and prints what was found.
+pub(super) fn conclude(
+    repository: &Repository,
+    folder: &Path,
+    page: &Path,
+    ending: &Ending,
+) -> Result<ExitCode, Failure> {
+    let waiting = Waiting::on(repository.evaluated()?, "making the page");
+    let digest = repository.digest()?;
+    report::write_page_with(repository, page, &digest)?;
+    if let Some(junit) = &ending.junit {
+        report::write_junit(repository, junit)?;
+    }
+    let summary = report::summary(repository)?;
+    drop(waiting);
+    match ending.format {
+        Format::Text => {
+            print(&report::summary_text(&summary, text_options()))?;
+            print(&format!("\n    Report {}\n    Digest {digest}\n", shown(page)))?;
+        }
+        Format::Json => {
+            print_json(&Concluded { results: folder, report: page, digest, summary: &summary })?;
+        }
+    }
+    Ok(ending.gate.code(&summary, repository.plan()))
+}
+
+/// A path as the user would type it: relative to where they are, if it is below.
+pub(super) fn shown(path: &Path) -> String {
+    let here = std::env::current_dir().ok();
+    let relative = here.as_deref().and_then(|here| path.strip_prefix(here).ok());
+    relative.unwrap_or(path).display().to_string()
+}

@@ -1,0 +1,30 @@
+//! `report`: the page and the tables anew.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+
+use crate::cli::Failure;
+use crate::cli::execution::{Ending, conclude};
+use crate::cli::results_folder::open;
+
+/// Which run is reported on, and where to.
+#[derive(Debug, Args)]
+pub(super) struct Options {
+    /// Folder of the run, for example `results/42`; by default the latest
+    #[arg(long, value_name = "DIR")]
+    results: Option<PathBuf>,
+    /// File of the page; by default `report.html` beside the results
+    #[arg(long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    ending: Ending,
+}
+
+pub(super) fn report_anew(results: &Path, options: &Options) -> Result<ExitCode, Failure> {
+    let repository = open(results, options.results.as_deref())?;
+    let folder = repository.path().parent().unwrap_or(results);
+    let page = options.output.clone().unwrap_or_else(|| folder.join("report.html"));
+    conclude(&repository, folder, &page, &options.ending)
+}
