@@ -181,7 +181,7 @@ impl<'a> Resolver<'a> {
                     format!("two copies of `{name}` are active at the same time in test `{}`", test.head.name.text);
                 let diagnostic = Diagnostic::new(Code::COPIES_OVERLAP, second, title)
                     .label("together the copies may exceed what the operation declares")
-                    .also(first, "the first copy is active here")
+                    .secondary(first, "the first copy is active here")
                     .note("if this is intended, add `may overlap` after `per test` in the campaigns");
                 self.report(diagnostic);
             }
@@ -191,7 +191,7 @@ impl<'a> Resolver<'a> {
                 let title = format!("two copies of `{name}` have the same seed in test `{}`", test.head.name.text);
                 let diagnostic = Diagnostic::new(Code::EQUAL_SEEDS, seed.span, title)
                     .label("the seed of an earlier copy")
-                    .also(span, "the earlier copy");
+                    .secondary(span, "the earlier copy");
                 self.report(diagnostic.note(
                     "with the same seed, both copies draw the same random numbers for a message; give each its own",
                 ));
@@ -224,7 +224,7 @@ impl<'a> Resolver<'a> {
             )
             .label("leaves the window given by `within`");
             if let Some((_, range)) = declared {
-                diagnostic = diagnostic.also(range.span, "the permitted window");
+                diagnostic = diagnostic.secondary(range.span, "the permitted window");
             }
             self.report(diagnostic);
             return None;
@@ -290,7 +290,7 @@ impl<'a> Resolver<'a> {
             for (again, _) in written {
                 let title = format!("duplicate value for `{}`", again.text);
                 let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, again.span, title).label("remove one of the two");
-                self.report(diagnostic.also(first.span, "first given here"));
+                self.report(diagnostic.secondary(first.span, "first given here"));
             }
             choices.extend(self.chosen(choice, index, operation, parameter, &example));
         }
@@ -340,7 +340,7 @@ impl<'a> Resolver<'a> {
                 let mut diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, text.span, title)
                     .label(format!("expected one of {}", listed.join(", ")));
                 if let Some(declared) = self.declared(index, parameter) {
-                    diagnostic = diagnostic.also(declared, "the permitted values are declared here");
+                    diagnostic = diagnostic.secondary(declared, "the permitted values are declared here");
                 }
                 self.report(diagnostic);
                 None

@@ -171,7 +171,7 @@ impl<'a> Resolver<'a> {
             let title = format!("the scope of `{name}` is ambiguous");
             let mut diagnostic = Diagnostic::new(Code::TEMPORAL_REACH, word, title)
                 .label("add parentheses")
-                .also(Span { lo: alone.hi, hi: last.span.hi, ..alone }, "does the scope include this?");
+                .secondary(Span { lo: alone.hi, hi: last.span.hi, ..alone }, "does the scope include this?");
             let parentheses =
                 |from: Span, to: Span| vec![(Span { hi: from.lo, ..from }, "(".to_owned()), (to.end(), ")".to_owned())];
             diagnostic.suggestions.push(Suggestion {
@@ -301,7 +301,7 @@ impl<'a> Resolver<'a> {
         );
         let diagnostic = Diagnostic::new(Code::WRONG_UNIT, span, title)
             .label(format!("expected {}", wanted.name()))
-            .also(*first_span, "the first comparison determines the unit")
+            .secondary(*first_span, "the first comparison determines the unit")
             .note("robustness is a single number: to combine different units, divide both sides of each comparison by a scale, such as `zones.level / 300mm > 0`");
         self.report(diagnostic);
         None
