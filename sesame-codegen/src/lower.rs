@@ -364,11 +364,11 @@ fn trend(metric: &model::Metric) -> Option<plan::Trend> {
         model::MetricSource::Hook(_) => metric.trend,
         model::MetricSource::FuzzingTime => Some(plan::Trend::Rising),
         model::MetricSource::Formula(formula) => match formula.aggregate {
-            model::Aggregate::Max(_) | model::Aggregate::Count(_) | model::Aggregate::Duration(_) => {
+            plan::Aggregate::Max { .. } | plan::Aggregate::Count { .. } | plan::Aggregate::Duration { .. } => {
                 Some(plan::Trend::Rising)
             }
-            model::Aggregate::Min(_) => Some(plan::Trend::Falling),
-            model::Aggregate::Last(_) | model::Aggregate::Mean(_) => None,
+            plan::Aggregate::Min { .. } => Some(plan::Trend::Falling),
+            plan::Aggregate::Last { .. } | plan::Aggregate::Mean { .. } => None,
         },
         model::MetricSource::Last(_) | model::MetricSource::Robustness(_) => None,
     }

@@ -19,6 +19,7 @@ mod condition;
 mod confirmation;
 mod coverage;
 mod custom;
+mod depth;
 mod disturbance;
 mod eddi;
 mod exploration;

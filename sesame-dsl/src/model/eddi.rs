@@ -1,7 +1,9 @@
 //! Runtime monitors: conditional safety certificates that watch evidence and publish which guarantee holds.
 
 use super::declaration::Declaration;
-use super::formula::{Condition, Input};
+use sesame_plan::Condition;
+
+use super::formula::Input;
 use super::ids::{EddiId, TopicId};
 use super::system::FieldPath;
 

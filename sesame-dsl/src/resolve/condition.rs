@@ -487,9 +487,11 @@ fn known_of(metric: &Metric) -> ValueRange {
         // It needs no message, so it has a value from the beginning.
         MetricSource::FuzzingTime => return ValueRange { low: 0.0, high: f64::INFINITY },
         MetricSource::Formula(formula) => match &formula.aggregate {
-            Aggregate::Count(_) | Aggregate::Duration(_) => true,
+            Aggregate::Count { .. } | Aggregate::Duration { .. } => true,
             // Over groups and keys these are the least, the greatest or the sum of values that are not negative.
-            Aggregate::Last(of) | Aggregate::Min(of) | Aggregate::Max(of) | Aggregate::Mean(of) => never_negative(of),
+            Aggregate::Last { of } | Aggregate::Min { of } | Aggregate::Max { of } | Aggregate::Mean { of } => {
+                never_negative(of)
+            }
         },
         MetricSource::Hook(_) | MetricSource::Last(_) | MetricSource::Robustness(_) => false,
     };
@@ -502,10 +504,10 @@ fn known_of(metric: &Metric) -> ValueRange {
 fn never_negative(expression: &Expression) -> bool {
     match expression {
         Expression::Constant(value) => *value >= 0.0,
-        Expression::Absolute(_) | Expression::Distance(..) => true,
+        Expression::Absolute(_) | Expression::Distance { .. } => true,
         Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) => of.iter().all(never_negative),
         Expression::Max(of) => of.iter().any(never_negative),
-        Expression::Divide(value, by) => never_negative(value) && never_negative(by),
+        Expression::Divide { value, by } => never_negative(value) && never_negative(by),
         Expression::Input(_) | Expression::Negate(_) => false,
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Resolver;
 use super::boolean::relation;
+use super::depth;
 use super::formula::{MAX_DEPTH, scaled};
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{Comparison, Expression, Input, Interval, Members, MetricSource, Robustness, Temporal};
@@ -52,7 +53,7 @@ impl<'a> Resolver<'a> {
             let twice = Expression::Product(vec![signals[at].clone(), Expression::Constant(2.0 * amount)]);
             signals[at] = Expression::Sum(vec![twice, Expression::Constant(-amount)]);
         }
-        if signals.iter().map(Expression::depth).max().max(Some(resolved.depth())) > Some(MAX_DEPTH) {
+        if signals.iter().map(depth::of_expression).max().max(Some(resolved.depth())) > Some(MAX_DEPTH) {
             self.too_deep(of.span);
             return None;
         }
@@ -350,9 +351,9 @@ fn open_end(expression: &ast::Expression) -> Option<(Span, Span, Span)> {
 fn names_input(of: &Expression) -> bool {
     match of {
         Expression::Constant(_) => false,
-        Expression::Input(_) | Expression::Distance(..) => true,
+        Expression::Input(_) | Expression::Distance { .. } => true,
         Expression::Negate(of) | Expression::Absolute(of) => names_input(of),
-        Expression::Divide(value, by) => names_input(value) || names_input(by),
+        Expression::Divide { value, by } => names_input(value) || names_input(by),
         Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) | Expression::Max(of) => {
             of.iter().any(names_input)
         }
