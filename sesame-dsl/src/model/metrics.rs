@@ -1,8 +1,6 @@
 //! What is measured, and what must hold of it.
 
-pub use sesame_plan::Trend;
-
-use sesame_plan::Direction;
+use sesame_plan::{Bound, Direction, Trend};
 
 use super::declaration::Declaration;
 use super::formula::Formula;
@@ -58,23 +56,6 @@ pub struct Requirement {
     pub metric: MetricId,
     /// The bound, in the metric's unit.
     pub bound: Bound,
-}
-
-/// What must hold of a metric's value.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Bound {
-    /// `<=`
-    AtMost(f64),
-    /// `<`
-    Below(f64),
-    /// `>=`
-    AtLeast(f64),
-    /// `>`
-    Above(f64),
-    /// `==`
-    Equal(f64),
-    /// `in [low, high]`, both ends included.
-    Within(Range),
 }
 
 /// A range of numbers, `low <= high`, both ends included.

@@ -1,10 +1,10 @@
 //! Physical labs: how tests are chosen for one, run in it, and compared with simulation.
 
-use sesame_plan::Dimension;
+use sesame_plan::{Bound, Dimension};
 
 use super::declaration::Declaration;
 use super::ids::MetricId;
-use super::metrics::{Bound, Range};
+use super::metrics::Range;
 
 /// A lab.
 #[derive(Debug, Clone, PartialEq)]

@@ -329,11 +329,11 @@ impl<'a> Resolver<'a> {
                     let place = point.coordinates[axis].span;
                     complete &= self.inside(found, place, all, &what, &permitted, declared);
                 }
-                complete.then_some(Choice::Point(chosen))
+                complete.then_some(Choice::Point { point: chosen })
             }
             (ast::Choice::Text(text), Domain::Texts(items) | Domain::Files(items)) => {
                 if items.contains(&text.text) {
-                    return Some(Choice::Text(text.text.clone()));
+                    return Some(Choice::Text { text: text.text.clone() });
                 }
                 let title = format!("`{}` is not a permitted value of {what}", self.text(text.span));
                 let listed: Vec<String> = items.iter().map(|item| quoted(item)).collect();
@@ -380,11 +380,11 @@ impl<'a> Resolver<'a> {
             (ast::Choice::Value(quantity), Shape::Value) => {
                 let value = self.value(quantity, unit, &what)?;
                 let value = if probability { self.probability(quantity, value) } else { value };
-                (Range { low: value, high: value }, Choice::Value(value))
+                (Range { low: value, high: value }, Choice::Value { value })
             }
             (ast::Choice::Range(range), Shape::Range) => {
                 let range = self.range(range, unit, &what)?;
-                (range, Choice::Range(range))
+                (range, Choice::Range { low: range.low, high: range.high })
             }
             (_, Shape::Range) => {
                 let written = self.text(span);
