@@ -28,6 +28,8 @@ pub struct Language {
     pub format: fn(file: &str, text: &str, look: Look) -> Result<String, Diagnosed>,
     /// The page of a diagnostic's code.
     pub explain: fn(code: &str) -> Option<&'static str>,
+    /// What a space declares by a name, and what mentions it, also if the space has errors; or why that cannot be told.
+    pub find: fn(file: &str, text: &str, name: &str) -> Result<Found, String>,
 }
 
 /// How diagnostics look.
@@ -52,6 +54,21 @@ pub struct Diagnosed {
     /// As text.
     pub diagnostics: String,
     /// How many of them are errors.
+    pub errors: usize,
+}
+
+/// A thing of a space.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Found {
+    /// Whether it is a campaign.
+    pub campaign: bool,
+    /// Its definition and its uses.
+    pub text: String,
+    /// Its uses alone; empty if it has none.
+    pub uses: String,
+    /// Definition and uses as one line of JSON.
+    pub json: String,
+    /// How many errors the space has. What could not be read is not among the uses.
     pub errors: usize,
 }
 
@@ -164,13 +181,18 @@ enum Command {
         #[arg(long, short = 'o', value_name = "FOLDER")]
         out: PathBuf,
     },
-    /// Explain the code of a diagnostic, for example E0203; or a campaign of a space, with every default written out.
+    /// Explain the code of a diagnostic, for example E0203; or something that a space declares, with all its uses.
+    ///
+    /// A campaign is shown with every default written out, and with the space of its tests.
     Explain {
-        /// The code, or the campaign.
-        #[arg(value_name = "CODE or CAMPAIGN")]
+        /// The code, or the name: for a field or parameter with what it belongs to, as in `SafetyZone.level`.
+        #[arg(value_name = "CODE or NAME")]
         what: String,
-        /// The `.sesame` file of the campaign.
+        /// The `.sesame` file that declares the name.
         file: Option<PathBuf>,
+        /// How a definition and its uses are shown: as text, or as one JSON object.
+        #[arg(long, value_enum, default_value_t, requires = "file")]
+        format: ExplainFormat,
     },
     /// Print a script that completes sesamec's command line in a shell.
     #[command(
@@ -201,6 +223,16 @@ enum Format {
     Json,
     /// Annotations for GitHub's workflows.
     Github,
+}
+
+/// How a definition and its uses are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+enum ExplainFormat {
+    /// Text.
+    #[default]
+    Human,
+    /// One JSON object.
+    Json,
 }
 
 /// What is generated, and where.
@@ -276,8 +308,10 @@ pub fn run(
         Command::Run { generation, arguments } => commands::run(shell, language, &generation, &arguments),
         Command::Results(asked) => results::results(shell, asked),
         Command::Import { file, out } => import::import(shell, language, &file, &out),
-        Command::Explain { what, file: Some(file) } => commands::explain_campaign(shell, language, &what, &file),
-        Command::Explain { what, file: None } => commands::explain_code(language, &what),
+        Command::Explain { what, file: Some(file), format } => {
+            commands::explain_name(shell, language, &what, &file, format)
+        }
+        Command::Explain { what, file: None, .. } => commands::explain_code(language, &what),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "sesamec", &mut script);

@@ -9,7 +9,7 @@ use sesame_dsl::diagnostic::visible;
 use sesame_plan::Transport;
 
 use super::shell::{self, Shell};
-use super::{Checked, Deny, Format, Generation, Language, Purpose, build};
+use super::{Checked, Deny, ExplainFormat, Format, Generation, Language, Purpose, build};
 use crate::emit::Templates;
 use crate::environment::{self, Options, RuntimeChoice, environment};
 use crate::files::{Owner, Tree};
@@ -195,23 +195,44 @@ pub(super) fn explain_code(language: &Language, code: &str) -> anyhow::Result<Ex
         bail!("there is no diagnostic `{shown}`; codes look like E0203");
     }
     bail!(
-        "`{shown}` is no code like E0203; to explain a campaign, name its file: `{} explain {shown} FILE`",
+        "`{shown}` is not a code like E0203; to explain a name of a space, add its file: `{} explain {shown} FILE`",
         shell::command()
     )
 }
 
-/// `sesamec explain CAMPAIGN FILE`
-pub(super) fn explain_campaign(
+/// `sesamec explain NAME FILE`
+pub(super) fn explain_name(
     shell: Shell,
     language: &Language,
-    campaign: &str,
+    name: &str,
     file: &Path,
+    format: ExplainFormat,
 ) -> anyhow::Result<ExitCode> {
-    let checked = check(shell, language, file, Format::Human)?;
-    let chosen = choose(&checked, file, Some(campaign))?;
-    let plan = &checked.plans[chosen].plan;
-    let text = format!("{}\n{}", crate::explain::campaign(plan), super::search_space::described(plan));
-    shell::asked_for(&visible(&text))?;
+    let text = input::text(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let found = (language.find)(&file.display().to_string(), &text, name).map_err(|why| anyhow!(why))?;
+    if format == ExplainFormat::Human && found.campaign {
+        let checked = check_text(shell, language, file, &text, Format::Human)?;
+        let plan = &checked.plans[choose(&checked, file, Some(name))?].plan;
+        let mut text = format!("{}\n{}", crate::explain::campaign(plan), super::search_space::described(plan));
+        if !found.uses.is_empty() {
+            // All else is text of the language as well.
+            text.push('\n');
+            text.extend(found.uses.lines().map(|line| format!("// {line}\n")));
+        }
+        shell::asked_for(&visible(&text))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if found.errors > 0 {
+        let (file, sesamec) = (file.display(), shell::command());
+        let has = if found.errors == 1 { "an error".to_owned() } else { format!("{} errors", found.errors) };
+        shell.warning(format!(
+            "{file} has {has}: uses that could not be read are missing; see `{sesamec} check {file}`"
+        ));
+    }
+    match format {
+        ExplainFormat::Human => shell::asked_for(&visible(&found.text))?,
+        ExplainFormat::Json => shell::asked_for(&found.json)?,
+    }
     Ok(ExitCode::SUCCESS)
 }
 

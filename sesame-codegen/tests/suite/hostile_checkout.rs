@@ -387,7 +387,8 @@ fn what_is_not_a_space_is_never_quoted() {
     let imports = format!("import \"secret\" import \"leak.sesame\" import \"{}\"", absolute.display());
     fs::write(at("importing.sesame"), format!("{SPACE}{imports}")).unwrap();
     for format in ["human", "short", "json", "github"] {
-        for (file, words) in [("importing.sesame", "ends in `.sesame`"), ("leak.sesame", "a file of another kind")] {
+        for (file, words) in [("importing.sesame", "must end in `.sesame`"), ("leak.sesame", "a file of another kind")]
+        {
             let (done, text) = said(folder.path(), &["check", file, "--format", format]);
             assert!(!done && !text.contains("tell_nobody") && text.contains(words), "{text}");
         }
