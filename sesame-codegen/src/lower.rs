@@ -133,7 +133,7 @@ impl Selection {
             name: requirement.declaration.name.clone(),
             text: requirement.text.clone(),
             metric: self.metric(requirement.metric),
-            bound: bound(requirement.bound),
+            bound: requirement.bound,
         }
     }
 
@@ -143,14 +143,14 @@ impl Selection {
             plan::TestOperation {
                 operation: self.operation(it.operation),
                 activation: self.activation(&it.activation, within.end),
-                parameters: it.choices.iter().map(choice).collect(),
+                parameters: it.choices.clone(),
                 draw_seed: it.draw_seed,
             }
         });
-        let expectations = test.expectations.iter().map(|expectation| plan::Expectation {
-            metric: self.metric(expectation.metric),
-            bound: bound(expectation.bound),
-        });
+        let expectations = test
+            .expectations
+            .iter()
+            .map(|expectation| plan::Expectation { metric: self.metric(expectation.metric), bound: expectation.bound });
         plan::KnownTest {
             name: test.declaration.name.clone(),
             doc: test.declaration.doc.clone(),
@@ -364,11 +364,11 @@ fn trend(metric: &model::Metric) -> Option<plan::Trend> {
         model::MetricSource::Hook(_) => metric.trend,
         model::MetricSource::FuzzingTime => Some(plan::Trend::Rising),
         model::MetricSource::Formula(formula) => match formula.aggregate {
-            model::Aggregate::Max(_) | model::Aggregate::Count(_) | model::Aggregate::Duration(_) => {
+            plan::Aggregate::Max { .. } | plan::Aggregate::Count { .. } | plan::Aggregate::Duration { .. } => {
                 Some(plan::Trend::Rising)
             }
-            model::Aggregate::Min(_) => Some(plan::Trend::Falling),
-            model::Aggregate::Last(_) | model::Aggregate::Mean(_) => None,
+            plan::Aggregate::Min { .. } => Some(plan::Trend::Falling),
+            plan::Aggregate::Last { .. } | plan::Aggregate::Mean { .. } => None,
         },
         model::MetricSource::Last(_) | model::MetricSource::Robustness(_) => None,
     }
@@ -434,26 +434,6 @@ fn within(operation: &model::Operation, end_after: f64) -> plan::Span {
     match operation.within {
         Some(window) => plan::Span { start: window.low, end: window.high },
         None => plan::Span { start: 0.0, end: end_after },
-    }
-}
-
-fn choice(choice: &model::Choice) -> plan::Choice {
-    match choice {
-        model::Choice::Value(value) => plan::Choice::Value { value: *value },
-        model::Choice::Range(range) => plan::Choice::Range { low: range.low, high: range.high },
-        model::Choice::Point(point) => plan::Choice::Point { point: *point },
-        model::Choice::Text(text) => plan::Choice::Text { text: text.clone() },
-    }
-}
-
-fn bound(bound: model::Bound) -> plan::Bound {
-    match bound {
-        model::Bound::AtMost(value) => plan::Bound::AtMost { value },
-        model::Bound::Below(value) => plan::Bound::Below { value },
-        model::Bound::AtLeast(value) => plan::Bound::AtLeast { value },
-        model::Bound::Above(value) => plan::Bound::Above { value },
-        model::Bound::Equal(value) => plan::Bound::Equal { value },
-        model::Bound::Within(range) => plan::Bound::Within { low: range.low, high: range.high },
     }
 }
 

@@ -62,7 +62,7 @@ impl Diagnostic {
     }
 
     /// With another place that is involved in the mistake.
-    pub fn also(mut self, span: Span, label: impl Into<String>) -> Self {
+    pub fn secondary(mut self, span: Span, label: impl Into<String>) -> Self {
         self.secondary.push((span, shortened(one_line(&label.into()))));
         self
     }

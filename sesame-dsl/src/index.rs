@@ -3,12 +3,10 @@
 //! The index is made from the syntax alone, before names mean anything. So it is there for a file with errors as well,
 //! with all of it that could be read: names that resolve, and names that do not.
 
-mod build;
+pub(crate) mod build;
 
 use crate::similar::most_similar;
 use crate::span::Span;
-
-pub(crate) use build::index;
 
 /// The definitions and references of a space.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

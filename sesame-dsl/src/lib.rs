@@ -49,7 +49,7 @@ impl Analysis {
 pub fn analyse(sources: &SourceMap, root: FileId) -> Analysis {
     let mut diagnostics = Vec::new();
     let merged = import::merge(sources, root, &mut diagnostics);
-    let index = index::index(&merged);
+    let index = index::build::index(&merged);
     let model = resolve::resolve(sources, root, merged, &mut diagnostics);
     if let Some(space) = &model {
         diagnostics.extend(check::check(space, root));

@@ -6,6 +6,7 @@
 
 mod campaign;
 pub mod condition;
+mod declaration;
 pub mod eddi;
 mod formula;
 mod fuzz;
@@ -16,6 +17,7 @@ mod system;
 mod temporal;
 
 pub use campaign::*;
+pub use declaration::Declaration;
 pub use formula::*;
 pub use fuzz::*;
 pub use ids::*;
@@ -28,11 +30,12 @@ use std::collections::BTreeMap;
 // What holds no names and no units is the same here and in a plan.
 pub use sesame_plan::stl::Interval;
 pub use sesame_plan::{
-    BoostedChildren, Comparison, Confirmation, Copies, Dimension, Direction, Distribution, Drain, Exploration, Members,
-    Moment, NotFinite, OperationKind, Recorded, Shape, Step, StopRule, Typical, ValueMode,
+    Aggregate, BoostedChildren, Bound, Choice, Comparison, Condition, Confirmation, Copies, Dimension, Direction,
+    Distribution, Drain, Exploration, Expression, Members, Moment, NotFinite, OperationKind, Recorded, Shape, Step,
+    StopRule, Trend, Typical, ValueMode,
 };
 
-use crate::span::{FileId, Span};
+use crate::span::FileId;
 
 /// A whole space.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,17 +87,4 @@ impl Space {
     pub fn file_of(&self, declaration: &Declaration) -> &str {
         self.files.get(&declaration.span.file).map_or("", String::as_str)
     }
-}
-
-/// What every declaration has.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Declaration {
-    /// Its name: ASCII letters, digits and `_`; unique in the space.
-    pub name: String,
-    /// Where the name stands.
-    pub span: Span,
-    /// Line of the name, from 1.
-    pub line: u32,
-    /// Its doc comment, lines joined by `\n`, without the slashes and one space after them; empty when there is none.
-    pub doc: String,
 }

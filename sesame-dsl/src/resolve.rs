@@ -19,6 +19,7 @@ mod condition;
 mod confirmation;
 mod coverage;
 mod custom;
+mod depth;
 mod disturbance;
 mod eddi;
 mod exploration;
@@ -194,7 +195,7 @@ impl<'a> Resolver<'a> {
                 let title = format!("`{}` is {is}, not {}", name.text, kind.with_article());
                 let diagnostic = Diagnostic::new(Code::OTHER_KIND, name.span, title)
                     .label(format!("expected {}", kind.with_article()))
-                    .also(definition.span, format!("declared as {is} here"));
+                    .secondary(definition.span, format!("declared as {is} here"));
                 self.report(diagnostic);
                 return None;
             }
@@ -255,14 +256,14 @@ impl<'a> Resolver<'a> {
         let title = format!("`{}` is listed twice", self.text(again));
         let diagnostic = Diagnostic::new(Code::LISTED_TWICE, again, title)
             .label("listed again here")
-            .also(first, "first listed here");
+            .secondary(first, "first listed here");
         self.report(diagnostic);
     }
 
     fn defined_twice(&mut self, title: String, again: Span, first: Span) {
         let diagnostic = Diagnostic::new(Code::DEFINED_TWICE, again, title)
             .label("redefined here")
-            .also(first, "first defined here");
+            .secondary(first, "first defined here");
         self.report(diagnostic);
     }
 
@@ -277,7 +278,7 @@ impl<'a> Resolver<'a> {
         for &again in spans.iter().skip(1) {
             let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, again, format!("duplicate `{what}`"))
                 .label("remove one of the two")
-                .also(spans[0], "first given here");
+                .secondary(spans[0], "first given here");
             self.report(diagnostic);
         }
     }

@@ -22,7 +22,7 @@ pub(super) fn misnamed_operations(space: &Space, diagnostics: &mut Vec<Diagnosti
         let title = format!("operation `{name}` is named after `{}` but disturbs `{}`", meant.name, own.name);
         let diagnostic = Diagnostic::new(Code::MISNAMED_OPERATION, operation.declaration.span, title)
             .label(format!("this acts on `{}`", own.name))
-            .also(meant.span, "the operation's name ends with the name of this topic");
+            .secondary(meant.span, "the operation's name ends with the name of this topic");
         diagnostics.push(diagnostic);
     }
 }
@@ -56,7 +56,7 @@ pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic
         diagnostics.push(
             Diagnostic::new(Code::NOBODY_HEARS, operation.declaration.span, title)
                 .label("no monitor and no outbound metric reads its topic either")
-                .also(topic.span, "the topic is declared here")
+                .secondary(topic.span, "the topic is declared here")
                 .note("if the simulator does not subscribe to the topic either, a campaign ends with an error after the reference run"),
         );
     }
@@ -77,8 +77,8 @@ pub(super) fn two_publishers(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
         let title = format!("nodes `{}` and `{}` both publish `{}`", first.name, second.name, topic.name);
         let diagnostic = Diagnostic::new(Code::TWO_PUBLISHERS, second.span, title)
             .label("also publishes it")
-            .also(first.span, "publishes it")
-            .also(topic.span, "the topic is declared here");
+            .secondary(first.span, "publishes it")
+            .secondary(topic.span, "the topic is declared here");
         diagnostics.push(diagnostic);
     }
 }

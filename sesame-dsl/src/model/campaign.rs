@@ -1,10 +1,11 @@
 //! Campaigns: how tests are found and run.
 
 use super::condition::ConditionSpace;
-use super::{
-    CampaignId, Confirmation, Copies, Declaration, Dimension, Exploration, MetricId, OperationId, Range, Recorded,
-    StopRule, TestId,
-};
+use sesame_plan::{Confirmation, Copies, Dimension, Exploration, Recorded, StopRule};
+
+use super::declaration::Declaration;
+use super::ids::{CampaignId, MetricId, OperationId, TestId};
+use super::metrics::Range;
 
 /// A campaign.
 #[derive(Debug, Clone, PartialEq)]

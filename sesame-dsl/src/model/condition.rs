@@ -2,7 +2,7 @@
 
 pub use sesame_plan::condition::{Comparison, Integers};
 
-use super::MetricId;
+use super::ids::MetricId;
 
 /// A condition over metrics, at most [`Condition::MAX_DEPTH`] levels deep.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,7 +111,7 @@ pub struct ConditionSpace {
     /// The whole numbers that variables are compared with. Default [`ConditionSpace::DEFAULT_INTEGERS`].
     pub integers: Integers,
     /// How long activations last, in seconds, `0 < low <= high`; `None` for activations that a condition ends.
-    pub lengths: Option<super::Range>,
+    pub lengths: Option<super::metrics::Range>,
     /// How often an operation may be activated in one run: at least 1, the default.
     pub times: u32,
 }

@@ -1,8 +1,12 @@
 //! What is measured, and what must hold of it.
 
-pub use sesame_plan::Trend;
+use sesame_plan::{Bound, Direction, Trend};
 
-use super::{Declaration, Direction, FieldPath, Formula, MetricId, Robustness, TopicId};
+use super::declaration::Declaration;
+use super::formula::Formula;
+use super::ids::{MetricId, TopicId};
+use super::system::FieldPath;
+use super::temporal::Robustness;
 use crate::units::Unit;
 
 /// A number computed from the messages of a test.
@@ -52,23 +56,6 @@ pub struct Requirement {
     pub metric: MetricId,
     /// The bound, in the metric's unit.
     pub bound: Bound,
-}
-
-/// What must hold of a metric's value.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Bound {
-    /// `<=`
-    AtMost(f64),
-    /// `<`
-    Below(f64),
-    /// `>=`
-    AtLeast(f64),
-    /// `>`
-    Above(f64),
-    /// `==`
-    Equal(f64),
-    /// `in [low, high]`, both ends included.
-    Within(Range),
 }
 
 /// A range of numbers, `low <= high`, both ends included.

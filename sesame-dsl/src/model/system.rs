@@ -1,6 +1,7 @@
 //! The system under test: simulator, messages, topics, nodes.
 
-use super::{Declaration, MessageId, TopicId};
+use super::declaration::Declaration;
+use super::ids::{MessageId, TopicId};
 use crate::span::Span;
 use crate::units::Unit;
 

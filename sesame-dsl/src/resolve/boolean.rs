@@ -20,13 +20,13 @@ impl<'a> Resolver<'a> {
                 if equality && self.is_condition(left) && self.is_condition(right) {
                     let left = self.condition(inputs, left);
                     let right = self.condition(inputs, right);
-                    let same = Condition::Same(Box::new(left?), Box::new(right?));
+                    let same = Condition::Same { left: Box::new(left?), right: Box::new(right?) };
                     return Some(if comparison == Comparison::Equal { same } else { Condition::Not(Box::new(same)) });
                 }
                 let (sides, _) = self.common(inputs, &[left, right])?;
                 let [left, right] = <[Expression; 2]>::try_from(sides).expect("two parts give two numbers");
                 self.one_outcome(expression, &left, comparison, &right);
-                Some(Condition::Compare(left, comparison, right))
+                Some(Condition::Compare { left, by: comparison, right })
             }
             ExpressionKind::Field(_) | ExpressionKind::Members(..) if self.is_condition(expression) => {
                 self.truth(inputs, expression).map(Condition::Input)
@@ -92,7 +92,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// The position of a `bool` input, which the expression is according to [`Self::is_condition`].
-    pub(super) fn truth(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<usize> {
+    pub(super) fn truth(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<u32> {
         let (path, members) = match &expression.kind {
             ExpressionKind::Field(path) => (path, None),
             ExpressionKind::Members(members, word, path) => (path, Some((*members, *word))),

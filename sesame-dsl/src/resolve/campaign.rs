@@ -149,7 +149,7 @@ impl<'a> Resolver<'a> {
             let diagnostic =
                 Diagnostic::new(Code::NO_DIRECTION, name.span, format!("objective `{}` has no direction", name.text))
                     .label("should it be maximised or minimised?")
-                    .also(declared.head.name.span, "the metric is declared here")
+                    .secondary(declared.head.name.span, "the metric is declared here")
                     .suggest("add `maximise` to search for large values", at, " maximise")
                     .suggest("add `minimise` to search for small values", at, " minimise");
             self.report(diagnostic);
@@ -233,7 +233,7 @@ impl<'a> Resolver<'a> {
         let label = if most == 1 { "there is only 1".to_owned() } else { format!("there are only {most}") };
         let diagnostic = Diagnostic::new(Code::BAD_COUNT, written.min.span, title).label(label);
         self.report(match why {
-            Some(span) => diagnostic.also(span, "each may occur at most once"),
+            Some(span) => diagnostic.secondary(span, "each may occur at most once"),
             None => diagnostic.note(
                 "operations before the start and after the end of a run have no time window, so a test contains each at \
                  most once; add `may overlap` to permit copies",
@@ -265,7 +265,9 @@ impl<'a> Resolver<'a> {
         } else {
             return;
         };
-        self.report(diagnostic.also(written.span, "its permitted window").also(end_written.span, "tests end here"));
+        self.report(
+            diagnostic.secondary(written.span, "its permitted window").secondary(end_written.span, "tests end here"),
+        );
     }
 
     fn search(
@@ -335,7 +337,7 @@ impl<'a> Resolver<'a> {
                     let span = evaluations.map_or(count.span, |count| count.span);
                     let diagnostic = Diagnostic::new(Code::BAD_COUNT, span, title)
                         .label(format!("expected at least {size}"))
-                        .also(count.span, "the population");
+                        .secondary(count.span, "the population");
                     self.report(diagnostic);
                     return None;
                 }
@@ -381,7 +383,7 @@ impl<'a> Resolver<'a> {
             } else {
                 continue;
             };
-            self.report(diagnostic.also(repeat.test.span, "repeated here"));
+            self.report(diagnostic.secondary(repeat.test.span, "repeated here"));
         }
     }
 
@@ -392,7 +394,7 @@ impl<'a> Resolver<'a> {
             let title = "a campaign that only observes cannot repeat a test";
             let diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, repeat, title)
                 .label("a test applies operations")
-                .also(passive.span, "this campaign only observes");
+                .secondary(passive.span, "this campaign only observes");
             self.report(diagnostic);
         }
     }
@@ -416,7 +418,7 @@ impl<'a> Resolver<'a> {
             let title = format!("{who} cannot have `{word}`");
             let mut diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, span, title)
                 .label("a campaign either searches, repeats a test or only observes")
-                .also(place, here);
+                .secondary(place, here);
             if word == "objectives" {
                 diagnostic = diagnostic.suggest("use `observes` to measure metrics", span, "observes");
             }

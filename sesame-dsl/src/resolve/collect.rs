@@ -23,7 +23,7 @@ impl<'a> Resolver<'a> {
             let mut diagnostic =
                 Diagnostic::new(Code::DEFINED_TWICE, head.name.span, format!("`{name}` is defined twice"))
                     .label(format!("redefined here as {}", kind.with_article()))
-                    .also(first.span, format!("first defined here as {}", first.kind.with_article()));
+                    .secondary(first.span, format!("first defined here as {}", first.kind.with_article()));
             if kind != first.kind {
                 diagnostic = diagnostic.note("a name can stand for only one thing in a space");
             }
@@ -92,7 +92,7 @@ impl<'a> Resolver<'a> {
                         let title = format!("`{name}` and `{first}` collide in the generated code");
                         let diagnostic = Diagnostic::new(Code::GENERATED_COLLISION, head.name.span, title)
                             .label(format!("its {what} would be `{generated}`"))
-                            .also(span, format!("this one's {what} would be `{generated}` too"));
+                            .secondary(span, format!("this one's {what} would be `{generated}` too"));
                         self.report(diagnostic);
                         break;
                     }
@@ -153,7 +153,7 @@ impl<'a> Resolver<'a> {
             let title = format!("{holder} can have only one `{what}`");
             let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, again, title)
                 .label("remove this one, or move it to another file")
-                .also(spans[0], "first declared here");
+                .secondary(spans[0], "first declared here");
             self.report(diagnostic);
         }
     }

@@ -198,7 +198,7 @@ impl<'a> Resolver<'a> {
         let title = format!("`{}` has no value before the test has ended", self.text(span));
         let diagnostic = Diagnostic::new(Code::NOT_A_CONDITION, span, title)
             .label("a robustness is known only at the end of a test")
-            .also(metric.declaration.span, "declared here");
+            .secondary(metric.declaration.span, "declared here");
         self.report(diagnostic);
         None
     }
@@ -248,7 +248,7 @@ impl<'a> Resolver<'a> {
             {
                 let declared = &self.metric_of(id).declaration;
                 let label = format!("`{}` is {}", declared.name, in_words(known, self.metric_of(id).unit.as_ref()));
-                diagnostic = diagnostic.also(declared.span, label);
+                diagnostic = diagnostic.secondary(declared.span, label);
             }
         }
         self.report(diagnostic);
@@ -330,7 +330,7 @@ impl<'a> Resolver<'a> {
             let title = format!("the initial value of `{}` is outside this range", name.text);
             let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, range.span, title)
                 .label(format!("expected a range that contains its `initial {initial}{}`", unit_text(unit.as_ref())))
-                .also(declared, "declared here");
+                .secondary(declared, "declared here");
             self.report(diagnostic);
             return None;
         }
@@ -339,7 +339,7 @@ impl<'a> Resolver<'a> {
             let title = format!("`{}` can never be in this range", name.text);
             let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, range.span, title)
                 .label(format!("it is {}", in_words(own, unit.as_ref())))
-                .also(declared, "declared here");
+                .secondary(declared, "declared here");
             self.report(diagnostic);
             return None;
         }
@@ -402,7 +402,7 @@ impl<'a> Resolver<'a> {
                 let title = format!("`{}` is required twice", self.text(span));
                 let diagnostic = Diagnostic::new(Code::LISTED_TWICE, span, title)
                     .label("required again here")
-                    .also(*before, "first required here");
+                    .secondary(*before, "first required here");
                 self.report(diagnostic);
                 complete = false;
                 continue;
@@ -458,7 +458,7 @@ impl<'a> Resolver<'a> {
             failed = true;
             let title = format!("no start condition can contain what `{}` requires", name.text);
             let diagnostic = Diagnostic::new(Code::CANNOT_CONTAIN, name.span, title).label(wrong);
-            self.report(diagnostic.also(span, "required here"));
+            self.report(diagnostic.secondary(span, "required here"));
         }
         let (needed, most) = (comparisons_needed(&constraints), 1_usize << (space.depth - 1));
         if !failed && needed > most {
@@ -467,7 +467,7 @@ impl<'a> Resolver<'a> {
             let label = format!("this needs {needed} comparisons, but there is room for only {most}");
             let mut diagnostic = Diagnostic::new(Code::CANNOT_CONTAIN, name.span, title).label(label);
             if let Some((clause, _)) = body.contains.first() {
-                diagnostic = diagnostic.also(*clause, "required here");
+                diagnostic = diagnostic.secondary(*clause, "required here");
             }
             self.report(diagnostic);
         }
@@ -487,9 +487,11 @@ fn known_of(metric: &Metric) -> ValueRange {
         // It needs no message, so it has a value from the beginning.
         MetricSource::FuzzingTime => return ValueRange { low: 0.0, high: f64::INFINITY },
         MetricSource::Formula(formula) => match &formula.aggregate {
-            Aggregate::Count(_) | Aggregate::Duration(_) => true,
+            Aggregate::Count { .. } | Aggregate::Duration { .. } => true,
             // Over groups and keys these are the least, the greatest or the sum of values that are not negative.
-            Aggregate::Last(of) | Aggregate::Min(of) | Aggregate::Max(of) | Aggregate::Mean(of) => never_negative(of),
+            Aggregate::Last { of } | Aggregate::Min { of } | Aggregate::Max { of } | Aggregate::Mean { of } => {
+                never_negative(of)
+            }
         },
         MetricSource::Hook(_) | MetricSource::Last(_) | MetricSource::Robustness(_) => false,
     };
@@ -502,10 +504,10 @@ fn known_of(metric: &Metric) -> ValueRange {
 fn never_negative(expression: &Expression) -> bool {
     match expression {
         Expression::Constant(value) => *value >= 0.0,
-        Expression::Absolute(_) | Expression::Distance(..) => true,
+        Expression::Absolute(_) | Expression::Distance { .. } => true,
         Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) => of.iter().all(never_negative),
         Expression::Max(of) => of.iter().any(never_negative),
-        Expression::Divide(value, by) => never_negative(value) && never_negative(by),
+        Expression::Divide { value, by } => never_negative(value) && never_negative(by),
         Expression::Input(_) | Expression::Negate(_) => false,
     }
 }

@@ -50,7 +50,7 @@ impl<'a> Resolver<'a> {
                 let title = format!("dimension `{}` is listed twice", name.text);
                 let diagnostic = Diagnostic::new(Code::LISTED_TWICE, name.span, title)
                     .label("remove one of the two")
-                    .also(first.dimension.span, "first listed here");
+                    .secondary(first.dimension.span, "first listed here");
                 self.report(diagnostic);
                 complete = false;
                 continue;
@@ -103,7 +103,7 @@ impl<'a> Resolver<'a> {
             let title = format!("`failsafe {found}` ends the search before its evaluations are made");
             let diagnostic = Diagnostic::new(Code::BAD_COUNT, count.span, title)
                 .label("expected at least the number of evaluations")
-                .also(evaluations.span, "the number of evaluations");
+                .secondary(evaluations.span, "the number of evaluations");
             self.report(diagnostic);
             return None;
         }

@@ -26,7 +26,7 @@ impl<'a> Resolver<'a> {
                 let title = format!("an operation `{}` cannot have a topic", self.text(moment));
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, topic.span, title)
                     .label("remove `on` and the topic")
-                    .also(moment, "no messages are sent at this time");
+                    .secondary(moment, "no messages are sent at this time");
                 self.report(diagnostic);
                 return None;
             }
@@ -219,7 +219,7 @@ impl<'a> Resolver<'a> {
         let declared = self.file.operations[index].head.name.span;
         let diagnostic = Diagnostic::new(Code::BAD_WINDOW, span, title)
             .label("expected a window such as `from 8s to 57s`, or `when` and a condition")
-            .also(declared, "declared here");
+            .secondary(declared, "declared here");
         self.report(diagnostic);
         false
     }

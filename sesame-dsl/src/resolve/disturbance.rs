@@ -146,7 +146,7 @@ impl<'a> Resolver<'a> {
                     let title = "a latency can have only one distribution";
                     let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, *again, title)
                         .label("remove one of the two")
-                        .also(*first, "first given here");
+                        .secondary(*first, "first given here");
                     self.report(diagnostic);
                 }
                 let (distribution, shape) = match distribution.first() {

@@ -107,7 +107,7 @@ impl<'a> Resolver<'a> {
             let title = format!("monitor `{}` has no guarantee named `{}`", demand.eddi.text, name.text);
             let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title)
                 .label("unknown guarantee")
-                .also(other.head.name.span, "the monitor is declared here");
+                .secondary(other.head.name.span, "the monitor is declared here");
             diagnostic = match most_similar(&name.text, guarantees.iter().copied()) {
                 Some(similar) => diagnostic.did_you_mean(name.span, similar),
                 None if guarantees.is_empty() => diagnostic.note("it has no guarantees"),
@@ -171,7 +171,7 @@ impl<'a> Resolver<'a> {
             let closing = cycle[cycle.len() - 1].1;
             let mut diagnostic = Diagnostic::new(Code::CIRCLE, closing, title).label("this demand closes the cycle");
             if !through.is_empty() {
-                diagnostic = diagnostic.also(first.span, "declared here");
+                diagnostic = diagnostic.secondary(first.span, "declared here");
             }
             self.report(diagnostic);
         }
@@ -234,7 +234,7 @@ impl<'a> Resolver<'a> {
                     let title = format!("two guarantees have integrity {integrity}");
                     let diagnostic = Diagnostic::new(Code::BAD_MONITOR, guarantee.integrity.span, title)
                         .label("used again here")
-                        .also(before, "first used here")
+                        .secondary(before, "first used here")
                         .note("the state of a monitor is the strongest guarantee that holds, so no two can be equally strong");
                     self.report(diagnostic);
                     complete = false;
@@ -288,7 +288,7 @@ impl<'a> Resolver<'a> {
                 let title = format!("`{}` is a state of the monitor, not evidence or a demand", name.text);
                 let diagnostic = Diagnostic::new(Code::OTHER_KIND, name.span, title)
                     .label("expected evidence or a demand")
-                    .also(*declared, "declared here");
+                    .secondary(*declared, "declared here");
                 self.report(diagnostic);
                 return None;
             }

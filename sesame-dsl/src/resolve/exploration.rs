@@ -30,7 +30,7 @@ impl<'a> Resolver<'a> {
                 "a search can have only one of `boost`, `construct`, `predict` and `novelty`",
             )
             .label("remove one of the two")
-            .also(campaign.explorations[0].span, "first given here");
+            .secondary(campaign.explorations[0].span, "first given here");
             self.report(diagnostic);
         }
         let Some(written) = campaign.explorations.first() else { return Some(None) };

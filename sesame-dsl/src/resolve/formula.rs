@@ -1,6 +1,7 @@
 //! Formulas of metrics: their inputs, their units, and how values over time are reduced to one.
 
 use super::Resolver;
+use super::depth;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{Aggregate, Condition, Expression, FieldPath, Formula, Id as _, Input, Members};
 use crate::model::{MetricSource, Type};
@@ -40,7 +41,7 @@ impl<'a> Resolver<'a> {
                     (first, Some(second)) => Condition::All(vec![first, second?]),
                 };
                 let (value, unit) = value?;
-                return self.finish(formula, inputs, Aggregate::Last(value), Some(condition), unit);
+                return self.finish(formula, inputs, Aggregate::Last { of: value }, Some(condition), unit);
             }
             FormulaKind::Plain(expression) => self.aggregate(&mut inputs, expression)?,
         };
@@ -88,12 +89,12 @@ impl<'a> Resolver<'a> {
             return None;
         }
         let (every, per) = (every?, per?);
-        if depth(&aggregate).max(when.as_ref().map_or(0, Condition::depth)) > MAX_DEPTH {
+        if depth::of_aggregate(&aggregate).max(when.as_ref().map_or(0, depth::of_condition)) > MAX_DEPTH {
             let title = format!("this formula is nested more than {MAX_DEPTH} levels deep");
             self.report(Diagnostic::new(Code::TOO_LARGE, whole, title).label("nested too deeply"));
             return None;
         }
-        if let (Aggregate::Last(Expression::Input(0)), None, None, None, false) =
+        if let (Aggregate::Last { of: Expression::Input(0) }, None, None, None, false) =
             (&aggregate, &when, every, &per, outbound)
             && self.members_of(&inputs[0].field) == 1
         {
@@ -136,15 +137,15 @@ impl<'a> Resolver<'a> {
             return None;
         };
         Some(match name.text.as_str() {
-            "count" => (Aggregate::Count(self.condition(inputs, argument)?), None),
-            "duration" => (Aggregate::Duration(self.condition(inputs, argument)?), Some(Unit::seconds())),
+            "count" => (Aggregate::Count { of: self.condition(inputs, argument)? }, None),
+            "duration" => (Aggregate::Duration { of: self.condition(inputs, argument)? }, Some(Unit::seconds())),
             word => {
                 let (value, unit) = self.number(inputs, argument)?;
                 let aggregate = match word {
-                    "min" => Aggregate::Min(value),
-                    "max" => Aggregate::Max(value),
-                    "mean" => Aggregate::Mean(value),
-                    _ => Aggregate::Last(value),
+                    "min" => Aggregate::Min { of: value },
+                    "max" => Aggregate::Max { of: value },
+                    "mean" => Aggregate::Mean { of: value },
+                    _ => Aggregate::Last { of: value },
                 };
                 (aggregate, unit)
             }
@@ -189,10 +190,10 @@ impl<'a> Resolver<'a> {
     fn every(&mut self, word: Span, every: &ast::Quantity, aggregate: &Aggregate) -> Option<f64> {
         let seconds = self.value(every, Some(&Unit::seconds()), "`every`")?;
         let name = match aggregate {
-            Aggregate::Min(_) => "min",
-            Aggregate::Max(_) => "max",
-            Aggregate::Duration(_) => "duration",
-            Aggregate::Last(_) | Aggregate::Mean(_) | Aggregate::Count(_) => {
+            Aggregate::Min { .. } => "min",
+            Aggregate::Max { .. } => "max",
+            Aggregate::Duration { .. } => "duration",
+            Aggregate::Last { .. } | Aggregate::Mean { .. } | Aggregate::Count { .. } => {
                 if seconds <= 0.0 {
                     let title = "the interval of `every` must be greater than 0s";
                     self.report(Diagnostic::new(Code::OUT_OF_RANGE, every.span, title).label("expected more than 0s"));
@@ -298,7 +299,7 @@ impl<'a> Resolver<'a> {
         path: &'a Path,
         field: FieldPath,
         members: Option<(ast::Members, Span)>,
-    ) -> Option<usize> {
+    ) -> Option<u32> {
         if let Some((_, word)) = members
             && self.members_of(&field) == 1
         {
@@ -317,10 +318,11 @@ impl<'a> Resolver<'a> {
             Some((ast::Members::Each, _)) => Members::Each,
         };
         let input = Input { field, members };
-        Some(inputs.iter().position(|known| *known == input).unwrap_or_else(|| {
+        let at = inputs.iter().position(|known| *known == input).unwrap_or_else(|| {
             inputs.push(input);
             inputs.len() - 1
-        }))
+        });
+        Some(u32::try_from(at).expect("a formula has fewer than 2^32 inputs"))
     }
 
     fn product(&mut self, inputs: &mut Vec<Input>, factors: &'a [(bool, ast::Expression)]) -> Option<Number> {
@@ -340,7 +342,7 @@ impl<'a> Resolver<'a> {
                 return None;
             };
             let value = match (left, *divides) {
-                (left, true) => Expression::Divide(Box::new(left), Box::new(number)),
+                (left, true) => Expression::Divide { value: Box::new(left), by: Box::new(number) },
                 (Expression::Product(mut before), false) => {
                     before.push(number);
                     Expression::Product(before)
@@ -476,10 +478,13 @@ impl<'a> Resolver<'a> {
             self.report(Diagnostic::new(Code::WRONG_UNIT, to.span, title).label(label));
             return None;
         }
-        Some((Expression::Distance(from_at, to_at, convert(1.0, to_unit.as_ref(), unit.as_ref())), unit))
+        Some((
+            Expression::Distance { from: from_at, to: to_at, scale: convert(1.0, to_unit.as_ref(), unit.as_ref()) },
+            unit,
+        ))
     }
 
-    fn point(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<(usize, Option<Unit>)> {
+    fn point(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<(u32, Option<Unit>)> {
         let (path, members) = match &expression.kind {
             ExpressionKind::Field(path) => (path, None),
             ExpressionKind::Members(members, word, path) => (path, Some((*members, *word))),
@@ -528,14 +533,5 @@ pub(super) fn scaled(value: Expression, scale: f64) -> Expression {
         value if scale == 1.0 => value,
         Expression::Constant(constant) => Expression::Constant(constant * scale),
         value => Expression::Product(vec![value, Expression::Constant(scale)]),
-    }
-}
-
-fn depth(aggregate: &Aggregate) -> usize {
-    match aggregate {
-        Aggregate::Last(value) | Aggregate::Min(value) | Aggregate::Max(value) | Aggregate::Mean(value) => {
-            value.depth()
-        }
-        Aggregate::Count(condition) | Aggregate::Duration(condition) => condition.depth(),
     }
 }

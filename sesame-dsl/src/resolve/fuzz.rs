@@ -181,7 +181,7 @@ impl<'a> Resolver<'a> {
                     format!("two copies of `{name}` are active at the same time in test `{}`", test.head.name.text);
                 let diagnostic = Diagnostic::new(Code::COPIES_OVERLAP, second, title)
                     .label("together the copies may exceed what the operation declares")
-                    .also(first, "the first copy is active here")
+                    .secondary(first, "the first copy is active here")
                     .note("if this is intended, add `may overlap` after `per test` in the campaigns");
                 self.report(diagnostic);
             }
@@ -191,7 +191,7 @@ impl<'a> Resolver<'a> {
                 let title = format!("two copies of `{name}` have the same seed in test `{}`", test.head.name.text);
                 let diagnostic = Diagnostic::new(Code::EQUAL_SEEDS, seed.span, title)
                     .label("the seed of an earlier copy")
-                    .also(span, "the earlier copy");
+                    .secondary(span, "the earlier copy");
                 self.report(diagnostic.note(
                     "with the same seed, both copies draw the same random numbers for a message; give each its own",
                 ));
@@ -224,7 +224,7 @@ impl<'a> Resolver<'a> {
             )
             .label("leaves the window given by `within`");
             if let Some((_, range)) = declared {
-                diagnostic = diagnostic.also(range.span, "the permitted window");
+                diagnostic = diagnostic.secondary(range.span, "the permitted window");
             }
             self.report(diagnostic);
             return None;
@@ -290,7 +290,7 @@ impl<'a> Resolver<'a> {
             for (again, _) in written {
                 let title = format!("duplicate value for `{}`", again.text);
                 let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, again.span, title).label("remove one of the two");
-                self.report(diagnostic.also(first.span, "first given here"));
+                self.report(diagnostic.secondary(first.span, "first given here"));
             }
             choices.extend(self.chosen(choice, index, operation, parameter, &example));
         }
@@ -329,18 +329,18 @@ impl<'a> Resolver<'a> {
                     let place = point.coordinates[axis].span;
                     complete &= self.inside(found, place, all, &what, &permitted, declared);
                 }
-                complete.then_some(Choice::Point(chosen))
+                complete.then_some(Choice::Point { point: chosen })
             }
             (ast::Choice::Text(text), Domain::Texts(items) | Domain::Files(items)) => {
                 if items.contains(&text.text) {
-                    return Some(Choice::Text(text.text.clone()));
+                    return Some(Choice::Text { text: text.text.clone() });
                 }
                 let title = format!("`{}` is not a permitted value of {what}", self.text(text.span));
                 let listed: Vec<String> = items.iter().map(|item| quoted(item)).collect();
                 let mut diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, text.span, title)
                     .label(format!("expected one of {}", listed.join(", ")));
                 if let Some(declared) = self.declared(index, parameter) {
-                    diagnostic = diagnostic.also(declared, "the permitted values are declared here");
+                    diagnostic = diagnostic.secondary(declared, "the permitted values are declared here");
                 }
                 self.report(diagnostic);
                 None
@@ -380,11 +380,11 @@ impl<'a> Resolver<'a> {
             (ast::Choice::Value(quantity), Shape::Value) => {
                 let value = self.value(quantity, unit, &what)?;
                 let value = if probability { self.probability(quantity, value) } else { value };
-                (Range { low: value, high: value }, Choice::Value(value))
+                (Range { low: value, high: value }, Choice::Value { value })
             }
             (ast::Choice::Range(range), Shape::Range) => {
                 let range = self.range(range, unit, &what)?;
-                (range, Choice::Range(range))
+                (range, Choice::Range { low: range.low, high: range.high })
             }
             (_, Shape::Range) => {
                 let written = self.text(span);

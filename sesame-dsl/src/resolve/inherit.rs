@@ -64,7 +64,7 @@ fn cycle_of(file: &File, cycle: &[usize]) -> Diagnostic {
     let last = cycle[cycle.len() - 1];
     let closes = file.campaigns[last].from.as_ref().map_or(first.span, |from| from.span);
     let diagnostic = Diagnostic::new(Code::CIRCLE, closes, title).label("this closes the cycle");
-    if cycle.len() == 1 { diagnostic } else { diagnostic.also(first.span, "declared here") }
+    if cycle.len() == 1 { diagnostic } else { diagnostic.secondary(first.span, "declared here") }
 }
 
 /// Whether a campaign itself says where its tests come from.

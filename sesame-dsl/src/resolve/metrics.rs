@@ -2,7 +2,7 @@
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, Bound, Id as _, MetricId, MetricSource, TopicId, Type};
+use crate::model::{self, Bound, Id as _, MetricId, MetricSource, Range, TopicId, Type};
 use crate::syntax::ast::{self, Comparison, Name};
 use crate::units::Unit;
 
@@ -146,15 +146,18 @@ impl<'a> Resolver<'a> {
         let unit = self.metrics[index].as_ref()?.unit.clone();
         let what = format!("metric `{}`", name.text);
         let bound = match bound {
-            ast::Bound::Within(range) => Bound::Within(self.range(range, unit.as_ref(), &what)?),
+            ast::Bound::Within(range) => {
+                let Range { low, high } = self.range(range, unit.as_ref(), &what)?;
+                Bound::Within { low, high }
+            }
             ast::Bound::Compare(comparison, quantity) => {
                 let value = self.value(quantity, unit.as_ref(), &what)?;
                 match comparison {
-                    Comparison::AtMost => Bound::AtMost(value),
-                    Comparison::Below => Bound::Below(value),
-                    Comparison::AtLeast => Bound::AtLeast(value),
-                    Comparison::Above => Bound::Above(value),
-                    Comparison::Equal => Bound::Equal(value),
+                    Comparison::AtMost => Bound::AtMost { value },
+                    Comparison::Below => Bound::Below { value },
+                    Comparison::AtLeast => Bound::AtLeast { value },
+                    Comparison::Above => Bound::Above { value },
+                    Comparison::Equal => Bound::Equal { value },
                 }
             }
         };

@@ -35,7 +35,7 @@ impl<'a> Resolver<'a> {
         let title = format!("node `{}` does not {not} `{}`", node.declaration.name, target.topic.text);
         let diagnostic = Diagnostic::new(Code::WHICH_NODES, span, title)
             .label(format!("expected a node that {does} it"))
-            .also(node.declaration.span, "the node is declared here");
+            .secondary(node.declaration.span, "the node is declared here");
         self.report(diagnostic);
     }
 
@@ -50,7 +50,7 @@ impl<'a> Resolver<'a> {
         let title = format!("simulator kind `{word}` does not report {who}");
         let diagnostic = Diagnostic::new(Code::WHICH_NODES, span, title)
             .label("remove the nodes; the operation then applies to every message of its topic")
-            .also(simulator.head.name.span, "the simulator is declared here");
+            .secondary(simulator.head.name.span, "the simulator is declared here");
         self.report(diagnostic);
     }
 }

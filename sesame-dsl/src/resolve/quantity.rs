@@ -141,7 +141,7 @@ impl Resolver<'_> {
             Diagnostic::new(Code::OUT_OF_RANGE, span, format!("`{written}` is out of range for {what}"))
                 .label(format!("expected {permitted}"));
         if let Some(declared) = declared {
-            diagnostic = diagnostic.also(declared, "the permitted range is declared here");
+            diagnostic = diagnostic.secondary(declared, "the permitted range is declared here");
         }
         self.report(diagnostic);
         false

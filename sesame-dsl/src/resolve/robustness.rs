@@ -2,6 +2,7 @@
 
 use super::Resolver;
 use super::boolean::relation;
+use super::depth;
 use super::formula::{MAX_DEPTH, scaled};
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{Comparison, Expression, Input, Interval, Members, MetricSource, Robustness, Temporal};
@@ -52,7 +53,7 @@ impl<'a> Resolver<'a> {
             let twice = Expression::Product(vec![signals[at].clone(), Expression::Constant(2.0 * amount)]);
             signals[at] = Expression::Sum(vec![twice, Expression::Constant(-amount)]);
         }
-        if signals.iter().map(Expression::depth).max().max(Some(resolved.depth())) > Some(MAX_DEPTH) {
+        if signals.iter().map(depth::of_expression).max().max(Some(resolved.depth())) > Some(MAX_DEPTH) {
             self.too_deep(of.span);
             return None;
         }
@@ -171,7 +172,7 @@ impl<'a> Resolver<'a> {
             let title = format!("the scope of `{name}` is ambiguous");
             let mut diagnostic = Diagnostic::new(Code::TEMPORAL_REACH, word, title)
                 .label("add parentheses")
-                .also(Span { lo: alone.hi, hi: last.span.hi, ..alone }, "does the scope include this?");
+                .secondary(Span { lo: alone.hi, hi: last.span.hi, ..alone }, "does the scope include this?");
             let parentheses =
                 |from: Span, to: Span| vec![(Span { hi: from.lo, ..from }, "(".to_owned()), (to.end(), ")".to_owned())];
             diagnostic.suggestions.push(Suggestion {
@@ -301,7 +302,7 @@ impl<'a> Resolver<'a> {
         );
         let diagnostic = Diagnostic::new(Code::WRONG_UNIT, span, title)
             .label(format!("expected {}", wanted.name()))
-            .also(*first_span, "the first comparison determines the unit")
+            .secondary(*first_span, "the first comparison determines the unit")
             .note("robustness is a single number: to combine different units, divide both sides of each comparison by a scale, such as `zones.level / 300mm > 0`");
         self.report(diagnostic);
         None
@@ -350,9 +351,9 @@ fn open_end(expression: &ast::Expression) -> Option<(Span, Span, Span)> {
 fn names_input(of: &Expression) -> bool {
     match of {
         Expression::Constant(_) => false,
-        Expression::Input(_) | Expression::Distance(..) => true,
+        Expression::Input(_) | Expression::Distance { .. } => true,
         Expression::Negate(of) | Expression::Absolute(of) => names_input(of),
-        Expression::Divide(value, by) => names_input(value) || names_input(by),
+        Expression::Divide { value, by } => names_input(value) || names_input(by),
         Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) | Expression::Max(of) => {
             of.iter().any(names_input)
         }

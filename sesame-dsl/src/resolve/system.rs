@@ -169,7 +169,7 @@ impl<'a> Resolver<'a> {
             && values_in(&field.ty, values) > 1
         {
             let of = values_in(&field.ty, values);
-            diagnostic = diagnostic.also(field.declaration.span, format!("this field alone has {of} values"));
+            diagnostic = diagnostic.secondary(field.declaration.span, format!("this field alone has {of} values"));
         }
         self.report(diagnostic);
     }
@@ -243,7 +243,7 @@ impl<'a> Resolver<'a> {
         };
         let diagnostic = Diagnostic::new(Code::RECURSIVE_MESSAGE, mention, title)
             .label("a value of this type would be infinite")
-            .also(first.span, "declared here");
+            .secondary(first.span, "declared here");
         self.report(diagnostic);
     }
 
@@ -356,7 +356,7 @@ impl<'a> Resolver<'a> {
                         format!("two topics have the path `{member}`"),
                     )
                     .label("used again here")
-                    .also(first, "first used here");
+                    .secondary(first, "first used here");
                     self.report(diagnostic);
                 } else {
                     paths.insert(member.clone(), topic.path.span);
@@ -438,7 +438,7 @@ impl<'a> Resolver<'a> {
                 format!("message `{}` has no field named `{}`", message.declaration.name, name.text),
             )
             .label("unknown field")
-            .also(message.declaration.span, "the message is declared here");
+            .secondary(message.declaration.span, "the message is declared here");
             if self.compared.more(known.len()) {
                 diagnostic = match most_similar(&name.text, known.iter().copied()) {
                     Some(similar) => diagnostic.did_you_mean(name.span, similar),

@@ -8,7 +8,7 @@ use pest::error::Error;
 use pest::iterators::Pairs;
 use sesame_grammar::{Rule, SesameParser};
 
-use super::token::text_end;
+use super::text::text_end;
 
 /// Largest file, in bytes: more than a hundred thousand lines.
 pub const MAX_BYTES: usize = 8 << 20;

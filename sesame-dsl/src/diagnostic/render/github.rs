@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::for_terminals;
+use super::terminal::for_terminals;
 use crate::diagnostic::{Diagnostic, Severity, visible};
 use crate::source::SourceMap;
 

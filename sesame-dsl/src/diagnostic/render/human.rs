@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Patch, Renderer, Snippet};
 
-use super::for_terminals;
+use super::terminal::for_terminals;
 use crate::diagnostic::{Diagnostic, Severity, hidden, visible};
 use crate::source::{SourceFile, SourceMap};
 use crate::span::Span;

@@ -150,7 +150,7 @@ impl Reader<'_> {
         let diagnostic =
             Diagnostic::new(Code::NOT_CLOSED, span, format!("the block of this `{}` is not closed", row.name))
                 .label(label)
-                .also(opened, "opened here");
+                .secondary(opened, "opened here");
         self.report(diagnostic);
     }
 
