@@ -147,8 +147,8 @@ pub enum Error {
     },
     /// The output folder holds the runners of another `.sesame` file.
     #[error(
-        "{} contains the runners of `{other}`, not of `{source_file}`: choose another folder with `-o`, or replace them with \
-         `--force`",
+        "{} contains the runners of `{other}`, not of `{source_file}`: choose another folder with `-o`, or replace \
+         them with `--force`",
         folder.display()
     )]
     OtherSpace {
@@ -190,8 +190,8 @@ pub enum Error {
     },
     /// A link where generated files have a folder, or where their manifest is.
     #[error(
-        "{} is a link, and generated files are never written through links: remove the link, or pass the folder that it leads to \
-         with `-o`",
+        "{} is a link, and generated files are never written through links: remove the link, or pass the folder that \
+         it leads to with `-o`",
         path.display()
     )]
     Link {
