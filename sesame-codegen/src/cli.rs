@@ -96,10 +96,10 @@ enum Deny {
     Warnings,
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 done, 1 the input has errors or generated files are out of date, 2 wrong usage; \
-                          `run` ends with the runner's own.";
+const EXIT_CODES: &str = "Exit codes: 0 success, 1 errors in the input or generated files out of date, 2 wrong usage; \
+                          `run` passes on the exit code of the runner.";
 
-/// Test campaigns for robots from a `.sesame` space: checks it, generates test runners, runs them.
+/// Compiler for `.sesame` spaces: checks them, generates test runners for robots, and runs test campaigns.
 #[derive(Debug, Parser)]
 #[command(name = "sesamec", version, about, after_help = EXIT_CODES)]
 struct Arguments {
@@ -109,64 +109,64 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Make a new project: a space, with a small simulator of its own.
+    /// Create a new project: a space with a small simulator.
     New {
-        /// Its folder; the last part is the space's name.
+        /// The folder of the project; its last part becomes the name of the space.
         folder: PathBuf,
         /// Where the runtime comes from: `path:FOLDER` or a version.
         #[arg(long, value_parser = RuntimeChoice::parse)]
         runtime: Option<RuntimeChoice>,
-        /// A folder with templates in place of sesamec's own, by their names; see the page on the compiler's commands.
+        /// A folder with templates that replace sesamec's own by name; see docs/sesamec.md.
         #[arg(long, value_name = "FOLDER")]
         templates: Option<PathBuf>,
     },
-    /// Check a space, and say all that is wrong with it.
+    /// Check a space and report all errors and warnings.
     Check {
         /// The `.sesame` file.
         file: PathBuf,
-        /// Exit with 1 if there is anything of this kind.
+        /// Exit with code 1 if there is any diagnostic of this kind.
         #[arg(long, value_name = "KIND")]
         deny: Option<Deny>,
         #[command(flatten)]
         diagnostics: Diagnostics,
     },
-    /// Bring `.sesame` files into the one layout. Nothing but blanks and line ends is changed.
+    /// Format `.sesame` files. Only white space changes.
     Fmt {
-        /// The files, or folders whose `.sesame` files are meant, and `-` for standard input to standard output; those in
-        /// this folder if not said.
+        /// Files, folders with `.sesame` files, or `-` for standard input to standard output; the `.sesame` files in the
+        /// current folder if omitted.
         files: Vec<PathBuf>,
-        /// Write nothing; show what would change, and exit with 1 if anything would.
+        /// Write nothing; show what would change, and exit with code 1 if anything would change.
         #[arg(long)]
         check: bool,
         #[command(flatten)]
         diagnostics: Diagnostics,
     },
-    /// Generate the test runners of a space, and stubs for hooks that are not there yet.
+    /// Generate the test runners of a space, and stubs for missing hooks.
     Generate {
         #[command(flatten)]
         generation: Generation,
-        /// Write nothing; exit with 1 if anything would be written.
+        /// Write nothing; exit with code 1 if anything would be written.
         #[arg(long, conflicts_with = "force")]
         check: bool,
         /// Write nothing; show what would be written, and how files would change.
         #[arg(long, conflicts_with = "check")]
         dry_run: bool,
-        /// Put the hooks into each runner's own `src/hooks/`, for a crate that is to be moved elsewhere. They start from the
-        /// shared ones: those in the output folder, or else in `runners` beside the file.
+        /// Put the hooks into each runner's own `src/hooks/`, so that its crate can be moved. They are copied from the shared
+        /// hooks in the output folder, or else in `runners` beside the file.
         #[arg(long)]
         self_contained: bool,
-        /// Copy the runtime, the simulator's crate and all others that are in folders into each runner, which then builds
-        /// without them; `--self-contained` besides.
+        /// Copy the runtime, the simulator's crate and all other crates in local folders into each runner, so that it builds
+        /// without them. Implies `--self-contained`.
         #[arg(long)]
         vendor: bool,
     },
     /// Check, generate, build, and run a campaign.
     #[command(after_help = "Everything after `--` goes to the runner, for example `-- --seed 7 --workers 4`.\n\n\
-                            Exit codes: 1 if the space, the generation or the build failed, 2 wrong usage, else the runner's own.")]
+                            Exit codes: 1 if checking, generating or building failed, 2 wrong usage, otherwise that of the runner.")]
     Run {
         #[command(flatten)]
         generation: Generation,
-        /// What the runner is told.
+        /// Arguments for the runner.
         #[arg(last = true, value_name = "RUNNER ARGUMENTS")]
         arguments: Vec<std::ffi::OsString>,
     },
@@ -175,9 +175,9 @@ enum Command {
     Results(results::Results),
     /// Import a testing space of the original SESAME platform (an EMF file, `.model`), with the tests that it performed.
     Import {
-        /// The file.
+        /// The `.model` file.
         file: PathBuf,
-        /// The folder for the space and the results; it must be empty or not there yet.
+        /// The folder for the space and the results; it must be empty or must not exist.
         #[arg(long, short = 'o', value_name = "FOLDER")]
         out: PathBuf,
     },

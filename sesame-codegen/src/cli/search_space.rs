@@ -12,7 +12,7 @@ use sesame_search::sspr::extent;
 
 /// A number that may be anything in a range counts as so many values.
 const STEPS: f64 = 100.0;
-/// Undisturbed runs of a campaign, one before and one after its tests.
+/// Reference runs of a campaign, one before and one after its tests.
 const REFERENCE_RUNS: u64 = 2;
 
 /// The space that a campaign searches, and its cost in simulated time, as comments of a `.sesame` file.
@@ -40,7 +40,7 @@ pub(super) fn described(plan: &CampaignPlan) -> String {
     lines.push((
         "cost",
         format!(
-            "at most {runs} runs of {end} s, {REFERENCE_RUNS} of them undisturbed: {} of simulated time",
+            "at most {runs} runs of {end} s, {REFERENCE_RUNS} of them reference runs: {} of simulated time",
             duration(runs as f64 * end)
         ),
     ));
@@ -62,8 +62,8 @@ fn space(plan: &CampaignPlan, permitted: &Permitted, lines: &mut Vec<(&str, Stri
     let ways = total(&chosen(&vec![0.0; kinds.len()], &copies, most)[fewest..]);
     let count = if fewest == most { format!("{fewest}") } else { format!("{fewest} to {most}") };
     let apart = match plan.campaign.copies {
-        Copies::Apart => "; copies of one never act at the same time",
-        Copies::MayOverlap => "; copies of one may act at the same time",
+        Copies::Apart => "; copies of one are never active at the same time",
+        Copies::MayOverlap => "; copies of one may be active at the same time",
         Copies::Once => ", each at most once",
     };
     let ways = format!("{} ways to choose them", power(ways));

@@ -84,9 +84,9 @@ impl<'a> Resolver<'a> {
 
     fn of_one_moment(&mut self, word: Span) {
         let word_text = self.text(word);
-        let title = format!("temporal operator `{word_text}` outside `robustness(…)`");
+        let title = format!("`{word_text}` is only allowed inside `robustness(…)`");
         let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, word, title)
-            .label("only allowed inside `robustness(…)`")
+            .label("temporal operator outside `robustness(…)`")
             .note("for example `robustness(always zones.level > 0mm)`");
         self.report(diagnostic);
     }
