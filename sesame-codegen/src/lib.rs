@@ -13,10 +13,8 @@ pub mod environment;
 pub mod explain;
 pub mod files;
 #[cfg(feature = "cli")]
-pub mod import;
+pub mod frontend;
 pub mod input;
-#[cfg(feature = "cli")]
-pub mod language;
 pub mod lower;
 pub mod names;
 pub mod output;

@@ -11,7 +11,7 @@ use sesame_codegen::cli::Look;
 use sesame_codegen::emit::emit;
 use sesame_codegen::environment::{Options, environment};
 use sesame_codegen::files::Tree;
-use sesame_codegen::language::SESAME;
+use sesame_codegen::frontend::SESAME;
 use sesame_codegen::output::{Mode, apply};
 use sesame_codegen::plan::RunnerPlan;
 use sesame_plan::CampaignPlan;

@@ -5,7 +5,7 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use sesame_codegen::cli::Look;
-use sesame_codegen::language::SESAME;
+use sesame_codegen::frontend::SESAME;
 
 /// A space with this many lines, all of which say something: topics, metrics, requirements, operations, known tests.
 fn space(lines: usize) -> String {

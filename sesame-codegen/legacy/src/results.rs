@@ -8,13 +8,13 @@ use sesame_plan::{CampaignPlan, Choice, MetricId, OperationId, Span, TestOperati
 use sesame_runtime::observation::{MetricObservation, Observation, OperationEffect, Outcome, WallTime};
 use sesame_runtime::record::{Origin, RecordError, Recorder, ResultSet, Status, TestRecord};
 
-use super::notes::{Kind, Notes};
-use super::original::{
+use crate::notes::{Kind, Notes};
+use crate::original::{
     Activation, Campaign, Comparison, Condition, Domain, Operand, Operation, OperationKind, Original, Test,
 };
-use super::parts::{Effect, Part, matching};
-use super::space::Mapped;
-use super::xml::{cleaned, printable};
+use crate::parts::{Effect, Part, matching};
+use crate::writer::Mapped;
+use crate::xml::{cleaned, printable};
 
 /// How much was recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,7 +35,7 @@ struct Importer<'o> {
 }
 
 /// Records what a campaign performed into a folder that holds no results.
-pub(super) fn record(
+pub(crate) fn record(
     original: &Original,
     mapped: &Mapped,
     at: usize,
