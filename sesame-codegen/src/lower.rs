@@ -11,12 +11,14 @@
 
 mod condition;
 mod formula;
+mod id;
 mod robustness;
 
 use sesame_dsl::model::{self, CampaignId, Id as _, Space};
 use sesame_dsl::units::Unit;
 use sesame_plan as plan;
 
+use self::id::{raw, topic_id};
 use crate::plan::{HookPlan, OperationPlan, RunnerPlan};
 
 /// The plan of a campaign's runner. `source` is the `.sesame` file's name without its folder, `generator` the name and
@@ -459,14 +461,6 @@ fn bound(bound: model::Bound) -> plan::Bound {
 
 fn unit(unit: Option<&Unit>) -> Option<String> {
     unit.map(|unit| unit.text().to_owned())
-}
-
-fn topic_id(id: model::TopicId) -> plan::TopicId {
-    plan::TopicId(raw(id.index()))
-}
-
-fn raw(index: usize) -> u32 {
-    u32::try_from(index).expect("a file holds fewer than 2^32 declarations")
 }
 
 #[cfg(test)]

@@ -7,8 +7,9 @@ use std::process::ExitCode;
 use anyhow::{Context as _, anyhow, bail};
 use sesame_legacy::{Imported, Kind, Recorded};
 
-use super::shell::{self, Shell};
-use super::{Checked, Format, Language, commands};
+use super::commands;
+use super::shell::{self, Format, Shell};
+use crate::frontend::{Checked, Language};
 use crate::{input, output};
 
 /// Notes of one kind that are shown at most; files repeat themselves.

@@ -5,7 +5,20 @@ use std::io::{self, IsTerminal as _, Write as _};
 
 use sesame_dsl::diagnostic::{shortened, visible};
 
-use super::{Format, Look};
+use crate::frontend::Look;
+
+/// How diagnostics are shown, as the command line names it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Format {
+    /// With the lines they speak of.
+    Human,
+    /// One line each: `file:line:column: error[E0203]: …`.
+    Short,
+    /// One JSON object and line each.
+    Json,
+    /// Annotations for GitHub's workflows.
+    Github,
+}
 
 /// Where messages go: standard error, so that standard output is free for what is asked for.
 #[derive(Debug, Clone, Copy)]

@@ -6,9 +6,9 @@ use quote::quote;
 use serde::Serialize;
 use sesame_plan::{Domain, Moment, Parameter, Topic, Type};
 
-use super::Problem;
 use super::handlers::{self, handlers, paths};
 use super::messages::{self, Messages, Place};
+use super::problem::Problem;
 use super::registry::{self, Registered};
 use super::rust::{self, one_line};
 use super::text::Templates;

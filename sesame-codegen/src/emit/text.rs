@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use tera::{Context, Tera};
 
-use super::Problem;
+use super::problem::Problem;
 
 /// The templates to fill in. Those of this project hold loops and no logic.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -4,8 +4,7 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use sesame_codegen::cli::Look;
-use sesame_codegen::frontend::SESAME;
+use sesame_codegen::frontend::{Look, SESAME};
 use sesame_legacy::{Broken, Imported, Kind, Recorded};
 use sesame_plan::CampaignPlan;
 use sesame_runtime::record::Repository;
