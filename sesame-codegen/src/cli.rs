@@ -56,8 +56,8 @@ enum Command {
     },
     /// Bring `.sesame` files into the one layout. Nothing but blanks and line ends is changed.
     Fmt {
-        /// The files, or folders whose `.sesame` files are meant, and `-` for standard input to standard output; those in
-        /// this folder if not said.
+        /// The files, or folders whose `.sesame` files are meant, and `-` for standard input to standard output; those
+        /// in this folder if not said.
         files: Vec<PathBuf>,
         /// Write nothing; show what would change, and exit with 1 if anything would.
         #[arg(long)]
@@ -75,12 +75,12 @@ enum Command {
         /// Write nothing; show what would be written, and how files would change.
         #[arg(long, conflicts_with = "check")]
         dry_run: bool,
-        /// Put the hooks into each runner's own `src/hooks/`, for a crate that is to be moved elsewhere. They start from the
-        /// shared ones: those in the output folder, or else in `runners` beside the file.
+        /// Put the hooks into each runner's own `src/hooks/`, for a crate that is to be moved elsewhere. They start
+        /// from the shared ones: those in the output folder, or else in `runners` beside the file.
         #[arg(long)]
         self_contained: bool,
-        /// Copy the runtime, the simulator's crate and all others that are in folders into each runner, which then builds
-        /// without them; `--self-contained` besides.
+        /// Copy the runtime, the simulator's crate and all others that are in folders into each runner, which then
+        /// builds without them; `--self-contained` besides.
         #[arg(long)]
         vendor: bool,
     },
@@ -97,7 +97,8 @@ enum Command {
     /// Analyse the results of campaigns: what ran, fronts, points in the reduced parameter space, coverage.
     #[command(subcommand)]
     Results(results::Results),
-    /// Import a testing space of the original SESAME platform (an EMF file, `.model`), with the tests that it performed.
+    /// Import a testing space of the original SESAME platform (an EMF file, `.model`), with the tests that it
+    /// performed.
     Import {
         /// The file.
         file: PathBuf,

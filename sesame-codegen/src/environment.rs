@@ -1,5 +1,5 @@
-//! What emitted crates need of the world: the runtime, the simulator's crate, and what `sesame.toml` lists. Reads files,
-//! writes none.
+//! What emitted crates need of the world: the runtime, the simulator's crate, and what `sesame.toml` lists. Reads
+//! files, writes none.
 //!
 //! Paths are written as seen from a runner's folder, relative wherever there is a relative way, so that a checkout or
 //! a project can be moved as a whole.
@@ -134,15 +134,16 @@ pub enum RuntimeChoice {
 /// What a command line says of the surroundings.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Options {
-    /// Where runners take the runtime from; if not said: `[runtime]` in `sesame.toml`, else the checkout that sesamec was
-    /// built from, else the released version.
+    /// Where runners take the runtime from; if not said: `[runtime]` in `sesame.toml`, else the checkout that sesamec
+    /// was built from, else the released version.
     pub runtime: Option<RuntimeChoice>,
     /// A folder, relative to the working directory, with templates in place of this project's; if not said: `templates`
     /// in `sesame.toml`, which is relative to that.
     pub templates: Option<PathBuf>,
     /// Each runner has the hooks in its own folder.
     pub self_contained: bool,
-    /// Each runner has the hooks, the runtime, the simulator, and every other crate that is in a folder in its own folder.
+    /// Each runner has the hooks, the runtime, the simulator, and every other crate that is in a folder in its own
+    /// folder.
     pub vendor: bool,
 }
 

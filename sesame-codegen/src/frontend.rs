@@ -14,8 +14,8 @@ use crate::plan::RunnerPlan;
 /// The language as the command needs it.
 #[derive(Debug, Clone, Copy)]
 pub struct Language {
-    /// Checks a space: its path, which diagnostics show and imports are relative to, its text, and how diagnostics are to
-    /// look.
+    /// Checks a space: its path, which diagnostics show and imports are relative to, its text, and how diagnostics are
+    /// to look.
     pub check: fn(file: &str, text: &str, look: Look) -> Checked,
     /// Formats a text in the same way: the text in the one layout, or diagnostics of its syntax errors.
     pub format: fn(file: &str, text: &str, look: Look) -> Result<String, Diagnosed>,

@@ -1,5 +1,5 @@
-//! Files that people give to `sesamec`, or that lie beside those: opened only if they are regular files, and read up to a
-//! limit.
+//! Files that people give to `sesamec`, or that lie beside those: opened only if they are regular files, and read up to
+//! a limit.
 //!
 //! So a pipe that nobody writes to cannot keep a command waiting, and a device that never ends cannot fill the memory.
 //! And what is read as text of one kind may be quoted in messages, so a link must not lead from there to a file of
@@ -82,8 +82,8 @@ pub fn bytes(path: &Path, most: u64) -> Result<Vec<u8>, Unreadable> {
     Ok(bytes)
 }
 
-/// The text of a regular file, of at most [`MOST_OF_A_TEXT`]. A link is followed if the file that it leads to has the same
-/// ending in its name.
+/// The text of a regular file, of at most [`MOST_OF_A_TEXT`]. A link is followed if the file that it leads to has the
+/// same ending in its name.
 pub fn text(path: &Path) -> Result<String, Unreadable> {
     regular(&fs::metadata(path)?)?;
     let target = path.canonicalize()?;

@@ -243,8 +243,8 @@ fn held(content: &model::Content) -> (&Vec<model::OperationId>, plan::Count) {
     (&content.operations, plan::Count { min: content.min, max: content.max })
 }
 
-/// What holds of several copies of one operation in a campaign's tests. A known test that a campaign repeats is run as tests
-/// of the space's searches are: its copies may act together where those of all of them may.
+/// What holds of several copies of one operation in a campaign's tests. A known test that a campaign repeats is run as
+/// tests of the space's searches are: its copies may act together where those of all of them may.
 fn copies(space: &Space, campaign: &model::Campaign) -> plan::Copies {
     match content(campaign) {
         Some(content) => content.copies,
@@ -360,7 +360,8 @@ fn node(node: &model::Node) -> plan::Node {
     }
 }
 
-/// The only way in which the value of a metric changes during a run, where its formula or the declaration of its hook says so.
+/// The only way in which the value of a metric changes during a run, where its formula or the declaration of its hook
+/// says so.
 fn trend(metric: &model::Metric) -> Option<plan::Trend> {
     match &metric.source {
         model::MetricSource::Hook(_) => metric.trend,

@@ -1,6 +1,7 @@
 //! A testing space of the original platform, as data: what its files hold, in the names of its last metamodel.
 //!
-//! A reference is a number that stands for the text in the file; [`Original::metric`] and its like say what it leads to.
+//! A reference is a number that stands for the text in the file; [`Original::metric`] and its like say what it leads
+//! to.
 
 use std::collections::HashMap;
 

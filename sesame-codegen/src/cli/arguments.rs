@@ -35,8 +35,8 @@ pub(super) struct Generation {
     /// Overwrite generated files that were edited by hand. Hooks are never overwritten.
     #[arg(long)]
     pub(super) force: bool,
-    /// Where the runtime comes from: `path:FOLDER`, `git:URL`, `git:URL?tag=TAG` (or `branch=`, `rev=`), or a version. If
-    /// not said: [runtime] in sesame.toml, else the checkout that sesamec was built from, else the released version.
+    /// Where the runtime comes from: `path:FOLDER`, `git:URL`, `git:URL?tag=TAG` (or `branch=`, `rev=`), or a version.
+    /// If not said: [runtime] in sesame.toml, else the checkout that sesamec was built from, else the released version.
     #[arg(long, value_parser = RuntimeChoice::parse)]
     pub(super) runtime: Option<RuntimeChoice>,
     /// A folder with templates in place of sesamec's own, by their names; `templates` in sesame.toml if not said.

@@ -117,8 +117,8 @@ pub(super) enum Results {
         /// values in any test of any run if not said.
         #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "VALUES")]
         reference: Vec<f64>,
-        /// The cells coverage is counted in, for example `T1:0:1:6,T2:0:0.5:6,P1:0:1:3`; those of the campaigns, if they
-        /// are the same in all, if not said.
+        /// The cells coverage is counted in, for example `T1:0:1:6,T2:0:0.5:6,P1:0:1:3`; those of the campaigns, if
+        /// they are the same in all, if not said.
         #[arg(long, value_name = "GRID", value_parser = Grid::parse)]
         grid: Option<Grid>,
         /// Show each run, also where there are groups.

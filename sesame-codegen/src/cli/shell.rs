@@ -103,8 +103,8 @@ impl Shell {
         Ok(())
     }
 
-    /// A line that begins with a painted word. What is said may quote anything, so no sign of it reaches a terminal as a
-    /// command, and no line of it fills the screen.
+    /// A line that begins with a painted word. What is said may quote anything, so no sign of it reaches a terminal as
+    /// a command, and no line of it fills the screen.
     fn say(self, style: &str, word: &str, what: impl Display) {
         let text: Vec<String> = what.to_string().split('\n').map(|line| shortened(line.to_owned())).collect();
         self.line(&format!("{} {}", self.painted(style, word), visible(&text.join("\n"))));
@@ -128,7 +128,8 @@ impl Shell {
     }
 }
 
-/// What was asked for, on standard output. A reader that has seen enough, such as `head`, is not a failure; a full disk is.
+/// What was asked for, on standard output. A reader that has seen enough, such as `head`, is not a failure; a full disk
+/// is.
 pub(super) fn asked_for(text: &str) -> anyhow::Result<()> {
     let mut output = io::stdout().lock();
     match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {

@@ -1,5 +1,5 @@
-//! `operations.rs` (parameters and a trait for each custom operation of the space), `operation_registry.rs` (the hooks of
-//! a campaign for the runtime), and the stubs of these hooks.
+//! `operations.rs` (parameters and a trait for each custom operation of the space), `operation_registry.rs` (the hooks
+//! of a campaign for the runtime), and the stubs of these hooks.
 
 use proc_macro2::TokenStream;
 use quote::quote;
