@@ -5,6 +5,7 @@ mod build;
 mod commands;
 mod fmt;
 mod import;
+mod progress;
 mod results;
 mod search_space;
 mod shell;

@@ -1,6 +1,7 @@
 //! Behaviour across crates, as a user meets it.
 #![cfg(test)]
 
+mod building;
 mod commands;
 mod conditions;
 mod confirm;

@@ -56,14 +56,20 @@ impl Shell {
         self.say("1;32", &format!("{verb:>10}"), what);
     }
 
-    /// Something is being done; the next line replaces this one. Only on a terminal.
+    /// Whether a line of [`doing`](Self::doing) is replaced by the next one, as only a terminal can.
+    pub(super) fn rewrites(self) -> bool {
+        self.terminal
+    }
+
+    /// Something is being done. On a terminal the next line replaces this one; elsewhere it stays.
     pub(super) fn doing(self, verb: &str, what: impl Display) {
-        if self.terminal {
-            let what = what.to_string();
-            let text = format!("\r\x1b[K{} {}", self.painted("1;36", &format!("{verb:>10}")), visible(&what));
-            // A terminal that is gone is no reason to stop.
-            let _ = io::stderr().write_all(text.as_bytes());
+        if !self.terminal {
+            return self.say("1;36", &format!("{verb:>10}"), what);
         }
+        let what = what.to_string();
+        let text = format!("\r\x1b[K{} {}", self.painted("1;36", &format!("{verb:>10}")), visible(&what));
+        // A terminal that is gone is no reason to stop.
+        let _ = io::stderr().write_all(text.as_bytes());
     }
 
     /// Something the user should know.
