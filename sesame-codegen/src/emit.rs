@@ -40,6 +40,8 @@ pub struct Environment {
     pub dependencies: BTreeMap<String, toml::Value>,
     /// A `Cargo.lock` to start from, so that all runners build the same versions.
     pub lock: Option<String>,
+    /// The target folder that runners share, as seen from the folder they are in; `target` in it where nothing is said.
+    pub target: Option<String>,
     /// Options of the command line that had a say, by name.
     pub options: BTreeMap<String, String>,
     /// The folder of the `.sesame` file, as seen from a runner's folder.
@@ -187,7 +189,11 @@ fn shared(plans: &[RunnerPlan], environment: &Environment) -> Result<Tree, Probl
     tree.add(
         ".cargo/config.toml",
         Owner::Machine,
-        note.clone() + "# One target folder for all runners, so that what they share is compiled once.\n[build]\ntarget-dir = \"target\"\n",
+        format!(
+            "{note}# One target folder for all runners, so that what they share is compiled once.\n[build]\n\
+             target-dir = {}\n",
+            toml::Value::from(environment.target.as_deref().unwrap_or("target"))
+        ),
     );
     tree.add(".gitignore", Owner::Machine, note + "/target/\n/*/results/\n");
     let readme = SharedReadme {
