@@ -504,8 +504,8 @@ fn workspace_lock(runtime: &Path) -> Option<String> {
     runtime.ancestors().take(3).find_map(|folder| input::text(&folder.join("Cargo.lock")).ok())
 }
 
-/// The target folder of the checkout that the runtime is of, as seen from a runners' folder in this checkout: SQLite, and
-/// more of what `sesamec` was made of, need not be compiled again. Runners elsewhere have one of their own.
+/// The target folder of the checkout that the runtime is of, as seen from a runners' folder in this checkout: SQLite,
+/// and more of what `sesamec` was made of, need not be compiled again. Runners elsewhere have one of their own.
 fn checkout_target(out: &Path, runtime: &Path) -> Option<String> {
     let root =
         settled(runtime).ok()?.ancestors().take(3).find(|folder| folder.join("Cargo.lock").is_file())?.to_owned();
