@@ -20,6 +20,11 @@ impl File {
     fn name(&self) -> &str {
         self.path.rsplit('/').next().unwrap_or(&self.path)
     }
+
+    /// What follows the last dot of its name.
+    fn ending(&self) -> Option<&str> {
+        self.name().rsplit_once('.').map(|(_, ending)| ending)
+    }
 }
 
 /// A crate of the workspace.
@@ -64,9 +69,9 @@ pub(crate) fn wide_comments(files: &[File]) -> Vec<String> {
 
 /// What begins a line of comment in a file of this kind; `None` for kinds that have none, or have other widths.
 fn comment_mark(file: &File) -> Option<&'static str> {
-    match file.name().rsplit_once('.') {
-        Some((_, "rs" | "pest")) => Some("//"),
-        Some((_, "toml" | "sh" | "py")) => Some("#"),
+    match file.ending() {
+        Some("rs" | "pest") => Some("//"),
+        Some("toml" | "sh" | "py") => Some("#"),
         _ if file.text.starts_with("#!") => Some("#"),
         _ => None,
     }
@@ -99,7 +104,7 @@ pub(crate) fn mod_files(files: &[File]) -> Vec<String> {
 
 /// Modules that do not begin with what they are for. The tests of a module, in `tests.rs`, need not.
 pub(crate) fn without_purpose(files: &[File]) -> Vec<String> {
-    let modules = files.iter().filter(|file| file.path.ends_with(".rs") && file.name() != "tests.rs");
+    let modules = files.iter().filter(|file| file.ending() == Some("rs") && file.name() != "tests.rs");
     let silent = modules.filter(|file| !file.text.starts_with("//!"));
     silent.map(|file| format!("{}: begin it with `//!` and a sentence on what it is for", file.path)).collect()
 }
