@@ -1,9 +1,11 @@
 //! The `sesamec` command.
 
+mod arguments;
 mod build;
 mod commands;
 mod fmt;
 mod import;
+mod progress;
 mod results;
 mod search_space;
 mod shell;
@@ -13,88 +15,11 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 
+use self::arguments::{Deny, Diagnostics, ExplainFormat, Generation, Purpose};
 use crate::environment::{Options, RuntimeChoice};
-use crate::plan::RunnerPlan;
+use crate::frontend::Language;
 
 pub use shell::Shell;
-
-/// The language as the command needs it.
-#[derive(Debug, Clone, Copy)]
-pub struct Language {
-    /// Checks a space: its path, which diagnostics show and imports are relative to, its text, and how diagnostics are to
-    /// look.
-    pub check: fn(file: &str, text: &str, look: Look) -> Checked,
-    /// Formats a text in the same way: the text in the one layout, or diagnostics of its syntax errors.
-    pub format: fn(file: &str, text: &str, look: Look) -> Result<String, Diagnosed>,
-    /// The page of a diagnostic's code.
-    pub explain: fn(code: &str) -> Option<&'static str>,
-    /// What a space declares by a name, and what mentions it, also if the space has errors; or why that cannot be told.
-    pub find: fn(file: &str, text: &str, name: &str) -> Result<Found, String>,
-}
-
-/// How diagnostics look.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Look {
-    /// For people, with the lines they speak of.
-    Human {
-        /// With colours.
-        colour: bool,
-    },
-    /// One line each.
-    Short,
-    /// One JSON object and line each.
-    Json,
-    /// One workflow command of GitHub each.
-    Github,
-}
-
-/// Diagnostics of a text with errors.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Diagnosed {
-    /// As text.
-    pub diagnostics: String,
-    /// How many of them are errors.
-    pub errors: usize,
-}
-
-/// A thing of a space.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Found {
-    /// Whether it is a campaign.
-    pub campaign: bool,
-    /// Its definition and its uses.
-    pub text: String,
-    /// Its uses alone; empty if it has none.
-    pub uses: String,
-    /// Definition and uses as one line of JSON.
-    pub json: String,
-    /// How many errors the space has. What could not be read is not among the uses.
-    pub errors: usize,
-}
-
-/// What came of checking a space.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Checked {
-    /// Errors and warnings as text; empty when there are none.
-    pub diagnostics: String,
-    /// How many of them are errors.
-    pub errors: usize,
-    /// How many of them are warnings.
-    pub warnings: usize,
-    /// What the space holds, for example `4 campaigns, 9 operations`.
-    pub summary: String,
-    /// A plan for each campaign; empty when there are errors.
-    pub plans: Vec<RunnerPlan>,
-    /// What the space says and no runner uses yet, one sentence each.
-    pub notes: Vec<String>,
-}
-
-/// What is an error besides errors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Deny {
-    /// Warnings too.
-    Warnings,
-}
 
 const EXIT_CODES: &str = "Exit codes: 0 success, 1 errors in the input or generated files out of date, 2 wrong usage; \
                           `run` passes on the exit code of the runner.";
@@ -151,12 +76,12 @@ enum Command {
         /// Write nothing; show what would be written, and how files would change.
         #[arg(long, conflicts_with = "check")]
         dry_run: bool,
-        /// Put the hooks into each runner's own `src/hooks/`, so that its crate can be moved. They are copied from the shared
-        /// hooks in the output folder, or else in `runners` beside the file.
+        /// Put the hooks into each runner's own `src/hooks/`, so that its crate can be moved. They are copied from the
+        /// shared hooks in the output folder, or else in `runners` beside the file.
         #[arg(long)]
         self_contained: bool,
-        /// Copy the runtime, the simulator's crate and all other crates in local folders into each runner, so that it builds
-        /// without them. Implies `--self-contained`.
+        /// Copy the runtime, the simulator's crate and all other crates in local folders into each runner, so that it
+        /// builds without them. Implies `--self-contained`.
         #[arg(long)]
         vendor: bool,
     },
@@ -173,7 +98,8 @@ enum Command {
     /// Analyse the results of campaigns: what ran, fronts, points in the reduced parameter space, coverage.
     #[command(subcommand)]
     Results(results::Results),
-    /// Import a testing space of the original SESAME platform (an EMF file, `.model`), with the tests that it performed.
+    /// Import a testing space of the original SESAME platform (an EMF file, `.model`), with the tests that it
+    /// performed.
     Import {
         /// The `.model` file.
         file: PathBuf,
@@ -202,79 +128,6 @@ enum Command {
         /// The shell.
         shell: clap_complete::Shell,
     },
-}
-
-/// How diagnostics are shown.
-#[derive(Debug, Clone, Copy, clap::Args)]
-struct Diagnostics {
-    /// How errors and warnings of the space are shown: `human` and `short` on standard error, `json` and `github` on
-    /// standard output.
-    #[arg(long, value_enum, default_value_t = Format::Human)]
-    format: Format,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Format {
-    /// With the lines they speak of.
-    Human,
-    /// One line each: `file:line:column: error[E0203]: …`.
-    Short,
-    /// One JSON object and line each.
-    Json,
-    /// Annotations for GitHub's workflows.
-    Github,
-}
-
-/// How a definition and its uses are shown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
-enum ExplainFormat {
-    /// Text.
-    #[default]
-    Human,
-    /// One JSON object.
-    Json,
-}
-
-/// What is generated, and where.
-#[derive(Debug, clap::Args)]
-struct Generation {
-    /// The `.sesame` file.
-    file: PathBuf,
-    /// The campaign; all of them for `generate`, the only one for `run` if not said.
-    #[arg(long, short)]
-    campaign: Option<String>,
-    /// The folder for the runners; `runners` beside the file if not said.
-    #[arg(long, short = 'o', value_name = "FOLDER")]
-    out: Option<PathBuf>,
-    /// Overwrite generated files that were edited by hand. Hooks are never overwritten.
-    #[arg(long)]
-    force: bool,
-    /// Where the runtime comes from: `path:FOLDER`, `git:URL`, `git:URL?tag=TAG` (or `branch=`, `rev=`), or a version. If
-    /// not said: [runtime] in sesame.toml, else the checkout that sesamec was built from, else the released version.
-    #[arg(long, value_parser = RuntimeChoice::parse)]
-    runtime: Option<RuntimeChoice>,
-    /// A folder with templates in place of sesamec's own, by their names; `templates` in sesame.toml if not said.
-    #[arg(long, value_name = "FOLDER")]
-    templates: Option<PathBuf>,
-    #[command(flatten)]
-    diagnostics: Diagnostics,
-}
-
-/// What `generate` does beside writing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Purpose {
-    /// Writing.
-    Write,
-    /// Telling by the exit code whether anything would be written.
-    Check,
-    /// Showing what would be written.
-    DryRun,
-}
-
-impl Generation {
-    fn options(&self) -> Options {
-        Options { runtime: self.runtime.clone(), templates: self.templates.clone(), ..Options::default() }
-    }
 }
 
 /// The command line of this process.

@@ -1,5 +1,5 @@
-//! What emitted crates need of the world: the runtime, the simulator's crate, and what `sesame.toml` lists. Reads files,
-//! writes none.
+//! What emitted crates need of the world: the runtime, the simulator's crate, and what `sesame.toml` lists. Reads
+//! files, writes none.
 //!
 //! Paths are written as seen from a runner's folder, relative wherever there is a relative way, so that a checkout or
 //! a project can be moved as a whole.
@@ -134,15 +134,16 @@ pub enum RuntimeChoice {
 /// What a command line says of the surroundings.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Options {
-    /// Where runners take the runtime from; if not said: `[runtime]` in `sesame.toml`, else the checkout that sesamec was
-    /// built from, else the released version.
+    /// Where runners take the runtime from; if not said: `[runtime]` in `sesame.toml`, else the checkout that sesamec
+    /// was built from, else the released version.
     pub runtime: Option<RuntimeChoice>,
     /// A folder, relative to the working directory, with templates in place of this project's; if not said: `templates`
     /// in `sesame.toml`, which is relative to that.
     pub templates: Option<PathBuf>,
     /// Each runner has the hooks in its own folder.
     pub self_contained: bool,
-    /// Each runner has the hooks, the runtime, the simulator, and every other crate that is in a folder in its own folder.
+    /// Each runner has the hooks, the runtime, the simulator, and every other crate that is in a folder in its own
+    /// folder.
     pub vendor: bool,
 }
 
@@ -212,7 +213,8 @@ pub fn environment(
     let home = source
         .parent()
         .map_or_else(|| Path::new("."), |parent| if parent == Path::new("") { Path::new(".") } else { parent });
-    let runner_folder = settled(out).map_err(|error| vec![error])?.join("runner");
+    let out_folder = settled(out).map_err(|error| vec![error])?;
+    let runner_folder = out_folder.join("runner");
     let mut errors = Vec::new();
     let settings = settings(&home.join(SETTINGS)).unwrap_or_else(|error| {
         errors.push(error);
@@ -220,9 +222,11 @@ pub fn environment(
     });
     let mut dependencies = BTreeMap::new();
     let mut lock = None;
+    let mut target = None;
     match runtime_dependency(&runner_folder, home, runtime, settings.runtime.as_ref()) {
         Ok((value, folder)) => {
             dependencies.insert(RUNTIME.to_owned(), value);
+            target = folder.as_deref().and_then(|folder| checkout_target(&out_folder, folder));
             lock = first_lock(out).or_else(|| folder.and_then(|folder| workspace_lock(&folder)));
         }
         Err(error) => errors.push(error),
@@ -292,7 +296,17 @@ pub fn environment(
     let system = plans.first().map_or_else(|| home.to_owned(), |first| home.join(first.system_folder()));
     let space_folder = relative(&runner_folder, home).map_err(|error| vec![error])?;
     let simulator_folder = relative(&runner_folder, &system).map_err(|error| vec![error])?;
-    Ok(Environment { dependencies, lock, options: said, space_folder, simulator_folder, hooks, vendored, templates })
+    Ok(Environment {
+        dependencies,
+        lock,
+        target,
+        options: said,
+        space_folder,
+        simulator_folder,
+        hooks,
+        vendored,
+        templates,
+    })
 }
 
 /// The runtime as a dependency of a crate in `folder`, which need not exist yet.
@@ -488,6 +502,17 @@ fn first_lock(out: &Path) -> Option<String> {
 /// leaves out what a runner does not use.
 fn workspace_lock(runtime: &Path) -> Option<String> {
     runtime.ancestors().take(3).find_map(|folder| input::text(&folder.join("Cargo.lock")).ok())
+}
+
+/// The target folder of the checkout that the runtime is of, as seen from a runners' folder in this checkout: SQLite,
+/// and more of what `sesamec` was made of, need not be compiled again. Runners elsewhere have one of their own.
+fn checkout_target(out: &Path, runtime: &Path) -> Option<String> {
+    let root =
+        settled(runtime).ok()?.ancestors().take(3).find(|folder| folder.join("Cargo.lock").is_file())?.to_owned();
+    if !out.starts_with(&root) {
+        return None;
+    }
+    relative(out, &root.join("target")).ok()
 }
 
 /// An absolute path without links and `..`; its last parts need not exist.

@@ -1,5 +1,5 @@
-//! Files that people give to `sesamec`, or that lie beside those: opened only if they are regular files, and read up to a
-//! limit.
+//! Files that people give to `sesamec`, or that lie beside those: opened only if they are regular files, and read up to
+//! a limit.
 //!
 //! So a pipe without a writer cannot block a command, and an endless device cannot fill the memory. Texts may be quoted in
 //! messages, so a link must not lead to a file of another kind: otherwise a checkout from someone else could show a
@@ -82,8 +82,8 @@ pub fn bytes(path: &Path, most: u64) -> Result<Vec<u8>, Unreadable> {
     Ok(bytes)
 }
 
-/// The text of a regular file, of at most [`MOST_OF_A_TEXT`]. A link is followed if the file that it leads to has the same
-/// ending in its name.
+/// The text of a regular file, of at most [`MOST_OF_A_TEXT`]. A link is followed if the file that it leads to has the
+/// same ending in its name.
 pub fn text(path: &Path) -> Result<String, Unreadable> {
     regular(&fs::metadata(path)?)?;
     let target = path.canonicalize()?;

@@ -11,12 +11,14 @@
 
 mod condition;
 mod formula;
+mod id;
 mod robustness;
 
 use sesame_dsl::model::{self, CampaignId, Id as _, Space};
 use sesame_dsl::units::Unit;
 use sesame_plan as plan;
 
+use self::id::{raw, topic_id};
 use crate::plan::{HookPlan, OperationPlan, RunnerPlan};
 
 /// The plan of a campaign's runner. `source` is the `.sesame` file's name without its folder, `generator` the name and
@@ -241,8 +243,8 @@ fn held(template: &model::TestTemplate) -> (&Vec<model::OperationId>, plan::Coun
     (&template.operations, plan::Count { min: template.min, max: template.max })
 }
 
-/// What holds of several copies of one operation in a campaign's tests. A known test that a campaign repeats is run as tests
-/// of the space's searches are: its copies may act together where those of all of them may.
+/// What holds of several copies of one operation in a campaign's tests. A known test that a campaign repeats is run as
+/// tests of the space's searches are: its copies may act together where those of all of them may.
 fn copies(space: &Space, campaign: &model::Campaign) -> plan::Copies {
     match template(campaign) {
         Some(template) => template.copies,
@@ -358,7 +360,8 @@ fn node(node: &model::Node) -> plan::Node {
     }
 }
 
-/// The only way in which the value of a metric changes during a run, where its formula or the declaration of its hook says so.
+/// The only way in which the value of a metric changes during a run, where its formula or the declaration of its hook
+/// says so.
 fn trend(metric: &model::Metric) -> Option<plan::Trend> {
     match &metric.source {
         model::MetricSource::Hook(_) => metric.trend,
@@ -439,14 +442,6 @@ fn within(operation: &model::Operation, end_after: f64) -> plan::Span {
 
 fn unit(unit: Option<&Unit>) -> Option<String> {
     unit.map(|unit| unit.text().to_owned())
-}
-
-fn topic_id(id: model::TopicId) -> plan::TopicId {
-    plan::TopicId(raw(id.index()))
-}
-
-fn raw(index: usize) -> u32 {
-    u32::try_from(index).expect("a file holds fewer than 2^32 declarations")
 }
 
 #[cfg(test)]

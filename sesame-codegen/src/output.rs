@@ -271,8 +271,8 @@ pub fn create(folder: &Path, files: &std::collections::BTreeMap<String, String>)
 /// The folder for results in a project.
 pub const RESULTS: &str = "results";
 
-/// Takes back what [`create`] wrote into a folder that was empty or, if it was not there before, that came with it: a file
-/// and the results beside it.
+/// Takes back what [`create`] wrote into a folder that was empty or, if it was not there before, that came with it: a
+/// file and the results beside it.
 pub fn withdraw(folder: &Path, file: &str, was_there: bool) -> Result<(), Error> {
     let gone = |path: PathBuf, done: io::Result<()>| match done {
         Err(cause) if cause.kind() != io::ErrorKind::NotFound => Err(Error::Io { action: "remove", path, cause }),

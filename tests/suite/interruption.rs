@@ -165,7 +165,8 @@ enum Victim {
     Worker,
 }
 
-/// Kills the supervisor or a worker after this share of what a run takes, and resumes where there is something to resume.
+/// Kills the supervisor or a worker after this share of what a run takes, and resumes where there is something to
+/// resume.
 fn killed_at(runner: &Runner, victim: Victim, moment: f64, whole: &str, takes: Duration) -> Progress {
     let results = format!("killed{moment:.6}");
     let running = Running::start(runner, &results, "2");

@@ -1,5 +1,5 @@
-//! Campaigns on a simulator that starts other processes, which are ended in every way there is: nothing is left of them, and
-//! results are what they would have been.
+//! Campaigns on a simulator that starts other processes, which are ended in every way there is: nothing is left of
+//! them, and results are what they would have been.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -193,7 +193,8 @@ fn simulators_have_time_to_end_once_their_input_is_closed() {
     }
 }
 
-/// A shell may start others before it becomes the runner; one of these may leave something behind while the runner runs.
+/// A shell may start others before it becomes the runner; one of these may leave something behind while the runner
+/// runs.
 #[test]
 fn what_a_runner_has_below_it_from_the_start_is_left_alone() {
     let Some(runner) = breeding("earlier_children", "quiet") else { return };
@@ -332,8 +333,8 @@ impl Work {
         Work { arguments: arguments(into), folder: format!("{into}/{name}"), whole: said.digest(), takes }
     }
 
-    /// Kills it after this share of its time, resumes it if there is something to resume, and compares. Says how many tests
-    /// were recorded when it was killed; `None` if it had ended, or hardly begun.
+    /// Kills it after this share of its time, resumes it if there is something to resume, and compares. Says how many
+    /// tests were recorded when it was killed; `None` if it had ended, or hardly begun.
     fn killed(&self, runner: &Runner, victim: Victim, moment: f64) -> Option<usize> {
         let words: Vec<&str> = self.arguments.iter().map(String::as_str).collect();
         let process = start(runner, &words, "");

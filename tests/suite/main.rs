@@ -2,6 +2,7 @@
 #![cfg(test)]
 
 mod architecture;
+mod building;
 mod commands;
 mod conditions;
 mod confirm;

@@ -8,11 +8,13 @@ use anyhow::{Context as _, anyhow, bail};
 use sesame_dsl::diagnostic::visible;
 use sesame_plan::Transport;
 
-use super::shell::{self, Shell};
-use super::{Checked, Deny, ExplainFormat, Format, Generation, Language, Purpose, build};
+use super::arguments::{Deny, ExplainFormat, Generation, Purpose};
+use super::build;
+use super::shell::{self, Format, Shell};
 use crate::emit::Templates;
 use crate::environment::{self, Options, RuntimeChoice, environment};
 use crate::files::{Owner, Tree};
+use crate::frontend::{Checked, Language};
 use crate::input;
 use crate::output::{self, Change, Mode, Orphan, Report};
 use crate::plan::RunnerPlan;

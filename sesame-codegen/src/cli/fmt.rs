@@ -7,8 +7,9 @@ use std::process::ExitCode;
 use anyhow::{Context as _, anyhow, bail};
 use sesame_dsl::diagnostic::visible;
 
-use super::shell::{self, Shell};
-use super::{Format, Language, commands};
+use super::commands;
+use super::shell::{self, Format, Shell};
+use crate::frontend::Language;
 use crate::{input, output};
 
 /// Standard input, among files.

@@ -113,8 +113,8 @@ fn confirming(confirmation: Confirmation, tests: u32, objectives: usize) -> Stri
 /// independent of each other and of the other tests'.
 ///
 /// Of n such tests with m objectives, E(n, m) are expected to be on the front: E(n, 1) = 1, and E(n, m) is the sum of
-/// E(i, m − 1) / i over i up to n (Bentley et al. 1978). The nth is as likely on it as each other, so E(n, m) / n is the
-/// probability that it enters, and the sum of these is E(n, m + 1).
+/// E(i, m − 1) / i over i up to n (Bentley et al. 1978). The nth is as likely on it as each other, so E(n, m) / n is
+/// the probability that it enters, and the sum of these is E(n, m + 1).
 fn entering(tests: u32, objectives: usize) -> f64 {
     let mut expected = vec![1.0; tests as usize];
     for _ in 0..objectives {
@@ -190,8 +190,8 @@ fn conditions(space: &ConditionSpace) -> f64 {
 }
 
 /// Per number of operations, from none to `most`, the decimal logarithm of the number of ways to choose them, of kinds
-/// each of which has so many variants (a logarithm too). Their order does not matter, and each kind may come as often as
-/// `copies` says.
+/// each of which has so many variants (a logarithm too). Their order does not matter, and each kind may come as often
+/// as `copies` says.
 fn chosen(kinds: &[f64], copies: &[usize], most: usize) -> Vec<f64> {
     let mut ways = vec![f64::NEG_INFINITY; most + 1];
     ways[0] = 0.0;

@@ -3,7 +3,7 @@
 use sesame_dsl::model;
 use sesame_plan as plan;
 
-use super::topic_id;
+use super::id::topic_id;
 
 pub(super) fn field(field: &model::FieldPath) -> plan::FieldRef {
     plan::FieldRef { topic: topic_id(field.topic), path: field.fields.clone() }

@@ -4,7 +4,7 @@ use sesame_dsl::model::{self, Temporal};
 use sesame_plan::stl::{Formula, Robustness};
 
 use super::formula::{inputs, side};
-use super::raw;
+use super::id::raw;
 
 pub(super) fn robustness(of: &model::Robustness) -> Robustness {
     Robustness {

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
 
-use sesame_codegen::cli::{Checked, Diagnosed, Found, Language, Look, Shell, run};
+use sesame_codegen::cli::{Shell, run};
+use sesame_codegen::frontend::{Checked, Diagnosed, Found, Language, Look};
 
 use crate::plans::small;
 

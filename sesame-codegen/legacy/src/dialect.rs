@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use super::xml::{Element, printable};
+use crate::xml::{Element, printable};
 
 /// Old names of elements and attributes beside the last ones.
 const RENAMED: [(&str, &str); 12] = [
@@ -139,7 +139,7 @@ pub struct Dialect {
 
 impl Dialect {
     /// Gives an element with all that is in it its last names.
-    pub(super) fn settle(&mut self, element: &mut Element) {
+    pub(crate) fn settle(&mut self, element: &mut Element) {
         self.rename(&mut element.tag);
         self.count(&element.tag);
         if let Some(kind) = &mut element.kind {
@@ -175,7 +175,7 @@ impl Dialect {
     }
 
     /// Why something is not carried over.
-    pub(super) fn why(name: &str) -> &'static str {
+    pub(crate) fn why(name: &str) -> &'static str {
         match name {
             "useMutationEnhancingCoverage" | "coverageBoostingStrategy" => "coverage is not boosted in this version",
             "launchFileLocation" | "launchDelaySeconds" | "customTerminateFileLocation" | "recordFileLocation" => {

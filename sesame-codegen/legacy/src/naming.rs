@@ -8,14 +8,14 @@ const LONGEST: usize = 60;
 
 /// Gives out names that are each other's, and no reserved words.
 #[derive(Debug, Default)]
-pub(super) struct Names {
+pub(crate) struct Names {
     taken: BTreeSet<String>,
 }
 
 impl Names {
     /// A name like `wanted`, or like `fallback` where nothing of it is left. Names differ in more than case and
     /// underscores, so that they do in generated code too.
-    pub(super) fn take(&mut self, wanted: &str, fallback: &str) -> String {
+    pub(crate) fn take(&mut self, wanted: &str, fallback: &str) -> String {
         let mut plain = plain(wanted);
         if plain.is_empty() {
             fallback.clone_into(&mut plain);
@@ -61,7 +61,7 @@ fn key(name: &str) -> String {
 }
 
 /// Whether a text can be the name of a field, which is as it is on the wire.
-pub(super) fn is_field(name: &str) -> bool {
+pub(crate) fn is_field(name: &str) -> bool {
     name.len() <= LONGEST
         && name.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
@@ -72,6 +72,13 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    fn is_identifier(name: &str) -> bool {
+        !name.starts_with(|first: char| first.is_ascii_digit())
+            && !name.is_empty()
+            && name.len() <= 200
+            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    }
 
     #[test]
     fn names_keep_what_they_can() {
@@ -94,7 +101,7 @@ mod tests {
             let mut names = Names::default();
             let given: Vec<String> = wanted.iter().map(|it| names.take(it, "thing")).collect();
             for (at, name) in given.iter().enumerate() {
-                prop_assert!(crate::names::check(name) && !is_reserved(name), "{name}");
+                prop_assert!(is_identifier(name) && !is_reserved(name), "{name}");
                 prop_assert!(given[..at].iter().all(|other| key(other) != key(name)), "{given:?}");
             }
         }

@@ -1,14 +1,15 @@
-//! Small files of our own in the place of the original platform's, which are not ours to keep.
+//! Files in the format of the original platform, small and written for these tests: the platform's own are not ours to
+//! publish.
 
-use std::path::PathBuf;
+use std::fs::File;
+use std::path::{Path, PathBuf};
 
-use tempfile::TempDir;
-
+use sesame_codegen::frontend::{Look, SESAME};
+use sesame_legacy::{Broken, Imported, Kind, Recorded};
+use sesame_plan::CampaignPlan;
 use sesame_results::record::Repository;
 use sesame_search::sspr::Convention;
-
-use super::*;
-use crate::cli::Look;
+use tempfile::TempDir;
 
 /// A space in a dialect: its head, and names of elements and attributes that changed over the years.
 fn space(head: &str, body: &str) -> String {
@@ -109,20 +110,24 @@ fn written(words: &str) -> (TempDir, PathBuf) {
     (folder, path)
 }
 
+fn read(path: &Path) -> Result<Imported, Broken> {
+    Imported::read(path, File::open(path).unwrap())
+}
+
 fn imported(words: &str) -> Imported {
     let (_folder, path) = written(words);
-    Imported::read(&path).unwrap_or_else(|broken| panic!("{broken}"))
+    read(&path).unwrap_or_else(|broken| panic!("{broken}"))
 }
 
 fn broken(words: &str) -> String {
     let (_folder, path) = written(words);
-    let broken = Imported::read(&path).map(|_| ()).unwrap_err().to_string();
+    let broken = read(&path).map(|_| ()).unwrap_err().to_string();
     broken.strip_prefix(&path.display().to_string()).unwrap().to_owned()
 }
 
 /// The plan of a campaign of the space that was written, which has no errors.
 fn plan(imported: &Imported, campaign: &str) -> CampaignPlan {
-    let checked = (crate::language::SESAME.check)("arm.sesame", imported.text(), Look::Human { colour: false });
+    let checked = (SESAME.check)("arm.sesame", imported.text(), Look::Human { colour: false });
     assert_eq!(checked.errors, 0, "{}\n{}", checked.diagnostics, imported.text());
     let plan = checked.plans.into_iter().find(|runner| runner.plan.campaign.name == campaign);
     plan.unwrap_or_else(|| panic!("{}", imported.text())).plan
@@ -218,7 +223,7 @@ fn names_that_would_be_code_or_paths_are_names() {
         .replace("name=\"push\"", "name=\"campaign\"");
     let imported = imported(&hostile);
     let plan = plan(&imported, "etc_cron_d_x");
-    assert_eq!(crate::names::campaign_folder(&plan.campaign.name), "etc_cron_d_x");
+    assert_eq!(sesame_codegen::names::campaign_folder(&plan.campaign.name), "etc_cron_d_x");
     let code = imported.text().lines().filter(|line| !line.trim_start().starts_with("//"));
     for line in code {
         assert!(!line.contains("exit(") && !line.contains("<script") && !line.contains("../"), "{line}");
@@ -256,7 +261,7 @@ fn an_element_without_an_end_is_refused() {
     // What follows are zeros, which no disk has to hold.
     let file = std::fs::File::options().append(true).open(&path).unwrap();
     file.set_len(64 << 20).unwrap();
-    let refused = Imported::read(&path).unwrap_err();
+    let refused = read(&path).unwrap_err();
     assert_eq!(refused.place, Some((2, 3)));
     assert!(refused.what.starts_with("what begins here has more than 32 MiB"), "{refused}");
 }
@@ -272,8 +277,8 @@ fn whatever_bytes_are_in_a_file_it_is_imported_or_refused() {
         let mut damaged = words.clone();
         damaged.splice(at..(at + bytes.len()).min(words.len()), bytes.iter().copied());
         std::fs::write(&path, &damaged).unwrap();
-        if let Ok(imported) = Imported::read(&path) {
-            let checked = (crate::language::SESAME.check)("arm.sesame", imported.text(), Look::Human { colour: false });
+        if let Ok(imported) = read(&path) {
+            let checked = (SESAME.check)("arm.sesame", imported.text(), Look::Human { colour: false });
             // A test that does not fit its template any more is a mistake that the command tells, and nothing worse.
             prop_assert_eq!(checked.errors == 0, !checked.plans.is_empty(), "{}", imported.text());
         }

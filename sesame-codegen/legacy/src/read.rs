@@ -1,17 +1,18 @@
 //! From a file to an [`Original`], campaign by campaign and test by test: only one of them is ever in memory as XML.
 
+use std::fs::File;
 use std::path::Path;
 
-use super::original::{
+use crate::original::{
     Activation, ActivationMode, Approach, Campaign, Comparison, Condition, Constraint, Coverage, Domain, FieldOfType,
     Metric, MetricSource, Node, Operand, Operation, OperationKind, Original, Reference, ResultSet, Simulator, Target,
     Test, TypeOfValue, ValueSet,
 };
-use super::xml::{Broken, Element, Source, Step, printable};
+use crate::xml::{Broken, Element, Source, Step, printable};
 
-/// Reads a file.
-pub(super) fn read(path: &Path) -> Result<Original, Broken> {
-    let mut source = Source::open(path)?;
+/// Reads a file; what is wrong in it is reported under this path.
+pub(crate) fn read(path: &Path, file: File) -> Result<Original, Broken> {
+    let mut source = Source::new(path, file);
     let mut original = Original::default();
     match source.next()? {
         Step::Open(root) if root.tag == "TestingSpace" => {

@@ -1,13 +1,11 @@
 //! A testing space of the original platform, as data: what its files hold, in the names of its last metamodel.
 //!
-//! A reference is a number that stands for the text in the file; [`Original::metric`] and its like say what it leads to.
+//! A reference is a number that stands for the text in the file; [`Original::metric`] and its like say what it leads
+//! to.
 
 use std::collections::HashMap;
-use std::path::Path;
 
-use super::dialect::Dialect;
-use super::read;
-use super::xml::Broken;
+use crate::dialect::Dialect;
 
 /// A whole file.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -24,16 +22,16 @@ pub struct Original {
     pub system: System,
     /// How the file speaks.
     pub dialect: Dialect,
-    pub(super) references: References,
+    pub(crate) references: References,
 }
 
 /// A reference to something in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Reference(pub(super) u32);
+pub struct Reference(pub(crate) u32);
 
 /// What a reference leads to: positions in the lists of [`Original`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Target {
+pub(crate) enum Target {
     Metric(usize),
     Operation(usize),
     Test(usize, usize),
@@ -43,14 +41,14 @@ pub(super) enum Target {
 
 /// The texts of references, and what they lead to.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct References {
+pub(crate) struct References {
     known: HashMap<Box<str>, u32>,
     targets: Vec<Option<Target>>,
 }
 
 impl References {
     /// The reference of a text: an id, or a path from the root.
-    pub(super) fn of(&mut self, text: &str) -> Reference {
+    pub(crate) fn of(&mut self, text: &str) -> Reference {
         if let Some(&known) = self.known.get(text) {
             return Reference(known);
         }
@@ -61,7 +59,7 @@ impl References {
     }
 
     /// Says what an id leads to.
-    pub(super) fn define(&mut self, id: &str, target: Target) {
+    pub(crate) fn define(&mut self, id: &str, target: Target) {
         let Reference(number) = self.of(id);
         self.targets[number as usize] = Some(target);
     }
@@ -89,11 +87,6 @@ fn target_of_path(path: &str) -> Option<Target> {
 }
 
 impl Original {
-    /// Reads a file.
-    pub fn read(path: &Path) -> Result<Original, Broken> {
-        read::read(path)
-    }
-
     fn target(&self, reference: Reference) -> Option<Target> {
         self.references.targets[reference.0 as usize]
     }

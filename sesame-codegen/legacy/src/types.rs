@@ -4,9 +4,9 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use super::naming::{Names, is_field};
-use super::original::{FieldOfType, Original, Reference, TypeOfValue};
-use super::xml::printable;
+use crate::naming::{Names, is_field};
+use crate::original::{FieldOfType, Original, Reference, TypeOfValue};
+use crate::xml::printable;
 
 /// Message types by their names: fields with a primitive, another type here, or a list (`[]`) of one.
 const COMMON: &[(&str, &[(&str, &str)])] = &[
@@ -52,7 +52,7 @@ const COMMON: &[(&str, &[(&str, &str)])] = &[
 
 /// A type in the `.sesame` file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Type {
+pub(crate) enum Type {
     Real,
     Int,
     Bool,
@@ -70,14 +70,14 @@ struct Message {
 
 /// The message types of a file, as they are needed.
 #[derive(Debug, Default)]
-pub(super) struct Messages {
+pub(crate) struct Messages {
     list: Vec<Message>,
     known: BTreeMap<String, usize>,
 }
 
 impl Messages {
     /// The type of a variable.
-    pub(super) fn of(&mut self, original: &Original, ty: Option<Reference>, names: &mut Names) -> Type {
+    pub(crate) fn of(&mut self, original: &Original, ty: Option<Reference>, names: &mut Names) -> Type {
         match ty.and_then(|ty| original.ty(ty)) {
             None => Type::Real,
             Some(ty) if ty.text => text_type(&ty.name),
@@ -167,7 +167,7 @@ impl Messages {
 
     /// Makes sure that a path leads from a type to a number, if need be by declaring fields on the way. What stands in
     /// the way is said in words.
-    pub(super) fn reach(&mut self, from: &Type, path: &[String], names: &mut Names) -> Result<(), String> {
+    pub(crate) fn reach(&mut self, from: &Type, path: &[String], names: &mut Names) -> Result<(), String> {
         let mut ty = from.clone();
         for (at, name) in path.iter().enumerate() {
             let Type::Message(message) = ty else { return Err(format!("there is no field `{}`", printable(name))) };
@@ -198,7 +198,7 @@ impl Messages {
     }
 
     /// A type in the words of the language.
-    pub(super) fn words(&self, ty: &Type) -> String {
+    pub(crate) fn words(&self, ty: &Type) -> String {
         match ty {
             Type::Real => "real".to_owned(),
             Type::Int => "int".to_owned(),
@@ -210,12 +210,12 @@ impl Messages {
     }
 
     /// Names of messages of which no field is known.
-    pub(super) fn empty(&self) -> Vec<&str> {
+    pub(crate) fn empty(&self) -> Vec<&str> {
         self.list.iter().filter(|message| message.fields.is_empty()).map(|message| message.name.as_str()).collect()
     }
 
     /// All messages in the words of the language. One without a known field gets one to be replaced.
-    pub(super) fn write(&self) -> String {
+    pub(crate) fn write(&self) -> String {
         let mut text = String::new();
         for message in &self.list {
             if message.fields.is_empty() {

@@ -7,13 +7,13 @@ use sesame_base::observation::{MetricObservation, Observation, OperationEffect, 
 use sesame_plan::{CampaignPlan, Choice, MetricId, OperationId, Span, TestOperation, condition as plan_condition};
 use sesame_results::record::{Origin, RecordError, Recorder, ResultSet, Status, TestRecord};
 
-use super::notes::{Kind, Notes};
-use super::original::{
+use crate::notes::{Kind, Notes};
+use crate::original::{
     Activation, Campaign, Comparison, Condition, Domain, Operand, Operation, OperationKind, Original, Test,
 };
-use super::parts::{Effect, Part, matching};
-use super::space::Mapped;
-use super::xml::{cleaned, printable};
+use crate::parts::{Effect, Part, matching};
+use crate::writer::Mapped;
+use crate::xml::{cleaned, printable};
 
 /// How much was recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,7 +34,7 @@ struct Importer<'o> {
 }
 
 /// Records what a campaign performed into a folder that holds no results.
-pub(super) fn record(
+pub(crate) fn record(
     original: &Original,
     mapped: &Mapped,
     at: usize,

@@ -39,12 +39,12 @@ pub struct Notes(BTreeMap<(Kind, String), usize>);
 
 impl Notes {
     /// Takes a note.
-    pub(super) fn say(&mut self, kind: Kind, text: impl Into<String>) {
+    pub(crate) fn say(&mut self, kind: Kind, text: impl Into<String>) {
         self.times(kind, text, 1);
     }
 
     /// Takes a note that there was reason for so often.
-    pub(super) fn times(&mut self, kind: Kind, text: impl Into<String>, times: usize) {
+    pub(crate) fn times(&mut self, kind: Kind, text: impl Into<String>, times: usize) {
         *self.0.entry((kind, text.into())).or_default() += times;
     }
 

@@ -3,48 +3,21 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use super::campaigns;
-use super::dialect::Dialect;
-use super::naming::Names;
-use super::notes::{Kind, Notes};
-use super::original::{
+use crate::campaigns;
+use crate::dialect::Dialect;
+use crate::naming::Names;
+use crate::notes::{Kind, Notes};
+use crate::original::{
     Activation, ActivationMode, Approach, Constraint, Domain, MetricSource, Operation, OperationKind, Original,
     Reference,
 };
-use super::parts::{Effect, Holders, Part, called, ordered};
-use super::types::{Messages, Type};
-use super::xml::{cleaned, printable};
-
-/// What of the original became what.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Mapped {
-    /// The `.sesame` file.
-    pub(super) text: String,
-    /// Names of metrics, by position in the original.
-    pub(super) metrics: Vec<Option<String>>,
-    /// What tests hold.
-    pub(super) holders: Holders,
-    /// What each of those became.
-    pub(super) parts: Vec<Vec<Part>>,
-    /// Names of campaigns, by position in the original.
-    pub(super) campaigns: Vec<Option<String>>,
-}
-
-/// What is known while the text is written.
-pub(super) struct Writer<'o> {
-    pub(super) original: &'o Original,
-    pub(super) notes: &'o mut Notes,
-    pub(super) names: Names,
-    pub(super) mapped: Mapped,
-    messages: Messages,
-    /// By position of what tests hold: the earliest end of a test that may hold it, in seconds.
-    first_ends: Vec<f64>,
-    /// By position of the variable.
-    topics: Vec<Option<(String, Type)>>,
-}
+use crate::parts::{Effect, Holders, Part, called, ordered};
+use crate::types::{Messages, Type};
+use crate::writer::{Mapped, Writer, number, percent, quoted_text};
+use crate::xml::printable;
 
 /// Maps a whole space. The error says what it lacks.
-pub(super) fn map(original: &Original, file: &str, notes: &mut Notes) -> Result<Mapped, String> {
+pub(crate) fn map(original: &Original, file: &str, notes: &mut Notes) -> Result<Mapped, String> {
     dialect(original, notes);
     let mut names = Names::default();
     let space = names.take(&original.name, "space");
@@ -103,25 +76,6 @@ fn dialect(original: &Original, notes: &mut Notes) {
 }
 
 impl Writer<'_> {
-    /// A name for something of a kind, like the one it had; that it is another one is told.
-    pub(super) fn name(&mut self, kind: &str, original: &str) -> String {
-        let name = self.names.take(original, kind);
-        if !original.is_empty() && name != original {
-            self.notes.say(Kind::Renamed, format!("{kind} `{}` is `{name}` here", printable(original)));
-        }
-        name
-    }
-
-    /// The topic that a reference to a variable became.
-    fn topic(&self, variable: Reference) -> Option<&(String, Type)> {
-        self.topics[self.original.variable(variable)?].as_ref()
-    }
-
-    /// The name of the metric that a reference to one became.
-    pub(super) fn metric(&self, metric: Reference) -> Option<&str> {
-        self.mapped.metrics[self.original.metric(metric)?].as_deref()
-    }
-
     fn topics(&mut self) -> Vec<(String, String, Type)> {
         let mut written: Vec<(String, String, Type)> = Vec::new();
         let mut paths: BTreeMap<String, usize> = BTreeMap::new();
@@ -370,7 +324,7 @@ impl Writer<'_> {
     fn custom(
         &mut self,
         operation: &Operation,
-        sets: &[super::original::ValueSet],
+        sets: &[crate::original::ValueSet],
         topic: Option<(String, Type)>,
         wanted: &str,
         clauses: &str,
@@ -499,7 +453,7 @@ impl Writer<'_> {
         match *constraint {
             Constraint::Metric(metric) => {
                 let name = self.metric(metric)?;
-                let offers = |campaign: &super::original::Campaign| {
+                let offers = |campaign: &crate::original::Campaign| {
                     campaign.condition_metrics.iter().any(|&it| self.metric(it) == Some(name))
                 };
                 using.all(offers).then(|| name.to_owned())
@@ -522,20 +476,4 @@ fn kind_word(kind: &OperationKind) -> &'static str {
         OperationKind::Custom { .. } => "custom",
         OperationKind::Other(_) => "other",
     }
-}
-
-/// A number as the language writes it.
-pub(super) fn number(value: f64) -> String {
-    // Zero has no sign.
-    format!("{}", value + 0.0)
-}
-
-/// A share as the language writes it, with the digits that were meant.
-pub(super) fn percent(share: f64) -> String {
-    format!("{}%", number((share * 1e11).round() / 1e9))
-}
-
-/// A text as the language writes it.
-pub(super) fn quoted_text(text: &str) -> String {
-    sesame_dsl::quoted(&cleaned(text))
 }

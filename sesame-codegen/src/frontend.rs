@@ -1,4 +1,4 @@
-//! The Sesame language, as the command uses it: text → diagnostics, and a plan for each campaign.
+//! The Sesame language as the command uses it: text → diagnostics, and a plan for each campaign.
 
 use std::path::Path;
 
@@ -9,10 +9,81 @@ use sesame_dsl::model::Space;
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 
-use crate::cli::{Checked, Diagnosed, Found, Language, Look};
 use crate::input::{self, Unreadable};
 use crate::lower::lower;
+use crate::plan::RunnerPlan;
 use crate::uses;
+
+/// The language as the command needs it.
+#[derive(Debug, Clone, Copy)]
+pub struct Language {
+    /// Checks a space: its path, which diagnostics show and imports are relative to, its text, and how diagnostics are
+    /// to look.
+    pub check: fn(file: &str, text: &str, look: Look) -> Checked,
+    /// Formats a text in the same way: the text in the one layout, or diagnostics of its syntax errors.
+    pub format: fn(file: &str, text: &str, look: Look) -> Result<String, Diagnosed>,
+    /// The page of a diagnostic's code.
+    pub explain: fn(code: &str) -> Option<&'static str>,
+    /// What a space declares by a name, and what mentions it, even if the space has errors; or why that cannot be told.
+    pub find: fn(file: &str, text: &str, name: &str) -> Result<Found, String>,
+}
+
+/// How diagnostics look.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Look {
+    /// For people, with the lines they speak of.
+    Human {
+        /// With colours.
+        colour: bool,
+    },
+    /// One line each.
+    Short,
+    /// One JSON object and line each.
+    Json,
+    /// One workflow command of GitHub each.
+    Github,
+}
+
+/// Diagnostics of a text with errors.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Diagnosed {
+    /// As text.
+    pub diagnostics: String,
+    /// How many of them are errors.
+    pub errors: usize,
+}
+
+/// A thing of a space.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Found {
+    /// Whether it is a campaign.
+    pub campaign: bool,
+    /// Its definition and its uses.
+    pub text: String,
+    /// Its uses alone; empty if it has none.
+    pub uses: String,
+    /// Definition and uses as one line of JSON.
+    pub json: String,
+    /// How many errors the space has. What could not be read is not among the uses.
+    pub errors: usize,
+}
+
+/// What came of checking a space.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Checked {
+    /// Errors and warnings as text; empty when there are none.
+    pub diagnostics: String,
+    /// How many of them are errors.
+    pub errors: usize,
+    /// How many of them are warnings.
+    pub warnings: usize,
+    /// What the space holds, for example `4 campaigns, 9 operations`.
+    pub summary: String,
+    /// A plan for each campaign; empty when there are errors.
+    pub plans: Vec<RunnerPlan>,
+    /// What the space says and no runner uses yet, one sentence each.
+    pub notes: Vec<String>,
+}
 
 /// The language of this version.
 pub const SESAME: Language = Language { check, format, explain: page, find };

@@ -2,9 +2,9 @@
 //! `.sesame` file and results.
 //!
 //! A file is read into an [`Original`] (`xml`, `dialect`, `read`), which is mapped to the text of a space that passes
-//! `check` (`space`, `parts`, `types`, `campaigns`, `naming`), and its performed tests to records (`results`). Whatever
-//! is not carried over as it was is told in [`Notes`]. No name or text of the file becomes anything but a name, a
-//! quoted text or a comment.
+//! `check` (`space`, `campaigns`, both with `writer`; `parts`, `types`, `naming`), and its performed tests to records
+//! (`results`). Everything that changes on the way is listed in [`Notes`]. No name or text of the file becomes anything
+//! but a name, a quoted text or a comment.
 
 mod campaigns;
 mod dialect;
@@ -15,11 +15,11 @@ mod parts;
 mod read;
 mod results;
 mod space;
-#[cfg(test)]
-mod tests;
 mod types;
+mod writer;
 mod xml;
 
+use std::fs::File;
 use std::path::Path;
 
 use sesame_plan::CampaignPlan;
@@ -38,16 +38,17 @@ pub struct Imported {
     pub original: Original,
     /// What an import did that a user should know.
     pub notes: Notes,
-    mapped: space::Mapped,
+    mapped: writer::Mapped,
 }
 
 impl Imported {
-    /// Reads a file and maps it. A file that is broken, or not of the original platform, gives one diagnostic.
-    pub fn read(path: &Path) -> Result<Imported, Broken> {
-        let original = Original::read(path)?;
+    /// Reads a file, which the caller has opened, and maps it. A file that is broken, or not of the original platform,
+    /// gives one diagnostic, in which the file is called by this path.
+    pub fn read(path: &Path, file: File) -> Result<Imported, Broken> {
+        let original = read::read(path, file)?;
         let mut notes = Notes::default();
-        let file = path.file_name().unwrap_or_default().to_string_lossy();
-        let mapped = space::map(&original, &file, &mut notes).map_err(|what| Broken {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let mapped = space::map(&original, &name, &mut notes).map_err(|what| Broken {
             file: path.to_owned(),
             place: None,
             what,

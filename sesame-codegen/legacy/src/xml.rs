@@ -2,14 +2,12 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use quick_xml::XmlVersion;
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
-
-use crate::input;
 
 /// Levels of elements at most: conditions nest, but nobody nests them this deep.
 const DEEPEST: usize = 200;
@@ -19,22 +17,22 @@ const LARGEST: u64 = 32 << 20;
 
 /// An element; of names only the part without their namespace, which differs between files that mean the same.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Element {
+pub(crate) struct Element {
     /// Its name.
-    pub(super) tag: String,
+    pub(crate) tag: String,
     /// Its `xsi:type`.
-    pub(super) kind: Option<String>,
+    pub(crate) kind: Option<String>,
     /// Its other attributes.
-    pub(super) attributes: Vec<(String, String)>,
+    pub(crate) attributes: Vec<(String, String)>,
     /// The text directly in it.
-    pub(super) text: String,
+    pub(crate) text: String,
     /// The elements directly in it; empty until [`Source::whole`] has read them.
-    pub(super) children: Vec<Element>,
+    pub(crate) children: Vec<Element>,
 }
 
 impl Element {
     /// An attribute.
-    pub(super) fn get(&self, name: &str) -> Option<&str> {
+    pub(crate) fn get(&self, name: &str) -> Option<&str> {
         self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
 }
@@ -63,7 +61,7 @@ impl fmt::Display for Broken {
 impl std::error::Error for Broken {}
 
 /// What comes next in a file.
-pub(super) enum Step {
+pub(crate) enum Step {
     /// An element begins; its children follow up to its [`Step::Close`].
     Open(Element),
     /// The element that is open ends.
@@ -105,7 +103,7 @@ impl Read for Bounded {
 }
 
 /// A file that is being read.
-pub(super) struct Source {
+pub(crate) struct Source {
     path: PathBuf,
     reader: Reader<Bounded>,
     buffer: Vec<u8>,
@@ -118,31 +116,26 @@ pub(super) struct Source {
 }
 
 impl Source {
-    pub(super) fn open(path: &Path) -> Result<Source, Broken> {
-        let file = input::open(path).map_err(|error| Broken {
-            file: path.to_owned(),
-            place: None,
-            what: format!("cannot be read: {error}"),
-        })?;
-        Ok(Source {
+    pub(crate) fn new(path: &Path, file: File) -> Source {
+        Source {
             path: path.to_owned(),
             reader: Reader::from_reader(Bounded { file: BufReader::new(file), left: LARGEST }),
             buffer: Vec::new(),
             open: Vec::new(),
             closing: false,
             at: 0,
-        })
+        }
     }
 
     /// The next step; texts between elements are passed over.
-    pub(super) fn next(&mut self) -> Result<Step, Broken> {
+    pub(crate) fn next(&mut self) -> Result<Step, Broken> {
         self.reader.get_mut().left = LARGEST;
         self.step().map(|(step, _)| step)
     }
 
     /// The rest of an element that was just opened: it with all that is in it. What is then found to be
     /// [broken](Self::broken) is where it began.
-    pub(super) fn whole(&mut self, opened: Element) -> Result<Element, Broken> {
+    pub(crate) fn whole(&mut self, opened: Element) -> Result<Element, Broken> {
         let began = self.at;
         let mut stack = vec![opened];
         loop {
@@ -186,7 +179,7 @@ impl Source {
                 }
                 Err(error) => {
                     let (at, what) = (self.reader.error_position(), error.to_string());
-                    return Err(broken_xml(&self.path, at, &what));
+                    return Err(self.not_xml(at, &what));
                 }
             };
             let (begun, empty) = match event {
@@ -201,7 +194,7 @@ impl Source {
                         None => Ok((Step::End, text)),
                         Some(open) => {
                             let what = format!("the file ends inside of `{open}`; it was cut off");
-                            Err(broken_xml(&self.path, self.at, &what))
+                            Err(self.not_xml(self.at, &what))
                         }
                     };
                 }
@@ -224,23 +217,19 @@ impl Source {
                     };
                     match named {
                         Some(character) => text.push(character),
-                        None => return Err(broken_xml(&self.path, self.at, "an entity that XML does not have")),
+                        None => return Err(self.not_xml(self.at, "an entity that XML does not have")),
                     }
                     continue;
                 }
-                Event::DocType(_) => return Err(broken_xml(&self.path, self.at, "a DOCTYPE, which no such file has")),
+                Event::DocType(_) => return Err(self.not_xml(self.at, "a DOCTYPE, which no such file has")),
                 Event::Decl(_) | Event::PI(_) | Event::Comment(_) => continue,
             };
             let element = match element(begun) {
                 Ok(element) => element,
-                Err(what) => return Err(broken_xml(&self.path, self.at, &what)),
+                Err(what) => return Err(self.not_xml(self.at, &what)),
             };
             if self.open.len() >= DEEPEST {
-                return Err(broken_xml(
-                    &self.path,
-                    self.at,
-                    &format!("elements are nested more than {DEEPEST} levels deep"),
-                ));
+                return Err(self.not_xml(self.at, &format!("elements are nested more than {DEEPEST} levels deep")));
             }
             self.open.push(element.tag.clone());
             self.closing = empty;
@@ -249,24 +238,38 @@ impl Source {
     }
 
     /// Something in the file that is wrong, in the element that was read last.
-    pub(super) fn broken(&self, what: impl Into<String>) -> Broken {
-        Broken { file: self.path.clone(), place: place_of(&self.path, self.at), what: what.into() }
+    pub(crate) fn broken(&self, what: impl Into<String>) -> Broken {
+        Broken {
+            file: self.path.clone(),
+            place: self.rewound().and_then(|file| place_of(file, self.at)),
+            what: what.into(),
+        }
     }
-}
 
-/// Something that is no XML; often for a reason that people know better.
-fn broken_xml(path: &Path, at: u64, what: &str) -> Broken {
-    if let Some(line) = merge_marker(path) {
-        return Broken {
-            file: path.to_owned(),
-            place: Some((line, 1)),
-            what:
-                "two versions of the file were merged, and the conflict here was never resolved; keep one side, delete \
-                   the lines that begin with `<<<<<<<`, `=======` and `>>>>>>>`, and import it again"
+    /// Something that is not XML; often for a reason that people know better.
+    fn not_xml(&self, at: u64, what: &str) -> Broken {
+        if let Some(line) = self.rewound().and_then(merge_marker) {
+            return Broken {
+                file: self.path.clone(),
+                place: Some((line, 1)),
+                what: "two versions of the file were merged, and the conflict here was never resolved; keep one side, \
+                       delete the lines that begin with `<<<<<<<`, `=======` and `>>>>>>>`, and import it again"
                     .to_owned(),
-        };
+            };
+        }
+        Broken {
+            file: self.path.clone(),
+            place: self.rewound().and_then(|file| place_of(file, at)),
+            what: format!("this is not XML: {what}"),
+        }
     }
-    Broken { file: path.to_owned(), place: place_of(path, at), what: format!("this is no XML: {what}") }
+
+    /// The file from its first byte, to find a place in it. Nothing more can be read as XML afterwards.
+    fn rewound(&self) -> Option<BufReader<&File>> {
+        let mut file = self.reader.get_ref().file.get_ref();
+        file.seek(SeekFrom::Start(0)).ok()?;
+        Some(BufReader::new(file))
+    }
 }
 
 /// An element as its first tag has it.
@@ -302,21 +305,20 @@ fn is_name(name: &str) -> bool {
 }
 
 /// What can be shown on a terminal of a text that anybody may have written.
-pub(super) fn printable(text: &str) -> String {
+pub(crate) fn printable(text: &str) -> String {
     let shown: String = text.chars().filter(|c| !c.is_control()).take(80).collect();
     shown.trim().to_owned()
 }
 
 /// A text without what no line holds, and of a length that a file can.
-pub(super) fn cleaned(text: &str) -> String {
+pub(crate) fn cleaned(text: &str) -> String {
     let cleaned: String = text.chars().filter(|c| !c.is_control()).take(1000).collect();
     cleaned.trim().to_owned()
 }
 
 /// The first line of a file that is a marker of a merge conflict. The file is read line by line, and no further than
 /// 64 bytes into each.
-fn merge_marker(path: &Path) -> Option<usize> {
-    let mut reader = BufReader::new(input::open(path).ok()?);
+fn merge_marker(mut reader: BufReader<&File>) -> Option<usize> {
     let mut line = Vec::new();
     for number in 1.. {
         line.clear();
@@ -350,8 +352,8 @@ fn skip_line(reader: &mut impl BufRead) -> Option<()> {
 }
 
 /// Line and column of a byte of a file, both from 1.
-fn place_of(path: &Path, offset: u64) -> Option<(usize, usize)> {
-    let mut reader = BufReader::new(input::open(path).ok()?).take(offset);
+fn place_of(reader: BufReader<&File>, offset: u64) -> Option<(usize, usize)> {
+    let mut reader = reader.take(offset);
     let (mut line, mut column) = (1, 1);
     loop {
         let used = {

@@ -4,21 +4,21 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::mem::discriminant;
 
-use super::notes::Kind;
-use super::original::{
+use crate::notes::Kind;
+use crate::original::{
     Activation, ActivationMode, Approach, Campaign, Comparison, Condition, Coverage, Domain, MetricSource, Operand,
     Operation, OperationKind, Original, Reference, Test,
 };
-use super::parts::{Effect, matching};
-use super::space::{Writer, number, percent, quoted_text};
-use super::xml::printable;
+use crate::parts::{Effect, matching};
+use crate::writer::{Writer, number, percent, quoted_text};
+use crate::xml::printable;
 
 /// Levels of a condition that the language permits.
 const MOST_LEVELS: u32 = 40;
 
 /// When the tests of a campaign end, in seconds. Where a campaign does not say it is the original's own constant, or
 /// later where its operations are.
-pub(super) fn end_of(original: &Original, campaign: &Campaign) -> f64 {
+pub(crate) fn end_of(original: &Original, campaign: &Campaign) -> f64 {
     if let Some(limit) = campaign.limit.filter(|&limit| limit > 0.0) {
         return limit;
     }
@@ -60,7 +60,7 @@ fn by_condition(campaign: &Campaign) -> Option<u32> {
 }
 
 /// All known tests and all campaigns.
-pub(super) fn write(writer: &mut Writer<'_>) -> (String, String) {
+pub(crate) fn write(writer: &mut Writer<'_>) -> (String, String) {
     let (mut tests, mut campaigns) = (String::new(), String::new());
     let mut known: BTreeMap<(usize, usize), String> = BTreeMap::new();
     let original = writer.original;
@@ -285,7 +285,7 @@ fn cells(writer: &mut Writer<'_>, coverage: &Coverage, shown: &str) -> Option<St
 }
 
 /// The metrics that the conditions of an operation compare.
-pub(super) fn compared_by(operation: &Operation) -> Vec<Reference> {
+pub(crate) fn compared_by(operation: &Operation) -> Vec<Reference> {
     fn collect(condition: &Condition, into: &mut Vec<Reference>) {
         match condition {
             Condition::Compare(left, _, right) => {

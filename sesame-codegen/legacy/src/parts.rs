@@ -3,22 +3,22 @@
 
 use std::collections::BTreeMap;
 
-use super::notes::{Kind, Notes};
-use super::original::{Activation, Domain, Operation, OperationKind, Original, Test, ValueSet};
-use super::xml::printable;
+use crate::notes::{Kind, Notes};
+use crate::original::{Activation, Domain, Operation, OperationKind, Original, Test, ValueSet};
+use crate::xml::printable;
 
 /// What an operation of the original became.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Part {
+pub(crate) struct Part {
     /// Its name in the `.sesame` file.
-    pub(super) name: String,
+    pub(crate) name: String,
     /// What it does, and where its choices come from.
-    pub(super) effect: Effect,
+    pub(crate) effect: Effect,
 }
 
 /// What a part does.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Effect {
+pub(crate) enum Effect {
     /// Draws from the value set at this position.
     Value { set: usize, relative: bool },
     /// Loses messages.
@@ -37,13 +37,13 @@ type Stray = (u8, Option<usize>, String);
 /// All operations that tests hold: those of the space, then those that tests hold without naming one of the space, each
 /// with the widest window and ranges that any of them has.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Holders {
-    pub(super) operations: Vec<Operation>,
+pub(crate) struct Holders {
+    pub(crate) operations: Vec<Operation>,
     strays: BTreeMap<Stray, usize>,
 }
 
 impl Holders {
-    pub(super) fn of(original: &Original) -> Holders {
+    pub(crate) fn of(original: &Original) -> Holders {
         let mut holders = Holders { operations: original.operations.clone(), strays: BTreeMap::new() };
         let tests = original.campaigns.iter().flat_map(|campaign| &campaign.tests);
         for operation in tests.flat_map(|test| &test.operations) {
@@ -62,12 +62,12 @@ impl Holders {
     }
 
     /// The position of what an operation of a test is one of.
-    pub(super) fn find(&self, original: &Original, operation: &Operation) -> Option<usize> {
+    pub(crate) fn find(&self, original: &Original, operation: &Operation) -> Option<usize> {
         template(original, operation).or_else(|| self.strays.get(&stray(original, operation)).copied())
     }
 
     /// The positions of what a test holds, each once.
-    pub(super) fn used_by<'t>(&self, original: &Original, tests: impl IntoIterator<Item = &'t Test>) -> Vec<usize> {
+    pub(crate) fn used_by<'t>(&self, original: &Original, tests: impl IntoIterator<Item = &'t Test>) -> Vec<usize> {
         let operations = tests.into_iter().flat_map(|test| &test.operations);
         let mut used: Vec<usize> = operations.filter_map(|operation| self.find(original, operation)).collect();
         used.sort_unstable();
@@ -139,14 +139,14 @@ fn widen(held: &mut Operation, by: &Operation) {
 }
 
 /// The value set of an operation that stands for one of its template: of the same name, or else at the same place.
-pub(super) fn matching<'s>(sets: &'s [ValueSet], template: &[ValueSet], at: usize) -> Option<&'s ValueSet> {
+pub(crate) fn matching<'s>(sets: &'s [ValueSet], template: &[ValueSet], at: usize) -> Option<&'s ValueSet> {
     let wanted = template.get(at)?;
     let same_name = |set: &&ValueSet| !wanted.name.is_empty() && set.name == wanted.name;
     sets.iter().find(same_name).or_else(|| sets.get(at))
 }
 
 /// Bounds in their order. Reversed ones are noted.
-pub(super) fn ordered<T: PartialOrd + std::fmt::Display>(low: T, high: T, of: &str, notes: &mut Notes) -> (T, T) {
+pub(crate) fn ordered<T: PartialOrd + std::fmt::Display>(low: T, high: T, of: &str, notes: &mut Notes) -> (T, T) {
     if low <= high {
         return (low, high);
     }
@@ -155,7 +155,7 @@ pub(super) fn ordered<T: PartialOrd + std::fmt::Display>(low: T, high: T, of: &s
 }
 
 /// How an operation is spoken of.
-pub(super) fn called(operation: &Operation) -> String {
+pub(crate) fn called(operation: &Operation) -> String {
     match printable(&operation.name) {
         name if name.is_empty() => "an operation without a name".to_owned(),
         name => format!("operation `{name}`"),
