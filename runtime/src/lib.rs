@@ -1,4 +1,5 @@
-//! What a generated SESAME test runner links: one name for the crates of the runtime, the campaign, and the command line.
+//! What a generated SESAME test runner links: one name for the crates of the runtime, the campaign, and the command
+//! line.
 //!
 //! The crates below this one are re-exported under the names of their rooms, so that a runner, its hooks and its
 //! simulator depend on `sesame-runtime` alone. Nothing here knows the `.sesame` language: a runner gets its campaign as

@@ -63,7 +63,8 @@ fn objections(graph: &[(String, BTreeSet<String>)], crates: &BTreeMap<String, BT
 #[test]
 fn crates_link_each_other_as_the_architecture_says() {
     let text = fs::read_to_string(workspace().join("ARCHITECTURE.md")).unwrap();
-    assert_eq!(objections(&graph(&text), &manifests()), [String::new(); 0]);
+    let objections = objections(&graph(&text), &manifests());
+    assert!(objections.is_empty(), "{objections:#?}");
 }
 
 #[test]

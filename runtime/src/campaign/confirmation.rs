@@ -22,8 +22,8 @@ use crate::campaign::settings::{Settings, default_timeout};
 const DETERMINISTIC_SIMULATOR: &str = "each run that confirms a test had exactly the results of the run it repeats: the simulator \
      does not vary with its seed, so `confirm` costs simulations and shows nothing";
 
-/// The simulator's seed of a repetition. It depends on the test's number and the repetition only, so that a test has the
-/// same seeds each time it is confirmed.
+/// The simulator's seed of a repetition. It depends on the test's number and the repetition only, so that a test has
+/// the same seeds each time it is confirmed.
 pub(super) fn confirmation_seed(seed: u64, test: u32, repetition: u32) -> u64 {
     derive_seed(seed, "confirm", &[u64::from(test), u64::from(repetition)])
 }
@@ -62,8 +62,9 @@ impl ConfirmedSearch {
         self.repeated.all_identical().then(|| DETERMINISTIC_SIMULATOR.to_owned())
     }
 
-    /// Confirms the tests of a generation that would be on the front, or violate a requirement, until all tests on the front
-    /// are confirmed; then gives tests their confirmed fitness and margins. `each` sees the number of runs and the front.
+    /// Confirms the tests of a generation that would be on the front, or violate a requirement, until all tests on the
+    /// front are confirmed; then gives tests their confirmed fitness and margins. `each` sees the number of runs and
+    /// the front.
     pub(super) fn confirm(
         &mut self,
         plan: &CampaignPlan,
@@ -112,9 +113,9 @@ pub struct Confirmations {
     pub times: u32,
 }
 
-/// Runs tests of finished results again, and records the runs beside those that are recorded already: the repetitions by
-/// which the campaign itself confirms are never among them, so its front stays what it is. `each` is told how many runs
-/// there are by now, and how many there will be. False if the user stopped it; what had ended by then is recorded.
+/// Runs tests of finished results again, and records the runs beside those that are recorded already: the repetitions
+/// by which the campaign itself confirms are never among them, so its front stays what it is. `each` is told how many
+/// runs there are by now, and how many there will be. False if the user stopped it; what had ended by then is recorded.
 pub fn confirm_recorded(
     recorder: &mut Recorder,
     confirmations: &Confirmations,

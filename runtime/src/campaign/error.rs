@@ -28,7 +28,8 @@ pub enum CampaignError {
         "the reference run failed: {0}\nnothing was fuzzed: a campaign needs a system that works without disturbance"
     )]
     Reference(String),
-    /// A reference run was killed, and killed again when it was repeated. It is not recorded, so that `resume` runs it again.
+    /// A reference run was killed, and killed again when it was repeated. It is not recorded, so that `resume` runs it
+    /// again.
     #[error(
         "the reference run failed: {reason}\nT{test} is not recorded, and what was recorded before is kept: `resume` runs it \
          again. If you did not kill it, give it more memory, or the campaign fewer `--workers`"

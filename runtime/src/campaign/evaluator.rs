@@ -146,8 +146,8 @@ impl<'a> Evaluator<'a> {
         self.recorder.put_event(&Event { kind: EventKind::Warning, test, text })
     }
 
-    /// The first of these tests as it is recorded, with its series only if the campaign looks at them. Those that follow are
-    /// read together with it, into `ahead`.
+    /// The first of these tests as it is recorded, with its series only if the campaign looks at them. Those that
+    /// follow are read together with it, into `ahead`.
     fn read(
         &self,
         ahead: &mut VecDeque<TestRecord>,

@@ -1,7 +1,7 @@
 //! Where tests run: the seam between a campaign and what carries out its tests.
 //!
-//! Tests are independent of each other, and results depend neither on the order in which they end nor on where they ran.
-//! So an executor may be [processes of this machine](crate::campaign::pool), or machines far away.
+//! Tests are independent of each other, and results depend neither on the order in which they end nor on where they
+//! ran. So an executor may be [processes of this machine](crate::campaign::pool), or machines far away.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -52,13 +52,13 @@ pub struct JobResult {
     pub number: u32,
     /// What the run showed.
     pub observation: Observation,
-    /// What happened to its worker: that it was killed and the test run again, what it printed last before it died. Of this
-    /// one session: it may hold process numbers.
+    /// What happened to its worker: that it was killed and the test run again, what it printed last before it died. Of
+    /// this one session: it may hold process numbers.
     pub notes: Vec<String>,
     /// Why the trace that was asked for could not be written: the result must not be recorded without it.
     pub trace_failure: Option<String>,
-    /// Whether its worker or its simulator was killed, and killed again when the test was repeated. The observation says so;
-    /// it may say nothing of the test, but only of this machine today.
+    /// Whether its worker or its simulator was killed, and killed again when the test was repeated. The observation
+    /// says so; it may say nothing of the test, but only of this machine today.
     pub killed: bool,
 }
 

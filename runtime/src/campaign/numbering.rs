@@ -112,8 +112,8 @@ impl Numbering {
     }
 }
 
-/// The tests of a campaign by their content, so that an equal one is not simulated again. Of each test its hash is kept:
-/// the tests themselves would be most of what a campaign holds in memory.
+/// The tests of a campaign by their content, so that an equal one is not simulated again. Of each test its hash is
+/// kept: the tests themselves would be most of what a campaign holds in memory.
 #[derive(Debug, Default)]
 struct SeenTests(HashMap<[u8; 16], u32>);
 

@@ -1,9 +1,9 @@
 //! The supervisor's side of its workers: starts them, hands out tests, and deals with those that die or hang.
 //!
-//! A worker that dies of something else than `SIGKILL` was brought down by its simulator or a hook: the test it ran is a
-//! crash. One that was killed is another matter, and so is a simulator that was: the test is run again. What Ctrl-C sends to
-//! all of a terminal's foreground processes does not reach workers, since that would look like a crash: the supervisor
-//! ends them.
+//! A worker that dies of something else than `SIGKILL` was brought down by its simulator or a hook: the test it ran is
+//! a crash. One that was killed is another matter, and so is a simulator that was: the test is run again. What Ctrl-C
+//! sends to all of a terminal's foreground processes does not reach workers, since that would look like a crash: the
+//! supervisor ends them.
 
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
@@ -135,8 +135,9 @@ impl WorkerSlot {
         .map_err(|NotStarted { reason, .. }| ExecutorError { worker: self.number, reason })
     }
 
-    /// Runs a test. If its worker or its simulator is killed, the test is run once more: a process killed by hand, or because
-    /// memory is short, must leave no trace in results. If it is killed again, the test is a crash that says so.
+    /// Runs a test. If its worker or its simulator is killed, the test is run once more: a process killed by hand, or
+    /// because memory is short, must leave no trace in results. If it is killed again, the test is a crash that says
+    /// so.
     fn run(&mut self, job: &Job) -> Result<JobResult, ExecutorError> {
         let (ended, victim) = self.attempt(job)?;
         let Some(victim) = victim.filter(|_| !self.stop.load(Ordering::Relaxed)) else { return Ok(ended) };

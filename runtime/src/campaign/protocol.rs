@@ -66,8 +66,8 @@ pub(super) struct Greeting {
 }
 
 impl Greeting {
-    /// Takes what has come of it, and nothing that follows it; `None` while it is not whole and the stream has no more for
-    /// now. Anything longer than a kilobyte is an error, and so is anything that is not a greeting.
+    /// Takes what has come of it, and nothing that follows it; `None` while it is not whole and the stream has no more
+    /// for now. Anything longer than a kilobyte is an error, and so is anything that is not a greeting.
     pub(super) fn hear(&mut self, stream: &mut impl Read) -> io::Result<Option<Hello>> {
         loop {
             let whole = match self.heard.first_chunk() {

@@ -1,4 +1,5 @@
-//! A campaign from its first reference run to its last: ask the search for tests, run them, record them, tell the search.
+//! A campaign from its first reference run to its last: ask the search for tests, run them, record them, tell the
+//! search.
 
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
@@ -33,8 +34,8 @@ pub enum CampaignEnd {
     Interrupted,
 }
 
-/// Runs a campaign in worker processes and records it; what the recorder already holds is not simulated again. Each worker
-/// gets a folder of its own in `directory`.
+/// Runs a campaign in worker processes and records it; what the recorder already holds is not simulated again. Each
+/// worker gets a folder of its own in `directory`.
 pub fn run_campaign(
     plan: &CampaignPlan,
     recorder: Recorder,
@@ -206,8 +207,8 @@ impl<'a, 'l> Campaign<'a, 'l> {
         Ok(end.map_or(ControlFlow::Continue(()), ControlFlow::Break))
     }
 
-    /// Runs the tests of a generation. Returns them in the order of their numbers, and the numbers of those that violate a
-    /// requirement.
+    /// Runs the tests of a generation. Returns them in the order of their numbers, and the numbers of those that
+    /// violate a requirement.
     fn evaluate(&mut self, planned: Vec<PlannedTest>) -> Result<(Vec<Evaluated>, BTreeSet<u32>), Halt> {
         let plan = self.plan;
         let (needs_course, needs_margins) = (search::needs_courses(plan), search::needs_margins(plan));

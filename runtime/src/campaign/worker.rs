@@ -19,14 +19,16 @@ use crate::campaign::protocol::{self, Reply};
 use crate::campaign::traces;
 use crate::runner::Runner;
 
-/// Serves the supervisor that started this process until it closes the connection, and then ends what was started for it.
+/// Serves the supervisor that started this process until it closes the connection, and then ends what was started for
+/// it.
 ///
 /// A panic of the simulator or of a hook is the outcome of its test; the worker goes on with a fresh connection to the
 /// simulator.
 pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::Result<()> {
     let mut stream = link::connect(supervisor)?;
     panic_capture::listen();
-    // So that what leaves its parents can be found when it is to end. Where the system cannot do that, groups have to do.
+    // So that what leaves its parents can be found when it is to end. Where the system cannot do that, groups have to
+    // do.
     descendants::adopt_orphans();
 
     let wires = WireTable::new(plan);
@@ -55,8 +57,9 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
     unreachable!("jobs come until the process is ended")
 }
 
-/// Reads jobs in a thread of its own. When the supervisor is gone, this thread ends what the worker started, and then the
-/// worker, even in the middle of a test that hangs: so no worker outlives its supervisor, and no simulator its worker.
+/// Reads jobs in a thread of its own. When the supervisor is gone, this thread ends what the worker started, and then
+/// the worker, even in the middle of a test that hangs: so no worker outlives its supervisor, and no simulator its
+/// worker.
 fn read_jobs(mut stream: Stream) -> mpsc::Receiver<Job> {
     let (sender, jobs) = mpsc::channel();
     thread::spawn(move || {
@@ -71,8 +74,8 @@ fn read_jobs(mut stream: Stream) -> mpsc::Receiver<Job> {
     jobs
 }
 
-/// Ends simulators, after the time that they are given to end by themselves, and then everything else that is below this
-/// process.
+/// Ends simulators, after the time that they are given to end by themselves, and then everything else that is below
+/// this process.
 fn end_what_was_started() {
     // Of the two threads that may get here, the later one waits until the earlier one is done.
     static TURN: Mutex<()> = Mutex::new(());

@@ -1,5 +1,5 @@
-//! `confirm`: tests of a finished run again, each with fresh seeds of the simulator, to see whether what was found in them
-//! comes again.
+//! `confirm`: tests of a finished run again, each with fresh seeds of the simulator, to see whether what was found in
+//! them comes again.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

@@ -26,8 +26,8 @@ use crate::cli::terminal::{print, print_json, say, text_options};
 use crate::runner::Runner;
 
 /// The most worker processes that may be asked for. Each is a process with a simulator of its own, and takes one of the
-/// supervisor's open files, of which systems permit 1024 by default. Results do not depend on how many there are, and more
-/// than a machine has processors gain something only where simulators wait.
+/// supervisor's open files, of which systems permit 1024 by default. Results do not depend on how many there are, and
+/// more than a machine has processors gain something only where simulators wait.
 const MOST_WORKERS: usize = 512;
 
 /// How tests are run.
@@ -39,7 +39,8 @@ pub(super) struct ExecutionArgs {
     /// Seconds of wall time after which a test is stopped; by default 20 times the reference run, at least 60
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     timeout: Option<Duration>,
-    /// Go on although nothing receives what an operation disturbs: the simulator does not subscribe to its topic, and no outbound metric reads it
+    /// Go on although nothing receives what an operation disturbs: the simulator does not subscribe to its topic, and
+    /// no outbound metric reads it
     #[arg(long)]
     allow_unheard: bool,
 }

@@ -27,7 +27,8 @@ pub(super) struct Options {
     test: String,
     #[command(flatten)]
     which: Which,
-    /// Seconds of wall time after which it is stopped; by default 20 times what it took, at least 60, or what stopped it
+    /// Seconds of wall time after which it is stopped; by default 20 times what it took, at least 60, or what stopped
+    /// it
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     timeout: Option<Duration>,
 }

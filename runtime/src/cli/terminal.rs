@@ -20,8 +20,8 @@ pub(super) enum Format {
     Json,
 }
 
-/// Says a line on standard error: progress, notes, warnings, errors. A full disk under a log, a reader that has gone away
-/// or a connection that is lost is no reason to end a run, so a line that cannot be written is dropped.
+/// Says a line on standard error: progress, notes, warnings, errors. A full disk under a log, a reader that has gone
+/// away or a connection that is lost is no reason to end a run, so a line that cannot be written is dropped.
 pub(super) fn say(line: fmt::Arguments<'_>) {
     // In one piece, so that it stays whole beside what other processes write to the same log.
     io::stderr().write_all(format!("{line}\n").as_bytes()).ok();
