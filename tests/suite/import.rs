@@ -194,7 +194,7 @@ fn every_stored_front_is_computed_again_from_the_stored_values() {
                     .rows()
                     .iter()
                     .map(|row| match &row[0] {
-                        Datum::Text(test) => test.clone(),
+                        Datum::Test(test) => test.to_string(),
                         other => panic!("{other:?}"),
                     })
                     .collect();

@@ -8,6 +8,7 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 
+use sesame_base::test_number::TestNumber;
 use sesame_plan::{CampaignPlan, Search};
 use sesame_results::record::Verdict;
 use sesame_results::report::Summary;
@@ -98,9 +99,9 @@ fn tests(count: usize) -> String {
 }
 
 /// Tests that ended in one of these ways, where that stands.
-fn broken_off<'a>(summary: &'a Summary, words: &[&str]) -> BTreeSet<&'a str> {
+fn broken_off(summary: &Summary, words: &[&str]) -> BTreeSet<TestNumber> {
     let found = summary.failures.iter().filter(|it| words.contains(&it.outcome.as_str()) && it.stands());
-    found.map(|failure| failure.test.as_str()).collect()
+    found.map(|failure| failure.test).collect()
 }
 
 fn expectations<'a>(summary: &'a Summary, verdict: Verdict, what: &'a str) -> impl Iterator<Item = String> + 'a {
@@ -163,9 +164,9 @@ mod tests {
         Gate { fail_on: fail_on.to_vec() }.objections(summary, plan)
     }
 
-    fn crash(number: usize) -> Failure {
+    fn crash(number: u32) -> Failure {
         let detail = "gone".to_owned();
-        Failure { test: format!("T{number}"), outcome: "crash".to_owned(), at: 1.0, detail, again: None }
+        Failure { test: TestNumber(number), outcome: "crash".to_owned(), at: 1.0, detail, again: None }
     }
 
     /// A finding, and what brings it into a summary.
@@ -180,7 +181,7 @@ mod tests {
             (Finding::Crash, |it| it.failures.push(crash(2))),
             (Finding::Timeout, |it| it.failures.push(Failure { outcome: "timeout".to_owned(), ..crash(3) })),
             (Finding::NotFinite, |it| {
-                it.not_finite.push(NotFinite { test: "T4".to_owned(), at: 1.0, metrics: vec!["speed".to_owned()] });
+                it.not_finite.push(NotFinite { test: TestNumber(4), at: 1.0, metrics: vec!["speed".to_owned()] });
             }),
             (Finding::Inconclusive, |it| it.requirements[1].inconclusive = 1),
         ];

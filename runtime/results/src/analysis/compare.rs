@@ -12,7 +12,7 @@ use sesame_search::in_unit;
 use sesame_search::indicators::volume;
 use sesame_search::sspr::Convention;
 
-use crate::analysis::{Dataset, Datum, rank_sum};
+use crate::analysis::{Datum, Table, rank_sum};
 use crate::record::{Origin, RecordError, Repository};
 
 /// A run to be compared.
@@ -264,7 +264,7 @@ impl Comparison {
     }
 
     /// A row for each run.
-    pub fn runs(&self) -> Dataset {
+    pub fn runs(&self) -> Table {
         let columns = [
             "group",
             "campaign",
@@ -282,7 +282,7 @@ impl Comparison {
             "coverage",
             "file",
         ];
-        let mut dataset = Dataset::new(columns.map(str::to_owned));
+        let mut dataset = Table::new(columns.map(str::to_owned));
         for run in &self.runs {
             let whole = |count: u32| Datum::Whole(i64::from(count));
             dataset.row([
@@ -308,9 +308,9 @@ impl Comparison {
 
     /// A row for each measure and group: median and quartiles over its runs; and of every group but the first how it
     /// compares with the first, by ranks. The probabilities are each for itself, not corrected for there being several.
-    pub fn groups(&self) -> Dataset {
+    pub fn groups(&self) -> Table {
         let columns = ["measure", "group", "runs", "lower", "median", "upper", "a12", "p", "p_is"];
-        let mut dataset = Dataset::new(columns.map(str::to_owned));
+        let mut dataset = Table::new(columns.map(str::to_owned));
         let groups = self.groups_of();
         for (name, measure) in MEASURES {
             let values = |runs: &[&Measured]| -> Vec<f64> { runs.iter().filter_map(|run| measure(run)).collect() };
@@ -340,8 +340,8 @@ impl Comparison {
 
     /// A row for each ordered pair of runs: the share of the second one's front that the first one's covers, Zitzler and
     /// Thiele's C: points that are equal to one of the first, or dominated by one.
-    pub fn pairs(&self) -> Dataset {
-        let mut dataset = Dataset::new(["first", "second", "c"].map(str::to_owned));
+    pub fn pairs(&self) -> Table {
+        let mut dataset = Table::new(["first", "second", "c"].map(str::to_owned));
         for first in &self.runs {
             for second in self.runs.iter().filter(|second| !std::ptr::eq(*second, first)) {
                 dataset.row([

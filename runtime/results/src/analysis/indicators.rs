@@ -10,7 +10,7 @@ use sesame_search::in_unit;
 use sesame_search::indicators::{reference_point, volume};
 use sesame_search::sspr::Convention;
 
-use crate::analysis::{Dataset, Datum};
+use crate::analysis::{Datum, Table};
 use crate::record::{Origin, RecordError, Repository, ResultSet};
 
 /// What a search had come to after a generation, or at a result set of an imported campaign.
@@ -250,14 +250,14 @@ fn evaluations_of(set: &ResultSet, tests: usize) -> Option<u32> {
 
 impl IndicatorAnalysis {
     /// A row for each generation.
-    pub fn dataset(&self) -> Dataset {
+    pub fn dataset(&self) -> Table {
         let imported = self.generations.iter().any(|it| it.set.is_some());
         let head = if imported { vec!["set"] } else { Vec::new() };
         let counts = ["generation", "evaluations", "unique", "no_effect", "crashes", "timeouts", "front"];
         let measures = ["hypervolume", "standard_error", "igd_plus"];
         let cells: &[&str] = if self.cells.is_some() { &["covered", "cells", "coverage"] } else { &[] };
         let columns = head.into_iter().chain(counts).chain(measures).chain(cells.iter().copied());
-        let mut dataset = Dataset::new(columns.map(str::to_owned));
+        let mut dataset = Table::new(columns.map(str::to_owned));
         let whole = |count: Option<u32>| count.map_or(Datum::Missing, |count| Datum::Whole(i64::from(count)));
         for it in &self.generations {
             let head = imported.then(|| it.set.clone().map_or(Datum::Missing, Datum::Text));

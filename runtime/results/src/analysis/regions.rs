@@ -16,9 +16,9 @@ use tree::{Columns, Growth, Node, Question};
 
 use sesame_plan::{CampaignPlan, RequirementId};
 
-use crate::analysis::{Dataset, Datum, Selection};
+use crate::analysis::confirmed::{failed, failed_tally};
+use crate::analysis::{Datum, Selection, Table};
 use crate::record::{Judge, Origin, RecordError, Repository, ScannedTest, Verdict};
-use crate::report::{failed, failed_tally};
 
 pub use tree::Tally;
 
@@ -249,15 +249,15 @@ impl Regions {
     }
 
     /// The tree as a picture on a page.
-    pub(crate) fn draw(&self, markup: &mut crate::report::Markup, plan: &CampaignPlan) {
+    pub(crate) fn draw(&self, markup: &mut crate::present::markup::Markup, plan: &CampaignPlan) {
         picture::draw(self, plan, markup);
     }
 }
 
 /// Regions as a table: a row for each.
-pub fn table(regions: &[Regions]) -> Dataset {
+pub fn table(regions: &[Regions]) -> Table {
     let columns = ["fails", "region", "failing", "tests", "share", "share_low", "share_high"];
-    let mut dataset = Dataset::new(columns.map(str::to_owned));
+    let mut dataset = Table::new(columns.map(str::to_owned));
     for of in regions {
         for rule in &of.rules {
             let share = rule.tally.share();

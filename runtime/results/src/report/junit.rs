@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
+use crate::analysis::confirmed::ConfirmedTest;
+use crate::present::markup::Markup;
+use crate::present::number;
 use crate::record::{RecordError, Repository, Verdict};
-use crate::report::confirmed::ConfirmedTest;
-use crate::report::markup::Markup;
-use crate::report::number;
-use crate::report::page::write_aside;
-use crate::report::summary::{ExpectationSummary, Failure, NotFinite, RequirementSummary, Summary, summary};
-use crate::report::text::headline;
+use crate::report::facts::summary::{ExpectationSummary, Failure, NotFinite, RequirementSummary, Summary, summary};
+use crate::report::file::write_aside;
+use crate::report::sentences::headline;
 
 /// Writes the JUnit file of a campaign's results.
 pub fn write_junit(repository: &Repository, path: &Path) -> Result<(), RecordError> {

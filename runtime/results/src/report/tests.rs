@@ -459,7 +459,7 @@ fn findings_that_were_run_again_say_how_often_they_came_again() {
     let summary = summary(&repository).unwrap();
     insta::assert_snapshot!("confirmed_summary", summary_text(&summary, WIDE));
     let first = summary.confirmed[0].clone();
-    insta::assert_snapshot!("confirmed_test", test_text(&show(&repository, &first.test).unwrap(), WIDE));
+    insta::assert_snapshot!("confirmed_test", test_text(&show(&repository, &first.test.to_string()).unwrap(), WIDE));
     insta::assert_snapshot!("confirmed_tests", confirmed_text(&summary.confirmed, WIDE));
     let standings: std::collections::BTreeSet<&str> =
         summary.confirmed.iter().filter_map(|test| test.standing).map(Standing::words).collect();
@@ -503,10 +503,10 @@ fn the_views_of_findings_agree_with_the_report() {
         .tests
         .into_iter()
         .filter(|test| test.duplicate_of.is_none())
-        .flat_map(|test| test.violates.into_iter().map(move |requirement| (test.test.clone(), requirement)))
+        .flat_map(|test| test.violates.into_iter().map(move |requirement| (test.test.to_string(), requirement)))
         .collect();
     let failures = summary.failures.iter().filter(|failure| failure.stands());
-    told.extend(failures.map(|failure| (failure.test.clone(), failure.outcome.clone())));
+    told.extend(failures.map(|failure| (failure.test.to_string(), failure.outcome.clone())));
     told.sort();
     let mut statement = open.prepare("SELECT test_name, coalesce(requirement, finding) FROM findings").unwrap();
     let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?))).unwrap();
@@ -586,12 +586,12 @@ fn violations_that_were_seen_in_one_run_only_are_counted() {
     let (_folder, repository) = confirmed();
     let found = summary(&repository).unwrap();
     let rows = list(&repository).unwrap().tests;
-    let again: Vec<&str> = found.confirmed.iter().map(|test| test.test.as_str()).collect();
+    let again: Vec<_> = found.confirmed.iter().map(|test| test.test).collect();
     let once = rows.iter().filter(|row| {
         !row.violates.is_empty()
             && row.duplicate_of.is_none()
             && row.origin != "reference"
-            && !again.contains(&row.test.as_str())
+            && !again.contains(&row.test)
     });
     let sentence = format!("{} tests that violate a requirement were run once only", once.count());
     assert!(summary_text(&found, WIDE).contains(&sentence), "{sentence}");

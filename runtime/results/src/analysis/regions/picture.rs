@@ -5,7 +5,7 @@ use sesame_plan::CampaignPlan;
 
 use crate::analysis::regions::Regions;
 use crate::analysis::regions::tree::{Node, Tally};
-use crate::report::{Markup, percent};
+use crate::present::markup::{Markup, percent};
 
 /// Height of a band, in pixels.
 const BAND: f64 = 46.0;

@@ -4,8 +4,8 @@ use sesame_base::observation::Outcome;
 
 use super::*;
 use crate::analysis::regions::tree::simplest_between;
+use crate::present::table::TextOptions;
 use crate::record::sample;
-use crate::report::TextOptions;
 
 /// Rows of a tree's node: those for which each question of the path is answered so.
 fn rows_of(columns: &Columns, path: &[Step], rows: usize) -> Vec<usize> {

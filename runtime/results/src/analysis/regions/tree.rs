@@ -4,7 +4,7 @@
 //! in the order of columns and thresholds if several are; a split stays only if it is no chance, by Fisher's exact test
 //! at 5 % over all questions that were weighed for it (Bonferroni); the same data give the same tree.
 
-use crate::report::wilson;
+use crate::analysis::statistics::wilson;
 
 /// Columns of numbers, a NaN where a row has none.
 #[derive(Debug, Clone, Default)]

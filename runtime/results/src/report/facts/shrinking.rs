@@ -5,19 +5,16 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use sesame_base::condition;
+use sesame_base::test_number::TestNumber;
 use sesame_optimise::dominance::Fitness;
 use sesame_plan::{Activation, CampaignPlan, Dimension, Failing, MetricId, RequirementId, Search, Test, TestOperation};
 use sesame_search::shrink::strength;
 use sesame_search::{Evaluated, Shrink, Strategy as _, sspr};
 
+use crate::present::number::{self, fixed};
 use crate::record::{MetricValue, RecordError, Repository, TestRow, fails};
 use crate::report::export::shrunk_block;
-use crate::report::markup::Markup;
-use crate::report::number::{self, fixed, plural, with_unit};
-use crate::report::page::{heading_row, test_link};
-use crate::report::summary::{operations, value_text};
-use crate::report::table::{Table, TextOptions};
-use crate::report::text::{left, paragraph, right};
+use crate::report::facts::summary::{operations, value_text};
 
 /// How a test was shrunk.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -44,7 +41,7 @@ pub struct Shrinking {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TestSize {
     /// Its name in these results.
-    pub test: String,
+    pub test: TestNumber,
     /// Its number in these results.
     pub number: u32,
     /// How many operations it has.
@@ -66,9 +63,9 @@ pub struct TestSize {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ShrinkStep {
     /// Its name in these results; of several runs, that of the first.
-    pub test: String,
+    pub test: TestNumber,
     /// The test that it was made of.
-    pub base: Option<String>,
+    pub base: Option<TestNumber>,
     /// What it was tried for, in a word.
     pub tried: String,
     /// What is different from the test that it was made of.
@@ -90,7 +87,7 @@ pub struct NamedValue {
     pub value: Option<f64>,
     /// The value with its unit, in words.
     #[serde(skip)]
-    text: String,
+    pub(crate) text: String,
 }
 
 impl Shrinking {
@@ -99,23 +96,6 @@ impl Shrinking {
         let mut ends: Vec<u32> = self.before.iter().chain(&self.after).map(|size| size.number).collect();
         ends.dedup();
         ends
-    }
-
-    /// What came of it, in a sentence.
-    fn sentence(&self) -> String {
-        let tried = plural(self.steps.len(), "test was tried", "tests were tried");
-        match (&self.before, &self.after) {
-            (None, _) => format!("{} has not run yet", self.test),
-            (Some(_), None) => {
-                format!("{} did not fail again, so nothing was shrunk; it {} once", self.test, self.fails)
-            }
-            (Some(_), Some(after)) if self.minimal => {
-                format!("{} {}; {tried}, and it cannot be shrunk by one more step", after.test, self.fails)
-            }
-            (Some(_), Some(after)) => {
-                format!("{} {}; {tried}, and more evaluations could perhaps shrink it further", after.test, self.fails)
-            }
-        }
     }
 }
 
@@ -149,8 +129,8 @@ pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Opt
     let steps = search.tried().iter().enumerate().filter_map(|(at, tried)| {
         let row = rows.get(&tried.number)?;
         Some(ShrinkStep {
-            test: format!("T{}", tried.number),
-            base: tried.base.map(|base| format!("T{}", search.tried()[base].number)),
+            test: TestNumber(tried.number),
+            base: tried.base.map(|base| TestNumber(search.tried()[base].number)),
             tried: tried.phase.words().to_owned(),
             change: match tried.base {
                 Some(base) => change(plan, &search.tried()[base].test, &tried.test),
@@ -221,7 +201,7 @@ fn size(
     let row = rows.get(&number);
     let point = sspr::observed_point(plan, &record.test, &record.observation);
     Ok(TestSize {
-        test: format!("T{number}"),
+        test: TestNumber(number),
         number,
         operations: record.test.operations.len(),
         operations_text: row.map_or_else(String::new, |row| operations(plan, row)),
@@ -280,151 +260,13 @@ fn activation(plan: &CampaignPlan, activation: &Activation) -> String {
     }
 }
 
-/// The table of before and after: its columns, and its rows.
-fn sizes(shrinking: &Shrinking) -> (Vec<String>, Vec<Vec<String>>) {
-    let first = shrinking.before.as_ref();
-    let metrics = first.map_or_else(Vec::new, |size| size.values.iter().map(|value| value.metric.clone()).collect());
-    let mut titles = ["", "test", "operations", "active", "intensity P1", "strength"].map(str::to_owned).to_vec();
-    titles.extend(metrics);
-    titles.push("which".to_owned());
-    let share = |share: Option<f64>| share.map_or("–".to_owned(), |share| fixed(share, 3));
-    let row = |(when, size): (&str, &TestSize)| {
-        let active = size.active_time.map_or("unknown".to_owned(), |time| with_unit(fixed(time, 2), Some("s")));
-        let mut cells = vec![
-            when.to_owned(),
-            size.test.clone(),
-            size.operations.to_string(),
-            active,
-            share(size.intensity),
-            share(Some(size.strength)),
-        ];
-        cells.extend(size.values.iter().map(|value| value.text.clone()));
-        cells.push(size.operations_text.clone());
-        cells
-    };
-    let before = shrinking.before.iter().map(|size| ("before", size));
-    let after = shrinking.after.iter().map(|size| ("after", size));
-    (titles, before.chain(after).map(row).collect())
-}
-
-/// The way in words: the table of before and after, what was gone on with, and the block.
-pub(crate) fn text(text: &mut String, shrinking: &Shrinking, options: TextOptions) {
-    text.push('\n');
-    text.push_str(&options.heading(&format!("{} shrunk", shrinking.test)));
-    text.push('\n');
-    let (titles, rows) = sizes(shrinking);
-    if !rows.is_empty() {
-        let words = ["", "test", "which"];
-        let column = |title: &String| if words.contains(&title.as_str()) { left(title) } else { right(title) };
-        let mut table = Table::new(titles.iter().map(column));
-        for row in rows {
-            table.row(row);
-        }
-        text.push_str(&table.render(options));
-    }
-    paragraph(text, &format!("{}.", shrinking.sentence()), options);
-    let kept: Vec<&ShrinkStep> = shrinking.steps.iter().filter(|step| step.kept).collect();
-    if kept.len() > 1 {
-        let mut table = Table::new([left("test"), left("tried"), left("change")]);
-        for step in &kept {
-            table.row([step.test.clone(), step.tried.clone(), step.change.clone()]);
-        }
-        text.push('\n');
-        text.push_str(&options.heading("The way there"));
-        text.push('\n');
-        text.push_str(&table.render(options));
-        paragraph(text, "Tests that did not fail are on the page, and in the results as JSON.", options);
-    }
-    if let Some(block) = &shrinking.block {
-        text.push('\n');
-        text.push_str(block);
-    }
-}
-
-/// The way as a section of the page: before and after, the block, and every test that was tried.
-pub(crate) fn section(body: &mut Markup, shrinking: &Shrinking, drawn: &[u32]) {
-    body.open("section", &[("id", "shrinking")]);
-    body.element("h2", &[], &format!("{} shrunk", shrinking.test));
-    body.element("p", &[], &format!("{}.", shrinking.sentence()));
-    let (mut titles, rows) = sizes(shrinking);
-    let last = titles.len() - 1;
-    // Headings of columns begin with capitals here; names of metrics stay as they are.
-    for (at, title) in titles.iter_mut().enumerate() {
-        if let Some(first) = title.get_mut(..1).filter(|_| at < 6 || at == last) {
-            first.make_ascii_uppercase();
-        }
-    }
-    table(body, &titles, 2..last, |body| {
-        for row in rows {
-            body.open("tr", &[]);
-            for (at, cell) in row.iter().enumerate() {
-                match at {
-                    0 => body.element("th", &[("scope", "row")], cell),
-                    1 => {
-                        body.open("td", &[]);
-                        test_link(body, cell, drawn);
-                        body.close();
-                    }
-                    at => body.element("td", &[("class", if at < last { "number" } else { "words" })], cell),
-                }
-            }
-            body.close();
-        }
-    });
-    let caption = "Active: how long operations were active in total. Intensity P1: the mean of the parameters as shares of \
-                   what is permitted. Strength: the sum over operations of how far their parameters are from where they \
-                   are mildest, each from 0 to 1.";
-    body.element("p", &[("class", "quiet")], caption);
-    if let Some(block) = &shrinking.block {
-        body.element("pre", &[], block);
-    }
-    body.open("details", &[]);
-    body.element("summary", &[], "Every test that was tried");
-    let metrics = shrinking.steps.first().map_or(&[][..], |step| &step.values);
-    let mut titles = ["Test", "Of", "Tried", "Change", "Failed", "Kept"].map(str::to_owned).to_vec();
-    titles.extend(metrics.iter().map(|value| value.metric.clone()));
-    table(body, &titles, 6..titles.len(), |body| {
-        for step in &shrinking.steps {
-            body.open("tr", &[]);
-            body.element("th", &[("scope", "row")], &step.test);
-            body.element("td", &[], step.base.as_deref().unwrap_or("–"));
-            body.element("td", &[], &step.tried);
-            body.element("td", &[("class", "sentence")], &step.change);
-            let failed = match shrinking.runs {
-                1 => if step.failed == 1 { "yes" } else { "no" }.to_owned(),
-                runs => format!("{} of {runs}", step.failed),
-            };
-            body.element("td", &[("class", if step.failed == shrinking.runs { "bad" } else { "words" })], &failed);
-            body.element("td", &[], if step.kept { "kept" } else { "–" });
-            for value in &step.values {
-                body.element("td", &[("class", "number")], &value.text);
-            }
-            body.close();
-        }
-    });
-    body.close();
-    body.close();
-}
-
-fn table(body: &mut Markup, titles: &[String], numbers: std::ops::Range<usize>, rows: impl FnOnce(&mut Markup)) {
-    let titles: Vec<&str> = titles.iter().map(String::as_str).collect();
-    body.open("div", &[("class", "scroll")]);
-    body.open("table", &[]);
-    heading_row(body, &titles, numbers);
-    body.open("tbody", &[]);
-    rows(body);
-    body.close();
-    body.close();
-    body.close();
-}
-
 #[cfg(test)]
 mod tests {
     use sesame_plan::{KnownTest, KnownTestId};
 
     use super::*;
     use crate::record::{Origin, Recorder, TestRecord, sample};
-    use crate::report::{page, summary, summary_text};
+    use crate::report::{TextOptions, page, summary, summary_text};
 
     /// A test of the sample campaign made smaller, as far as so many runs.
     fn recorded(most: usize) -> (tempfile::TempDir, Repository) {

@@ -6,11 +6,12 @@ use serde_json::{Value, json};
 
 use sesame_plan::{CampaignPlan, Direction, GridAxis};
 
-use crate::report::axis::Axis;
-use crate::report::coverage::{CoverageSummary, coverage_sentence};
-use crate::report::markup::{Markup, coordinate, percent};
-use crate::report::published::{BOOSTING, CELLS, TRACKING, is_published_grid};
-use crate::report::{chart, number};
+use crate::present::axis::Axis;
+use crate::present::markup::{Markup, coordinate, percent};
+use crate::present::{chart, number};
+use crate::report::facts::coverage::CoverageSummary;
+use crate::report::html::published::{BOOSTING, CELLS, TRACKING, is_published_grid};
+use crate::report::sentences::coverage_sentence;
 
 /// Cells that a map draws at most; of larger ones none is drawn.
 const MOST_DRAWN: usize = 10_000;

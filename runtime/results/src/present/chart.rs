@@ -4,8 +4,8 @@
 
 use std::fmt::Write as _;
 
-use crate::report::axis::Axis;
-use crate::report::markup::{Markup, coordinate, percent};
+use crate::present::axis::Axis;
+use crate::present::markup::{Markup, coordinate, percent};
 
 /// Draws the ticks of both axes with a line across the chart at each.
 pub(crate) fn ticks(markup: &mut Markup, across: &Axis, up: &Axis) {

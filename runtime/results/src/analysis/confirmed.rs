@@ -5,17 +5,18 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use sesame_base::observation::Outcome;
-use sesame_plan::{CampaignPlan, Confirmation, Direction, Typical};
+use sesame_base::test_number::TestNumber;
+use sesame_plan::{CampaignPlan, Direction};
 
+use crate::analysis::statistics::wilson;
+use crate::present::number::{fixed, plural};
 use crate::record::{Judge, RecordError, Repetition, Repository, Standing, Tally, TestRow, Verdict, confirmed_fitness};
-use crate::report::number::{self, fixed, join_words, plural};
-use crate::report::repetition::wilson;
 
 /// The findings of a test that was run again. The run that selected the test is not one of its repetitions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ConfirmedTest {
     /// Its name.
-    pub test: String,
+    pub test: TestNumber,
     /// Its number.
     pub number: u32,
     /// Whether it is on the front.
@@ -151,7 +152,7 @@ fn confirmed(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow, front: bool)
     let failures = FAILURES.into_iter().filter_map(|word| failed_again(judge, row, word));
     let findings: Vec<FindingAgain> = requirements.chain(failures).collect();
     Some(ConfirmedTest {
-        test: format!("T{}", row.number),
+        test: TestNumber(row.number),
         number: row.number,
         front,
         repetitions: runs.len(),
@@ -190,60 +191,5 @@ impl ConfirmedTest {
         let share = |finding: &FindingAgain| finding.again as f64 / finding.conclusive as f64;
         let said = self.findings.iter().filter(|finding| finding.conclusive > 0);
         said.reduce(|best, finding| if share(finding) > share(best) { finding } else { best })
-    }
-}
-
-/// How many of these tests are confirmed, flaky and not confirmed, as in `4 confirmed, 1 flaky`; empty for tests without
-/// findings.
-pub(crate) fn standings(tests: &[&ConfirmedTest]) -> String {
-    let words = [Standing::Confirmed, Standing::Flaky, Standing::NotConfirmed].into_iter().filter_map(|standing| {
-        let count = tests.iter().filter(|test| test.standing == Some(standing)).count();
-        (count > 0).then(|| format!("{count} {}", standing.words()))
-    });
-    join_words(&words.collect::<Vec<_>>())
-}
-
-/// How many runs confirmed findings of how many tests, in a sentence; `None` if no test was run again.
-pub(crate) fn confirmation_sentence(tests: &[ConfirmedTest]) -> Option<String> {
-    let runs: usize = tests.iter().map(|test| test.repetitions).sum();
-    if tests.is_empty() {
-        return None;
-    }
-    let mut sentence =
-        format!("{} of {}", plural(runs, "further run", "further runs"), plural(tests.len(), "test", "tests"));
-    let front = standings(&tests.iter().filter(|test| test.front).collect::<Vec<_>>());
-    let all = standings(&tests.iter().collect::<Vec<_>>());
-    if !all.is_empty() {
-        let _ = write!(sentence, " to confirm them: {all}");
-        if front.is_empty() {
-            sentence.push_str("; none of these on the front");
-        } else if front != all {
-            let _ = write!(sentence, "; on the front {front}");
-        }
-    }
-    let surprises = tests.iter().filter(|test| test.findings.iter().any(|finding| !finding.first)).count();
-    if surprises > 0 {
-        let tests = plural(surprises, "test shows", "tests show");
-        let _ = write!(sentence, "; {tests} a finding that its first run did not");
-    }
-    Some(sentence)
-}
-
-/// How many tests with violations were run once only, in a sentence; `None` if there are none, and if a reader does not
-/// expect confirmation.
-pub(crate) fn once_sentence(once: usize, confirms: bool) -> Option<String> {
-    let tests = plural(once, "test that violates a requirement was", "tests that violate a requirement were");
-    (confirms && once > 0).then(|| format!("{tests} run once only"))
-}
-
-/// How the values of a confirmed front were computed, in a sentence.
-pub(crate) fn values_sentence(confirmation: Confirmation) -> String {
-    let runs = plural(confirmation.times as usize, "fresh run", "fresh runs");
-    match confirmation.by {
-        Typical::Mean => format!("Values are means of {runs} of each test."),
-        Typical::Median => format!("Values are medians of {runs} of each test."),
-        Typical::Quantile { share } => {
-            format!("Values are those that {} % of {runs} of each test reach or exceed.", number::number(100.0 * share))
-        }
     }
 }

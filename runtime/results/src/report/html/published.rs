@@ -2,7 +2,7 @@
 
 use sesame_plan::{Dimension, GridAxis};
 
-use crate::report::coverage::CoverageSummary;
+use crate::report::facts::coverage::CoverageSummary;
 
 /// Cells of that grid.
 pub(crate) const CELLS: f64 = 108.0;

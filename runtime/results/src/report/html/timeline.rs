@@ -8,12 +8,12 @@ use sesame_base::observation::{MetricObservation, Outcome};
 use sesame_base::verdict::ends;
 use sesame_plan::{Bound, CampaignPlan, Metric, MetricSource, Span};
 
+use crate::present::axis::Axis;
+use crate::present::markup::{Markup, coordinate, percent};
+use crate::present::number;
 use crate::record::{TestRecord, violation_spans};
-use crate::report::axis::Axis;
-use crate::report::markup::{Markup, coordinate, percent};
-use crate::report::number;
-use crate::report::show::{OperationReport, TestReport};
-use crate::report::text::{choices_text, effect_text, planned_text, spans_text};
+use crate::report::facts::show::{OperationReport, TestReport};
+use crate::report::sentences::{choices_text, effect_text, planned_text, spans_text};
 
 /// Height of a lane of an operation, in pixels.
 const LANE: f64 = 30.0;
@@ -282,7 +282,7 @@ mod tests {
 
     use super::*;
     use crate::record::{Origin, sample};
-    use crate::report::show::report_on;
+    use crate::report::facts::show::report_on;
 
     #[test]
     fn a_line_holds_its_value_until_the_next_change() {

@@ -5,22 +5,25 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use sesame_base::observation::Counters;
+use sesame_base::test_number::TestNumber;
 use sesame_plan::{Activation, CampaignPlan, Choice, Span};
 
+use crate::analysis::confirmed::{ConfirmedTest, confirmed_test};
+use crate::analysis::statistics::wilson;
+use crate::present::number;
 use crate::record::{
     EventKind, Judge, MetricValue, Origin, RecordError, Repetition, Repository, Tally, TestRecord, TestRow, Verdict,
     verdict, violation_spans,
 };
-use crate::report::confirmed::{ConfirmedTest, confirmed_test};
-use crate::report::repetition::wilson;
-use crate::report::stacked::{Stacked, stacked};
-use crate::report::{export, number, summary};
+use crate::report::export;
+use crate::report::facts::stacked::{Stacked, stacked};
+use crate::report::facts::summary;
 
 /// A line in the list of all tests.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ListedTest {
     /// Its name.
-    pub test: String,
+    pub test: TestNumber,
     /// `reference`, `search`, or the name of a regression test.
     pub origin: String,
     /// The generation it belongs to.
@@ -28,7 +31,7 @@ pub struct ListedTest {
     /// `completed`, `no_effect`, `unknown`, `crash` or `timeout`.
     pub outcome: String,
     /// The equal test whose result stands for this one.
-    pub duplicate_of: Option<String>,
+    pub duplicate_of: Option<TestNumber>,
     /// Whether it is on the front.
     pub front: bool,
     /// A value per metric of the plan, in its order.
@@ -54,7 +57,7 @@ pub struct TestList {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TestReport {
     /// Its name.
-    pub test: String,
+    pub test: TestNumber,
     /// Its number.
     pub number: u32,
     /// `reference`, `search`, or the name of a regression test.
@@ -62,11 +65,11 @@ pub struct TestReport {
     /// The generation it belongs to.
     pub generation: Option<u32>,
     /// The tests it was made of.
-    pub parents: Vec<String>,
+    pub parents: Vec<TestNumber>,
     /// The simulator's seed in its run.
     pub simulator_seed: u64,
     /// The equal test whose result stands for this one.
-    pub duplicate_of: Option<String>,
+    pub duplicate_of: Option<TestNumber>,
     /// `completed`, `no_effect`, `unknown`, `crash` or `timeout`.
     pub outcome: String,
     /// What is known of a crash or timeout.
@@ -203,11 +206,11 @@ pub fn list(repository: &Repository) -> Result<TestList, RecordError> {
 
 fn listed(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow, front: bool) -> ListedTest {
     ListedTest {
-        test: format!("T{}", row.number),
+        test: TestNumber(row.number),
         origin: origin(plan, row.origin),
         generation: row.generation,
         outcome: row.outcome.word().to_owned(),
-        duplicate_of: row.duplicate_of.map(|number| format!("T{number}")),
+        duplicate_of: row.duplicate_of.map(TestNumber),
         front,
         values: row.values.clone(),
         violates: summary::violated(plan, judge, row),
@@ -240,13 +243,13 @@ pub fn show(repository: &Repository, name: &str) -> Result<TestReport, RecordErr
 pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, fresh: &[Repetition], front: bool) -> TestReport {
     let observation = &record.observation;
     TestReport {
-        test: format!("T{}", record.number),
+        test: TestNumber(record.number),
         number: record.number,
         origin: origin(plan, record.origin),
         generation: record.generation,
-        parents: record.parents.iter().map(|number| format!("T{number}")).collect(),
+        parents: record.parents.iter().copied().map(TestNumber).collect(),
         simulator_seed: record.simulator_seed,
-        duplicate_of: record.duplicate_of.map(|number| format!("T{number}")),
+        duplicate_of: record.duplicate_of.map(TestNumber),
         outcome: observation.outcome.word().to_owned(),
         detail: observation.outcome.detail(),
         end: observation.end,

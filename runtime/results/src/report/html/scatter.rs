@@ -5,12 +5,15 @@
 
 use std::fmt::Write as _;
 
-use sesame_plan::Direction;
+use sesame_base::test_number::TestNumber;
+use sesame_plan::{CampaignPlan, Direction};
 
-use crate::report::axis::Axis;
-use crate::report::chart;
-use crate::report::markup::{Markup, coordinate, percent};
-use crate::report::summary::Objective;
+use crate::present::axis::Axis;
+use crate::present::chart;
+use crate::present::markup::{Markup, coordinate, percent};
+use crate::present::number::{self, with_unit};
+use crate::record::{Origin, TestRow};
+use crate::report::facts::summary::{Objective, Summary, operations, shown_value};
 
 /// One axis of a chart.
 #[derive(Debug, Clone)]
@@ -39,7 +42,7 @@ pub(crate) struct Point {
     pub(crate) y: f64,
     pub(crate) kind: Kind,
     /// The test's name.
-    pub(crate) test: String,
+    pub(crate) test: TestNumber,
     /// What is said of it when it is pointed at.
     pub(crate) title: String,
     /// Whether the page has a timeline of it to jump to.
@@ -87,6 +90,21 @@ pub(crate) fn scatter(markup: &mut Markup, x: &Dimension, y: &Dimension, points:
     markup.close();
     markup.element("p", &[("class", "axis-title below")], &x.axis_title());
     markup.close();
+}
+
+/// The tooltip of a dot: the test, its operations, and the values of its objectives.
+pub(crate) fn dot_title(plan: &CampaignPlan, summary: &Summary, row: &TestRow) -> String {
+    let values = summary.objectives.iter().enumerate().map(|(at, objective)| {
+        let value = shown_value(summary, row, at).map_or("–".to_owned(), number::number);
+        format!("{} {}", objective.metric, with_unit(value, objective.unit.as_deref()))
+    });
+    let values = values.collect::<Vec<String>>().join(", ");
+    match row.origin {
+        Origin::Reference => format!("reference run: {values}"),
+        Origin::Known(_) | Origin::Search => {
+            format!("{} ({}): {values}", TestNumber(row.number), operations(plan, row))
+        }
+    }
 }
 
 /// The axis of an objective.
@@ -174,13 +192,13 @@ struct Screen {
 /// Writes the names of points where they cover no other name and no point of the front; a name without such a place
 /// is left out (the dot still tells it when pointed at).
 fn names(markup: &mut Markup, points: &[&Point], places: &[(f64, f64)], screen: Screen) {
-    let lengths: Vec<f64> = points.iter().map(|point| point.test.len() as f64 * 7.5).collect();
+    let lengths: Vec<f64> = points.iter().map(|point| point.test.to_string().len() as f64 * 7.5).collect();
     for ((point, (x, y)), placed) in points.iter().zip(places).zip(place_names(places, &lengths, screen)) {
         let Some(placed) = placed else { continue };
         let class = format!("{}{}", screen.class, placed.anchor);
         let (x, y, dx, dy) = (percent(*x), percent(*y), coordinate(placed.dx), coordinate(placed.dy));
         let attributes = [("class", class.as_str()), ("x", &x), ("y", &y), ("dx", &dx), ("dy", &dy)];
-        markup.element("text", &attributes, &point.test);
+        markup.element("text", &attributes, &point.test.to_string());
     }
 }
 
@@ -246,8 +264,9 @@ mod tests {
 
     use super::*;
 
-    fn point(x: f64, y: f64, kind: Kind, test: &str) -> Point {
-        Point { x, y, kind, test: test.to_owned(), title: format!("{test}: {x}, {y}"), linked: kind == Kind::Front }
+    fn point(x: f64, y: f64, kind: Kind, number: u32) -> Point {
+        let test = TestNumber(number);
+        Point { x, y, kind, test, title: format!("{test}: {x}, {y}"), linked: kind == Kind::Front }
     }
 
     fn along(title: &str, direction: Direction) -> Dimension {
@@ -257,11 +276,11 @@ mod tests {
     #[test]
     fn a_small_chart_reads_as_it_should() {
         let points = [
-            point(1.0, 0.0, Kind::Front, "T1"),
-            point(4.0, 3.0, Kind::Front, "T2"),
-            point(9.0, 8.0, Kind::Front, "T3"),
-            point(8.0, 2.0, Kind::Plain, "T4"),
-            point(0.0, 0.0, Kind::Reference, "T0"),
+            point(1.0, 0.0, Kind::Front, 1),
+            point(4.0, 3.0, Kind::Front, 2),
+            point(9.0, 8.0, Kind::Front, 3),
+            point(8.0, 2.0, Kind::Plain, 4),
+            point(0.0, 0.0, Kind::Reference, 0),
         ];
         let mut markup = Markup::default();
         let detail = Detail { named: true, points: 100 };
@@ -273,8 +292,8 @@ mod tests {
     #[test]
     fn many_points_are_thinned_and_the_front_is_not() {
         let mut points: Vec<Point> =
-            (0..10_000u32).map(|n| point(f64::from(n % 100), f64::from(n / 100), Kind::Plain, "T9")).collect();
-        points.extend((0..50).map(|n| point(f64::from(n), f64::from(n), Kind::Front, "T1")));
+            (0..10_000u32).map(|n| point(f64::from(n % 100), f64::from(n / 100), Kind::Plain, 9)).collect();
+        points.extend((0..50).map(|n| point(f64::from(n), f64::from(n), Kind::Front, 1)));
         let mut markup = Markup::default();
         let (x, y) = (along("x", Direction::Minimise), along("y", Direction::Maximise));
         scatter(&mut markup, &x, &y, &points, Detail { named: true, points: 800 });

@@ -9,7 +9,6 @@ use sesame_search::coverage::{Coverage, CurvePoint, Feasible, Grid, curve};
 use sesame_search::sspr::Convention;
 
 use crate::record::{Origin, RecordError, Repository, ScannedTest};
-use crate::report::number::fixed;
 
 /// How much of the space a campaign has looked at.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -115,16 +114,4 @@ pub(crate) fn coverage(repository: &Repository) -> Result<Option<CoverageSummary
         reachable,
         worst,
     }))
-}
-
-/// The coverage in words: `54 of 108 cells covered (50 %), 56 % of the 96 that can be reached`.
-pub(crate) fn coverage_sentence(coverage: &CoverageSummary) -> String {
-    let CoverageSummary { covered, cells, feasible, .. } = *coverage;
-    let percent = |share: f64| fixed(100.0 * share, usize::from(share < 0.1));
-    let known = if coverage.feasible_exact { "" } else { ", as far as known" };
-    format!(
-        "{covered} of {cells} cells covered ({} %), {} % of the {feasible} that can be reached{known}",
-        percent(coverage.coverage),
-        percent(coverage.feasible_coverage),
-    )
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use sesame_plan::{CampaignPlan, Choice, Domain, Operation, OperationId, OperationKind, Span, Test, ValueMode};
 
-use crate::report::number;
+use crate::present::number;
 
 /// An operation whose copies acted at the same time.
 #[derive(Debug, Clone, PartialEq, Serialize)]

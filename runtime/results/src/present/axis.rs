@@ -1,6 +1,6 @@
 //! Axes: round ticks, and where a value stands between the ends.
 
-use crate::report::number;
+use crate::present::number;
 
 /// An axis from one round number to another.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,18 +5,19 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 
 use sesame_base::observation::Outcome;
+use sesame_base::test_number::TestNumber;
 use sesame_plan::{Bound, CampaignPlan, Confirmation, Copies, Direction, MetricId, Requirement};
 
+use crate::analysis::confirmed::{ConfirmedTest, FAILURES, FindingAgain, confirmed_tests, failed, failed_again};
+use crate::present::number;
 use crate::record::{
     EventKind, Judge, MetricValue, Origin, RecordError, Repository, Standing, TestRow, Verdict, verdict,
 };
-use crate::report::confirmed::{ConfirmedTest, FAILURES, FindingAgain, confirmed_tests, failed, failed_again};
-use crate::report::coverage::{CoverageSummary, coverage};
-use crate::report::number;
-use crate::report::repetition::{Repetition, repetition};
-use crate::report::show::stacked_in;
-use crate::report::shrinking::{Shrinking, shrinking};
-use crate::report::stacked::Stacked;
+use crate::report::facts::coverage::{CoverageSummary, coverage};
+use crate::report::facts::repetition::{Repetition, repetition};
+use crate::report::facts::show::stacked_in;
+use crate::report::facts::shrinking::{Shrinking, shrinking};
+use crate::report::facts::stacked::Stacked;
 
 /// What a campaign found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -100,7 +101,7 @@ pub struct Objective {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FrontTest {
     /// Its name.
-    pub test: String,
+    pub test: TestNumber,
     /// Its number.
     pub number: u32,
     /// A value per objective: that by which it is on the front, of its repetitions where the campaign confirms.
@@ -152,7 +153,7 @@ pub struct RequirementSummary {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Worst {
     /// The test.
-    pub test: String,
+    pub test: TestNumber,
     /// The metric's value in it.
     pub value: f64,
     /// The value and its unit; `(never set)` follows where it is the default.
@@ -163,7 +164,7 @@ pub struct Worst {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ExpectationSummary {
     /// The test's name in the results.
-    pub test: String,
+    pub test: TestNumber,
     /// The regression test's name in the space.
     pub known_test: String,
     /// The metric.
@@ -180,7 +181,7 @@ pub struct ExpectationSummary {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Failure {
     /// The test.
-    pub test: String,
+    pub test: TestNumber,
     /// `crash` or `timeout`.
     pub outcome: String,
     /// Simulation time at which it broke off, in seconds.
@@ -193,11 +194,6 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// How often it was seen again, in words; a dash if the test was run once only.
-    pub(crate) fn again_words(&self) -> String {
-        self.again.as_ref().map_or("–".to_owned(), FindingAgain::words)
-    }
-
     /// Whether it counts as a finding: it does not if fresh runs never show it.
     pub fn stands(&self) -> bool {
         self.again.as_ref().is_none_or(|again| again.standing != Some(Standing::NotConfirmed))
@@ -208,7 +204,7 @@ impl Failure {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotFinite {
     /// The test.
-    pub test: String,
+    pub test: TestNumber,
     /// Simulation time of the first such number, in seconds.
     pub at: f64,
     /// The metrics that read one.
@@ -255,7 +251,7 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
         .collect();
     let warnings = repository.events()?.into_iter().filter(|event| event.kind == EventKind::Warning).map(|event| {
         match event.test {
-            Some(test) => format!("T{test}: {}", event.text),
+            Some(test) => format!("{}: {}", TestNumber(test), event.text),
             None => event.text,
         }
     });
@@ -345,7 +341,7 @@ fn front(
     sorted.sort_by(|a, b| danger(b).total_cmp(&danger(a)).then(a.number.cmp(&b.number)));
     let on_front = sorted.into_iter().map(|row| {
         Ok(FrontTest {
-            test: format!("T{}", row.number),
+            test: TestNumber(row.number),
             number: row.number,
             values: values(row),
             operations: operations(plan, row),
@@ -445,7 +441,7 @@ fn summarise_requirement(
     }
     found.worst = worst.and_then(|(_, row, shown)| {
         let value = shown.value?;
-        Some(Worst { test: format!("T{}", row.number), value, text: value_text(shown, unit) })
+        Some(Worst { test: TestNumber(row.number), value, text: value_text(shown, unit) })
     });
     found
 }
@@ -490,7 +486,7 @@ fn expectations(plan: &CampaignPlan, rows: &[TestRow]) -> Vec<ExpectationSummary
             let metric = plan.metric(expectation.metric);
             let shown = row.value(expectation.metric);
             found.push(ExpectationSummary {
-                test: format!("T{}", row.number),
+                test: TestNumber(row.number),
                 known_test: known.name.clone(),
                 metric: metric.name.clone(),
                 bound: number::exact_bound(expectation.bound, metric.unit.as_deref()),
@@ -512,7 +508,7 @@ fn failures(judge: &Judge<'_>, row: &TestRow) -> Vec<Failure> {
         let fresh = judge.runs(row.number).iter().filter(|run| failed(&run.outcome, word) == Verdict::Violated);
         let (at, outcome) = own.or_else(|| fresh.map(|run| (run.end, &run.outcome)).next())?;
         Some(Failure {
-            test: format!("T{}", row.number),
+            test: TestNumber(row.number),
             outcome: word.to_owned(),
             at,
             detail: outcome.detail().unwrap_or_default(),
@@ -526,7 +522,7 @@ fn not_finite(plan: &CampaignPlan, row: &TestRow) -> Option<NotFinite> {
     let read = || row.values.iter().zip(&plan.metrics).filter(|(shown, _)| shown.not_finite.is_some());
     let at = read().filter_map(|(shown, _)| shown.not_finite).min_by(f64::total_cmp)?;
     let metrics = read().map(|(_, metric)| metric.name.clone()).collect();
-    row.duplicate_of.is_none().then(|| NotFinite { test: format!("T{}", row.number), at, metrics })
+    row.duplicate_of.is_none().then(|| NotFinite { test: TestNumber(row.number), at, metrics })
 }
 
 fn spreads(plan: &CampaignPlan, rows: &[TestRow]) -> Vec<Spread> {
@@ -553,4 +549,13 @@ fn spreads(plan: &CampaignPlan, rows: &[TestRow]) -> Vec<Spread> {
             })
         })
         .collect()
+}
+
+/// The value of an objective by which a test is judged: that of its repetitions where the campaign confirmed it.
+pub(crate) fn shown_value(summary: &Summary, row: &TestRow, objective: usize) -> Option<f64> {
+    let repeated = summary.confirmed.iter().find(|test| test.number == row.number);
+    match repeated.and_then(|test| test.values.as_ref()) {
+        Some(values) => values.get(objective).copied(),
+        None => row.value(summary.objectives[objective].id).value,
+    }
 }

@@ -9,14 +9,13 @@ use sesame_plan::Direction;
 use sesame_search::fitness_of;
 
 use crate::analysis::{Indicator, IndicatorAnalysis, indicators};
+use crate::present::axis::Axis;
+use crate::present::chart::{self, evenly};
+use crate::present::markup::{Markup, coordinate, percent};
+use crate::present::number::{self, plural};
 use crate::record::{RecordError, Repository, TestRow};
-use crate::report::axis::Axis;
-use crate::report::chart::{self, evenly};
-use crate::report::markup::{Markup, coordinate, percent};
-use crate::report::number::{self, plural};
-use crate::report::page::{dot_title, shown_value};
-use crate::report::scatter::dimension;
-use crate::report::summary::Summary;
+use crate::report::facts::summary::{Summary, shown_value};
+use crate::report::html::scatter::{dimension, dot_title};
 
 /// Points of a line at most, evenly chosen: more than a chart has pixels would show nothing new.
 const POINTS: usize = 400;
