@@ -7,11 +7,15 @@
 //!
 //! A [`Recorder`] writes while a campaign runs; a [`Repository`] reads, during a run or after it.
 
+mod columns;
+mod cursor;
 mod difference;
 mod digest;
 mod error;
+mod files;
 mod folder;
 mod fresh;
+mod read_tests;
 mod recognise;
 mod recorder;
 mod repetitions;
@@ -21,6 +25,7 @@ pub mod sample;
 mod scan;
 mod schema;
 mod series;
+mod series_views;
 #[cfg(test)]
 mod tests;
 
@@ -30,13 +35,13 @@ use sesame_base::observation::{Observation, Outcome};
 use sesame_plan::{KnownTestId, Requirement, Test};
 
 pub use difference::{Difference, differences};
-pub use digest::digest;
 pub use error::RecordError;
-pub use folder::{Claim, DATABASE, LOCK, TRACES, claim_folder, latest_folder, latest_unfinished, trace_file};
+pub use files::{DATABASE, LOCK, TRACES, trace_file};
+pub use folder::{Claim, claim_folder, latest_folder, latest_unfinished};
 pub use fresh::{Standing, Tally};
 pub use recorder::Recorder;
 pub use repetitions::{Judge, confirmed_fitness, confirmed_margins};
-pub use repository::{CampaignFacts, Repository};
+pub use repository::{CampaignFacts, Repository, digest};
 pub use scan::{ScannedOperation, ScannedTest};
 pub use schema::SCHEMA;
 pub use sesame_base::observation::MetricValue;

@@ -1,14 +1,12 @@
 //! One hash of the whole content of a results repository.
 
 use std::fmt::Write as _;
-use std::path::Path;
 
 use rusqlite::Connection;
 use rusqlite::types::ValueRef;
 use sha2::{Digest as _, Sha256};
 
-use crate::record::series::PIECES_SINCE;
-use crate::record::{RecordError, Repository, schema};
+use crate::record::schema::{self, PIECES_SINCE};
 
 /// What is hashed, in this order: a name, and a query whose order of rows depends on nothing but the content.
 const CONTENT: &[(&str, &str)] = &[
@@ -96,10 +94,6 @@ const PORTION: usize = 1 << 16;
 /// Results of an earlier schema have the digest that their release computed. Names of columns and verdicts are not hashed,
 /// so the content of a run hashes the same in schemas 6 and 7, except for two things: the plan's JSON, and the outcome of a
 /// test without effect, which is `no_effect` in schema 7 and was `void` before.
-pub fn digest(path: &Path) -> Result<String, RecordError> {
-    Repository::open(path)?.digest()
-}
-
 pub(super) fn of_connection(connection: &Connection, version: i64) -> rusqlite::Result<String> {
     // One read transaction, so that a run writing meanwhile is seen at one point.
     let transaction = connection.unchecked_transaction()?;

@@ -12,9 +12,8 @@ use rusqlite::Connection;
 
 use sesame_plan::CampaignPlan;
 
-use crate::record::schema::{DDL, STANDARD_WORDS_SINCE, wide_views};
-use crate::record::series::PIECES_SINCE;
-use crate::record::{RecordError, series};
+use crate::record::schema::{DDL, PIECES_SINCE, STANDARD_WORDS_SINCE, wide_views};
+use crate::record::{RecordError, series_views};
 
 /// The objects of a schema by name: the kind of each, and the words of the statement that creates it.
 type Objects = BTreeMap<String, (String, String)>;
@@ -50,9 +49,9 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
         made.unwrap_or_else(|error| unreachable!("the schema of this program is sound: {error}"))
     };
     let ours = if schema >= STANDARD_WORDS_SINCE {
-        CURRENT.get_or_init(|| sound(made_by(&[DDL, &series::views()])))
+        CURRENT.get_or_init(|| sound(made_by(&[DDL, &series_views::views()])))
     } else if schema >= PIECES_SINCE {
-        SCHEMA_6.get_or_init(|| sound(made_by(&[DDL_6, &series::views()])))
+        SCHEMA_6.get_or_init(|| sound(made_by(&[DDL_6, &series_views::views()])))
     } else {
         SCHEMA_5.get_or_init(|| sound(made_by(&[DDL_6, TO_SCHEMA_5])))
     };

@@ -7,15 +7,17 @@ use rusqlite::{Connection, ErrorCode, Transaction, params};
 
 use sesame_base::condition;
 use sesame_base::observation::{Observation, Outcome};
+use sesame_base::test_number::TestNumber;
 use sesame_plan::condition::{Condition, Operand};
 use sesame_plan::{Activation, CampaignPlan, Choice};
 use sesame_search as search;
 use sesame_search::indicators::GenerationIndicators;
 
-use crate::record::folder::{BEGUN, DATABASE, Lock};
-use crate::record::schema::{self, index};
+use crate::record::columns::index;
+use crate::record::files::{BEGUN, DATABASE};
+use crate::record::folder::Lock;
 use crate::record::{
-    Claim, Event, EventKind, GenerationCoverage, Origin, RecordError, Repository, ResultSet, TestRecord, series,
+    Claim, Event, EventKind, GenerationCoverage, Origin, RecordError, Repository, ResultSet, TestRecord, schema, series,
 };
 
 /// Writes the results of one campaign run. There is one per folder: it holds the folder's lock.
@@ -448,7 +450,7 @@ fn write_test(transaction: &Transaction<'_>, plan: &CampaignPlan, record: &TestR
         )?
         .execute(params![
             number,
-            format!("T{number}"),
+            TestNumber(*number).to_string(),
             origin.word(),
             known_test,
             generation,

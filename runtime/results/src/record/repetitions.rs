@@ -11,8 +11,8 @@ use sesame_search as search;
 use sesame_search::Margin;
 use sesame_search::confirming::{typical, typical_margin};
 
+use crate::record::columns::{finite, index, metric_value, perhaps_finite, position, unsigned};
 use crate::record::recorder::write_event;
-use crate::record::schema::index;
 use crate::record::{
     Event, EventKind, MetricValue, RecordError, Recorder, Repetition, Repository, ScannedTest, Tally, TestRow, Verdict,
 };
@@ -189,7 +189,7 @@ impl Repository {
             [],
             |row| {
                 let at: (u32, u32) = (row.get(0)?, row.get(1)?);
-                Ok((at, super::repository::position(row, 2)?, super::repository::metric_value(row, 3)?))
+                Ok((at, position(row, 2)?, metric_value(row, 3)?))
             },
         )?;
         let mut of: BTreeMap<(u32, u32), Vec<MetricValue>> = BTreeMap::new();
@@ -204,8 +204,8 @@ impl Repository {
             [],
             |row| {
                 let at: (u32, u32) = (row.get(0)?, row.get(1)?);
-                let ended: (f64, u64) = (super::repository::finite(row, 3)?, super::repository::unsigned(row, 4)?);
-                let limit = super::repository::perhaps_finite(row, 7)?;
+                let ended: (f64, u64) = (finite(row, 3)?, unsigned(row, 4)?);
+                let limit = perhaps_finite(row, 7)?;
                 let outcome: (String, Option<String>, Option<f64>) = (row.get(5)?, row.get(6)?, limit);
                 Ok((at, row.get::<_, String>(2)?, ended, outcome))
             },

@@ -10,7 +10,8 @@ use rusqlite::{Connection, OpenFlags};
 use sesame_base::verdict::ends;
 use sesame_plan::{CampaignPlan, Direction};
 
-use crate::record::{RecordError, series};
+use crate::record::columns::index;
+use crate::record::{RecordError, series_views};
 
 /// The schema's version, in the file's `user_version`.
 pub const SCHEMA: i64 = 7;
@@ -28,6 +29,9 @@ pub(super) const DDL: &str = include_str!("schema.sql");
 /// views, which nothing here reads.
 pub(super) const STANDARD_WORDS_SINCE: i64 = 7;
 
+/// The first schema with series in pieces; before, each point was a row.
+pub(super) const PIECES_SINCE: i64 = 6;
+
 /// Columns that this release reads from tables, and their names before [`STANDARD_WORDS_SINCE`].
 const RENAMED: [(&str, &str); 2] = [("operation_seed", "draw_seed"), ("no_effect", "void")];
 
@@ -43,7 +47,7 @@ pub(super) fn query(sql: &str, schema: i64) -> Cow<'_, str> {
 pub(crate) fn install(connection: &mut Connection, plan: &CampaignPlan, seed: u64) -> rusqlite::Result<()> {
     let transaction = connection.transaction()?;
     transaction.execute_batch(DDL)?;
-    transaction.execute_batch(&series::views())?;
+    transaction.execute_batch(&series_views::views())?;
     transaction.execute_batch(&wide_views(plan))?;
     transaction.execute(
         "INSERT INTO campaign (id, space, name, source, generator, runtime, seed, evaluations, end_after_s, plan) \
@@ -97,11 +101,6 @@ pub(crate) fn install(connection: &mut Connection, plan: &CampaignPlan, seed: u6
     transaction.pragma_update(None, "application_id", APPLICATION_ID)?;
     transaction.pragma_update(None, "user_version", SCHEMA)?;
     transaction.commit()
-}
-
-/// A position in a list as SQLite's integer.
-pub(crate) fn index(position: usize) -> i64 {
-    i64::try_from(position).expect("no list has 2^63 members")
 }
 
 /// The views with a column per metric, which only a plan can name: `results` has a row per test, `front` those of the

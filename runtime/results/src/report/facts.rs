@@ -8,3 +8,4 @@ pub(super) mod show;
 pub(super) mod shrinking;
 pub(super) mod stacked;
 pub(super) mod summary;
+pub(super) mod wording;

@@ -11,8 +11,9 @@ use crate::report::facts::show::{MetricReport, OperationReport, TestList, Verdic
 use crate::report::facts::shrinking::{NamedValue, ShrinkStep, Shrinking, TestSize};
 use crate::report::facts::stacked::Stacked;
 use crate::report::facts::summary::{
-    ExpectationSummary, Failure, NotFinite, Objective, RequirementSummary, Spread, Summary, value_text,
+    ExpectationSummary, Failure, NotFinite, Objective, RequirementSummary, Spread, Summary,
 };
+use crate::report::facts::wording::value_text;
 use crate::report::sentences::{
     as_expected, choices_text, effect_text, outcome_words, planned_text, rate_text, spans_text,
 };

@@ -16,8 +16,8 @@ use crate::record::{
     verdict, violation_spans,
 };
 use crate::report::export;
-use crate::report::facts::stacked::{Stacked, stacked};
-use crate::report::facts::summary;
+use crate::report::facts::stacked::{Stacked, stacked_in};
+use crate::report::facts::wording;
 
 /// A line in the list of all tests.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -213,8 +213,8 @@ fn listed(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow, front: bool) ->
         duplicate_of: row.duplicate_of.map(TestNumber),
         front,
         values: row.values.clone(),
-        violates: summary::violated(plan, judge, row),
-        operations: summary::operations(plan, row),
+        violates: wording::violated(plan, judge, row),
+        operations: wording::operations(plan, row),
     }
 }
 
@@ -280,12 +280,6 @@ pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, fresh: &[Repet
     }
 }
 
-/// The operations whose copies acted at the same time in a recorded test.
-pub(crate) fn stacked_in(plan: &CampaignPlan, record: &TestRecord) -> Vec<Stacked> {
-    let observed: Vec<&[Span]> = record.observation.operations.iter().map(|it| it.intervals.as_slice()).collect();
-    stacked(plan, &record.test, &observed)
-}
-
 fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> {
     let reports = record.test.operations.iter().enumerate().map(|(position, used)| {
         let operation = plan.operation(used.operation);
@@ -341,7 +335,7 @@ fn verdicts(plan: &CampaignPlan, record: &TestRecord, fresh: &[Repetition]) -> V
             verdict: tally.verdict(first),
             first,
             fresh: (!fresh.is_empty()).then_some(FreshVerdicts { tally, interval }),
-            value: summary::value_text(value, metric.unit.as_deref()),
+            value: wording::value_text(value, metric.unit.as_deref()),
             outside: shown
                 .map_or_else(Vec::new, |shown| violation_spans(&shown.series, requirement.bound, observation.end)),
         }

@@ -14,7 +14,7 @@ use sesame_search::{Evaluated, Shrink, Strategy as _, sspr};
 use crate::present::number::{self, fixed};
 use crate::record::{MetricValue, RecordError, Repository, TestRow, fails};
 use crate::report::export::shrunk_block;
-use crate::report::facts::summary::{operations, value_text};
+use crate::report::facts::wording::{operations, value_text};
 
 /// How a test was shrunk.
 #[derive(Debug, Clone, PartialEq, Serialize)]

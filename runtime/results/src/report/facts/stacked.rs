@@ -9,6 +9,7 @@ use serde::Serialize;
 use sesame_plan::{CampaignPlan, Choice, Domain, Operation, OperationId, OperationKind, Span, Test, ValueMode};
 
 use crate::present::number;
+use crate::record::TestRecord;
 
 /// An operation whose copies acted at the same time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -50,9 +51,15 @@ impl Stacked {
     }
 }
 
+/// The operations whose copies acted at the same time in a recorded test.
+pub(crate) fn stacked_in(plan: &CampaignPlan, record: &TestRecord) -> Vec<Stacked> {
+    let observed: Vec<&[Span]> = record.observation.operations.iter().map(|it| it.intervals.as_slice()).collect();
+    stacked(plan, &record.test, &observed)
+}
+
 /// The operations of a test whose copies acted at the same time, in the plan's order. `observed` are the intervals of each
 /// operation of the test, as far as they are known.
-pub(crate) fn stacked(plan: &CampaignPlan, test: &Test, observed: &[&[Span]]) -> Vec<Stacked> {
+fn stacked(plan: &CampaignPlan, test: &Test, observed: &[&[Span]]) -> Vec<Stacked> {
     let mut copies: BTreeMap<OperationId, Vec<usize>> = BTreeMap::new();
     for (at, used) in test.operations.iter().enumerate().take(observed.len()) {
         copies.entry(used.operation).or_default().push(at);

@@ -15,9 +15,9 @@ use crate::record::{
 };
 use crate::report::facts::coverage::{CoverageSummary, coverage};
 use crate::report::facts::repetition::{Repetition, repetition};
-use crate::report::facts::show::stacked_in;
 use crate::report::facts::shrinking::{Shrinking, shrinking};
-use crate::report::facts::stacked::Stacked;
+use crate::report::facts::stacked::{Stacked, stacked_in};
+use crate::report::facts::wording::{operations, value_text, violated};
 
 /// What a campaign found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -363,32 +363,6 @@ fn stacked_of(repository: &Repository, row: &TestRow) -> Result<Vec<Stacked>, Re
     Ok(stacked_in(plan, &repository.test(row.number)?))
 }
 
-/// Names of the requirements a test violates.
-pub(crate) fn violated(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow) -> Vec<String> {
-    plan.requirements
-        .iter()
-        .filter(|requirement| judge.verdict(row, requirement) == Verdict::Violated)
-        .map(|requirement| requirement.name.clone())
-        .collect()
-}
-
-/// A test's operations with their counts, in the space's order, as in `jitter_link0 ×2, lose_link0`.
-pub(crate) fn operations(plan: &CampaignPlan, row: &TestRow) -> String {
-    let named: Vec<String> = plan
-        .operations
-        .iter()
-        .enumerate()
-        .filter_map(|(id, operation)| {
-            match row.test.operations.iter().filter(|used| used.operation.index() == id).count() {
-                0 => None,
-                1 => Some(operation.name.clone()),
-                n => Some(format!("{} ×{n}", operation.name)),
-            }
-        })
-        .collect();
-    if named.is_empty() { "without disturbance".to_owned() } else { named.join(", ") }
-}
-
 fn summarise_requirement(
     plan: &CampaignPlan,
     judge: &Judge<'_>,
@@ -457,15 +431,6 @@ impl RequirementSummary {
             parts.push(format!("{} not confirmed", self.not_confirmed));
         }
         if parts.is_empty() { "–".to_owned() } else { parts.join("; ") }
-    }
-}
-
-/// A metric's value with its unit; `(never set)` follows where it is the default.
-pub(crate) fn value_text(shown: MetricValue, unit: Option<&str>) -> String {
-    match shown.value {
-        None => "unmeasured".to_owned(),
-        Some(value) if shown.set => number::quantity(value, unit),
-        Some(value) => format!("{} (never set)", number::quantity(value, unit)),
     }
 }
 

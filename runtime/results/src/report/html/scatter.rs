@@ -13,7 +13,8 @@ use crate::present::chart;
 use crate::present::markup::{Markup, coordinate, percent};
 use crate::present::number::{self, with_unit};
 use crate::record::{Origin, TestRow};
-use crate::report::facts::summary::{Objective, Summary, operations, shown_value};
+use crate::report::facts::summary::{Objective, Summary, shown_value};
+use crate::report::facts::wording::operations;
 
 /// One axis of a chart.
 #[derive(Debug, Clone)]
