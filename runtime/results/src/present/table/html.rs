@@ -121,7 +121,8 @@ mod tests {
         let texts = |name: &str| {
             let cells = document.descendants().filter(|node| node.has_tag_name(name));
             let text = |node: roxmltree::Node<'_, '_>| {
-                node.descendants().filter(roxmltree::Node::is_text).filter_map(|text| text.text()).collect::<String>()
+                let texts = node.descendants().filter(roxmltree::Node::is_text).filter_map(|text| text.text());
+                texts.collect::<String>().trim().to_owned()
             };
             cells.map(text).collect::<Vec<String>>()
         };
