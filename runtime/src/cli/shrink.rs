@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use sesame_base::observation::{Observation, Outcome};
+use sesame_base::test_number::TestNumber;
 use sesame_plan::{CampaignPlan, Failing, KnownTest, KnownTestId, RequirementId, Search};
 use sesame_results::record::{Origin, Repository, TestRecord, Verdict, verdict};
 
@@ -56,7 +57,7 @@ pub(super) fn shrink(
     }
     let repository = open(results, options.results.as_deref())?;
     let record = repository.test(repository.find(&options.test)?)?;
-    let name = format!("T{}", record.number);
+    let name = TestNumber(record.number).to_string();
     let failing = failing(&repository, &record, &options.requirement)?;
     refuse_changed(&repository, plan, record.number)?;
     let run = repository.path().parent().unwrap_or(results);
@@ -73,9 +74,9 @@ pub(super) fn shrink(
 /// How a test failed, and with which requirements.
 pub(super) fn failing(repository: &Repository, record: &TestRecord, wanted: &[String]) -> Result<Failing, Failure> {
     let plan = repository.plan();
-    let test = format!("T{}", record.number);
+    let test = TestNumber(record.number);
     if record.test.operations.is_empty() {
-        return Err(Failure(format!("{test} disturbs nothing, so there is nothing to make smaller")));
+        return Err(Failure(format!("{test} has no operations, so there is nothing to shrink")));
     }
     match record.observation.outcome {
         Outcome::Crash { .. } if wanted.is_empty() => return Ok(Failing::Crash),

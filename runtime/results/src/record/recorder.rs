@@ -143,7 +143,7 @@ impl Recorder {
         // What would be refused when it is read is never written.
         let unfit = || plan.validate_test(&record.test).err().map(|error| error.to_string());
         if let Some(what) = unrecordable(record).or_else(unfit) {
-            return Err(RecordError::Unrecordable { test: record.number, what, path });
+            return Err(RecordError::Unrecordable { test: TestNumber(record.number), what, path });
         }
         let written = self.repository.connection.transaction().and_then(|transaction| {
             write_test(&transaction, plan, record)?;
@@ -153,7 +153,7 @@ impl Recorder {
             Some(error) if error.extended_code == rusqlite::ffi::SQLITE_CONSTRAINT_PRIMARYKEY => {
                 match self.repository.row(record.number) {
                     Err(RecordError::NoSuchTest { .. }) => self.repository.without_test(record.number),
-                    _ => RecordError::TestExists { number: record.number, path },
+                    _ => RecordError::TestExists { number: TestNumber(record.number), path },
                 }
             }
             _ => RecordError::database("record a test", &path, source),

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use rusqlite::params;
 
 use sesame_base::observation::{MetricObservation, Observation, Outcome, WallTime};
+use sesame_base::test_number::TestNumber;
 use sesame_optimise::dominance::Fitness;
 use sesame_plan::{CampaignPlan, Requirement};
 use sesame_search as search;
@@ -118,7 +119,8 @@ impl Recorder {
         self.check_lock()?;
         let Repetition { test, position, simulator_seed, outcome, end, messages, values } = repetition;
         let path = self.repository().path().to_owned();
-        let unrecordable = |what: String| RecordError::Unrecordable { test: *test, what, path: path.clone() };
+        let unrecordable =
+            |what: String| RecordError::Unrecordable { test: TestNumber(*test), what, path: path.clone() };
         let (detail, limit) = match outcome {
             Outcome::Completed | Outcome::NoEffect | Outcome::Unknown => (None, None),
             Outcome::Crash { message } => (Some(message.as_str()), None),
@@ -166,7 +168,7 @@ impl Recorder {
             }
             for warning in warnings {
                 // Of the campaign: a test's own warnings are those of its own run.
-                let text = format!("repetition {position} of T{test}: {warning}");
+                let text = format!("repetition {position} of {}: {warning}", TestNumber(*test));
                 write_event(&transaction, &Event { kind: EventKind::Warning, test: None, text })?;
             }
             transaction.commit()

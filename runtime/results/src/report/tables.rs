@@ -1,6 +1,6 @@
 //! The tables of reports: each is put together once, and text and HTML render it.
 
-use crate::analysis::confirmed::{ConfirmedTest, tally_words};
+use crate::analysis::confirmed::{ConfirmedTest, FindingAgain, tally_words};
 use crate::analysis::regions::Rule;
 use crate::present::number::{self, plural};
 use crate::present::table::{Cell, Column, Datum, Table};
@@ -144,7 +144,7 @@ pub(super) fn failures(failures: &[Failure]) -> Table {
     for failure in failures {
         let mut cells: Vec<Cell> =
             vec![Datum::Test(failure.test).into(), Datum::text(&failure.outcome).bad_if(true), at(failure.at).into()];
-        cells.extend(again.then(|| Datum::maybe(failure.again.as_ref().map(|again| again.words())).into()));
+        cells.extend(again.then(|| Datum::maybe(failure.again.as_ref().map(FindingAgain::words)).into()));
         cells.push(Datum::text(&failure.detail).into());
         table.row(cells);
     }
@@ -264,7 +264,9 @@ fn findings_of(confirmed: &ConfirmedTest) -> Vec<[Datum; 2]> {
 /// The findings of a test that was run again.
 pub(super) fn findings(confirmed: &ConfirmedTest) -> Table {
     let mut table = Table::with([Column::heading("finding"), Column::words("seen again")]);
-    findings_of(confirmed).into_iter().for_each(|row| table.row(row));
+    for row in findings_of(confirmed) {
+        table.row(row);
+    }
     table
 }
 
@@ -373,7 +375,7 @@ pub(super) fn regions(rules: &[Rule]) -> Table {
 pub(super) fn differences(differences: &[Difference]) -> Table {
     let mut table = Table::with(["", "recorded", "replayed"].map(Column::words));
     for Difference { what, before, after } in differences {
-        table.row([what, before, after].map(|text| Datum::text(text)));
+        table.row([what, before, after].map(Datum::text));
     }
     table
 }

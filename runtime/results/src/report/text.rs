@@ -155,6 +155,8 @@ fn section(text: &mut String, title: &str, table: &Table, options: TextOptions) 
 
 #[cfg(test)]
 mod tests {
+    use sesame_base::test_number::TestNumber;
+
     use super::*;
     use crate::record::{Difference, MetricValue};
     use crate::report::facts::recording::{FedMetric, Sameness};
@@ -162,7 +164,7 @@ mod tests {
     #[test]
     fn a_replay_says_what_differs() {
         let options = TextOptions { width: None, colour: false };
-        let same = Replay { test: "T5".to_owned(), simulator_seed: 7, same: true, differences: vec![] };
+        let same = Replay { test: TestNumber(5), simulator_seed: 7, same: true, differences: vec![] };
         assert_eq!(replay_text(&same, options), "T5 came out the same, bit for bit (simulator seed 7)\n");
         let words = |what: &str, before: &str, after: &str| Difference {
             what: what.to_owned(),

@@ -2,6 +2,7 @@
 
 use rusqlite::Connection;
 
+use sesame_base::test_number::TestNumber;
 use sesame_plan::condition::ConditionEnd;
 use sesame_plan::{Activation, Choice, OperationId, TestOperation};
 
@@ -23,7 +24,7 @@ fn a_test_that_cannot_be_recorded_leaves_nothing_behind() {
     let error = recorder.commit(&unfit).unwrap_err().to_string();
     assert!(error.contains("operations[0].activation") && error.contains("before the start"), "{error}");
     let error = recorder.commit(&records[2]).unwrap_err();
-    assert!(matches!(error, RecordError::TestExists { number: 2, .. }), "{error}");
+    assert!(matches!(error, RecordError::TestExists { number: TestNumber(2), .. }), "{error}");
     assert_eq!(recorder.repository().tests().unwrap().len(), 3);
     recorder.commit(&records[3]).unwrap();
     assert_eq!(recorder.repository().test(3).unwrap(), records[3]);

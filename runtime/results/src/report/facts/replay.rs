@@ -2,13 +2,15 @@
 
 use serde::Serialize;
 
+use sesame_base::test_number::TestNumber;
+
 use crate::record::Difference;
 
 /// What became of a recorded test that was run once more.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Replay {
     /// The test.
-    pub test: String,
+    pub test: TestNumber,
     /// The simulator's seed, then and now.
     pub simulator_seed: u64,
     /// Whether everything observed is the same, bit for bit.

@@ -487,7 +487,7 @@ fn not_finite(plan: &CampaignPlan, row: &TestRow) -> Option<NotFinite> {
     let read = || row.values.iter().zip(&plan.metrics).filter(|(shown, _)| shown.not_finite.is_some());
     let at = read().filter_map(|(shown, _)| shown.not_finite).min_by(f64::total_cmp)?;
     let metrics = read().map(|(_, metric)| metric.name.clone()).collect();
-    row.duplicate_of.is_none().then(|| NotFinite { test: TestNumber(row.number), at, metrics })
+    row.duplicate_of.is_none().then_some(NotFinite { test: TestNumber(row.number), at, metrics })
 }
 
 fn spreads(plan: &CampaignPlan, rows: &[TestRow]) -> Vec<Spread> {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use sesame_base::observation::Outcome;
+use sesame_base::test_number::TestNumber;
 use sesame_optimise::front::Front;
 use sesame_plan::Direction;
 use sesame_search::fitness_of;
@@ -236,7 +237,7 @@ fn fronts(
             let (cx, cy) = (percent(across.share(*x)), percent(1.0 - up.share(*y)));
             let class = format!("dot w{}", shade(stay.from, shown.len()));
             let (from, to) = (stay.from.to_string(), stay.to.to_string());
-            let link = format!("#T{}", row.number);
+            let link = format!("#{}", TestNumber(row.number));
             let linked = drawn.contains(&row.number);
             if linked {
                 markup.open("a", &[("href", &link)]);
