@@ -1,6 +1,6 @@
 //! Analyses of a results file: what campaigns, tests, fronts, points and coverage there are in it, as tables.
 //!
-//! Any results file will do, whatever campaign wrote it and whether or not it is finished. Each analysis reads the file
+//! They read any results file, of any campaign, finished or not. Each analysis reads the file
 //! once from beginning to end, and gives a [`Table`], which prints as a table, as CSV and as JSON.
 
 mod compare;

@@ -1,4 +1,4 @@
-//! How facts are presented, whatever they are about: numbers as people read them, tables, markup, axes and charts.
+//! Presentation, independent of what is presented: numbers as people read them, tables, markup, axes and charts.
 
 pub(crate) mod axis;
 pub(crate) mod chart;

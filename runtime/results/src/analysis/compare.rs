@@ -1,4 +1,4 @@
-//! Runs beside each other: measures that mean the same in each, and groups of runs by their medians and ranks.
+//! Comparison of runs: measures with the same meaning in each, and groups of runs by their medians and ranks.
 
 use std::path::PathBuf;
 
@@ -54,7 +54,7 @@ pub enum CompareError {
         /// Values needed.
         needed: usize,
     },
-    /// The campaign's cells are no grid.
+    /// The campaign's cells are not a grid.
     #[error(transparent)]
     Grid(#[from] GridError),
 }
@@ -63,7 +63,7 @@ fn theirs(objectives: &[String]) -> String {
     if objectives.is_empty() { "none".to_owned() } else { objectives.join(", ") }
 }
 
-/// What a run came to.
+/// The measures of a run.
 #[derive(Debug, Clone, PartialEq)]
 struct Measured {
     group: String,
@@ -144,7 +144,7 @@ pub fn compare(runs: &[Run], reference: Option<&[f64]>, grid: Option<Grid>) -> R
             .collect(),
     };
     let finite = reference.iter().all(|place| place.is_finite());
-    // Numbers of tests mean nothing across runs: points are told apart by their values.
+    // Numbers of tests mean nothing across runs: points are identified by their values.
     let fitness: Vec<Fitness> = measured
         .iter()
         .flat_map(|run| run.front.members())

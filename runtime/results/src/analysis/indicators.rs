@@ -22,7 +22,7 @@ pub struct Indicator {
     pub generation: Option<u32>,
     /// Tests evaluated by then; of an imported campaign as the set's name says.
     pub evaluations: Option<u32>,
-    /// Of these, no exact duplicates. `None` where nobody counted, as of the next three.
+    /// Of these, not exact duplicates. `None`, as the next three, for imported results, in which they were not counted.
     pub unique: Option<u32>,
     /// Of these, without effect.
     pub no_effect: Option<u32>,
@@ -64,7 +64,7 @@ struct Judged {
     cell: Option<usize>,
 }
 
-/// The indicators after each generation that came to its end. Of an imported campaign, whose tests are of no generation,
+/// The indicators after each complete generation. Of an imported campaign, whose tests are of no generation,
 /// there is one for each result set: of the front of its members.
 ///
 /// Hypervolumes are measured from the `reference` given, a value per objective in its unit; else from the one that was
@@ -72,13 +72,12 @@ struct Judged {
 pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<IndicatorAnalysis, RecordError> {
     let plan = repository.plan();
     let objectives = &plan.campaign.objectives;
-    let grid =
-        match &plan.campaign.coverage {
-            Some(goal) => Some(Grid::new(goal.axes.clone()).map_err(|error| {
-                RecordError::damaged(repository.path(), format!("its coverage is no grid: {error}"))
-            })?),
-            None => None,
-        };
+    let grid = match &plan.campaign.coverage {
+        Some(goal) => Some(Grid::new(goal.axes.clone()).map_err(|error| {
+            RecordError::damaged(repository.path(), format!("the cells of its coverage are not a grid: {error}"))
+        })?),
+        None => None,
+    };
     let judge = repository.judge()?;
     let mut tests = Vec::new();
     repository.scan(&mut |test| {

@@ -2,7 +2,7 @@
 //!
 //! For each requirement that tests violate (and for crashes and timeouts) a [tree](tree) of a few questions divides the
 //! tests into regions, and says of each how many of its tests fail. The regions of a tree do not overlap, and together
-//! they hold every test that says anything about the requirement; tests without effect are among them, duplicates and reference
+//! they hold every test that is conclusive about the requirement; tests without effect are among them, duplicates and reference
 //! runs are not.
 
 mod feature;
@@ -69,7 +69,7 @@ struct Step {
     missing: bool,
 }
 
-/// Why regions cannot be told.
+/// Why regions cannot be computed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RegionsError {
@@ -90,7 +90,7 @@ pub enum RegionsError {
 struct Gathered {
     features: Vec<Feature>,
     columns: Columns,
-    /// Per target whether each test fails; `None` for one that says nothing.
+    /// Per target whether each test fails; `None` for a test that is inconclusive.
     labels: Vec<(Target, Vec<Option<bool>>)>,
 }
 

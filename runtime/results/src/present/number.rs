@@ -60,7 +60,7 @@ pub(crate) fn bound(bound: Bound, unit: Option<&str>) -> String {
     }
 }
 
-/// A bound with all its digits, for whoever compares a value with it: what is expected may be exact to the last bit.
+/// A bound with all its digits, for comparison with a value: an expectation may be exact to the last bit.
 pub(crate) fn exact_bound(bound: Bound, unit: Option<&str>) -> String {
     let (sign, number) = match bound {
         Bound::AtMost { value } => ("≤ ", exact(value)),

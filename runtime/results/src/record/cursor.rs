@@ -7,7 +7,7 @@ pub(super) struct Cursor<'s, T> {
     rows: Rows<'s>,
     read: fn(&Row<'_>) -> rusqlite::Result<T>,
     next: Option<(u32, T)>,
-    /// A test that rows were passed over of: nobody asked for it.
+    /// A test whose rows were skipped, since nothing asked for it.
     passed_over: Option<u32>,
 }
 

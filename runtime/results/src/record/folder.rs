@@ -11,10 +11,10 @@ use crate::record::{RecordError, Repository};
 /// A fresh folder for a run.
 #[derive(Debug)]
 pub struct Claim {
-    /// The folder; it exists now, holds no results, and is nobody else's as long as the claim is kept.
+    /// The folder; it exists, holds no results, and no other process uses it as long as the claim exists.
     pub folder: PathBuf,
     /// The latest run of the same name that was begun, is not finished, and that no process is writing: what `resume`
-    /// could go on with.
+    /// could continue.
     pub unfinished: Option<PathBuf>,
     pub(crate) lock: Lock,
 }

@@ -228,7 +228,7 @@ impl Repository {
         }
         let orphans = [operations.orphan(), choices.orphan(), values.orphan()];
         match orphans.into_iter().flatten().min() {
-            // A test that is asked for by itself is missing for whoever asked.
+            // A single test is missing for the caller, who gets an error of its own.
             Some(orphan) if numbers.start() < numbers.end() => Err(self.without_test(orphan)),
             _ => Ok(found),
         }
@@ -333,7 +333,7 @@ impl Repository {
                 }))
             },
         )?;
-        // A run that could not report what its operations did has no effects; of an imported one nobody counted them.
+        // A run that could not report what its operations did has no effects; imported runs have effects without counts.
         let mut effects: BTreeMap<u32, Vec<OperationEffect>> = BTreeMap::new();
         for row in rows {
             let of = counted.remove(&row.number).unwrap_or_default();

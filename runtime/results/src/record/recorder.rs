@@ -82,7 +82,7 @@ impl Recorder {
         Recorder::begin_session(repository, lock, workers)
     }
 
-    /// Goes on with the results of a run that was interrupted.
+    /// Continues the results of a run that was interrupted.
     pub fn resume(folder: &Path, workers: u32) -> Result<Recorder, RecordError> {
         Recorder::open(folder, workers, false)
     }
@@ -261,7 +261,7 @@ impl Recorder {
         written.map_err(|e| RecordError::database("record the indicators", &self.repository.path, e))
     }
 
-    /// Records an event. A warning said before is kept once, so that a resumed run may say it again.
+    /// Records an event. An equal warning is recorded once, so that a resumed run may repeat it.
     pub fn put_event(&mut self, event: &Event) -> Result<(), RecordError> {
         let written = self.repository.connection.transaction().and_then(|transaction| {
             let known: bool = transaction
@@ -277,7 +277,7 @@ impl Recorder {
         written.map_err(|e| RecordError::database("record an event", &self.repository.path, e))
     }
 
-    /// Ends this session but not the run: `resume` can go on with it. Dropping does the same without the time of day.
+    /// Ends this session but not the run: `resume` can continue it. Dropping does the same without the time of day.
     pub fn interrupt(self) -> Result<(), RecordError> {
         self.end_session()
     }
@@ -293,7 +293,7 @@ impl Recorder {
         self.end_session()?;
         self.repository.connection.flush_prepared_statement_cache();
         // Leaving the write-ahead log needs the file for ourselves. With a reader at work the log stays, which loses
-        // nothing: whoever closes the file last folds it in.
+        // nothing: the last process that closes the file folds it in.
         let left: rusqlite::Result<String> =
             self.repository.connection.query_row("PRAGMA journal_mode = DELETE", [], |row| row.get(0));
         match left {
@@ -336,7 +336,7 @@ fn host() -> Option<String> {
     Some(name.trim().to_owned()).filter(|name| !name.is_empty())
 }
 
-/// What of a test SQLite could not give back as it is: numbers that are none, counts beyond 63 bits.
+/// What SQLite could not return as it was written: numbers that are not finite, counts beyond 63 bits.
 fn unrecordable(record: &TestRecord) -> Option<String> {
     let Observation { outcome, end, operations, metrics, messages, wall, unheard: _, warnings: _ } =
         &record.observation;

@@ -42,7 +42,7 @@ pub fn confirmed_margins(plan: &CampaignPlan, repetitions: &[Repetition]) -> Opt
     Some((0..plan.requirements.len()).map(of).collect())
 }
 
-/// The repetitions by which a campaign confirms a test of its own accord, if it does and all are there.
+/// The repetitions by which a campaign itself confirms a test, if it does and all are there.
 fn own<'a>(plan: &CampaignPlan, repetitions: &'a [Repetition]) -> Option<&'a [Repetition]> {
     let times = plan.campaign.confirm?.times;
     let count = repetitions.iter().take_while(|run| run.position <= times).count();
@@ -69,7 +69,7 @@ impl Repetition {
     }
 }
 
-/// By what the tests of a campaign are judged.
+/// Judges the tests of a campaign by their fresh runs where they were run again.
 #[derive(Debug)]
 pub struct Judge<'a> {
     plan: &'a CampaignPlan,
@@ -96,7 +96,7 @@ impl Judge<'_> {
         self.tally(test.duplicate_of.unwrap_or(test.number), requirement).verdict(test.verdict(requirement))
     }
 
-    /// What the fresh runs of a test say about a requirement; of a test that is no duplicate.
+    /// The verdicts of a test's fresh runs on a requirement; the test must not be a duplicate.
     pub fn tally(&self, test: u32, requirement: &Requirement) -> Tally {
         Tally::of(self.runs(test).iter().map(|run| run.verdict(requirement)))
     }
@@ -178,7 +178,7 @@ impl Recorder {
 }
 
 impl Repository {
-    /// By what its tests are judged.
+    /// A judge of its tests.
     pub fn judge(&self) -> Result<Judge<'_>, RecordError> {
         Ok(Judge { plan: self.plan(), repetitions: self.repetitions()? })
     }

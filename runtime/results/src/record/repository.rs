@@ -50,7 +50,7 @@ impl Repository {
         let schema = connection
             .pragma_query_value(None, "user_version", |row| row.get(0))
             .map_err(|e| RecordError::database("read the campaign", &path, e))?;
-        // Before anything is asked of it: what has the name of a table may be something else that never comes to an end.
+        // Before the first query: an object with the name of a table may be a view that never ends.
         recognise::tables(&connection, &path, schema)?;
         let row: Result<(String, String, String, Option<String>), _> =
             connection.query_row("SELECT plan, seed, runtime, stop FROM campaign", [], |row| {
@@ -63,7 +63,7 @@ impl Repository {
         let plan = serde_json::from_str(&plan)
             .map_err(|e| RecordError::damaged(&path, format!("its plan cannot be read: {e}")))?;
         recognise::views(&connection, &path, &plan)?;
-        let seed = seed.parse().map_err(|_| RecordError::damaged(&path, format!("`{seed}` is no seed")))?;
+        let seed = seed.parse().map_err(|_| RecordError::damaged(&path, format!("`{seed}` is not a seed")))?;
         connection.set_prepared_statement_cache_capacity(STATEMENTS);
         Ok(Repository { connection, path, schema, facts: CampaignFacts { plan, seed, runtime, stop } })
     }
@@ -78,7 +78,7 @@ impl Repository {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
-    /// Makes the folder for traces, if there is none. Gives the run's folder as workers, which work elsewhere, need it.
+    /// Makes the folder for traces, if it is missing. Returns the absolute path of the run's folder, for workers in other folders.
     pub fn make_trace_folder(&self) -> Result<PathBuf, RecordError> {
         let traces = self.folder().join(TRACES);
         let made = std::fs::create_dir_all(&traces).and_then(|()| std::path::absolute(self.folder()));
@@ -273,7 +273,7 @@ impl Repository {
     }
 
     pub(super) fn seed(&self, text: &str) -> Result<u64, RecordError> {
-        text.parse().map_err(|_| RecordError::damaged(&self.path, format!("`{text}` is no seed")))
+        text.parse().map_err(|_| RecordError::damaged(&self.path, format!("`{text}` is not a seed")))
     }
 
     pub(super) fn read<T>(

@@ -47,7 +47,7 @@ fn operation(name: &str, topic: u32, kind: OperationKind, parameters: Vec<Parame
     }
 }
 
-/// The metrics of this plan that go one way only; a cycle time is set once, to whatever it is.
+/// The metrics of this plan that change in one direction only; a cycle time is set once.
 fn trends(name: &str) -> Option<Trend> {
     match name {
         "collision_occurrence" | "fuzzing_time" | "top_speed" => Some(Trend::Rising),

@@ -10,7 +10,7 @@ use crate::record::columns::{choice, metric_value, perhaps_finite, position, spa
 use crate::record::cursor::Cursor;
 use crate::record::{MetricValue, Origin, RecordError, Repository};
 
-/// One test as analyses see it: what it disturbed, when, and what came out; no time series.
+/// One test as analyses see it: its operations, when they acted, and the results; without time series.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScannedTest {
     /// Its number in the campaign.
@@ -68,16 +68,17 @@ impl ScannedTest {
         Point::of(&disturbances, convention)
     }
 
-    /// Its point, if it counts for coverage: it had an effect, and is no duplicate.
+    /// Its point, if it counts for coverage: it had an effect, and is not a duplicate.
     pub fn covering_point(&self, plan: &CampaignPlan, convention: Convention) -> Option<Point> {
         coverage::counts(&self.outcome, self.duplicate_of.is_some()).then(|| self.point(plan, convention)).flatten()
     }
 }
 
-/// A row of `operations`: its position, the operation's name, when it was to be active, and whether it had an effect, or nobody counted.
+/// A row of `operations`: its position, the operation's name, when it was to be active, and whether it had an effect or
+/// effects were not counted.
 type PlannedRow = (usize, String, Option<Span>, bool);
 
-/// A row of `choices`: the position of its operation, and the choice; `None` where it is none.
+/// A row of `choices`: the position of its operation, and the choice; `None` if it is damaged.
 type ChoiceRow = (usize, Option<Choice>);
 
 impl Repository {

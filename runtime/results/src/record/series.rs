@@ -1,4 +1,4 @@
-//! Time series as they are kept: in pieces of up to 64 points, 8 bytes a value, of which SQL can still read each point.
+//! Time series as they are stored: in pieces of up to 64 points, 8 bytes a value, from which SQL can still read each point.
 //!
 //! Series are most of what a campaign records: a row per point took three times the space, and ten times as long to read.
 //! The view `change_points` has such a row per point, computed from the pieces.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-/// The views that show series point by point, whatever reads them: doubles are put together from their digits.
+/// The views that show series point by point, in any SQLite client: doubles are computed from their digits.
 pub(super) fn views() -> String {
     let zeros = "'[0' || replace(hex(zeroblob(p.points - 1)), '00', ',0') || ']'";
     let digits = |column: &str, bytes: &str| {
@@ -19,7 +19,7 @@ pub(super) fn views() -> String {
         };
         (0..10).map(bit).collect::<Vec<_>>().join(" * ")
     };
-    // Each step is exact, whatever computes it: a power of two times a number of 53 bits.
+    // Each step is exact on every machine: a power of two times a number of 53 bits.
     let to_double = format!(
         "CASE WHEN digits >= '8' THEN -1.0 ELSE 1.0 END * CASE \
          WHEN exponent >= 1023 THEN (1.0 + mantissa / 4503599627370496.0) * ({}) \

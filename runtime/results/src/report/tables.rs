@@ -111,7 +111,7 @@ pub(super) fn expectations(expectations: &[ExpectationSummary]) -> Table {
             Datum::text(known_test).into(),
             Datum::Test(*test).into(),
             Datum::text(metric).into(),
-            // All digits, which a comparison goes by.
+            // All digits, since the comparison is exact.
             Cell::from(Datum::Text(value.map_or("unmeasured".to_owned(), number::exact))),
             Datum::text(bound).into(),
             Datum::text(as_expected(*verdict)).bad_if(*verdict != Verdict::Satisfied),

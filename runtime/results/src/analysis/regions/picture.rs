@@ -66,7 +66,7 @@ fn bar(
     let title = format!("{words}: {}", tally(node.tally));
     let (x, y) = (percent(before / all), pixels(top));
     let (wide, high) = (percent(width), pixels(BAND));
-    // What does not fit into a bar is cut off there, as pictures inside others are; pointing at it tells it whole.
+    // Text that does not fit into a bar is cut off; its tooltip has all of it.
     let place = [("x", x.as_str()), ("y", &y), ("width", &wide), ("height", &high)];
     markup.open("svg", &[&place[..], &[("role", "img"), ("aria-label", &title)]].concat());
     markup.element("title", &[], &title);

@@ -83,8 +83,9 @@ impl WorstOfCells {
 pub(crate) fn coverage(repository: &Repository) -> Result<Option<CoverageSummary>, RecordError> {
     let plan = repository.plan();
     let Some(goal) = &plan.campaign.coverage else { return Ok(None) };
-    let grid = Grid::new(goal.axes.clone())
-        .map_err(|error| RecordError::damaged(repository.path(), format!("its coverage is no grid: {error}")))?;
+    let grid = Grid::new(goal.axes.clone()).map_err(|error| {
+        RecordError::damaged(repository.path(), format!("the cells of its coverage are not a grid: {error}"))
+    })?;
     let mut points = Vec::new();
     let mut worst = WorstOfCells::new(plan);
     repository.scan(&mut |test| {

@@ -1,4 +1,4 @@
-//! What repeating one test says about it: how often each requirement was violated, and how sure that is.
+//! Repetition of one test: how often it violated each requirement, and how sure that is.
 
 use serde::Serialize;
 
@@ -7,7 +7,7 @@ use sesame_plan::{CampaignPlan, Search};
 use crate::analysis::statistics::wilson;
 use crate::record::{Origin, Tally, TestRow};
 
-/// What the repetitions of one test say.
+/// The results of repeating one test.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Repetition {
     /// The test that was repeated.
@@ -25,13 +25,13 @@ pub struct ViolationRate {
     pub text: String,
     /// Runs that violate it.
     pub violated: usize,
-    /// Runs that say anything about it: those that keep it, and those that violate it.
+    /// Runs that are conclusive about it: those that satisfy it, and those that violate it.
     pub conclusive: usize,
-    /// The 95 % Wilson interval of the probability that a run violates it; `None` when no run says anything.
+    /// The 95 % Wilson interval of the probability that a run violates it; `None` if all runs are inconclusive.
     pub interval: Option<[f64; 2]>,
 }
 
-/// The repetition that a plan's campaign is, if it is one.
+/// The results of a campaign that repeats a test; `None` for any other.
 pub(crate) fn repetition(plan: &CampaignPlan, rows: &[TestRow]) -> Option<Repetition> {
     let Search::Repeat { test, .. } = plan.campaign.search else { return None };
     let requirements = plan.requirements.iter().map(|requirement| {

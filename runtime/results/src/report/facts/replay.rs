@@ -1,4 +1,4 @@
-//! Whether a test that was run once more came out the same.
+//! Whether a test that was run once more gave the same results.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use sesame_base::test_number::TestNumber;
 
 use crate::record::Difference;
 
-/// What became of a recorded test that was run once more.
+/// The result of running a recorded test once more.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Replay {
     /// The test.
@@ -15,6 +15,6 @@ pub struct Replay {
     pub simulator_seed: u64,
     /// Whether everything observed is the same, bit for bit.
     pub same: bool,
-    /// What differs, if anything: `before` as recorded, `after` as replayed.
+    /// The differences: `before` as recorded, `after` as replayed.
     pub differences: Vec<Difference>,
 }

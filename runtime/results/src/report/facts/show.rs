@@ -89,12 +89,12 @@ pub struct TestReport {
     pub metrics: Vec<MetricReport>,
     /// All requirements of the space.
     pub requirements: Vec<VerdictReport>,
-    /// What its repetitions say, where it was run again.
+    /// Findings of its fresh runs, if it was run again.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirmed: Option<ConfirmedTest>,
-    /// What should be brought to the user's attention.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
-    /// What the session in which it ran left about it, such as the last words of its worker.
+    /// Notes of the session in which it ran, such as the last stderr lines of its worker.
     pub notes: Vec<String>,
     /// Its trace, or that of the test whose result stands for it, where there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -169,11 +169,11 @@ pub struct VerdictReport {
     pub metric: String,
     /// The bound in words.
     pub bound: String,
-    /// What the test says: its fresh runs where it was run again, else its one run.
+    /// The verdict of the test: of its fresh runs if it was run again, else of its only run.
     pub verdict: Verdict,
-    /// What its first run says.
+    /// The verdict of its first run.
     pub first: Verdict,
-    /// What its fresh runs say, where it was run again.
+    /// The verdicts of its fresh runs, if it was run again.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fresh: Option<FreshVerdicts>,
     /// The metric's value in the first run, in words.
@@ -182,13 +182,13 @@ pub struct VerdictReport {
     pub outside: Vec<Span>,
 }
 
-/// What the fresh runs of a test say about a requirement.
+/// The verdicts of a test's fresh runs on a requirement.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FreshVerdicts {
     /// How many say what.
     #[serde(flatten)]
     pub tally: Tally,
-    /// The 95 % Wilson interval of the probability that a run violates it; `None` where none says anything.
+    /// The 95 % Wilson interval of the probability that a run violates it; `None` if all are inconclusive.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -239,7 +239,7 @@ pub fn show(repository: &Repository, name: &str) -> Result<TestReport, RecordErr
     Ok(report)
 }
 
-/// Everything on a test, from its record and its fresh runs; findings that came again, notes and trace are not there.
+/// Everything on a test, from its record and its fresh runs, without the findings of fresh runs, notes and trace.
 pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, fresh: &[Repetition], front: bool) -> TestReport {
     let observation = &record.observation;
     TestReport {

@@ -27,9 +27,9 @@ pub struct Shrinking {
     pub runs: u32,
     /// Whether no single step shrinks the smallest test further: all of them were tried.
     pub minimal: bool,
-    /// The test as it was, in these results; `None` where it has not run yet.
+    /// The original test in these results; `None` if it has not run yet.
     pub before: Option<TestSize>,
-    /// The smallest test that still fails; `None` where not even the test itself failed again.
+    /// The smallest test that still fails; `None` if not even the original failed again.
     pub after: Option<TestSize>,
     /// The smallest test as a `test` block of the language.
     pub block: Option<String>,
@@ -55,7 +55,7 @@ pub struct TestSize {
     pub intensity: Option<f64>,
     /// How strong its operations are in total, each from 0 to 1, see [`strength`].
     pub strength: f64,
-    /// What its run showed, of each metric that its failing is about.
+    /// The values of its run, of each metric that its failing is about.
     pub values: Vec<NamedValue>,
 }
 
@@ -66,19 +66,19 @@ pub struct ShrinkStep {
     pub test: TestNumber,
     /// The test that it was made of.
     pub base: Option<TestNumber>,
-    /// What it was tried for, in a word.
+    /// The phase of the shrink that tried it.
     pub tried: String,
-    /// What is different from the test that it was made of.
+    /// The difference from the test that it was made of.
     pub change: String,
     /// In how many of its runs it failed.
     pub failed: u32,
-    /// Whether it was gone on with.
+    /// Whether it was accepted: the next tests were made of it.
     pub kept: bool,
-    /// What its first run showed, of each metric that its failing is about.
+    /// The values of its first run, of each metric that its failing is about.
     pub values: Vec<NamedValue>,
 }
 
-/// What a run showed of a metric.
+/// The value of a metric in a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NamedValue {
     /// The metric.
@@ -91,7 +91,7 @@ pub struct NamedValue {
 }
 
 impl Shrinking {
-    /// Numbers of the test as it was and of the smallest one, if there is a smaller one.
+    /// Numbers of the original and of the smallest test, if there is a smaller one.
     pub(crate) fn ends(&self) -> Vec<u32> {
         let mut ends: Vec<u32> = self.before.iter().chain(&self.after).map(|size| size.number).collect();
         ends.dedup();
@@ -99,7 +99,7 @@ impl Shrinking {
     }
 }
 
-/// The way to a smaller test, if the campaign of these results is one: the search is walked again over what is recorded.
+/// How a test was shrunk, if these results are of a shrink: the search is replayed over the recorded tests.
 pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Option<Shrinking>, RecordError> {
     let plan = repository.plan();
     let (Search::Shrink { test, failing, .. }, Some(mut search)) = (&plan.campaign.search, Shrink::of(plan)) else {
@@ -117,7 +117,7 @@ pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Opt
             let (test, fitness) = (candidate.test.clone(), Fitness::Measured(Vec::new()));
             told.push(Evaluated { number, test, fitness, point: None, course: None, margins: Vec::new(), failing });
         }
-        // A run that is unfinished is told as far as its last whole generation.
+        // An unfinished run is shown up to its last complete generation.
         if asked.is_empty() || told.len() < asked.len() {
             break;
         }
@@ -134,7 +134,7 @@ pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Opt
             tried: tried.phase.words().to_owned(),
             change: match tried.base {
                 Some(base) => change(plan, &search.tried()[base].test, &tried.test),
-                None => format!("{name} as it was"),
+                None => format!("{name} unchanged"),
             },
             failed: tried.failed?,
             kept: kept.contains(&at),
@@ -212,7 +212,7 @@ fn size(
     })
 }
 
-/// What of a test is different from the one that it was made of.
+/// How a test differs from the one that it was made of.
 fn change(plan: &CampaignPlan, base: &Test, test: &Test) -> String {
     let name = |used: &TestOperation| plan.operation(used.operation).name.as_str();
     if test.operations.len() < base.operations.len() {
@@ -256,7 +256,7 @@ fn activation(plan: &CampaignPlan, activation: &Activation) -> String {
         Activation::ConditionFor { start, length, times } => {
             format!("when {} for {} s{}", words(start), fixed(*length, 2), often(*times))
         }
-        Activation::Offline => "beside the run".to_owned(),
+        Activation::Offline => "before or after the run".to_owned(),
     }
 }
 

@@ -1,6 +1,6 @@
-//! Copies of one operation that acted at the same time: how many, and what their choices came to together.
+//! Copies of one operation that acted at the same time: how many, and the sums of their choices.
 //!
-//! It goes by the intervals that were observed. Where copies are kept apart there is nothing to find but in known tests.
+//! This is computed from the observed intervals. Where a campaign keeps copies apart, only regression tests can have any.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,11 +18,11 @@ pub struct Stacked {
     pub operation: String,
     /// The most copies that were active at once: 2 or more.
     pub copies: usize,
-    /// What the choices came to together, per parameter whose choices add up.
+    /// The sums of their choices, per parameter whose choices add up.
     pub sums: Vec<StackedSum>,
 }
 
-/// What the choices of copies for one parameter came to together.
+/// The sum of the choices of copies for one parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StackedSum {
     /// The parameter.

@@ -1,4 +1,4 @@
-//! The front of a campaign as pictures and a table, or how far metrics went where there is none.
+//! The front of a campaign as pictures and a table, or the ranges of metrics if there are no objectives.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;

@@ -23,7 +23,7 @@ use crate::report::tables;
 /// Timelines drawn at most; of a larger front evenly chosen ones.
 const TIMELINES: usize = 24;
 
-/// Writes the page beside the results, or wherever it is wanted.
+/// Writes the page to this path, beside the results or elsewhere.
 pub fn write_page(repository: &Repository, path: &Path) -> Result<(), RecordError> {
     write_page_with(repository, path, &repository.digest()?)
 }
@@ -40,7 +40,7 @@ pub fn page(repository: &Repository) -> Result<String, RecordError> {
     page_in(repository, Path::new(""), &repository.digest()?)
 }
 
-/// The page, with the run's folder as it is seen from the page's place.
+/// The page; `folder` is the path of the run's folder relative to the page.
 fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<String, RecordError> {
     let rows = repository.tests()?;
     let members = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);

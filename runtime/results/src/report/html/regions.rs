@@ -26,9 +26,9 @@ pub(super) fn regions(body: &mut Markup, repository: &Repository) -> Result<(), 
     }
     body.open("section", &[("id", "regions")]);
     body.element("h2", &[], "Where tests fail");
-    let caption = "Regions of tests that a small decision tree tells apart, from the reduced space (T1 to O3) and the \
-                   operations; the redder, the more fail. Rules describe these tests: whether they hold for others, only \
-                   tests can tell.";
+    let caption = "Regions of tests that a small decision tree separates, by the reduced space (T1 to O3) and the \
+                   operations; the redder, the more fail. Rules describe these tests; only further tests can show \
+                   whether they hold for others.";
     body.element("p", &[("class", "quiet")], caption);
     for regions in &found {
         of_one(body, regions, repository);

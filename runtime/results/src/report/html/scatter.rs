@@ -44,7 +44,7 @@ pub(crate) struct Point {
     pub(crate) kind: Kind,
     /// The test's name.
     pub(crate) test: TestNumber,
-    /// What is said of it when it is pointed at.
+    /// Its tooltip.
     pub(crate) title: String,
     /// Whether the page has a timeline of it to jump to.
     pub(crate) linked: bool,

@@ -11,7 +11,7 @@ use crate::report::html::timeline::timeline;
 use crate::report::sentences::outcome_sentence;
 use crate::report::tables;
 
-/// Draws a test of these results; `folder` is the run's folder as it is seen from the page's place.
+/// Draws a test of these results; `folder` is the path of the run's folder relative to the page.
 pub(super) fn test(
     body: &mut Markup,
     repository: &Repository,
