@@ -467,7 +467,7 @@ fn read_all(folder: &Path) -> Read {
             )
         };
     }
-    let shown = |dataset: analysis::Dataset| (dataset.text(options), dataset.csv(), dataset.json());
+    let shown = |dataset: analysis::Table| (dataset.text(options), dataset.csv(), dataset.json());
     ask!(repository.digest(), |digest| digest);
     ask!(repository.sessions(), |sessions| sessions);
     ask!(analysis::campaigns(std::slice::from_ref(&repository)), shown);

@@ -170,7 +170,7 @@ fn results_left_in_the_middle_of_writing_are_put_right_where_something_may_be_wr
         }
         disk.remount("ro");
         let refused = runner.run(&["digest", "--results", "disk/3"]).expect(1);
-        assert!(refused.err.contains("a run that broke off left these results unsettled"), "{}", refused.err);
+        assert!(refused.err.contains("a run that broke off left these results in need of recovery"), "{}", refused.err);
         assert!(refused.err.contains("disk/3"), "{}", refused.err);
         disk.remount("rw");
         assert_eq!(runner.run(&["digest", "--results", "disk/3"]).expect(0).out.trim(), whole);

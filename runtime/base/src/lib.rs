@@ -8,6 +8,7 @@ pub mod activation;
 pub mod condition;
 pub mod decimal;
 pub mod observation;
+pub mod test_number;
 pub mod time;
 pub mod verdict;
 pub mod visible;

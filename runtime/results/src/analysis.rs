@@ -1,13 +1,14 @@
 //! Analyses of a results file: what campaigns, tests, fronts, points and coverage there are in it, as tables.
 //!
-//! Any results file will do, whatever campaign wrote it and whether or not it is finished. Each analysis reads the file
-//! once from beginning to end, and gives a [`Dataset`], which prints as a table, as CSV and as JSON.
+//! They read any results file, of any campaign, finished or not. Each analysis reads the file
+//! once from beginning to end, and gives a [`Table`], which prints as a table, as CSV and as JSON.
 
 mod compare;
-mod dataset;
+pub(crate) mod confirmed;
 mod indicators;
 mod rank_sum;
 pub mod regions;
+pub(crate) mod statistics;
 #[cfg(test)]
 mod tests;
 
@@ -20,11 +21,11 @@ use sesame_search::coverage::{Coverage, CurvePoint, Feasible, Grid, curve};
 use sesame_search::in_unit;
 use sesame_search::sspr::Convention;
 
+use crate::analysis::confirmed::confirmed_tests;
 use crate::record::{Origin, RecordError, Repository, ScannedTest};
-use crate::report::confirmed_tests;
 
+pub use crate::present::table::{Datum, Table, TextOptions};
 pub use compare::{CompareError, Comparison, Run, compare};
-pub use dataset::{Dataset, Datum};
 pub use indicators::{Indicator, IndicatorAnalysis, indicators};
 pub use rank_sum::{RankSum, rank_sum};
 
@@ -56,9 +57,9 @@ impl Selection {
 }
 
 /// What each file holds, one row per file, in their order.
-pub fn campaigns(repositories: &[Repository]) -> Result<Dataset, RecordError> {
+pub fn campaigns(repositories: &[Repository]) -> Result<Table, RecordError> {
     let columns = ["file", "space", "campaign", "search", "seed", "tests", "front", "objectives", "sets", "ended"];
-    let mut dataset = Dataset::new(columns.map(str::to_owned));
+    let mut dataset = Table::new(columns.map(str::to_owned));
     for repository in repositories {
         let facts = repository.campaign();
         let plan = &facts.plan;
@@ -90,21 +91,21 @@ fn search_word(search: &Search) -> &'static str {
         Search::Falsification { .. } => "falsification",
         Search::Random { .. } => "random",
         Search::Repeat { .. } => "repeat",
-        Search::Known { .. } => "known tests",
+        Search::Known { .. } => "regression tests",
         Search::Shrink { .. } => "shrink",
     }
 }
 
 /// All tests but the reference runs: where each comes from, how it ended, and the value of each metric; of imported ones
 /// also what they were called.
-pub fn tests(repository: &Repository, selection: &Selection) -> Result<Dataset, RecordError> {
+pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, RecordError> {
     let plan = repository.plan();
     let originals = repository.original_names()?;
     let original = (!originals.is_empty()).then(|| "original_name".to_owned());
     let columns = ["origin", "generation", "outcome", "duplicate_of", "operations"].map(str::to_owned);
     let metrics = plan.metrics.iter().map(|metric| metric.name.clone());
     let mut dataset =
-        Dataset::new(std::iter::once("test".to_owned()).chain(original.clone()).chain(columns).chain(metrics));
+        Table::new(std::iter::once("test".to_owned()).chain(original.clone()).chain(columns).chain(metrics));
     repository.scan(&mut |test| {
         if test.origin == Origin::Reference || !selection.holds(test.number) {
             return;
@@ -115,17 +116,13 @@ pub fn tests(repository: &Repository, selection: &Selection) -> Result<Dataset, 
             Datum::Text(test.origin.word().to_owned()),
             test.generation.map_or(Datum::Missing, |generation| Datum::Whole(i64::from(generation))),
             Datum::Text(test.outcome.word().to_owned()),
-            test.duplicate_of.map_or(Datum::Missing, name),
+            test.duplicate_of.map_or(Datum::Missing, Datum::test),
             Datum::Text(operations(plan, &test)),
         ];
         let values = (0u32..).map(MetricId).take(plan.metrics.len()).map(|id| Datum::real(test.value(id).value));
-        dataset.row(std::iter::once(name(test.number)).chain(called).chain(head).chain(values));
+        dataset.row(std::iter::once(Datum::test(test.number)).chain(called).chain(head).chain(values));
     })?;
     Ok(dataset)
-}
-
-fn name(number: u32) -> Datum {
-    Datum::Text(format!("T{number}"))
 }
 
 /// A test's operations in its order, apart by spaces.
@@ -139,9 +136,9 @@ fn operations(plan: &CampaignPlan, test: &ScannedTest) -> String {
 /// own fronts. Without a selection these are the tests of the whole file.
 ///
 /// Where tests were run again, `finding` is what fresh runs show most often (a requirement, `crash` or `timeout`), `confirmed`
-/// is in how many of the `said` runs that say anything about it, of all `repetitions`. From `confirmed_low` to
+/// is in how many of the `conclusive` runs, of all `repetitions`. From `confirmed_low` to
 /// `confirmed_high` is the 95 % Wilson interval, and `standing` is `confirmed`, `flaky` or `not confirmed`.
-pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, RecordError> {
+pub fn front(repository: &Repository, selection: &Selection) -> Result<Table, RecordError> {
     let plan = repository.plan();
     let objectives = &plan.campaign.objectives;
     let judge = repository.judge()?;
@@ -159,11 +156,11 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, 
     };
     let again: &[&str] = match confirmed.len() {
         0 => &[],
-        _ => &["finding", "confirmed", "said", "repetitions", "confirmed_low", "confirmed_high", "standing"],
+        _ => &["finding", "confirmed", "conclusive", "repetitions", "confirmed_low", "confirmed_high", "standing"],
     };
     let again_columns = again.iter().map(|&column| column.to_owned());
     let mut dataset =
-        Dataset::new(["test".to_owned()].into_iter().chain(names).chain(["same_as".to_owned()]).chain(again_columns));
+        Table::new(["test".to_owned()].into_iter().chain(names).chain(["same_as".to_owned()]).chain(again_columns));
     if objectives.is_empty() {
         return Ok(dataset);
     }
@@ -174,21 +171,21 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, 
         let Some(oriented) = fitness.objectives() else { continue };
         let Ok(at) = members.binary_search_by(|member| lexicographic(&member.objectives, oriented)) else { continue };
         let values = objectives.iter().zip(oriented).map(|(&id, &value)| Datum::real(Some(in_unit(plan, id, value))));
-        let same = if members[at].number == *number { Datum::Missing } else { name(members[at].number) };
+        let same = if members[at].number == *number { Datum::Missing } else { Datum::test(members[at].number) };
         let of = confirmed.iter().find(|test| test.number == *number);
         let surest = of.and_then(|test| test.surest());
         let ends = surest.and_then(|finding| finding.interval);
         let came_again = [
             surest.map_or(Datum::Missing, |finding| Datum::Text(finding.finding.clone())),
             surest.map_or(Datum::Missing, |finding| Datum::count(finding.again)),
-            surest.map_or(Datum::Missing, |finding| Datum::count(finding.said)),
+            surest.map_or(Datum::Missing, |finding| Datum::count(finding.conclusive)),
             of.map_or(Datum::Missing, |test| Datum::count(test.repetitions)),
             Datum::real(ends.map(|[low, _]| low)),
             Datum::real(ends.map(|[_, high]| high)),
             surest.and_then(|finding| finding.standing).map_or(Datum::Missing, |it| Datum::Text(it.words().to_owned())),
         ];
         let came_again = came_again.into_iter().take(again.len());
-        dataset.row([name(*number)].into_iter().chain(values).chain([same]).chain(came_again));
+        dataset.row([Datum::test(*number)].into_iter().chain(values).chain([same]).chain(came_again));
     }
     Ok(dataset)
 }
@@ -200,17 +197,17 @@ pub fn sspr(
     selection: &Selection,
     dimensions: &[Dimension],
     convention: Convention,
-) -> Result<Dataset, RecordError> {
+) -> Result<Table, RecordError> {
     let plan = repository.plan();
     let names = dimensions.iter().map(|dimension| dimension.name().to_owned());
-    let mut dataset = Dataset::new(["test".to_owned()].into_iter().chain(names));
+    let mut dataset = Table::new(["test".to_owned()].into_iter().chain(names));
     repository.scan(&mut |test| {
         if test.origin == Origin::Reference || !selection.holds(test.number) {
             return;
         }
         if let Some(point) = test.point(plan, convention) {
             let coordinates = dimensions.iter().map(|&dimension| Datum::real(point.get(dimension)));
-            dataset.row([name(test.number)].into_iter().chain(coordinates));
+            dataset.row([Datum::test(test.number)].into_iter().chain(coordinates));
         }
     })?;
     Ok(dataset)
@@ -224,8 +221,8 @@ pub struct CoverageAnalysis {
     curve: Vec<CurvePoint>,
 }
 
-/// Counts the cells of a grid that the tests of a selection hit, in the order of their numbers; void tests and
-/// duplicates cover nothing.
+/// Counts the cells of a grid that the tests of a selection hit, in the order of their numbers; tests
+/// without effect and duplicates cover nothing.
 pub fn coverage(
     repository: &Repository,
     selection: &Selection,
@@ -248,9 +245,9 @@ pub fn coverage(
 
 impl CoverageAnalysis {
     /// Coverage over evaluations: a row for each test that covered a cell, and for the last one.
-    pub fn curve(&self) -> Dataset {
+    pub fn curve(&self) -> Table {
         let columns = ["evaluations", "covered", "cells", "coverage", "feasible", "feasible_coverage"];
-        let mut dataset = Dataset::new(columns.map(str::to_owned));
+        let mut dataset = Table::new(columns.map(str::to_owned));
         let (cells, feasible) = (self.coverage.grid().len(), self.coverage.feasible(&self.feasible));
         for point in &self.curve {
             dataset.row([
@@ -266,12 +263,12 @@ impl CoverageAnalysis {
     }
 
     /// Each cell: where it lies on each axis, how often it was hit, and whether a test can reach it.
-    pub fn cells(&self) -> Dataset {
+    pub fn cells(&self) -> Table {
         let grid = self.coverage.grid();
         let ends = |axis: &GridAxis| ["low", "high"].map(|end| format!("{}_{end}", axis.dimension.name()));
         let columns = grid.axes().iter().flat_map(ends);
         let more = ["hits", "covered", "feasible"].map(str::to_owned);
-        let mut dataset = Dataset::new(columns.chain(more));
+        let mut dataset = Table::new(columns.chain(more));
         for (cell, &hits) in self.coverage.hits().iter().enumerate() {
             let place = grid.place(cell);
             let edges = grid

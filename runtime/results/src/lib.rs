@@ -7,5 +7,6 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod analysis;
+mod present;
 pub mod record;
 pub mod report;

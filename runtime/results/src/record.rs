@@ -1,17 +1,21 @@
 //! The results repository: what a campaign run leaves behind, in one SQLite file.
 //!
-//! It guarantees: a test is there whole or not at all, whatever kills the process; one process writes at a time; what
-//! is read equals what was written, bit for bit; equal campaigns have equal digests, whatever the number of workers
-//! and however often a run was interrupted. The file is meant to be read by others too: its schema is documented in
+//! It guarantees: a test is there completely or not at all, even if the process is killed; one process writes at a time;
+//! what is read equals what was written, bit for bit; equal campaigns have equal digests, with any number of workers and
+//! interruptions. The file is meant to be read by others too: its schema is documented in
 //! the file itself, and its views answer the common questions.
 //!
 //! A [`Recorder`] writes while a campaign runs; a [`Repository`] reads, during a run or after it.
 
+mod columns;
+mod cursor;
 mod difference;
 mod digest;
 mod error;
+mod files;
 mod folder;
 mod fresh;
+mod read_tests;
 mod recognise;
 mod recorder;
 mod repetitions;
@@ -21,6 +25,7 @@ pub mod sample;
 mod scan;
 mod schema;
 mod series;
+mod series_views;
 #[cfg(test)]
 mod tests;
 
@@ -30,13 +35,13 @@ use sesame_base::observation::{Observation, Outcome};
 use sesame_plan::{KnownTestId, Requirement, Test};
 
 pub use difference::{Difference, differences};
-pub use digest::digest;
 pub use error::RecordError;
-pub use folder::{Claim, DATABASE, LOCK, TRACES, claim_folder, latest_folder, latest_unfinished, trace_file};
+pub use files::{DATABASE, LOCK, TRACES, trace_file};
+pub use folder::{Claim, claim_folder, latest_folder, latest_unfinished};
 pub use fresh::{Standing, Tally};
 pub use recorder::Recorder;
 pub use repetitions::{Judge, confirmed_fitness, confirmed_margins};
-pub use repository::{CampaignFacts, Repository};
+pub use repository::{CampaignFacts, Repository, digest};
 pub use scan::{ScannedOperation, ScannedTest};
 pub use schema::SCHEMA;
 pub use sesame_base::observation::MetricValue;
@@ -112,9 +117,9 @@ impl Repetition {
 /// Where a test comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
-    /// The undisturbed run for comparison.
+    /// A run without disturbance, for comparison.
     Reference,
-    /// A known test of the space.
+    /// A regression test of the space.
     Known(KnownTestId),
     /// The campaign's search.
     Search,

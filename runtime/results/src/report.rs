@@ -1,59 +1,39 @@
-//! What a campaign found, for people: tables for a terminal, the same as data, and one page with pictures.
+//! What a campaign found, for people and build servers: text for a terminal, one page with pictures, JUnit XML.
 //!
-//! All of it is read from the results repository, so that it can be made again at any time, and each form says the
-//! same: [`summary`], [`list`] and [`show`] gather the facts (they serialise to JSON as they are), [`summary_text`] and its like
-//! lay them out, [`page()`] draws them.
+//! Everything is read from the results repository, so reports can be made again at any time. [`summary`], [`list`] and
+//! [`show`] compute the facts, which serialise to JSON as they are. [`summary_text`] and its like render them as text, and
+//! [`page()`] as HTML; both share their tables and sentences.
 
-mod axis;
-mod cells;
-mod chart;
-mod confirmed;
-mod coverage;
 mod export;
-mod generations;
+mod facts;
+mod file;
+mod html;
 mod junit;
-mod markup;
-pub(crate) mod number;
-mod page;
-mod policy;
-mod published;
-mod recording;
-mod regions;
-mod repetition;
-mod replay;
-mod scatter;
-mod show;
-mod shrinking;
-mod stacked;
-mod summary;
-mod table;
+mod sentences;
+mod tables;
 mod text;
-mod timeline;
 
-pub use confirmed::{ConfirmedTest, FindingAgain};
-pub(crate) use confirmed::{confirmed_tests, failed, failed_tally};
-pub use coverage::CoverageSummary;
+pub use crate::analysis::confirmed::{ConfirmedTest, FindingAgain};
+pub use crate::present::table::TextOptions;
 pub use export::{ExportError, Exported, export, is_name};
-pub use junit::{junit, write_junit};
-pub(crate) use markup::{Markup, percent};
-pub use page::{page, write_page, write_page_with};
-pub use recording::{FedMetric, RecordingReplay, Sameness, recording_text};
-pub(crate) use repetition::wilson;
-pub use repetition::{Repetition, ViolationRate};
-pub use replay::{Replay, replay_text};
-pub use show::{
+pub use facts::coverage::CoverageSummary;
+pub use facts::recording::{FedMetric, RecordingReplay, Sameness};
+pub use facts::repetition::{Repetition, ViolationRate};
+pub use facts::replay::Replay;
+pub use facts::show::{
     ChoiceReport, FreshVerdicts, ListedTest, MetricReport, OperationReport, TestList, TestReport, VerdictReport, list,
     show,
 };
-pub use shrinking::{ShrinkStep, Shrinking, TestSize};
-pub use stacked::{Stacked, StackedSum};
-pub use summary::{
+pub use facts::shrinking::{ShrinkStep, Shrinking, TestSize};
+pub use facts::stacked::{Stacked, StackedSum};
+pub use facts::summary::{
     Counts, ExpectationSummary, Failure, FrontTest, NotFinite, Objective, RequirementSummary, Spread, Summary, Worst,
     summary,
 };
-pub use table::TextOptions;
-pub(crate) use table::text_table;
-pub use text::{confirmed_text, headline, list_text, summary_text, test_text};
+pub use html::{page, write_page, write_page_with};
+pub use junit::{junit, write_junit};
+pub use sentences::headline;
+pub use text::{confirmed_text, list_text, recording_text, replay_text, summary_text, test_text};
 
 #[cfg(test)]
 mod tests;

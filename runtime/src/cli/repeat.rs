@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+use sesame_base::test_number::TestNumber;
 use sesame_plan::{CampaignPlan, KnownTest, KnownTestId, Search, Test};
 use sesame_rng::derive_seed;
 
@@ -16,7 +17,7 @@ use crate::runner::Runner;
 /// Which test is repeated, and how.
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// A known test's name, or a recorded test, for example `T158`
+    /// A regression test's name, or a recorded test, for example `T158`
     test: String,
     /// How often
     #[arg(value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -80,7 +81,7 @@ fn recorded(plan: &CampaignPlan, results: &Path, options: &Options) -> Result<Re
     refuse_changed(&repository, plan, number)?;
     let run = repository.path().parent().unwrap_or(results);
     Ok(Repeated {
-        name: format!("T{number}"),
+        name: TestNumber(number).to_string(),
         test: repository.test(number)?.test,
         plan: repository.plan().clone(),
         seed: repository.campaign().seed,

@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::Args;
 
 use sesame_base::observation::Outcome;
+use sesame_base::test_number::TestNumber;
 use sesame_plan::CampaignPlan;
 use sesame_results::record::{TestRecord, differences};
 use sesame_results::report::{Replay, replay_text};
@@ -64,7 +65,7 @@ pub(super) fn replay(
     }
     let differences = differences(repository.plan(), &record.test, &record.observation, &again);
     let replay = Replay {
-        test: format!("T{}", record.number),
+        test: TestNumber(record.number),
         simulator_seed: record.simulator_seed,
         same: differences.is_empty(),
         differences,

@@ -1,4 +1,4 @@
-//! `shrink`: a failing test made smaller, for as long as it fails as it did.
+//! `shrink`: reduces a failing test while it still fails in the same way.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use sesame_base::observation::{Observation, Outcome};
+use sesame_base::test_number::TestNumber;
 use sesame_plan::{CampaignPlan, Failing, KnownTest, KnownTestId, RequirementId, Search};
 use sesame_results::record::{Origin, Repository, TestRecord, Verdict, verdict};
 
@@ -14,7 +15,7 @@ use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_changed};
 use crate::runner::Runner;
 
-/// Which test is made smaller, and how.
+/// Which test is shrunk, and how.
 #[derive(Debug, Args)]
 pub(super) struct Options {
     /// The test, for example `T158`
@@ -56,7 +57,7 @@ pub(super) fn shrink(
     }
     let repository = open(results, options.results.as_deref())?;
     let record = repository.test(repository.find(&options.test)?)?;
-    let name = format!("T{}", record.number);
+    let name = TestNumber(record.number).to_string();
     let failing = failing(&repository, &record, &options.requirement)?;
     refuse_changed(&repository, plan, record.number)?;
     let run = repository.path().parent().unwrap_or(results);
@@ -73,9 +74,9 @@ pub(super) fn shrink(
 /// How a test failed, and with which requirements.
 pub(super) fn failing(repository: &Repository, record: &TestRecord, wanted: &[String]) -> Result<Failing, Failure> {
     let plan = repository.plan();
-    let test = format!("T{}", record.number);
+    let test = TestNumber(record.number);
     if record.test.operations.is_empty() {
-        return Err(Failure(format!("{test} disturbs nothing, so there is nothing to make smaller")));
+        return Err(Failure(format!("{test} has no operations, so there is nothing to shrink")));
     }
     match record.observation.outcome {
         Outcome::Crash { .. } if wanted.is_empty() => return Ok(Failing::Crash),
@@ -100,15 +101,15 @@ pub(super) fn failing(repository: &Repository, record: &TestRecord, wanted: &[St
     let chosen: Vec<RequirementId> =
         violated.iter().copied().filter(|id| wanted.is_empty() || wanted.iter().any(|it| it == named(id))).collect();
     // What needs no disturbance says nothing about one.
-    let undisturbed = match repository.tests()?.iter().find(|row| row.origin == Origin::Reference) {
+    let reference = match repository.tests()?.iter().find(|row| row.origin == Origin::Reference) {
         Some(row) => self::violated(plan, &repository.test(row.number)?.observation),
         None => Vec::new(),
     };
-    let caused: Vec<RequirementId> = chosen.iter().copied().filter(|id| !undisturbed.contains(id)).collect();
+    let caused: Vec<RequirementId> = chosen.iter().copied().filter(|id| !reference.contains(id)).collect();
     if caused.is_empty() {
         let names: Vec<&str> = chosen.iter().map(named).collect();
         return Err(Failure(format!(
-            "the reference run violates {} too, so {test} is not what makes it so",
+            "the reference run violates {} too, so {test} is not its cause",
             names.join(", ")
         )));
     }
@@ -162,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_test_is_kept_to_what_it_did_and_the_undisturbed_run_did_not() {
+    fn a_test_is_shrunk_by_the_requirements_that_it_violates_and_the_reference_run_does_not() {
         let violation = |requirements: &[u32]| {
             Ok(Failing::Violation { requirements: requirements.iter().copied().map(RequirementId).collect() })
         };

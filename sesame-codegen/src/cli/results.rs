@@ -8,7 +8,7 @@ use anyhow::{Context as _, bail};
 use clap::{Args, Subcommand, ValueEnum};
 
 use sesame_plan::Dimension;
-use sesame_results::analysis::{self, Dataset, Run, Selection, regions};
+use sesame_results::analysis::{self, Run, Selection, Table, regions};
 use sesame_results::record::{DATABASE, Repository};
 use sesame_results::report::TextOptions;
 use sesame_search::coverage::Grid;
@@ -357,13 +357,13 @@ fn gather(path: &Path, found: &mut Vec<PathBuf>) -> anyhow::Result<()> {
 }
 
 /// Prints for people or programs.
-fn print(dataset: &Dataset, output: &Output) -> anyhow::Result<ExitCode> {
+fn print(table: &Table, output: &Output) -> anyhow::Result<ExitCode> {
     let terminal = std::io::stdout().is_terminal();
     let colour = terminal && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
     let text = match output.format {
-        Format::Table => dataset.text(TextOptions { width: None, colour }),
-        Format::Csv => dataset.csv(),
-        Format::Json => dataset.json(),
+        Format::Table => table.text(TextOptions { width: None, colour }),
+        Format::Csv => table.csv(),
+        Format::Json => table.json(),
     };
     shell::asked_for(&text)?;
     Ok(ExitCode::SUCCESS)

@@ -1,4 +1,4 @@
-//! Runs beside each other: measures that mean the same in each, and groups of runs by their medians and ranks.
+//! Comparison of runs: measures with the same meaning in each, and groups of runs by their medians and ranks.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use sesame_search::in_unit;
 use sesame_search::indicators::volume;
 use sesame_search::sspr::Convention;
 
-use crate::analysis::{Dataset, Datum, rank_sum};
+use crate::analysis::{Datum, Table, rank_sum};
 use crate::record::{Origin, RecordError, Repository};
 
 /// A run to be compared.
@@ -54,7 +54,7 @@ pub enum CompareError {
         /// Values needed.
         needed: usize,
     },
-    /// The campaign's cells are no grid.
+    /// The campaign's cells are not a grid.
     #[error(transparent)]
     Grid(#[from] GridError),
 }
@@ -63,7 +63,7 @@ fn theirs(objectives: &[String]) -> String {
     if objectives.is_empty() { "none".to_owned() } else { objectives.join(", ") }
 }
 
-/// What a run came to.
+/// The measures of a run.
 #[derive(Debug, Clone, PartialEq)]
 struct Measured {
     group: String,
@@ -72,7 +72,7 @@ struct Measured {
     seed: u64,
     tests: u32,
     unique: u32,
-    void: u32,
+    no_effect: u32,
     crashes: u32,
     timeouts: u32,
     front: Front,
@@ -144,7 +144,7 @@ pub fn compare(runs: &[Run], reference: Option<&[f64]>, grid: Option<Grid>) -> R
             .collect(),
     };
     let finite = reference.iter().all(|place| place.is_finite());
-    // Numbers of tests mean nothing across runs: points are told apart by their values.
+    // Numbers of tests mean nothing across runs: points are identified by their values.
     let fitness: Vec<Fitness> = measured
         .iter()
         .flat_map(|run| run.front.members())
@@ -200,7 +200,7 @@ fn measure(run: &Run, cells: Option<&(Grid, u32)>) -> Result<Measured, RecordErr
         seed: run.repository.campaign().seed,
         tests: 0,
         unique: 0,
-        void: 0,
+        no_effect: 0,
         crashes: 0,
         timeouts: 0,
         front: Front::default(),
@@ -220,7 +220,7 @@ fn measure(run: &Run, cells: Option<&(Grid, u32)>) -> Result<Measured, RecordErr
         measured.unique += u32::from(test.duplicate_of.is_none());
         match test.outcome {
             Outcome::Completed | Outcome::Unknown => {}
-            Outcome::Void => measured.void += 1,
+            Outcome::NoEffect => measured.no_effect += 1,
             Outcome::Crash { .. } => measured.crashes += 1,
             Outcome::Timeout { .. } => measured.timeouts += 1,
         }
@@ -252,7 +252,7 @@ const MEASURES: [Measure; 9] = [
     ("coverage", |run| run.coverage),
     ("tests", |run| Some(f64::from(run.tests))),
     ("unique", |run| Some(f64::from(run.unique))),
-    ("void", |run| Some(f64::from(run.void))),
+    ("no_effect", |run| Some(f64::from(run.no_effect))),
     ("crashes", |run| Some(f64::from(run.crashes))),
     ("timeouts", |run| Some(f64::from(run.timeouts))),
 ];
@@ -264,14 +264,14 @@ impl Comparison {
     }
 
     /// A row for each run.
-    pub fn runs(&self) -> Dataset {
+    pub fn runs(&self) -> Table {
         let columns = [
             "group",
             "campaign",
             "seed",
             "tests",
             "unique",
-            "void",
+            "no_effect",
             "crashes",
             "timeouts",
             "front",
@@ -282,7 +282,7 @@ impl Comparison {
             "coverage",
             "file",
         ];
-        let mut dataset = Dataset::new(columns.map(str::to_owned));
+        let mut dataset = Table::new(columns.map(str::to_owned));
         for run in &self.runs {
             let whole = |count: u32| Datum::Whole(i64::from(count));
             dataset.row([
@@ -291,7 +291,7 @@ impl Comparison {
                 Datum::Text(run.seed.to_string()),
                 whole(run.tests),
                 whole(run.unique),
-                whole(run.void),
+                whole(run.no_effect),
                 whole(run.crashes),
                 whole(run.timeouts),
                 Datum::count(run.front.members().len()),
@@ -308,9 +308,9 @@ impl Comparison {
 
     /// A row for each measure and group: median and quartiles over its runs; and of every group but the first how it
     /// compares with the first, by ranks. The probabilities are each for itself, not corrected for there being several.
-    pub fn groups(&self) -> Dataset {
+    pub fn groups(&self) -> Table {
         let columns = ["measure", "group", "runs", "lower", "median", "upper", "a12", "p", "p_is"];
-        let mut dataset = Dataset::new(columns.map(str::to_owned));
+        let mut dataset = Table::new(columns.map(str::to_owned));
         let groups = self.groups_of();
         for (name, measure) in MEASURES {
             let values = |runs: &[&Measured]| -> Vec<f64> { runs.iter().filter_map(|run| measure(run)).collect() };
@@ -340,8 +340,8 @@ impl Comparison {
 
     /// A row for each ordered pair of runs: the share of the second one's front that the first one's covers, Zitzler and
     /// Thiele's C: points that are equal to one of the first, or dominated by one.
-    pub fn pairs(&self) -> Dataset {
-        let mut dataset = Dataset::new(["first", "second", "c"].map(str::to_owned));
+    pub fn pairs(&self) -> Table {
+        let mut dataset = Table::new(["first", "second", "c"].map(str::to_owned));
         for first in &self.runs {
             for second in self.runs.iter().filter(|second| !std::ptr::eq(*second, first)) {
                 dataset.row([

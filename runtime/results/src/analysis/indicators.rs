@@ -10,7 +10,7 @@ use sesame_search::in_unit;
 use sesame_search::indicators::{reference_point, volume};
 use sesame_search::sspr::Convention;
 
-use crate::analysis::{Dataset, Datum};
+use crate::analysis::{Datum, Table};
 use crate::record::{Origin, RecordError, Repository, ResultSet};
 
 /// What a search had come to after a generation, or at a result set of an imported campaign.
@@ -22,10 +22,10 @@ pub struct Indicator {
     pub generation: Option<u32>,
     /// Tests evaluated by then; of an imported campaign as the set's name says.
     pub evaluations: Option<u32>,
-    /// Of these, no exact duplicates. `None` where nobody counted, as of the next three.
+    /// Of these, not exact duplicates. `None`, as the next three, for imported results, in which they were not counted.
     pub unique: Option<u32>,
     /// Of these, without effect.
-    pub void: Option<u32>,
+    pub no_effect: Option<u32>,
     /// Of these, crashes.
     pub crashes: Option<u32>,
     /// Of these, timeouts.
@@ -64,7 +64,7 @@ struct Judged {
     cell: Option<usize>,
 }
 
-/// The indicators after each generation that came to its end. Of an imported campaign, whose tests are of no generation,
+/// The indicators after each complete generation. Of an imported campaign, whose tests are of no generation,
 /// there is one for each result set: of the front of its members.
 ///
 /// Hypervolumes are measured from the `reference` given, a value per objective in its unit; else from the one that was
@@ -72,13 +72,12 @@ struct Judged {
 pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<IndicatorAnalysis, RecordError> {
     let plan = repository.plan();
     let objectives = &plan.campaign.objectives;
-    let grid =
-        match &plan.campaign.coverage {
-            Some(goal) => Some(Grid::new(goal.axes.clone()).map_err(|error| {
-                RecordError::damaged(repository.path(), format!("its coverage is no grid: {error}"))
-            })?),
-            None => None,
-        };
+    let grid = match &plan.campaign.coverage {
+        Some(goal) => Some(Grid::new(goal.axes.clone()).map_err(|error| {
+            RecordError::damaged(repository.path(), format!("the cells of its coverage are not a grid: {error}"))
+        })?),
+        None => None,
+    };
     let judge = repository.judge()?;
     let mut tests = Vec::new();
     repository.scan(&mut |test| {
@@ -121,7 +120,7 @@ pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<
                 generation: Some(it.generation),
                 evaluations: Some(it.evaluations),
                 unique: Some(it.unique),
-                void: Some(it.void),
+                no_effect: Some(it.no_effect),
                 crashes: Some(it.crashes),
                 timeouts: Some(it.timeouts),
                 front: it.front,
@@ -228,7 +227,7 @@ fn of_sets(
             generation: set.generation,
             evaluations,
             unique: None,
-            void: None,
+            no_effect: None,
             crashes: None,
             timeouts: None,
             front: u32::try_from(front.members().len()).unwrap_or(u32::MAX),
@@ -250,18 +249,19 @@ fn evaluations_of(set: &ResultSet, tests: usize) -> Option<u32> {
 
 impl IndicatorAnalysis {
     /// A row for each generation.
-    pub fn dataset(&self) -> Dataset {
+    pub fn dataset(&self) -> Table {
         let imported = self.generations.iter().any(|it| it.set.is_some());
         let head = if imported { vec!["set"] } else { Vec::new() };
-        let counts = ["generation", "evaluations", "unique", "void", "crashes", "timeouts", "front"];
+        let counts = ["generation", "evaluations", "unique", "no_effect", "crashes", "timeouts", "front"];
         let measures = ["hypervolume", "standard_error", "igd_plus"];
         let cells: &[&str] = if self.cells.is_some() { &["covered", "cells", "coverage"] } else { &[] };
         let columns = head.into_iter().chain(counts).chain(measures).chain(cells.iter().copied());
-        let mut dataset = Dataset::new(columns.map(str::to_owned));
+        let mut dataset = Table::new(columns.map(str::to_owned));
         let whole = |count: Option<u32>| count.map_or(Datum::Missing, |count| Datum::Whole(i64::from(count)));
         for it in &self.generations {
             let head = imported.then(|| it.set.clone().map_or(Datum::Missing, Datum::Text));
-            let counts = [it.generation, it.evaluations, it.unique, it.void, it.crashes, it.timeouts, Some(it.front)];
+            let counts =
+                [it.generation, it.evaluations, it.unique, it.no_effect, it.crashes, it.timeouts, Some(it.front)];
             let cells = self.cells.map(|cells| {
                 let share = it.covered.map(|covered| covered as f64 / cells as f64);
                 [it.covered.map_or(Datum::Missing, Datum::count), Datum::count(cells), Datum::real(share)]

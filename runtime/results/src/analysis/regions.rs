@@ -2,7 +2,7 @@
 //!
 //! For each requirement that tests violate (and for crashes and timeouts) a [tree](tree) of a few questions divides the
 //! tests into regions, and says of each how many of its tests fail. The regions of a tree do not overlap, and together
-//! they hold every test that says anything about the requirement; void tests are among them, duplicates and undisturbed
+//! they hold every test that is conclusive about the requirement; tests without effect are among them, duplicates and reference
 //! runs are not.
 
 mod feature;
@@ -16,9 +16,9 @@ use tree::{Columns, Growth, Node, Question};
 
 use sesame_plan::{CampaignPlan, RequirementId};
 
-use crate::analysis::{Dataset, Datum, Selection};
+use crate::analysis::confirmed::{failed, failed_tally};
+use crate::analysis::{Datum, Selection, Table};
 use crate::record::{Judge, Origin, RecordError, Repository, ScannedTest, Verdict};
-use crate::report::{failed, failed_tally};
 
 pub use tree::Tally;
 
@@ -69,7 +69,7 @@ struct Step {
     missing: bool,
 }
 
-/// Why regions cannot be told.
+/// Why regions cannot be computed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RegionsError {
@@ -90,7 +90,7 @@ pub enum RegionsError {
 struct Gathered {
     features: Vec<Feature>,
     columns: Columns,
-    /// Per target whether each test fails; `None` for one that says nothing.
+    /// Per target whether each test fails; `None` for a test that is inconclusive.
     labels: Vec<(Target, Vec<Option<bool>>)>,
 }
 
@@ -205,8 +205,8 @@ fn fails(plan: &CampaignPlan, judge: &Judge<'_>, target: Target, test: &ScannedT
     };
     match said {
         Verdict::Violated => Some(true),
-        Verdict::Kept => Some(false),
-        Verdict::Unsaid => None,
+        Verdict::Satisfied => Some(false),
+        Verdict::Inconclusive => None,
     }
 }
 
@@ -249,15 +249,15 @@ impl Regions {
     }
 
     /// The tree as a picture on a page.
-    pub(crate) fn draw(&self, markup: &mut crate::report::Markup, plan: &CampaignPlan) {
+    pub(crate) fn draw(&self, markup: &mut crate::present::markup::Markup, plan: &CampaignPlan) {
         picture::draw(self, plan, markup);
     }
 }
 
 /// Regions as a table: a row for each.
-pub fn table(regions: &[Regions]) -> Dataset {
+pub fn table(regions: &[Regions]) -> Table {
     let columns = ["fails", "region", "failing", "tests", "share", "share_low", "share_high"];
-    let mut dataset = Dataset::new(columns.map(str::to_owned));
+    let mut dataset = Table::new(columns.map(str::to_owned));
     for of in regions {
         for rule in &of.rules {
             let share = rule.tally.share();

@@ -1,8 +1,8 @@
 use sesame_plan::{CoverageGoal, GridAxis};
 
 use super::*;
+use crate::present::table::TextOptions;
 use crate::record::sample;
-use crate::report::TextOptions;
 
 fn repository() -> (tempfile::TempDir, Repository) {
     let folder = tempfile::tempdir().unwrap();
@@ -21,9 +21,9 @@ fn all() -> Selection {
     Selection::default()
 }
 
-fn names(dataset: &Dataset) -> Vec<String> {
-    let first = dataset.rows().iter().map(|row| match &row[0] {
-        Datum::Text(name) => name.clone(),
+fn names(dataset: &Table) -> Vec<String> {
+    let first = dataset.rows().into_iter().map(|row| match &row[0] {
+        Datum::Test(test) => test.to_string(),
         other => panic!("{other:?}"),
     });
     first.collect()
@@ -37,7 +37,7 @@ fn tests_are_listed_with_the_values_that_were_recorded() {
     let searched: Vec<_> = rows.iter().filter(|row| row.origin != Origin::Reference).collect();
     assert_eq!(dataset.rows().len(), searched.len());
     for (row, found) in dataset.rows().iter().zip(searched) {
-        assert_eq!(row[0], Datum::Text(format!("T{}", found.number)));
+        assert_eq!(row[0], Datum::test(found.number));
         assert_eq!(row[3], Datum::Text(found.outcome.word().to_owned()));
         for (at, datum) in row[6..].iter().enumerate() {
             let id = MetricId(u32::try_from(at).unwrap());
@@ -51,15 +51,16 @@ fn tests_are_listed_with_the_values_that_were_recorded() {
 fn the_front_of_all_tests_is_that_of_the_campaign_and_equal_tests_say_so() {
     let (_folder, repository) = repository();
     let dataset = front(&repository, &all()).unwrap();
-    let standing: Vec<&Vec<Datum>> = dataset.rows().iter().filter(|row| row.last() == Some(&Datum::Missing)).collect();
+    let mut standing = dataset.rows();
+    standing.retain(|row| row.last() == Some(&Datum::Missing));
     let recorded = repository.latest_result_set().unwrap().unwrap().members;
-    let recorded: Vec<Datum> = recorded.into_iter().map(name).collect();
+    let recorded: Vec<Datum> = recorded.into_iter().map(Datum::test).collect();
     assert!(recorded.len() > 2);
     assert_eq!(standing.iter().map(|row| row[0].clone()).collect::<Vec<_>>(), recorded);
     // Values are those of the tests, whichever way they are optimised.
-    let listed = tests(&repository, &all()).unwrap();
+    let listed = tests(&repository, &all()).unwrap().rows();
     for row in dataset.rows() {
-        let test = listed.rows().iter().find(|test| test[0] == row[0]).unwrap();
+        let test = listed.iter().find(|test| test[0] == row[0]).unwrap();
         assert_eq!(row[1..3], [test[7].clone(), test[6].clone()], "fuzzing time and collisions");
     }
     let members = Selection::of(&repository, Some("front")).unwrap();
@@ -80,8 +81,8 @@ fn points_are_those_of_the_observed_intervals_in_the_convention_asked_for() {
     assert_eq!(dataset.columns().len(), 10);
     let mut compared = 0;
     for row in dataset.rows() {
-        let Datum::Text(test) = &row[0] else { panic!("{row:?}") };
-        let record = repository.test(repository.find(test).unwrap()).unwrap();
+        let Datum::Test(test) = &row[0] else { panic!("{row:?}") };
+        let record = repository.test(repository.find(&test.to_string()).unwrap()).unwrap();
         let disturbances = sesame_search::sspr::observed(repository.plan(), &record.test, &record.observation);
         let point = sesame_search::sspr::Point::of(&disturbances, Convention::Original).unwrap();
         for (datum, dimension) in row[1..].iter().zip(Dimension::ALL) {
@@ -102,7 +103,8 @@ fn coverage_afterwards_is_what_the_campaign_reports() {
     let grid = Grid::parse("T1:0:1:6,T2:0:0.5:6").unwrap();
     let analysis = coverage(&repository, &all(), grid.clone(), 1, Convention::Ours).unwrap();
     let curve = analysis.curve();
-    let last = curve.rows().last().unwrap();
+    let rows = curve.rows();
+    let last = rows.last().unwrap();
     assert_eq!(last[1..3], [Datum::count(reported.covered), Datum::Whole(36)]);
     assert_eq!(last[4], Datum::count(reported.feasible));
     let cells = analysis.cells();
@@ -125,7 +127,7 @@ fn campaigns_tell_what_a_file_holds() {
 
 #[test]
 fn what_is_printed_for_programs_reads_back() {
-    let mut dataset = Dataset::new(["a".to_owned(), "b, \"c\"".to_owned(), "d".to_owned(), "e".to_owned()]);
+    let mut dataset = Table::new(["a".to_owned(), "b, \"c\"".to_owned(), "d".to_owned(), "e".to_owned()]);
     let third = 0.1 + 0.2;
     dataset.row([Datum::Text("x\ny".to_owned()), Datum::Real(third), Datum::Missing, Datum::Truth(true)]);
     dataset.row([Datum::Whole(-3), Datum::Real(1e300), Datum::Text(String::new()), Datum::Whole(7)]);
@@ -135,25 +137,25 @@ fn what_is_printed_for_programs_reads_back() {
     assert_eq!(json[0]["b, \"c\""].as_f64(), Some(third));
     assert_eq!(json[1]["b, \"c\""].as_f64(), Some(1e300));
     assert!(json[0]["d"].is_null());
-    assert_eq!(Dataset::new(["a".to_owned()]).json(), "[]\n");
+    assert_eq!(Table::new(["a".to_owned()]).json(), "[]\n");
     assert_eq!(Datum::real(Some(f64::NAN)), Datum::Missing);
 }
 
 #[test]
 fn numbers_of_unlike_things_in_one_column_have_digits_of_their_own() {
-    let mut dataset = Dataset::new(["measure".to_owned(), "median".to_owned()]);
+    let mut dataset = Table::new(["measure".to_owned(), "median".to_owned()]);
     for (name, value) in [("hypervolume", 19_852.6), ("igd_plus", 0.1346), ("p", 1.75e-4), ("tests", 210.0)] {
         dataset.row([Datum::Text(name.to_owned()), Datum::lone(Some(value))]);
     }
-    let text = dataset.text(crate::report::TextOptions { width: None, colour: false });
+    let text = dataset.text(crate::present::table::TextOptions { width: None, colour: false });
     let shown: Vec<&str> = text.lines().skip(1).filter_map(|line| line.split_whitespace().last()).collect();
     assert_eq!(shown, ["19853", "0.135", "1.75e-4", "210"], "{text}");
     assert_eq!(Datum::lone(Some(f64::INFINITY)), Datum::Missing);
 }
 
 /// Numbers of a column, by its name.
-fn numbers(dataset: &Dataset, column: &str) -> Vec<Option<f64>> {
-    let at = dataset.columns().iter().position(|name| name == column).unwrap();
+fn numbers(dataset: &Table, column: &str) -> Vec<Option<f64>> {
+    let at = dataset.columns().iter().position(|&name| name == column).unwrap();
     let number = |row: &Vec<Datum>| match row[at] {
         Datum::Missing => None,
         Datum::Real(number) | Datum::Lone(number) => Some(number),
@@ -181,7 +183,7 @@ fn indicators_are_those_recorded_and_end_on_the_front() {
     assert_eq!(last.covered, Some(reported.coverage.as_ref().unwrap().covered));
     let counts = reported.counts;
     assert_eq!((last.evaluations, last.unique), (Some(61), Some(60)));
-    assert_eq!(last.void, u32::try_from(counts.void).ok());
+    assert_eq!(last.no_effect, u32::try_from(counts.no_effect).ok());
     assert_eq!((last.crashes, last.timeouts), (Some(2), Some(1)));
     assert_eq!(last.front as usize, reported.front.len());
     insta::assert_snapshot!("indicators", dataset.text(TextOptions { width: None, colour: false }));

@@ -1,7 +1,8 @@
-//! What can go wrong with results on disk, each with the path and what to do.
+//! Errors of results on disk, each with the path and a remedy.
 
 use std::path::{Path, PathBuf};
 
+use sesame_base::test_number::TestNumber;
 use sesame_base::visible::visible;
 
 /// Why results could not be written or read.
@@ -14,7 +15,7 @@ pub enum RecordError {
         /// The database.
         path: PathBuf,
     },
-    /// There is no database where one was looked for.
+    /// There is no database at this place.
     #[error("no results here; name the folder of a run, for example `results/42`: {}", path.display())]
     Missing {
         /// The database looked for.
@@ -28,23 +29,23 @@ pub enum RecordError {
         /// The lock file.
         path: PathBuf,
     },
-    /// The lock was taken away while a run went on, so that another may write these results too.
+    /// The lock was removed during a run, so another run may write these results too.
     #[error(
-        "the lock of these results was removed while they were written, so that another run may write them: this one ends; \
-         `resume` goes on: {}", path.display()
+        "the lock of these results was removed while they were written, so another run may be writing them; this run ends, and \
+         `resume` continues it: {}", path.display()
     )]
     LockLost {
         /// The lock file.
         path: PathBuf,
     },
-    /// The run has ended, there is nothing to go on with.
+    /// The run has ended, so there is nothing to resume.
     #[error("this run is finished; start a new one with `run`: {}", path.display())]
     Finished {
         /// The database.
         path: PathBuf,
     },
-    /// The run has not ended, and what it still records would come out otherwise.
-    #[error("this run is unfinished: `resume` goes on with it: {}", path.display())]
+    /// The run has not ended: additions could change what it still records.
+    #[error("this run is unfinished; `resume` continues it: {}", path.display())]
     Unfinished {
         /// The database.
         path: PathBuf,
@@ -52,7 +53,7 @@ pub enum RecordError {
     /// The file is not a results repository.
     #[error("not the results of a campaign ({found}); nothing was changed: {}", path.display())]
     Foreign {
-        /// What it seems to be.
+        /// What the file is instead.
         found: String,
         /// The file.
         path: PathBuf,
@@ -70,7 +71,7 @@ pub enum RecordError {
         /// The file.
         path: PathBuf,
     },
-    /// An earlier release wrote the file, whose tests had less to say.
+    /// An earlier release wrote the file, in a schema that is not read any more.
     #[error(
         "these results have schema {found}, this release reads {known}; read them with the release that wrote them, or \
          run the campaign again: {}", path.display()
@@ -83,10 +84,10 @@ pub enum RecordError {
         /// The file.
         path: PathBuf,
     },
-    /// An earlier release wrote the file: it can be read, but not gone on with.
+    /// An earlier release wrote the file: it can be read, but not written.
     #[error(
-        "these results have schema {found}, this release writes {known}: they can be read, but nothing can be added; go on \
-         with the release that wrote them, or run the campaign again: {}", path.display()
+        "these results have schema {found}, this release writes {known}: they can be read, but nothing can be added; \
+         continue with the release that wrote them, or run the campaign again: {}", path.display()
     )]
     ReadOnly {
         /// Schema of the file.
@@ -104,27 +105,27 @@ pub enum RecordError {
         /// The file.
         path: PathBuf,
     },
-    /// Reading needs to write: a run that broke off left the file unsettled, and it lies where nothing may be written.
+    /// The file must be recovered before it is read, since a run broke off, but it may not be written.
     #[error(
-        "a run that broke off left these results unsettled, and they lie where nothing may be written ({source}); make \
-         their folder writable, or copy all of it to where you may write: {}", path.display()
+        "a run that broke off left these results in need of recovery, but they cannot be written ({source}); make their \
+         folder writable, or copy all of it to a writable place: {}", path.display()
     )]
     Unsettled {
-        /// What the database says.
+        /// The error of the database.
         source: rusqlite::Error,
         /// The database.
         path: PathBuf,
     },
     /// A test of this number is there already.
-    #[error("test T{number} is recorded already; a number is used once: {}", path.display())]
+    #[error("test {number} is recorded already; a number is used once: {}", path.display())]
     TestExists {
         /// The number.
-        number: u32,
+        number: TestNumber,
         /// The database.
         path: PathBuf,
     },
     /// There is no such test.
-    #[error("no test `{name}` in these results; `list` shows what there is: {}", path.display())]
+    #[error("no test `{name}` in these results; `list` shows all tests: {}", path.display())]
     NoSuchTest {
         /// What was asked for.
         name: String,
@@ -142,10 +143,10 @@ pub enum RecordError {
         path: PathBuf,
     },
     /// A test that could not be read back: a number that is not finite, a large count, or what does not fit the plan.
-    #[error("test T{test} cannot be recorded ({what}): {}", path.display())]
+    #[error("test {test} cannot be recorded ({what}): {}", path.display())]
     Unrecordable {
         /// The test.
-        test: u32,
+        test: TestNumber,
         /// What does not fit.
         what: String,
         /// The database.

@@ -5,32 +5,16 @@ use std::io::{Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
+use crate::record::files::{BEGUN, DATABASE, LOCK};
 use crate::record::{RecordError, Repository};
-
-/// Name of the database in a run's folder.
-pub const DATABASE: &str = "results.sqlite";
-
-/// Name of the database until it has all of its tables.
-pub(crate) const BEGUN: &str = "results.sqlite.begun";
-
-/// Name of the lock file in a run's folder.
-pub const LOCK: &str = "results.lock";
-
-/// Name of the folder of traces in a run's folder.
-pub const TRACES: &str = "traces";
-
-/// Where the trace of a test is, if it has one, in the results in this folder.
-pub fn trace_file(folder: &Path, test: u32) -> PathBuf {
-    folder.join(TRACES).join(format!("T{test}.mcap"))
-}
 
 /// A fresh folder for a run.
 #[derive(Debug)]
 pub struct Claim {
-    /// The folder; it exists now, holds no results, and is nobody else's as long as the claim is kept.
+    /// The folder; it exists, holds no results, and no other process uses it as long as the claim exists.
     pub folder: PathBuf,
     /// The latest run of the same name that was begun, is not finished, and that no process is writing: what `resume`
-    /// could go on with.
+    /// could continue.
     pub unfinished: Option<PathBuf>,
     pub(crate) lock: Lock,
 }
@@ -91,7 +75,7 @@ fn holds_nothing(folder: &Path) -> Result<bool, RecordError> {
 }
 
 /// The folder of the campaign's run whose results were written last, if there is any: the first of those that
-/// [`latest_unfinished`] goes through. Its name begins with its seed: what else was run on the side (known tests, repetitions)
+/// [`latest_unfinished`] goes through. Its name begins with its seed: what else was run on the side (regression tests, repetitions)
 /// is looked at when it is asked for.
 pub fn latest_folder(results: &Path) -> Result<Option<PathBuf>, RecordError> {
     Ok(latest_first(results)?.into_iter().next())

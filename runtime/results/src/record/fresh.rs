@@ -1,28 +1,28 @@
-//! What a test says once it was run again with fresh seeds of the simulator.
+//! The verdict of a test that was run again with fresh seeds of the simulator.
 //!
-//! This is the one place that decides it, for requirements as for crashes and timeouts. The fresh runs count, the run that
-//! selected the test does not: it was chosen for what it showed. A fresh run that says nothing is neither for nor against.
+//! This is the only place that decides it, for requirements as for crashes and timeouts. Only fresh runs count: the run that
+//! selected the test was chosen for what it showed. An inconclusive fresh run speaks neither for nor against a finding.
 
 use serde::Serialize;
 
 use crate::record::Verdict;
 
-/// What the fresh runs of one test say about one requirement.
+/// How many fresh runs of a test gave each verdict on a requirement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Tally {
     /// Runs that violate it.
     pub violated: usize,
-    /// Runs that keep it.
-    pub kept: usize,
-    /// Runs that say nothing about it.
-    pub unsaid: usize,
+    /// Runs that satisfy it.
+    pub satisfied: usize,
+    /// Runs that are inconclusive.
+    pub inconclusive: usize,
 }
 
-/// Whether a finding is to be believed.
+/// Whether fresh runs confirm a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Standing {
-    /// Every fresh run that says anything shows it.
+    /// Every conclusive fresh run shows it.
     Confirmed,
     /// Some show it, some do not.
     Flaky,
@@ -42,44 +42,44 @@ impl Standing {
 }
 
 impl Tally {
-    /// Counts what runs say.
+    /// Counts the verdicts of runs.
     pub fn of(runs: impl IntoIterator<Item = Verdict>) -> Tally {
         let mut tally = Tally::default();
         for said in runs {
             match said {
                 Verdict::Violated => tally.violated += 1,
-                Verdict::Kept => tally.kept += 1,
-                Verdict::Unsaid => tally.unsaid += 1,
+                Verdict::Satisfied => tally.satisfied += 1,
+                Verdict::Inconclusive => tally.inconclusive += 1,
             }
         }
         tally
     }
 
-    /// Runs that say anything.
-    pub fn said(self) -> usize {
-        self.violated + self.kept
+    /// Runs that violate or satisfy the requirement.
+    pub fn conclusive(self) -> usize {
+        self.violated + self.satisfied
     }
 
-    /// What the test says, whose first run said this.
+    /// The verdict of the test, given that of its first run.
     ///
-    /// It violates the requirement if a fresh run does, and keeps it if fresh runs say something and none violates it.
-    /// Where no fresh run says anything, a violation by the first run stands, since nothing speaks against it, but that the
-    /// first run kept it is not enough. A test that was never run again says what its one run said.
+    /// It violates the requirement if a fresh run does, and satisfies it if some fresh run satisfies it and none violates it.
+    /// If all fresh runs are inconclusive, a violation by the first run stands, since nothing speaks against it, but a
+    /// satisfied requirement becomes inconclusive. A test that was never run again has the verdict of its only run.
     pub fn verdict(self, first: Verdict) -> Verdict {
         match self {
             Tally { violated: 1.., .. } => Verdict::Violated,
-            Tally { kept: 1.., .. } => Verdict::Kept,
-            Tally { unsaid: 1.., .. } if first == Verdict::Kept => Verdict::Unsaid,
+            Tally { satisfied: 1.., .. } => Verdict::Satisfied,
+            Tally { inconclusive: 1.., .. } if first == Verdict::Satisfied => Verdict::Inconclusive,
             _ => first,
         }
     }
 
-    /// Whether the violation is to be believed; `None` where there is none, and where no fresh run says anything.
+    /// Whether fresh runs confirm the violation; `None` without a violation, and if all fresh runs are inconclusive.
     pub fn standing(self, first: Verdict) -> Option<Standing> {
         match self {
-            Tally { violated: 1.., kept: 0, .. } => Some(Standing::Confirmed),
+            Tally { violated: 1.., satisfied: 0, .. } => Some(Standing::Confirmed),
             Tally { violated: 1.., .. } => Some(Standing::Flaky),
-            Tally { kept: 1.., .. } if first == Verdict::Violated => Some(Standing::NotConfirmed),
+            Tally { satisfied: 1.., .. } if first == Verdict::Violated => Some(Standing::NotConfirmed),
             _ => None,
         }
     }
@@ -87,40 +87,40 @@ impl Tally {
 
 #[cfg(test)]
 mod tests {
-    use Verdict::{Kept, Unsaid, Violated};
+    use Verdict::{Inconclusive, Satisfied, Violated};
     use proptest::prelude::*;
 
     use super::*;
 
     #[test]
-    fn a_requirement_that_only_the_first_run_kept_is_violated() {
+    fn a_requirement_that_only_the_first_run_satisfied_is_violated() {
         let tally = Tally::of([Violated; 4]);
-        assert_eq!((tally.verdict(Kept), tally.standing(Kept)), (Violated, Some(Standing::Confirmed)));
-        let tally = Tally::of([Kept, Violated, Kept, Violated]);
-        assert_eq!((tally.verdict(Kept), tally.standing(Kept)), (Violated, Some(Standing::Flaky)));
+        assert_eq!((tally.verdict(Satisfied), tally.standing(Satisfied)), (Violated, Some(Standing::Confirmed)));
+        let tally = Tally::of([Satisfied, Violated, Satisfied, Violated]);
+        assert_eq!((tally.verdict(Satisfied), tally.standing(Satisfied)), (Violated, Some(Standing::Flaky)));
     }
 
     #[test]
     fn a_violation_that_no_fresh_run_shows_is_none() {
-        let tally = Tally::of([Kept, Unsaid, Kept]);
-        assert_eq!((tally.verdict(Violated), tally.standing(Violated)), (Kept, Some(Standing::NotConfirmed)));
+        let tally = Tally::of([Satisfied, Inconclusive, Satisfied]);
+        assert_eq!((tally.verdict(Violated), tally.standing(Violated)), (Satisfied, Some(Standing::NotConfirmed)));
     }
 
     #[test]
-    fn runs_that_say_nothing_are_neither_for_nor_against() {
-        let tally = Tally::of([Violated, Unsaid, Unsaid]);
-        assert_eq!((tally.said(), tally.standing(Violated)), (1, Some(Standing::Confirmed)));
-        let nothing = Tally::of([Unsaid; 3]);
+    fn inconclusive_runs_speak_neither_for_nor_against() {
+        let tally = Tally::of([Violated, Inconclusive, Inconclusive]);
+        assert_eq!((tally.conclusive(), tally.standing(Violated)), (1, Some(Standing::Confirmed)));
+        let nothing = Tally::of([Inconclusive; 3]);
         assert_eq!((nothing.verdict(Violated), nothing.standing(Violated)), (Violated, None));
-        assert_eq!(nothing.verdict(Kept), Unsaid, "one lucky run is not enough where all others broke off");
+        assert_eq!(nothing.verdict(Satisfied), Inconclusive, "one lucky run is not enough where all others broke off");
     }
 
     fn said() -> impl Strategy<Value = Verdict> {
-        prop::sample::select(vec![Kept, Violated, Unsaid])
+        prop::sample::select(vec![Satisfied, Violated, Inconclusive])
     }
 
     proptest! {
-        /// The oracle goes by the sentences of the documentation, one after the other.
+        /// The oracle follows the sentences of the documentation, one after the other.
         #[test]
         fn the_rule_is_that_of_a_naive_recount(first in said(), runs in prop::collection::vec(said(), 0..8)) {
             let any = |wanted: Verdict| runs.contains(&wanted);
@@ -128,18 +128,18 @@ mod tests {
                 first
             } else if any(Violated) {
                 Violated
-            } else if any(Kept) {
-                Kept
+            } else if any(Satisfied) {
+                Satisfied
             } else if first == Violated {
                 Violated
             } else {
-                Unsaid
+                Inconclusive
             };
-            let standing = if any(Violated) && any(Kept) {
+            let standing = if any(Violated) && any(Satisfied) {
                 Some(Standing::Flaky)
             } else if any(Violated) {
                 Some(Standing::Confirmed)
-            } else if any(Kept) && first == Violated {
+            } else if any(Satisfied) && first == Violated {
                 Some(Standing::NotConfirmed)
             } else {
                 None
@@ -147,7 +147,7 @@ mod tests {
             let tally = Tally::of(runs.iter().copied());
             prop_assert_eq!(tally.verdict(first), verdict);
             prop_assert_eq!(tally.standing(first), standing);
-            prop_assert_eq!(tally.said() + tally.unsaid, runs.len());
+            prop_assert_eq!(tally.conclusive() + tally.inconclusive, runs.len());
         }
     }
 }

@@ -7,15 +7,17 @@ use rusqlite::{Connection, ErrorCode, Transaction, params};
 
 use sesame_base::condition;
 use sesame_base::observation::{Observation, Outcome};
+use sesame_base::test_number::TestNumber;
 use sesame_plan::condition::{Condition, Operand};
 use sesame_plan::{Activation, CampaignPlan, Choice};
 use sesame_search as search;
 use sesame_search::indicators::GenerationIndicators;
 
-use crate::record::folder::{BEGUN, DATABASE, Lock};
-use crate::record::schema::{self, index};
+use crate::record::columns::index;
+use crate::record::files::{BEGUN, DATABASE};
+use crate::record::folder::Lock;
 use crate::record::{
-    Claim, Event, EventKind, GenerationCoverage, Origin, RecordError, Repository, ResultSet, TestRecord, series,
+    Claim, Event, EventKind, GenerationCoverage, Origin, RecordError, Repository, ResultSet, TestRecord, schema, series,
 };
 
 /// Writes the results of one campaign run. There is one per folder: it holds the folder's lock.
@@ -80,7 +82,7 @@ impl Recorder {
         Recorder::begin_session(repository, lock, workers)
     }
 
-    /// Goes on with the results of a run that was interrupted.
+    /// Continues the results of a run that was interrupted.
     pub fn resume(folder: &Path, workers: u32) -> Result<Recorder, RecordError> {
         Recorder::open(folder, workers, false)
     }
@@ -141,7 +143,7 @@ impl Recorder {
         // What would be refused when it is read is never written.
         let unfit = || plan.validate_test(&record.test).err().map(|error| error.to_string());
         if let Some(what) = unrecordable(record).or_else(unfit) {
-            return Err(RecordError::Unrecordable { test: record.number, what, path });
+            return Err(RecordError::Unrecordable { test: TestNumber(record.number), what, path });
         }
         let written = self.repository.connection.transaction().and_then(|transaction| {
             write_test(&transaction, plan, record)?;
@@ -151,7 +153,7 @@ impl Recorder {
             Some(error) if error.extended_code == rusqlite::ffi::SQLITE_CONSTRAINT_PRIMARYKEY => {
                 match self.repository.row(record.number) {
                     Err(RecordError::NoSuchTest { .. }) => self.repository.without_test(record.number),
-                    _ => RecordError::TestExists { number: record.number, path },
+                    _ => RecordError::TestExists { number: TestNumber(record.number), path },
                 }
             }
             _ => RecordError::database("record a test", &path, source),
@@ -221,7 +223,7 @@ impl Recorder {
             generation,
             evaluations,
             unique,
-            void,
+            no_effect,
             crashes,
             timeouts,
             front,
@@ -231,14 +233,14 @@ impl Recorder {
         let written = self.repository.connection.transaction().and_then(|transaction| {
             transaction
                 .prepare_cached(
-                    "INSERT OR REPLACE INTO indicators (generation, evaluations, unique_tests, void, crashes, timeouts, \
+                    "INSERT OR REPLACE INTO indicators (generation, evaluations, unique_tests, no_effect, crashes, timeouts, \
                      front, hypervolume, estimated, standard_error) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
                 )?
                 .execute(params![
                     generation,
                     evaluations,
                     unique,
-                    void,
+                    no_effect,
                     crashes,
                     timeouts,
                     front,
@@ -259,7 +261,7 @@ impl Recorder {
         written.map_err(|e| RecordError::database("record the indicators", &self.repository.path, e))
     }
 
-    /// Records an event. A warning said before is kept once, so that a resumed run may say it again.
+    /// Records an event. An equal warning is recorded once, so that a resumed run may repeat it.
     pub fn put_event(&mut self, event: &Event) -> Result<(), RecordError> {
         let written = self.repository.connection.transaction().and_then(|transaction| {
             let known: bool = transaction
@@ -275,7 +277,7 @@ impl Recorder {
         written.map_err(|e| RecordError::database("record an event", &self.repository.path, e))
     }
 
-    /// Ends this session but not the run: `resume` can go on with it. Dropping does the same without the time of day.
+    /// Ends this session but not the run: `resume` can continue it. Dropping does the same without the time of day.
     pub fn interrupt(self) -> Result<(), RecordError> {
         self.end_session()
     }
@@ -291,7 +293,7 @@ impl Recorder {
         self.end_session()?;
         self.repository.connection.flush_prepared_statement_cache();
         // Leaving the write-ahead log needs the file for ourselves. With a reader at work the log stays, which loses
-        // nothing: whoever closes the file last folds it in.
+        // nothing: the last process that closes the file folds it in.
         let left: rusqlite::Result<String> =
             self.repository.connection.query_row("PRAGMA journal_mode = DELETE", [], |row| row.get(0));
         match left {
@@ -334,7 +336,7 @@ fn host() -> Option<String> {
     Some(name.trim().to_owned()).filter(|name| !name.is_empty())
 }
 
-/// What of a test SQLite could not give back as it is: numbers that are none, counts beyond 63 bits.
+/// What SQLite could not return as it was written: numbers that are not finite, counts beyond 63 bits.
 fn unrecordable(record: &TestRecord) -> Option<String> {
     let Observation { outcome, end, operations, metrics, messages, wall, unheard: _, warnings: _ } =
         &record.observation;
@@ -436,7 +438,7 @@ fn write_test(transaction: &Transaction<'_>, plan: &CampaignPlan, record: &TestR
         Origin::Reference | Origin::Search => None,
     };
     let (detail, limit) = match &observation.outcome {
-        Outcome::Completed | Outcome::Void | Outcome::Unknown => (None, None),
+        Outcome::Completed | Outcome::NoEffect | Outcome::Unknown => (None, None),
         Outcome::Crash { message } => (Some(message.as_str()), None),
         Outcome::Timeout { limit } => (None, Some(*limit)),
     };
@@ -448,7 +450,7 @@ fn write_test(transaction: &Transaction<'_>, plan: &CampaignPlan, record: &TestR
         )?
         .execute(params![
             number,
-            format!("T{number}"),
+            TestNumber(*number).to_string(),
             origin.word(),
             known_test,
             generation,
@@ -513,7 +515,7 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
         transaction
             .prepare_cached(
                 "INSERT INTO operations (test, position, operation, start_s, end_s, start_condition, end_condition, \
-                 length_s, times, draw_seed, seen, changed, dropped, delayed, queued, injected, side_effects, unheard, \
+                 length_s, times, operation_seed, seen, changed, dropped, delayed, queued, injected, side_effects, unheard, \
                  first_touch_s, last_touch_s) \
                  VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20)",
             )?

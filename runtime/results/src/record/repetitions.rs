@@ -5,14 +5,15 @@ use std::collections::BTreeMap;
 use rusqlite::params;
 
 use sesame_base::observation::{MetricObservation, Observation, Outcome, WallTime};
+use sesame_base::test_number::TestNumber;
 use sesame_optimise::dominance::Fitness;
 use sesame_plan::{CampaignPlan, Requirement};
 use sesame_search as search;
 use sesame_search::Margin;
 use sesame_search::confirming::{typical, typical_margin};
 
+use crate::record::columns::{finite, index, metric_value, perhaps_finite, position, unsigned};
 use crate::record::recorder::write_event;
-use crate::record::schema::index;
 use crate::record::{
     Event, EventKind, MetricValue, RecordError, Recorder, Repetition, Repository, ScannedTest, Tally, TestRow, Verdict,
 };
@@ -41,7 +42,7 @@ pub fn confirmed_margins(plan: &CampaignPlan, repetitions: &[Repetition]) -> Opt
     Some((0..plan.requirements.len()).map(of).collect())
 }
 
-/// The repetitions by which a campaign confirms a test of its own accord, if it does and all are there.
+/// The repetitions by which a campaign itself confirms a test, if it does and all are there.
 fn own<'a>(plan: &CampaignPlan, repetitions: &'a [Repetition]) -> Option<&'a [Repetition]> {
     let times = plan.campaign.confirm?.times;
     let count = repetitions.iter().take_while(|run| run.position <= times).count();
@@ -68,7 +69,7 @@ impl Repetition {
     }
 }
 
-/// By what the tests of a campaign are judged.
+/// Judges the tests of a campaign by their fresh runs where they were run again.
 #[derive(Debug)]
 pub struct Judge<'a> {
     plan: &'a CampaignPlan,
@@ -95,7 +96,7 @@ impl Judge<'_> {
         self.tally(test.duplicate_of.unwrap_or(test.number), requirement).verdict(test.verdict(requirement))
     }
 
-    /// What the fresh runs of a test say about a requirement; of a test that is no duplicate.
+    /// The verdicts of a test's fresh runs on a requirement; the test must not be a duplicate.
     pub fn tally(&self, test: u32, requirement: &Requirement) -> Tally {
         Tally::of(self.runs(test).iter().map(|run| run.verdict(requirement)))
     }
@@ -118,9 +119,10 @@ impl Recorder {
         self.check_lock()?;
         let Repetition { test, position, simulator_seed, outcome, end, messages, values } = repetition;
         let path = self.repository().path().to_owned();
-        let unrecordable = |what: String| RecordError::Unrecordable { test: *test, what, path: path.clone() };
+        let unrecordable =
+            |what: String| RecordError::Unrecordable { test: TestNumber(*test), what, path: path.clone() };
         let (detail, limit) = match outcome {
-            Outcome::Completed | Outcome::Void | Outcome::Unknown => (None, None),
+            Outcome::Completed | Outcome::NoEffect | Outcome::Unknown => (None, None),
             Outcome::Crash { message } => (Some(message.as_str()), None),
             Outcome::Timeout { limit } => (None, Some(*limit)),
         };
@@ -166,7 +168,7 @@ impl Recorder {
             }
             for warning in warnings {
                 // Of the campaign: a test's own warnings are those of its own run.
-                let text = format!("repetition {position} of T{test}: {warning}");
+                let text = format!("repetition {position} of {}: {warning}", TestNumber(*test));
                 write_event(&transaction, &Event { kind: EventKind::Warning, test: None, text })?;
             }
             transaction.commit()
@@ -176,7 +178,7 @@ impl Recorder {
 }
 
 impl Repository {
-    /// By what its tests are judged.
+    /// A judge of its tests.
     pub fn judge(&self) -> Result<Judge<'_>, RecordError> {
         Ok(Judge { plan: self.plan(), repetitions: self.repetitions()? })
     }
@@ -189,7 +191,7 @@ impl Repository {
             [],
             |row| {
                 let at: (u32, u32) = (row.get(0)?, row.get(1)?);
-                Ok((at, super::repository::position(row, 2)?, super::repository::metric_value(row, 3)?))
+                Ok((at, position(row, 2)?, metric_value(row, 3)?))
             },
         )?;
         let mut of: BTreeMap<(u32, u32), Vec<MetricValue>> = BTreeMap::new();
@@ -204,8 +206,8 @@ impl Repository {
             [],
             |row| {
                 let at: (u32, u32) = (row.get(0)?, row.get(1)?);
-                let ended: (f64, u64) = (super::repository::finite(row, 3)?, super::repository::unsigned(row, 4)?);
-                let limit = super::repository::perhaps_finite(row, 7)?;
+                let ended: (f64, u64) = (finite(row, 3)?, unsigned(row, 4)?);
+                let limit = perhaps_finite(row, 7)?;
                 let outcome: (String, Option<String>, Option<f64>) = (row.get(5)?, row.get(6)?, limit);
                 Ok((at, row.get::<_, String>(2)?, ended, outcome))
             },
@@ -257,7 +259,7 @@ mod tests {
         let mut empty = repetition(3, 2, crash, None);
         empty.values.clear();
         vec![
-            repetition(5, 1, Outcome::Void, Some(0.0)),
+            repetition(5, 1, Outcome::NoEffect, Some(0.0)),
             repetition(3, 1, Outcome::Completed, Some(1.0 / 3.0)),
             empty,
             repetition(3, 3, Outcome::Timeout { limit: 30.0 }, Some(2.0)),
@@ -318,7 +320,10 @@ mod tests {
         assert!(refused.unwrap_err().to_string().contains("repetition 1 is inf"));
         let first = repetition(3, 1, Outcome::Completed, Some(1.0));
         recorder.put_repetition(&first, &["`top_speed` refused NaN".to_owned()]).unwrap();
-        assert!(recorder.put_repetition(&repetition(3, 1, Outcome::Void, None), &[]).is_err(), "it is there already");
+        assert!(
+            recorder.put_repetition(&repetition(3, 1, Outcome::NoEffect, None), &[]).is_err(),
+            "it is there already"
+        );
         let repository = recorder.finish("all evaluations done").unwrap();
         assert_eq!(repository.repetitions().unwrap()[&3], [first]);
         let warned = repository
@@ -368,7 +373,7 @@ mod tests {
     /// A run: how it ended, and whether it shows a collision; `None` where it has no value.
     fn run() -> impl Strategy<Value = (Outcome, Option<bool>)> {
         let crash = Outcome::Crash { message: String::new() };
-        let outcomes = vec![Outcome::Completed, Outcome::Void, Outcome::Timeout { limit: 1.0 }, crash];
+        let outcomes = vec![Outcome::Completed, Outcome::NoEffect, Outcome::Timeout { limit: 1.0 }, crash];
         (prop::sample::select(outcomes), prop::option::of(any::<bool>()))
     }
 
@@ -382,16 +387,16 @@ mod tests {
         ) {
             let said = |(outcome, shows): &(Outcome, Option<bool>)| match (outcome, shows) {
                 (_, Some(true)) => "violated",
-                (Outcome::Completed | Outcome::Void, Some(false)) => "kept",
-                _ => "unsaid",
+                (Outcome::Completed | Outcome::NoEffect, Some(false)) => "satisfied",
+                _ => "inconclusive",
             };
             let count = |word: &str| fresh.iter().filter(|run| said(run) == word).count();
-            let expected = match (fresh.len(), count("violated"), count("kept")) {
+            let expected = match (fresh.len(), count("violated"), count("satisfied")) {
                 (0, ..) => said(&first),
                 (_, 1.., _) => "violated",
-                (_, _, 1..) => "kept",
+                (_, _, 1..) => "satisfied",
                 _ if said(&first) == "violated" => "violated",
-                _ => "unsaid",
+                _ => "inconclusive",
             };
             let value = |shows: Option<bool>| shows.map(|shows| f64::from(u8::from(shows)));
 
@@ -418,14 +423,14 @@ mod tests {
             prop_assert_eq!(word("verdicts"), expected);
             prop_assert_eq!(word("first_verdicts"), said(&first));
             let counts: Vec<(u32, u32, u32)> = open
-                .prepare("SELECT confirmed, said, repetitions FROM confirmations")
+                .prepare("SELECT confirmed, conclusive, repetitions FROM confirmations")
                 .unwrap()
                 .query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
                 .unwrap()
                 .collect::<Result<_, _>>()
                 .unwrap();
             let listed = !fresh.is_empty() && (said(&first) == "violated" || count("violated") > 0);
-            let counted = [count("violated"), count("violated") + count("kept"), fresh.len()];
+            let counted = [count("violated"), count("violated") + count("satisfied"), fresh.len()];
             let [violated, told, all] = counted.map(|count| u32::try_from(count).unwrap());
             prop_assert_eq!(counts, if listed { vec![(violated, told, all)] } else { vec![] });
             let is_finding: bool = open

@@ -1,16 +1,16 @@
 //! Going through all tests of a run, one after the other, without holding them all: what analyses do.
 
-use rusqlite::{Row, Rows};
-
 use sesame_base::observation::Outcome;
+use sesame_base::test_number::TestNumber;
 use sesame_plan::{CampaignPlan, Choice, OperationId, Span};
 use sesame_search::coverage;
 use sesame_search::sspr::{Convention, Disturbance, Point, disturbance};
 
-use crate::record::repository::{choice, metric_value, perhaps_finite, position, span};
+use crate::record::columns::{choice, metric_value, perhaps_finite, position, span};
+use crate::record::cursor::Cursor;
 use crate::record::{MetricValue, Origin, RecordError, Repository};
 
-/// One test as analyses see it: what it disturbed, when, and what came out; no time series.
+/// One test as analyses see it: its operations, when they acted, and the results; without time series.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScannedTest {
     /// Its number in the campaign.
@@ -68,65 +68,17 @@ impl ScannedTest {
         Point::of(&disturbances, convention)
     }
 
-    /// Its point, if it counts for coverage: it had an effect, and is no duplicate.
+    /// Its point, if it counts for coverage: it had an effect, and is not a duplicate.
     pub fn covering_point(&self, plan: &CampaignPlan, convention: Convention) -> Option<Point> {
         coverage::counts(&self.outcome, self.duplicate_of.is_some()).then(|| self.point(plan, convention)).flatten()
     }
 }
 
-/// Rows of a table that are in the order of tests, taken test by test.
-pub(super) struct Cursor<'s, T> {
-    rows: Rows<'s>,
-    read: fn(&Row<'_>) -> rusqlite::Result<T>,
-    next: Option<(u32, T)>,
-    /// A test that rows were passed over of: nobody asked for it.
-    passed_over: Option<u32>,
-}
-
-impl<'s, T> Cursor<'s, T> {
-    /// The first column of each row is its test.
-    pub(super) fn over(rows: Rows<'s>, read: fn(&Row<'_>) -> rusqlite::Result<T>) -> rusqlite::Result<Self> {
-        let mut cursor = Cursor { rows, read, next: None, passed_over: None };
-        cursor.step()?;
-        Ok(cursor)
-    }
-
-    fn step(&mut self) -> rusqlite::Result<()> {
-        self.next = match self.rows.next()? {
-            Some(row) => Some((row.get(0)?, (self.read)(row)?)),
-            None => None,
-        };
-        Ok(())
-    }
-
-    /// The rows of a test; tests are asked for in ascending order.
-    pub(super) fn of(&mut self, test: u32) -> rusqlite::Result<Vec<T>> {
-        let mut found = Vec::new();
-        while let Some((owner, item)) = self.next.take() {
-            if owner > test {
-                self.next = Some((owner, item));
-                break;
-            }
-            if owner == test {
-                found.push(item);
-            } else {
-                self.passed_over = Some(owner);
-            }
-            self.step()?;
-        }
-        Ok(found)
-    }
-
-    /// A test that has rows here, and that was not asked for.
-    pub(super) fn orphan(&self) -> Option<u32> {
-        self.passed_over.or(self.next.as_ref().map(|(owner, _)| *owner))
-    }
-}
-
-/// A row of `operations`: its position, the operation's name, when it was to be active, and whether it had an effect, or nobody counted.
+/// A row of `operations`: its position, the operation's name, when it was to be active, and whether it had an effect or
+/// effects were not counted.
 type PlannedRow = (usize, String, Option<Span>, bool);
 
-/// A row of `choices`: the position of its operation, and the choice; `None` where it is none.
+/// A row of `choices`: the position of its operation, and the choice; `None` if it is damaged.
 type ChoiceRow = (usize, Option<Choice>);
 
 impl Repository {
@@ -179,6 +131,7 @@ impl Repository {
         let mut rows = tests.query([]).map_err(failed)?;
         while let Some(row) = rows.next().map_err(failed)? {
             let number: u32 = row.get(0).map_err(failed)?;
+            let this = TestNumber(number);
             let head = || -> rusqlite::Result<_> {
                 let origin: (String, Option<String>) = (row.get(1)?, row.get(2)?);
                 let outcome: (String, Option<String>, Option<f64>) =
@@ -203,7 +156,7 @@ impl Repository {
                 self.in_order(number, "operations", at, test.operations.len())?;
                 let operation = *ids
                     .get(name.as_str())
-                    .ok_or_else(|| damaged(format!("T{number} has an operation `{name}` that the plan lacks")))?;
+                    .ok_or_else(|| damaged(format!("{this} has an operation `{name}` that the plan lacks")))?;
                 test.operations.push(ScannedOperation {
                     operation,
                     planned,
@@ -212,10 +165,10 @@ impl Repository {
                     acted,
                 });
             }
-            let stray = |what: &str| damaged(format!("T{number} has {what} without an operation"));
+            let stray = |what: &str| damaged(format!("{this} has {what} without an operation"));
             for (at, choice) in choices.of(number).map_err(failed)? {
                 let choice = choice.ok_or_else(|| {
-                    damaged(format!("T{number} has a choice that is neither value, range, point nor text"))
+                    damaged(format!("{this} has a choice that is neither value, range, point nor text"))
                 })?;
                 test.operations.get_mut(at).ok_or_else(|| stray("a choice"))?.choices.push(choice);
             }
@@ -225,11 +178,11 @@ impl Repository {
             for it in &test.operations {
                 let (needed, chosen) = (self.plan().operation(it.operation).parameters.len(), it.choices.len());
                 if needed != chosen {
-                    return Err(damaged(format!("T{number} has {chosen} choices for {needed} parameters")));
+                    return Err(damaged(format!("{this} has {chosen} choices for {needed} parameters")));
                 }
             }
             if !test.values.is_empty() && test.values.len() != self.plan().metrics.len() {
-                return Err(damaged(format!("T{number} has {} values", test.values.len())));
+                return Err(damaged(format!("{this} has {} values", test.values.len())));
             }
             each(test);
         }

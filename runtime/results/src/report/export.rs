@@ -10,6 +10,7 @@ use serde::Serialize;
 use sesame_base::condition;
 use sesame_base::decimal::{decimal, quantity};
 use sesame_base::observation::Outcome;
+use sesame_base::test_number::TestNumber;
 use sesame_plan::{Activation, CampaignPlan, Choice, MetricId, Moment, OperationKind, TestOperation};
 
 use crate::record::{RecordError, Repository, TestRecord};
@@ -18,7 +19,7 @@ use crate::record::{RecordError, Repository, TestRecord};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Exported {
     /// The test's name in the results.
-    pub test: String,
+    pub test: TestNumber,
     /// The name of the block.
     pub name: String,
     /// The block.
@@ -32,32 +33,35 @@ pub enum ExportError {
     /// It cannot be read.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// It disturbs nothing, and a `test` block disturbs something.
-    #[error("T{0} disturbs nothing, so there is no `test` to write; every run of a campaign begins with it")]
-    Undisturbed(u32),
+    /// It has no operations, and a `test` block has at least one.
+    #[error("{0} is a reference run: it has no operations that a `test` could hold")]
+    Undisturbed(TestNumber),
 }
 
-/// The test that a user calls `T158`, `158`, or by the name of a known test, as a block of the language.
+/// The test that a user calls `T158`, `158`, or by the name of a regression test, as a block of the language.
 ///
 /// The block has a `name` of its own, by default one that the space does not use yet. It expects of each objective the
 /// value that was measured; in a campaign without objectives, of each metric that a requirement bounds.
 pub fn export(repository: &Repository, test: &str, name: Option<&str>) -> Result<Exported, ExportError> {
     let record = repository.test(repository.find(test)?)?;
     if record.test.operations.is_empty() {
-        return Err(ExportError::Undisturbed(record.number));
+        return Err(ExportError::Undisturbed(TestNumber(record.number)));
     }
     let plan = repository.plan();
-    let name =
-        name.map_or_else(|| free_name(plan, &format!("{}_T{}", plan.campaign.name, record.number)), str::to_owned);
-    let doc = format!("T{} of `{}`, seed {}.", record.number, plan.campaign.name, repository.campaign().seed);
+    let name = name.map_or_else(
+        || free_name(plan, &format!("{}_{}", plan.campaign.name, TestNumber(record.number))),
+        str::to_owned,
+    );
+    let doc =
+        format!("{} of `{}`, seed {}.", TestNumber(record.number), plan.campaign.name, repository.campaign().seed);
     let block = block(plan, &doc, &record, &name);
-    Ok(Exported { test: format!("T{}", record.number), name, block })
+    Ok(Exported { test: TestNumber(record.number), name, block })
 }
 
 /// The block of a test that was made out of another one, `original`, in a campaign of this seed.
 pub(super) fn shrunk_block(plan: &CampaignPlan, seed: u64, record: &TestRecord, original: &str) -> String {
     let name = free_name(plan, &format!("{}_{original}_shrunk", plan.campaign.name));
-    block(plan, &format!("{original} of `{}`, seed {seed}, made smaller.", plan.campaign.name), record, &name)
+    block(plan, &format!("{original} of `{}`, seed {seed}, shrunk.", plan.campaign.name), record, &name)
 }
 
 fn block(plan: &CampaignPlan, doc: &str, record: &TestRecord, name: &str) -> String {

@@ -1,127 +1,43 @@
 //! Reports as text for a terminal.
 
-use std::fmt::Write as _;
+use crate::analysis::confirmed::ConfirmedTest;
+use crate::present::number::{join_words, plural};
+use crate::present::table::{Table, TextOptions, visible, wrap};
+use crate::report::facts::recording::RecordingReplay;
+use crate::report::facts::replay::Replay;
+use crate::report::facts::show::{TestList, TestReport};
+use crate::report::facts::shrinking::Shrinking;
+use crate::report::facts::summary::Summary;
+use crate::report::sentences::{
+    confirmation_sentence, counts_sentence, coverage_sentence, headline, once_sentence, outcome_sentence,
+    shrinking_sentence, values_sentence,
+};
+use crate::report::tables;
 
-use sesame_base::observation::Counters;
-use sesame_plan::Span;
-
-use crate::record::{MetricValue, Verdict};
-use crate::report::confirmed::{ConfirmedTest, confirmation_sentence, once_sentence, tally_words, values_sentence};
-use crate::report::coverage::coverage_sentence;
-use crate::report::number::{self, fixed, join_words, plural, with_unit};
-use crate::report::repetition::{Repetition, ViolationRate};
-use crate::report::show::{OperationReport, TestList, TestReport};
-use crate::report::shrinking;
-use crate::report::stacked::Stacked;
-use crate::report::summary::{ExpectationSummary, FrontTest, Objective, Spread, Summary, value_text};
-use crate::report::table::{Align, Table, TextOptions, visible, wrap};
-
-pub(super) fn left(title: &str) -> (String, Align) {
-    (title.to_owned(), Align::Left)
-}
-
-pub(super) fn right(title: &str) -> (String, Align) {
-    (title.to_owned(), Align::Right)
-}
-
-/// One sentence on the whole: `Front of 6 tests, 2 requirements broken (R1 by 31 tests, R4 by 3)`.
-pub fn headline(summary: &Summary) -> String {
-    let mut broken: Vec<String> = Vec::new();
-    for requirement in summary.requirements.iter().filter(|requirement| requirement.violated > 0) {
-        let count = match broken.len() {
-            0 => plural(requirement.violated, "test", "tests"),
-            _ => requirement.violated.to_string(),
-        };
-        broken.push(format!("{} by {count}", requirement.requirement));
-    }
-    let mut parts = Vec::new();
-    if !summary.objectives.is_empty() {
-        parts.push(format!("front of {}", plural(summary.front.len(), "test", "tests")));
-    }
-    parts.push(match broken.len() {
-        0 if summary.requirements.is_empty() => "no requirements to break".to_owned(),
-        0 => "no requirement broken".to_owned(),
-        n => format!("{} broken ({})", plural(n, "requirement", "requirements"), broken.join(", ")),
-    });
-    let kept = summary.expectations.iter().filter(|expectation| expectation.verdict == Verdict::Kept).count();
-    match summary.expectations.len() {
-        0 => {}
-        all if kept == all => parts.push(plural(all, "expectation kept", "expectations kept")),
-        all => parts.push(format!("{kept} of {} kept", plural(all, "expectation", "expectations"))),
-    }
-    for (word, several) in [("crash", "crashes"), ("timeout", "timeouts")] {
-        let count = summary.failures.iter().filter(|failure| failure.outcome == word && failure.stands()).count();
-        if count > 0 {
-            parts.push(plural(count, word, several));
-        }
-    }
-    let mut sentence = parts.join(", ");
-    if let Some(first) = sentence.get_mut(..1) {
-        first.make_ascii_uppercase();
-    }
-    sentence
-}
-
-/// What a campaign found: the front, the requirements, crashes and timeouts, and what was void.
+/// What a campaign found: the front, the requirements, crashes and timeouts, and how many tests had no effect.
 pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     let mut text = String::new();
     paragraph(&mut text, &headline(summary), options);
     if !summary.front.is_empty() {
-        text.push_str(&front(summary).render(options));
+        text.push_str(&tables::front(summary).text(options));
         if let Some(confirmation) = summary.confirmation {
             paragraph(&mut text, &values_sentence(confirmation), options);
         }
     }
-    if let Some(shrinking) = &summary.shrinking {
-        shrinking::text(&mut text, shrinking, options);
+    if let Some(found) = &summary.shrinking {
+        shrinking(&mut text, found, options);
     }
-    if summary.objectives.is_empty() && !summary.spreads.is_empty() && summary.shrinking.is_none() {
-        section(&mut text, "Values", &spreads(&summary.spreads), options);
+    if summary.objectives.is_empty() && summary.shrinking.is_none() {
+        section(&mut text, "Values", &tables::spreads(&summary.spreads), options);
     }
-    if !summary.requirements.is_empty() {
-        section(&mut text, "Requirements", &requirements(summary), options);
+    section(&mut text, "Requirements", &tables::requirements(summary), options);
+    section(&mut text, "Regression tests", &tables::expectations(&summary.expectations), options);
+    if let Some(repetition) = &summary.repetition {
+        let title = format!("{} repeated", repetition.test);
+        section(&mut text, &title, &tables::violation_rates(&repetition.requirements), options);
     }
-    if !summary.expectations.is_empty() {
-        let mut table =
-            Table::new([left("known test"), left("test"), left("value"), left("expected"), left("came out")]);
-        for expectation in &summary.expectations {
-            table.row([
-                expectation.known_test.clone(),
-                expectation.test.clone(),
-                format!("{} {}", expectation.metric, expectation_value(expectation)),
-                expectation.bound.clone(),
-                came_out(expectation.verdict).to_owned(),
-            ]);
-        }
-        section(&mut text, "Known tests", &table, options);
-    }
-    if let Some(repetition) = &summary.repetition
-        && !repetition.requirements.is_empty()
-    {
-        section(&mut text, &format!("{} repeated", repetition.test), &repeated(repetition), options);
-    }
-    if !summary.failures.is_empty() {
-        let again = summary.failures.iter().any(|failure| failure.again.is_some());
-        let mut columns = vec![left("test"), left("outcome"), right("at")];
-        columns.extend(again.then(|| left("came again")));
-        columns.push(left("cause"));
-        let mut table = Table::new(columns);
-        for failure in &summary.failures {
-            let at = with_unit(fixed(failure.at, 2), Some("s"));
-            let mut cells = vec![failure.test.clone(), failure.outcome.clone(), at];
-            cells.extend(again.then(|| failure.again_words()));
-            cells.push(failure.detail.clone());
-            table.row(cells);
-        }
-        section(&mut text, "Crashes and timeouts", &table, options);
-    }
-    if !summary.not_finite.is_empty() {
-        let mut table = Table::new([left("test"), right("at"), left("read by")]);
-        for found in &summary.not_finite {
-            table.row([found.test.clone(), with_unit(fixed(found.at, 2), Some("s")), found.metrics.join(", ")]);
-        }
-        section(&mut text, "Numbers that are not finite", &table, options);
-    }
+    section(&mut text, "Crashes and timeouts", &tables::failures(&summary.failures), options);
+    section(&mut text, "Numbers that are not finite", &tables::not_finite(&summary.not_finite), options);
     text.push('\n');
     if let Some(coverage) = &summary.coverage {
         paragraph(&mut text, &coverage_sentence(coverage), options);
@@ -130,7 +46,7 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     if let Some(sentence) = confirmation_sentence(&summary.confirmed) {
         paragraph(&mut text, &sentence, options);
     }
-    if let Some(sentence) = once_sentence(summary.once, confirms(summary)) {
+    if let Some(sentence) = once_sentence(summary) {
         paragraph(&mut text, &sentence, options);
     }
     for warning in &summary.warnings {
@@ -139,195 +55,29 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     text
 }
 
-/// Whether a reader may expect that tests were run again.
-fn confirms(summary: &Summary) -> bool {
-    summary.confirmation.is_some() || !summary.confirmed.is_empty()
-}
-
-/// How many tests ran, and what became of those that say nothing.
-pub(crate) fn counts_sentence(summary: &Summary) -> String {
-    let counts = &summary.counts;
-    let mut left_out = Vec::new();
-    if counts.void > 0 {
-        let share = 100.0 * counts.void as f64 / counts.evaluations as f64;
-        left_out.push(format!("{} void ({share:.0} %: no operation had any effect)", counts.void));
+/// How a test was shrunk: before and after, the accepted steps, and the block.
+fn shrinking(text: &mut String, shrinking: &Shrinking, options: TextOptions) {
+    let sizes = tables::sizes(shrinking);
+    text.push('\n');
+    text.push_str(&options.heading(&format!("{} shrunk", shrinking.test)));
+    text.push('\n');
+    if !sizes.is_empty() {
+        text.push_str(&sizes.text(options));
     }
-    if counts.unmeasured > 0 {
-        left_out.push(format!("{} unmeasured (a metric without value)", counts.unmeasured));
+    paragraph(text, &format!("{}.", shrinking_sentence(shrinking)), options);
+    if shrinking.steps.iter().filter(|step| step.kept).count() > 1 {
+        section(text, "Accepted steps", &tables::accepted_steps(shrinking), options);
+        paragraph(text, "Tests that did not fail are on the page, and in the results as JSON.", options);
     }
-    if counts.duplicates > 0 {
-        left_out.push(plural(counts.duplicates, "duplicate (not simulated again)", "duplicates (not simulated again)"));
-    }
-    let mut sentence = plural(counts.evaluations, "evaluation", "evaluations");
-    if !left_out.is_empty() {
-        let _ = write!(sentence, ", of these {}", join_words(&left_out));
-    }
-    if summary.stop.is_none() {
-        sentence.push_str("; the run is unfinished");
-    }
-    sentence
-}
-
-pub(super) fn paragraph(text: &mut String, sentence: &str, options: TextOptions) {
-    for line in wrap(sentence, options.width.unwrap_or(usize::MAX)) {
-        text.push_str(&line);
+    if let Some(block) = &shrinking.block {
         text.push('\n');
+        text.push_str(block);
     }
-}
-
-pub(super) fn section(text: &mut String, title: &str, table: &Table, options: TextOptions) {
-    text.push('\n');
-    text.push_str(&options.heading(title));
-    text.push('\n');
-    text.push_str(&table.render(options));
-}
-
-fn front(summary: &Summary) -> Table {
-    let mut columns = vec![left("test")];
-    columns.extend(summary.objectives.iter().map(|objective| right(&objective.metric)));
-    columns.push(left("violates"));
-    let again = confirmed_column(summary);
-    columns.extend(again.is_some().then(|| left("confirmed")));
-    let stacked = stacked_column(summary);
-    columns.extend(stacked.is_some().then(|| left("at once")));
-    columns.push(left("operations"));
-    let mut table = Table::new(columns);
-    let values = objective_columns(summary);
-    for (row, test) in summary.front.iter().enumerate() {
-        let mut cells = vec![test.test.clone()];
-        cells.extend(values.iter().map(|column| column[row].clone()));
-        cells.push(test.violates.join(" "));
-        cells.extend(again.as_ref().map(|column| column[row].clone()));
-        cells.extend(stacked.as_ref().map(|column| column[row].clone()));
-        cells.push(test.operations.clone());
-        table.row(cells);
-    }
-    table
-}
-
-/// How often what was found in the tests of the front came again; `None` where none of them was run again.
-pub(crate) fn confirmed_column(summary: &Summary) -> Option<Vec<String>> {
-    let of = |number: u32| summary.confirmed.iter().find(|test| test.number == number);
-    let any = summary.front.iter().any(|test| of(test.number).is_some());
-    any.then(|| summary.front.iter().map(|test| of(test.number).map_or("–".to_owned(), ConfirmedTest::words)).collect())
-}
-
-/// Which operations' copies acted at the same time, and what they came to; `None` where none did.
-pub(crate) fn stacked_column(summary: &Summary) -> Option<Vec<String>> {
-    let words = |test: &FrontTest| test.stacked.iter().map(Stacked::words).collect::<Vec<_>>().join("; ");
-    let any = summary.front.iter().any(|test| !test.stacked.is_empty());
-    any.then(|| summary.front.iter().map(words).collect())
-}
-
-/// The front's values in words, a column per objective.
-pub(crate) fn objective_columns(summary: &Summary) -> Vec<Vec<String>> {
-    let columns = summary.objectives.iter().enumerate().map(|(at, Objective { unit, .. })| {
-        let values = || summary.front.iter().map(move |test| test.values.get(at).copied().flatten());
-        let decimals = number::decimals(values().flatten());
-        let word =
-            |value: Option<f64>| value.map_or("–".to_owned(), |x| with_unit(fixed(x, decimals), unit.as_deref()));
-        values().map(word).collect()
-    });
-    columns.collect()
-}
-
-fn requirements(summary: &Summary) -> Table {
-    let again = !summary.confirmed.is_empty();
-    let mut columns = vec![left("name"), left("bound"), right("violated"), right("kept"), right("unsaid")];
-    columns.extend(again.then(|| left("run again")));
-    columns.extend([left("undisturbed"), left("worst"), left("sentence")]);
-    let mut table = Table::new(columns);
-    for requirement in &summary.requirements {
-        let mut cells = vec![
-            requirement.requirement.clone(),
-            format!("{} {}", requirement.metric, requirement.bound),
-            requirement.violated.to_string(),
-            requirement.kept.to_string(),
-            requirement.unsaid.to_string(),
-        ];
-        cells.extend(again.then(|| requirement.standings()));
-        cells.extend([
-            requirement.reference.map_or("–", Verdict::word).to_owned(),
-            requirement.worst.as_ref().map_or("–".to_owned(), |worst| format!("{} {}", worst.test, worst.text)),
-            requirement.text.clone(),
-        ]);
-        table.row(cells);
-    }
-    table
-}
-
-fn repeated(repetition: &Repetition) -> Table {
-    let mut table = Table::new([left("requirement"), left("violated"), left("sentence")]);
-    for requirement in &repetition.requirements {
-        table.row([requirement.requirement.clone(), rate_text(requirement), requirement.text.clone()]);
-    }
-    table
-}
-
-/// How often a requirement was violated, as in `7 of 10 [40 %, 89 %]`.
-pub(crate) fn rate_text(rate: &ViolationRate) -> String {
-    let Some(interval) = rate.interval else { return "no run tells".to_owned() };
-    let [low, high] = interval.map(|share| format!("{:.0} %", share * 100.0));
-    format!("{} of {} [{low}, {high}]", rate.violated, rate.said)
-}
-
-/// The value that was to be as expected, with all its digits.
-pub(crate) fn expectation_value(expectation: &ExpectationSummary) -> String {
-    expectation.value.map_or("unmeasured".to_owned(), number::exact)
-}
-
-/// Whether it came out as expected.
-pub(crate) fn came_out(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Kept => "yes",
-        Verdict::Violated => "no",
-        Verdict::Unsaid => "unsaid",
-    }
-}
-
-fn spreads(spreads: &[Spread]) -> Table {
-    let mut table =
-        Table::new([left("metric"), right("tests"), right("least"), right("median"), right("most"), left("unit")]);
-    for spread in spreads {
-        let decimals = number::decimals([spread.min, spread.median, spread.max]);
-        table.row([
-            spread.metric.clone(),
-            spread.count.to_string(),
-            fixed(spread.min, decimals),
-            fixed(spread.median, decimals),
-            fixed(spread.max, decimals),
-            spread.unit.clone().unwrap_or_default(),
-        ]);
-    }
-    table
 }
 
 /// All tests of a campaign, a line each; `*` marks those on the front.
 pub fn list_text(list: &TestList, options: TextOptions) -> String {
-    let mut columns = vec![left("test"), left("origin"), right("gen"), left("outcome")];
-    columns.extend(list.metrics.iter().zip(&list.units).map(|(metric, unit)| match unit {
-        Some(unit) => right(&format!("{metric} [{unit}]")),
-        None => right(metric),
-    }));
-    columns.extend([left("violates"), left("operations")]);
-    let mut table = Table::new(columns);
-    let decimals: Vec<usize> = (0..list.metrics.len())
-        .map(|at| number::decimals(list.tests.iter().filter_map(|test| test.values.get(at)?.value)))
-        .collect();
-    for test in &list.tests {
-        let mut cells = vec![
-            format!("{}{}", test.test, if test.front { "*" } else { "" }),
-            test.origin.clone(),
-            test.generation.map_or(String::new(), |generation| generation.to_string()),
-            test.duplicate_of.as_ref().map_or_else(|| test.outcome.clone(), |original| format!("as {original}")),
-        ];
-        cells.extend(decimals.iter().enumerate().map(|(at, &decimals)| {
-            test.values.get(at).and_then(|shown| shown.value).map_or("–".to_owned(), |value| fixed(value, decimals))
-        }));
-        cells.extend([test.violates.join(" "), test.operations.clone()]);
-        table.row(cells);
-    }
-    table.render(options)
+    tables::list(list).text(options)
 }
 
 /// Everything on one test.
@@ -336,65 +86,18 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     paragraph(&mut text, &options.heading(&format!("{} ({})", test.test, test.origin)), options);
     paragraph(&mut text, &outcome_sentence(test), options);
     if !test.parents.is_empty() {
-        paragraph(&mut text, &format!("made of {}", join_words(&test.parents)), options);
+        let parents: Vec<String> = test.parents.iter().map(ToString::to_string).collect();
+        paragraph(&mut text, &format!("parents {}", join_words(&parents)), options);
     }
     paragraph(&mut text, &format!("simulator seed {}", test.simulator_seed), options);
-    if !test.operations.is_empty() {
-        let mut table = Table::new([
-            left("operation"),
-            left("kind"),
-            left("topic"),
-            left("planned"),
-            left("observed"),
-            left("choices"),
-            left("effect"),
-        ]);
-        for operation in &test.operations {
-            table.row([
-                operation.operation.clone(),
-                operation.kind.clone(),
-                operation.topic.clone().unwrap_or_default(),
-                planned_text(operation),
-                operation.observed.as_deref().map_or("unknown".to_owned(), spans_text),
-                choices_text(operation),
-                effect_text(operation),
-            ]);
-        }
-        section(&mut text, "Operations", &table, options);
-    }
+    section(&mut text, "Operations", &tables::operations(&test.operations), options);
     for stacked in &test.stacked {
         paragraph(&mut text, &stacked.words(), options);
     }
-    let mut table = Table::new([left("metric"), left("value"), right("changes")]);
-    for metric in &test.metrics {
-        let shown = MetricValue::whole(metric.value, metric.set);
-        table.row([metric.metric.clone(), value_text(shown, metric.unit.as_deref()), metric.changes.to_string()]);
-    }
-    section(&mut text, "Metrics", &table, options);
-    if !test.requirements.is_empty() {
-        let again = test.requirements.iter().any(|requirement| requirement.fresh.is_some());
-        let mut columns = vec![left("name"), left("verdict"), left("bound")];
-        if again {
-            columns.extend([left("violated in fresh runs"), left("in the first run")]);
-        }
-        columns.extend([left("value"), left("outside"), left("sentence")]);
-        let mut table = Table::new(columns);
-        for requirement in &test.requirements {
-            let mut cells = vec![
-                requirement.requirement.clone(),
-                requirement.verdict.word().to_owned(),
-                format!("{} {}", requirement.metric, requirement.bound),
-            ];
-            if let Some(fresh) = &requirement.fresh {
-                cells.extend([tally_words(fresh.tally), requirement.first.word().to_owned()]);
-            }
-            cells.extend([requirement.value.clone(), spans_text(&requirement.outside), requirement.text.clone()]);
-            table.row(cells);
-        }
-        section(&mut text, "Requirements", &table, options);
-    }
+    section(&mut text, "Metrics", &tables::metrics(&test.metrics), options);
+    section(&mut text, "Requirements", &tables::verdicts(&test.requirements), options);
     if let Some(confirmed) = &test.confirmed {
-        section(&mut text, "Run again", &run_again(confirmed), options);
+        section(&mut text, "Run again", &tables::findings(confirmed), options);
     }
     for warning in &test.warnings {
         paragraph(&mut text, &format!("warning: {}", visible(warning)), options);
@@ -408,100 +111,94 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     text
 }
 
-/// What was found in tests that were run again, and how often it came again: a line for each finding.
+/// Findings of tests that were run again, and how often each was seen again: a line for each finding.
 pub fn confirmed_text(tests: &[ConfirmedTest], options: TextOptions) -> String {
-    let mut table = Table::new([left("test"), left("finding"), left("came again")]);
-    for test in tests {
-        if test.findings.is_empty() {
-            table.row([test.test.clone(), "nothing".to_owned(), plural(test.repetitions, "run", "runs")]);
-        }
-        for finding in &test.findings {
-            table.row([test.test.clone(), finding.finding.clone(), finding.words()]);
-        }
-    }
-    table.render(options)
+    tables::confirmed(tests).text(options)
 }
 
-/// What was found in a test, and how often it came again.
-fn run_again(confirmed: &ConfirmedTest) -> Table {
-    let mut table = Table::new([left("finding"), left("came again")]);
-    if confirmed.findings.is_empty() {
-        table.row(["nothing".to_owned(), plural(confirmed.repetitions, "run", "runs")]);
+/// A replay in words.
+pub fn replay_text(replay: &Replay, options: TextOptions) -> String {
+    let Replay { test, simulator_seed, differences, .. } = replay;
+    if replay.same {
+        return format!("{test} came out the same, bit for bit (simulator seed {simulator_seed})\n");
     }
-    for finding in &confirmed.findings {
-        table.row([finding.finding.clone(), finding.words()]);
-    }
-    table
+    let count = plural(differences.len(), "difference", "differences");
+    let table = tables::differences(differences).text(options);
+    format!("{test} came out different (simulator seed {simulator_seed}): {count}\n{table}")
 }
 
-/// How a test ended, in a sentence.
-pub(crate) fn outcome_sentence(test: &TestReport) -> String {
-    let mut sentence = match &test.detail {
-        Some(detail) => format!("{} at {} s: {}", test.outcome, fixed(test.end, 2), visible(detail)),
-        None if test.outcome == "void" => {
-            format!("void: no operation had any effect up to its end at {} s", fixed(test.end, 2))
-        }
-        None => format!("{} at {} s", test.outcome, fixed(test.end, 2)),
-    };
-    let _ =
-        write!(sentence, ", {}", plural(usize::try_from(test.messages).unwrap_or(usize::MAX), "message", "messages"));
-    if let Some(generation) = test.generation {
-        let _ = write!(sentence, ", generation {generation}");
-    }
-    if let Some(original) = &test.duplicate_of {
-        let _ = write!(sentence, ", result taken from the equal test {original}");
-    }
-    if test.front {
-        sentence.push_str(", on the front");
-    }
-    sentence
+/// What metrics make of a recording, in words.
+pub fn recording_text(replay: &RecordingReplay, options: TextOptions) -> String {
+    let name = replay.run.clone().unwrap_or_else(|| "a recording that no runner made".to_owned());
+    let messages = usize::try_from(replay.messages).unwrap_or(usize::MAX);
+    let table = tables::fed_metrics(&replay.metrics).text(options);
+    format!("{name}: {} fed\n{table}", plural(messages, "message", "messages"))
 }
 
-/// When an operation was to be active: its window, or the conditions that switched it; a dash for an offline one.
-pub(crate) fn planned_text(operation: &OperationReport) -> String {
-    match (&operation.conditions, operation.planned) {
-        (Some(conditions), _) => conditions.clone(),
-        (None, planned) => spans_text(planned.as_slice()),
+fn paragraph(text: &mut String, sentence: &str, options: TextOptions) {
+    for line in wrap(sentence, options.width.unwrap_or(usize::MAX)) {
+        text.push_str(&line);
+        text.push('\n');
     }
 }
 
-/// Spans in seconds, as in `8.00–57.00 s`; a dash for none.
-pub(crate) fn spans_text(spans: &[Span]) -> String {
-    if spans.is_empty() {
-        return "–".to_owned();
+/// A table under its title; nothing if it has no rows.
+fn section(text: &mut String, title: &str, table: &Table, options: TextOptions) {
+    if table.is_empty() {
+        return;
     }
-    let words: Vec<String> = spans.iter().take(4).map(|span| format!("{:.2}–{:.2}", span.start, span.end)).collect();
-    let more = if spans.len() > 4 { format!(" and {} more", spans.len() - 4) } else { String::new() };
-    format!("{} s{more}", words.join(", "))
+    text.push('\n');
+    text.push_str(&options.heading(title));
+    text.push('\n');
+    text.push_str(&table.text(options));
 }
 
-/// What an operation's parameters are, in words.
-pub(crate) fn choices_text(operation: &OperationReport) -> String {
-    let words: Vec<&str> = operation.choices.iter().map(|choice| choice.text.as_str()).collect();
-    if words.is_empty() { "–".to_owned() } else { words.join(", ") }
-}
+#[cfg(test)]
+mod tests {
+    use sesame_base::test_number::TestNumber;
 
-/// What an operation did, in words, as in `2450 seen, 2450 changed from 8.00 to 56.98 s`.
-pub(crate) fn effect_text(operation: &OperationReport) -> String {
-    let Some(counters) = operation.counters else { return "unknown".to_owned() };
-    let Counters { seen, changed, dropped, delayed, queued, injected, side_effects, unheard } = counters;
-    let mut words = vec![format!("{seen} seen")];
-    let named = [
-        (changed, "changed"),
-        (dropped, "dropped"),
-        (delayed, "delayed"),
-        (queued, "queued behind them"),
-        (injected, "injected"),
-        (side_effects, "side effects"),
-        (unheard, "disturbed where nobody listens"),
-    ];
-    words.extend(named.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}")));
-    if !counters.any_effect() {
-        words.push("no effect".to_owned());
+    use super::*;
+    use crate::record::{Difference, MetricValue};
+    use crate::report::facts::recording::{FedMetric, Sameness};
+
+    #[test]
+    fn a_replay_says_what_differs() {
+        let options = TextOptions { width: None, colour: false };
+        let same = Replay { test: TestNumber(5), simulator_seed: 7, same: true, differences: vec![] };
+        assert_eq!(replay_text(&same, options), "T5 came out the same, bit for bit (simulator seed 7)\n");
+        let words = |what: &str, before: &str, after: &str| Difference {
+            what: what.to_owned(),
+            before: before.to_owned(),
+            after: after.to_owned(),
+        };
+        let differences = vec![
+            words("the outcome", "completed", "crash: gone"),
+            words("metric `cycle_time`", "68.20000000000001", "68.2"),
+        ];
+        insta::assert_snapshot!(replay_text(&Replay { same: false, differences, ..same }, options));
     }
-    let mut text = words.join(", ");
-    if let (Some(first), Some(last)) = (operation.first_touch, operation.last_touch) {
-        let _ = write!(text, " from {first:.2} to {last:.2} s");
+
+    #[test]
+    fn each_metric_stands_beside_what_was_recorded() {
+        let metric = |name: &str, now: Option<f64>, recorded, sameness| FedMetric {
+            metric: name.to_owned(),
+            unit: (name == "cycle_time").then(|| "s".to_owned()),
+            now: MetricValue::whole(now, now.is_some()),
+            recorded,
+            sameness,
+        };
+        let replay = RecordingReplay {
+            recording: "T5.mcap".into(),
+            run: Some("T5 of coverage_experiment (completed)".to_owned()),
+            messages: 1_200,
+            same: false,
+            metrics: vec![
+                metric("collisions", Some(18.0), Some(17.0), Sameness::Differs),
+                metric("cycle_time", Some(68.2), Some(68.2), Sameness::Equal),
+                metric("clearance", None, None, Sameness::NotRecorded),
+            ],
+            warnings: vec![],
+        };
+        insta::assert_snapshot!(recording_text(&replay, TextOptions { width: None, colour: false }));
     }
-    text
 }

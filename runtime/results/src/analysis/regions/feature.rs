@@ -5,8 +5,8 @@ use sesame_plan::{CampaignPlan, Dimension, OperationId, Span};
 use sesame_search::sspr::{Convention, disturbance};
 
 use crate::analysis::regions::tree::Question;
+use crate::present::number;
 use crate::record::ScannedTest;
-use crate::report::number;
 
 /// One number of a test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,13 +5,13 @@ use sesame_plan::CampaignPlan;
 
 use crate::analysis::regions::Regions;
 use crate::analysis::regions::tree::{Node, Tally};
-use crate::report::{Markup, percent};
+use crate::present::markup::{Markup, percent};
 
 /// Height of a band, in pixels.
 const BAND: f64 = 46.0;
 
 /// Colours of a file that stands alone; on the page the page's own count.
-const STYLE: &str = "svg{font:13px system-ui,sans-serif}.kept{fill:#b9c6d3}.violated{fill:#c2410c}.edge{fill:none;stroke:#fff;\
+const STYLE: &str = "svg{font:13px system-ui,sans-serif}.passing{fill:#b9c6d3}.violated{fill:#c2410c}.edge{fill:none;stroke:#fff;\
                      stroke-width:2}.words{fill:#1b2330}";
 
 /// The picture as a file of its own.
@@ -66,11 +66,11 @@ fn bar(
     let title = format!("{words}: {}", tally(node.tally));
     let (x, y) = (percent(before / all), pixels(top));
     let (wide, high) = (percent(width), pixels(BAND));
-    // What does not fit into a bar is cut off there, as pictures inside others are; pointing at it tells it whole.
+    // Text that does not fit into a bar is cut off; its tooltip has all of it.
     let place = [("x", x.as_str()), ("y", &y), ("width", &wide), ("height", &high)];
     markup.open("svg", &[&place[..], &[("role", "img"), ("aria-label", &title)]].concat());
     markup.element("title", &[], &title);
-    markup.leaf("rect", &[("class", "kept"), ("width", "100%"), ("height", "100%")]);
+    markup.leaf("rect", &[("class", "passing"), ("width", "100%"), ("height", "100%")]);
     let opacity = format!("{failing:.3}");
     markup.leaf("rect", &[("class", "violated"), ("width", "100%"), ("height", "100%"), ("fill-opacity", &opacity)]);
     markup.leaf("rect", &[("class", "edge"), ("width", "100%"), ("height", "100%")]);

@@ -4,8 +4,8 @@ use sesame_base::observation::Outcome;
 
 use super::*;
 use crate::analysis::regions::tree::simplest_between;
+use crate::present::table::TextOptions;
 use crate::record::sample;
-use crate::report::TextOptions;
 
 /// Rows of a tree's node: those for which each question of the path is answered so.
 fn rows_of(columns: &Columns, path: &[Step], rows: usize) -> Vec<usize> {
@@ -238,8 +238,8 @@ fn the_counts_of_each_rule_are_those_of_the_tests_that_it_describes() {
                         let requirement = repository.plan().requirements.iter().find(|it| it.name == name).unwrap();
                         match row.verdict(requirement) {
                             Verdict::Violated => Some(true),
-                            Verdict::Kept => Some(false),
-                            Verdict::Unsaid => None,
+                            Verdict::Satisfied => Some(false),
+                            Verdict::Inconclusive => None,
                         }
                     }
                 };

@@ -1,10 +1,10 @@
 //! A small decision tree over columns of numbers (CART; Breiman, Friedman, Olshen and Stone 1984).
 //!
 //! It guarantees: each split is the one of least Gini impurity among all that leave enough rows on both sides, the first
-//! in the order of columns and thresholds if several are; a split stays only if it is no chance, by Fisher's exact test
+//! in the order of columns and thresholds if several are; a split stays only if it is not a chance effect, by Fisher's exact test
 //! at 5 % over all questions that were weighed for it (Bonferroni); the same data give the same tree.
 
-use crate::report::wilson;
+use crate::analysis::statistics::wilson;
 
 /// Columns of numbers, a NaN where a row has none.
 #[derive(Debug, Clone, Default)]

@@ -1,0 +1,11 @@
+//! The facts of reports, each computed once from the results. They serialise to JSON as they are.
+
+pub(super) mod coverage;
+pub(super) mod recording;
+pub(super) mod repetition;
+pub(super) mod replay;
+pub(super) mod show;
+pub(super) mod shrinking;
+pub(super) mod stacked;
+pub(super) mod summary;
+pub(super) mod wording;

@@ -1,0 +1,16 @@
+//! Reports as HTML: the page, and its parts.
+
+mod cells;
+mod front;
+mod generations;
+mod header;
+mod page;
+mod policy;
+mod published;
+mod regions;
+mod scatter;
+mod shrinking;
+mod test;
+mod timeline;
+
+pub use page::{page, write_page, write_page_with};

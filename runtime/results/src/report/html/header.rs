@@ -1,0 +1,80 @@
+//! The head of the page: what was run, and how.
+
+use sesame_plan::Search;
+
+use crate::present::markup::Markup;
+use crate::present::number::{self, plural};
+use crate::record::{RecordError, Repository};
+use crate::report::facts::summary::Summary;
+use crate::report::sentences::{counts_sentence, headline};
+
+pub(super) fn header(
+    body: &mut Markup,
+    repository: &Repository,
+    summary: &Summary,
+    digest: &str,
+) -> Result<(), RecordError> {
+    let facts = repository.campaign();
+    let plan = &facts.plan;
+    let sessions = repository.sessions()?;
+    body.open("header", &[]);
+    body.element("p", &[("class", "kicker")], &plan.space);
+    body.element("h1", &[], &plan.campaign.name);
+    for doc in [&plan.campaign.doc, &plan.doc] {
+        if !doc.is_empty() {
+            body.element("p", &[("class", "doc")], doc);
+        }
+    }
+    body.element("p", &[("class", "headline")], &format!("{}.", headline(summary)));
+    body.element("p", &[], &format!("{}.", counts_sentence(summary)));
+    let search = match &plan.campaign.search {
+        Search::Nsga2 { population, evaluations } => {
+            format!("NSGA-II, population {population}, {evaluations} evaluations")
+        }
+        Search::MapElites { population, evaluations } => {
+            format!("MAP-Elites, {population} tests per generation, {evaluations} evaluations")
+        }
+        Search::LatinHypercube { evaluations } => format!("Latin hypercube, {evaluations} evaluations"),
+        Search::Sobol { evaluations } => format!("Sobol points, {evaluations} evaluations"),
+        Search::Falsification { population: 1, evaluations } => format!("falsification, {evaluations} evaluations"),
+        Search::Falsification { population, evaluations } => {
+            format!("falsification, {population} tests at a time, {evaluations} evaluations")
+        }
+        Search::Random { evaluations } => format!("random, {evaluations} evaluations"),
+        Search::Repeat { test, times } => format!("{} repeated {times} times", plan.test(*test).name),
+        Search::Known { tests } => plural(tests.len(), "regression test", "regression tests"),
+        Search::Shrink { test, evaluations, .. } => {
+            format!("{} shrunk, {evaluations} evaluations at most", plan.test(*test).name)
+        }
+    };
+    let search = match plan.campaign.coverage.as_ref().and_then(|goal| goal.stop_at) {
+        Some(share) => format!("{search} at most, until {} % of the cells are covered", number::number(100.0 * share)),
+        None => search,
+    };
+    let wall: f64 = sessions.iter().filter_map(|session| Some(session.ended_at? - session.started_at)).sum();
+    let workers = sessions.last().map_or(0, |session| session.workers);
+    let workers = plural(usize::try_from(workers).unwrap_or(usize::MAX), "worker", "workers");
+    let rows = [
+        ("Search", search),
+        ("Seed", facts.seed.to_string()),
+        ("One test", format!("{} of simulation", number::quantity(plan.campaign.end_after, Some("s")))),
+        ("Took", format!("{} s on {workers}", number::fixed(wall, 1))),
+        ("Made by", format!("{}, sesame-runtime {}", plan.generator, facts.runtime)),
+        ("Source", plan.source.clone()),
+        ("Ended", facts.stop.clone().unwrap_or_else(|| "unfinished".to_owned())),
+        ("Digest", digest.to_owned()),
+    ];
+    body.open("dl", &[]);
+    for (name, value) in &rows {
+        body.open("div", &[("class", if *name == "Digest" { "digest" } else { "fact" })]);
+        body.element("dt", &[], name);
+        body.element("dd", &[], value);
+        body.close();
+    }
+    body.close();
+    for warning in &summary.warnings {
+        body.element("p", &[("class", "warning")], &format!("Warning: {warning}"));
+    }
+    body.close();
+    Ok(())
+}

@@ -1,0 +1,177 @@
+//! The page with pictures: one file that needs nothing but itself.
+
+use std::path::Path;
+
+use sesame_base::observation::Outcome;
+
+use crate::present::chart::evenly;
+use crate::present::markup::{Markup, fill};
+use crate::present::table::Table;
+use crate::record::{Origin, RecordError, Repository, TestRow};
+use crate::report::facts::shrinking::Shrinking;
+use crate::report::facts::summary::{Summary, summarise};
+use crate::report::file::write_aside;
+use crate::report::html::front::front;
+use crate::report::html::generations::generations;
+use crate::report::html::header::header;
+use crate::report::html::policy::policy;
+use crate::report::html::test::test;
+use crate::report::html::{cells, regions, shrinking};
+use crate::report::sentences::once_sentence;
+use crate::report::tables;
+
+/// Timelines drawn at most; of a larger front evenly chosen ones.
+const TIMELINES: usize = 24;
+
+/// Writes the page to this path, beside the results or elsewhere.
+pub fn write_page(repository: &Repository, path: &Path) -> Result<(), RecordError> {
+    write_page_with(repository, path, &repository.digest()?)
+}
+
+/// The same for results whose digest is known already.
+pub fn write_page_with(repository: &Repository, path: &Path, digest: &str) -> Result<(), RecordError> {
+    let beside = path.parent() == Some(repository.folder());
+    let folder = if beside { Path::new("") } else { repository.folder() };
+    write_aside(path, &page_in(repository, folder, digest)?).map_err(|e| RecordError::io("write the page", path, e))
+}
+
+/// The page, from a campaign's results; a run may still be going on. Links to traces lead from the run's folder.
+pub fn page(repository: &Repository) -> Result<String, RecordError> {
+    page_in(repository, Path::new(""), &repository.digest()?)
+}
+
+/// The page; `folder` is the path of the run's folder relative to the page.
+fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<String, RecordError> {
+    let rows = repository.tests()?;
+    let members = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
+    let summary = summarise(repository, &rows, &members)?;
+    let groups = chosen(&summary, &rows);
+    let drawn: Vec<u32> = groups.iter().flat_map(|group| group.tests.iter().copied()).collect();
+
+    let mut body = Markup::default();
+    header(&mut body, repository, &summary, digest)?;
+    body.open("main", &[]);
+    if let Some(shrinking) = &summary.shrinking {
+        shrinking::shrinking(&mut body, shrinking, &drawn);
+    }
+    requirements(&mut body, &summary, &drawn);
+    front(&mut body, repository, &summary, &rows, &drawn);
+    generations(&mut body, repository, &summary, &rows, &drawn)?;
+    if let Some(coverage) = &summary.coverage {
+        cells::coverage(&mut body, repository.plan(), coverage, &drawn);
+    }
+    regions::regions(&mut body, repository)?;
+    sections(&mut body, &summary, &drawn);
+    for group in groups.iter().filter(|group| !group.tests.is_empty()) {
+        body.open("section", &[]);
+        body.element("h2", &[], group.title);
+        body.element("p", &[("class", "quiet")], &group.caption);
+        for &number in &group.tests {
+            test(&mut body, repository, &summary, number, folder)?;
+        }
+        body.close();
+    }
+    body.close();
+    let title = format!("{} of {}, seed {}", summary.campaign, summary.space, summary.seed);
+    let mut escaped = Markup::default();
+    escaped.text(&title);
+    let shell = sesame_templates::report::PAGE;
+    // The policy is of the shell alone: what is filled in is not permitted to hold styles or scripts.
+    let policy = policy(shell);
+    Ok(fill(shell, &[("policy", &policy), ("title", &escaped.finish()), ("body", &body.finish())]))
+}
+
+/// Tests that get a timeline, under a heading.
+struct Group {
+    title: &'static str,
+    caption: String,
+    tests: Vec<u32>,
+}
+
+fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
+    let reference: Vec<u32> =
+        rows.iter().filter(|row| row.origin == Origin::Reference).map(|row| row.number).take(1).collect();
+    let all: Vec<u32> = summary.front.iter().map(|test| test.number).collect();
+    let front = evenly(&all, TIMELINES);
+    let worst = summary.requirements.iter().filter_map(|requirement| requirement.worst.as_ref());
+    let worst = worst.filter_map(|worst| rows.iter().find(|row| row.number == worst.test.0));
+    let failed =
+        rows.iter().filter(|row| matches!(row.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. })).take(4);
+    let known = rows.iter().filter(|row| matches!(row.origin, Origin::Known(_))).take(8);
+    let mut more: Vec<u32> = Vec::new();
+    for row in worst.chain(failed).chain(known) {
+        if !front.contains(&row.number) && !more.contains(&row.number) {
+            more.push(row.number);
+        }
+    }
+    let front_caption = if front.len() < all.len() {
+        format!("{} of the {} tests on the front, evenly chosen; use `show` for the others.", front.len(), all.len())
+    } else {
+        "Outlined: planned; filled: active. Red: outside the bound of a requirement.".to_owned()
+    };
+    let shrunk = summary.shrinking.as_ref().map_or_else(Vec::new, Shrinking::ends);
+    more.retain(|number| !shrunk.contains(number));
+    let shrunk_caption = "The test before and after it was shrunk.".to_owned();
+    vec![
+        Group { title: "Before and after", caption: shrunk_caption, tests: shrunk },
+        Group {
+            title: "Reference run",
+            caption: "The run without disturbance, for comparison.".to_owned(),
+            tests: reference,
+        },
+        Group { title: "Tests on the front", caption: front_caption, tests: front },
+        Group {
+            title: "More tests to look at",
+            caption: "The worst violation of each requirement, crashes and timeouts, and regression tests.".to_owned(),
+            tests: more,
+        },
+    ]
+}
+
+/// Rows of failures shown at most.
+const FAILURES: usize = 50;
+
+/// The requirements, with a sentence on violations that were seen once only.
+fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
+    let table = tables::requirements(summary);
+    if table.is_empty() {
+        return;
+    }
+    body.open("section", &[]);
+    body.element("h2", &[], "Requirements");
+    table.html(body, drawn);
+    if let Some(sentence) = once_sentence(summary) {
+        body.element("p", &[("class", "quiet")], &format!("{sentence}."));
+    }
+    body.close();
+}
+
+/// The sections that are a table each.
+fn sections(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
+    if let Some(repetition) = &summary.repetition {
+        let caption = "How often each requirement was violated, with the 95 % Wilson interval.";
+        let table = tables::violation_rates(&repetition.requirements);
+        section(body, &format!("{} repeated", repetition.test), Some(caption), table, drawn);
+    }
+    section(body, "Regression tests", None, tables::expectations(&summary.expectations), drawn);
+    section(body, "Crashes and timeouts", None, tables::failures(&summary.failures), drawn);
+    section(body, "Numbers that are not finite", None, tables::not_finite(&summary.not_finite), drawn);
+}
+
+/// A table under its title, with at most [`FAILURES`] rows; nothing if it has none.
+fn section(body: &mut Markup, title: &str, caption: Option<&str>, mut table: Table, drawn: &[u32]) {
+    if table.is_empty() {
+        return;
+    }
+    body.open("section", &[]);
+    body.element("h2", &[], title);
+    if let Some(caption) = caption {
+        body.element("p", &[("class", "quiet")], caption);
+    }
+    let more = table.truncate(FAILURES);
+    table.html(body, drawn);
+    if more > 0 {
+        body.element("p", &[("class", "quiet")], &format!("And {more} more; `report --format json` has all."));
+    }
+    body.close();
+}

@@ -1,0 +1,89 @@
+//! A test on the page: its heading, its timeline, and everything on it as tables.
+
+use std::path::Path;
+
+use crate::present::markup::Markup;
+use crate::record::{MetricValue, RecordError, Repository, Verdict, trace_file};
+use crate::report::facts::show::{TestReport, report_on};
+use crate::report::facts::summary::Summary;
+use crate::report::facts::wording::value_text;
+use crate::report::html::timeline::timeline;
+use crate::report::sentences::outcome_sentence;
+use crate::report::tables;
+
+/// Draws a test of these results; `folder` is the path of the run's folder relative to the page.
+pub(super) fn test(
+    body: &mut Markup,
+    repository: &Repository,
+    summary: &Summary,
+    number: u32,
+    folder: &Path,
+) -> Result<(), RecordError> {
+    let record = repository.test(number)?;
+    let ran = record.duplicate_of.unwrap_or(number);
+    let on_front = summary.front.iter().any(|test| test.number == number);
+    let report = report_on(repository.plan(), &record, repository.judge()?.runs(ran), on_front);
+    body.open("article", &[("class", "test"), ("id", &report.test.to_string())]);
+    heading(body, summary, &report);
+    timeline(body, repository.plan(), &record, &report);
+    figures(body, &report);
+    if repository.trace(number, record.duplicate_of).is_some() {
+        trace_link(body, &trace_file(folder, ran));
+    }
+    body.close();
+    Ok(())
+}
+
+fn heading(body: &mut Markup, summary: &Summary, report: &TestReport) {
+    body.open("h3", &[]);
+    body.text(&report.test.to_string());
+    if report.origin != "search" {
+        body.element("span", &[("class", "quiet")], &format!(" {}", report.origin));
+    }
+    for requirement in report.requirements.iter().filter(|requirement| requirement.verdict == Verdict::Violated) {
+        body.element("span", &[("class", "chip"), ("title", &requirement.text)], &requirement.requirement);
+    }
+    body.close();
+    let values: Vec<String> = summary
+        .objectives
+        .iter()
+        .filter_map(|objective| {
+            let metric = report.metrics.iter().find(|metric| metric.metric == objective.metric)?;
+            let shown = MetricValue::whole(metric.value, metric.set);
+            Some(format!("{} {}", metric.metric, value_text(shown, metric.unit.as_deref())))
+        })
+        .collect();
+    body.element("p", &[("class", "values")], &values.join(" · "));
+}
+
+/// Everything on a test as tables, folded away.
+fn figures(body: &mut Markup, report: &TestReport) {
+    body.open("details", &[]);
+    body.element("summary", &[], "Figures");
+    body.element(
+        "p",
+        &[("class", "quiet")],
+        &format!("{}. Simulator seed {}.", outcome_sentence(report), report.simulator_seed),
+    );
+    if !report.operations.is_empty() {
+        tables::operations(&report.operations).html(body, &[]);
+    }
+    for stacked in &report.stacked {
+        body.element("p", &[("class", "quiet")], &stacked.words());
+    }
+    tables::metrics(&report.metrics).html(body, &[]);
+    if !report.requirements.is_empty() {
+        tables::verdicts(&report.requirements).html(body, &[]);
+    }
+    for warning in &report.warnings {
+        body.element("p", &[("class", "warning")], &format!("Warning: {warning}"));
+    }
+    body.close();
+}
+
+/// A link to a trace, for tools that read MCAP.
+fn trace_link(body: &mut Markup, file: &Path) {
+    body.open("p", &[("class", "quiet")]);
+    body.element("a", &[("href", &file.display().to_string())], "Trace (MCAP)");
+    body.close();
+}

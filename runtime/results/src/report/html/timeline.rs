@@ -1,0 +1,344 @@
+//! One test over time: when its operations were active, and what the metrics did meanwhile.
+//!
+//! Rows share one time axis. Like all charts they are fluid: horizontal places are shares of the width.
+
+use std::fmt::Write as _;
+
+use sesame_base::observation::{MetricObservation, Outcome};
+use sesame_base::verdict::ends;
+use sesame_plan::{Bound, CampaignPlan, Metric, MetricSource, Span};
+
+use crate::present::axis::Axis;
+use crate::present::markup::{Markup, coordinate, percent};
+use crate::present::number;
+use crate::record::{TestRecord, violation_spans};
+use crate::report::facts::show::{OperationReport, TestReport};
+use crate::report::sentences::{choices_text, effect_text, planned_text, spans_text};
+
+/// Height of a lane of an operation, in pixels.
+const LANE: f64 = 30.0;
+
+/// Height of a metric's row, in pixels.
+const SERIES: f64 = 76.0;
+
+/// Space above and below a metric's line in its row, in pixels.
+const MARGIN: f64 = 15.0;
+
+/// Change points drawn per row: four for each of so many columns at most.
+const COLUMNS: f64 = 400.0;
+
+/// Draws a test over time.
+pub(crate) fn timeline(markup: &mut Markup, plan: &CampaignPlan, record: &TestRecord, report: &TestReport) {
+    let end = record.observation.end;
+    let time = Axis::exact(0.0, plan.campaign.end_after.max(end), 8);
+    let broke_off = matches!(record.observation.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. });
+    let broke_off = broke_off.then_some(end);
+    let label = format!("{} over time", report.test);
+    markup.open("figure", &[("class", "timeline"), ("aria-label", &label)]);
+    for operation in &report.operations {
+        lane(markup, &time, operation, broke_off);
+    }
+    for id in shown_metrics(plan, record) {
+        series(markup, plan, &time, id, &record.observation.metrics[id], (end, broke_off));
+    }
+    row(markup, |markup| markup.element("span", &[("class", "quiet")], "simulation time"));
+    markup.open("svg", &[("class", "plot"), ("height", "24"), ("aria-hidden", "true")]);
+    let labels = time.labels();
+    for (at, (tick, text)) in time.ticks.iter().zip(&labels).enumerate() {
+        let text = if at + 1 == labels.len() { format!("{text} s") } else { text.clone() };
+        // Every other one gives way on a narrow screen.
+        let class = if at % 2 == 0 { "tick middle" } else { "tick middle wide" };
+        markup.element("text", &[("class", class), ("x", &percent(time.share(*tick))), ("y", "14")], &text);
+    }
+    markup.close();
+    markup.close();
+    if let Some(at) = broke_off {
+        let words = format!("Broke off at {}: {}.", number::quantity(at, Some("s")), report.outcome);
+        markup.element("p", &[("class", "quiet")], &words);
+    }
+    markup.close();
+}
+
+/// Opens a row and writes its label; the caller adds the plot and closes the row.
+fn row(markup: &mut Markup, label: impl FnOnce(&mut Markup)) {
+    markup.open("div", &[("class", "row")]);
+    markup.open("div", &[("class", "label")]);
+    label(markup);
+    markup.close();
+}
+
+fn lane(markup: &mut Markup, time: &Axis, operation: &OperationReport, broke_off: Option<f64>) {
+    let effect = operation.counters.map(|counters| counters.any_effect());
+    row(markup, |markup| {
+        markup.element("b", &[], &operation.operation);
+        let choices = if operation.choices.is_empty() { operation.kind.clone() } else { choices_text(operation) };
+        markup.element("span", &[("class", "quiet")], &choices);
+        if effect == Some(false) {
+            markup.element("span", &[("class", "note")], "no effect");
+        }
+    });
+    let observed = operation.observed.as_deref().unwrap_or_default();
+    let said = match &operation.observed {
+        Some(spans) => format!("active {}", spans_text(spans)),
+        None => "activity unknown".to_owned(),
+    };
+    let title =
+        format!("{}: planned {}, {said}; {}", operation.operation, planned_text(operation), effect_text(operation));
+    let height = coordinate(LANE);
+    markup.open("svg", &[("class", "plot"), ("height", &height), ("role", "img"), ("aria-label", &title)]);
+    backdrop(markup, time, broke_off);
+    let mut window = |span: Span, class: &str, inset: f64| {
+        let x = percent(time.share(span.start));
+        let width = percent((time.share(span.end) - time.share(span.start)).max(0.0001));
+        let (y, height) = (coordinate(inset), coordinate(LANE - 2.0 * inset));
+        let attributes = [("class", class), ("x", &x), ("y", &y), ("width", &width), ("height", &height), ("rx", "2")];
+        markup.open("rect", &attributes);
+        markup.element("title", &[], &title);
+        markup.close();
+    };
+    // Where conditions decide, what was seen is what was planned.
+    for &span in operation.planned.as_ref().map_or(observed, std::slice::from_ref) {
+        window(span, "planned", 5.0);
+    }
+    for &span in observed {
+        window(span, if effect == Some(false) { "seen idle" } else { "seen" }, 9.0);
+    }
+    markup.close();
+    markup.close();
+}
+
+/// Metrics with something to draw: those that a requirement bounds, then the objectives, then the rest.
+fn shown_metrics(plan: &CampaignPlan, record: &TestRecord) -> Vec<usize> {
+    let bounded = plan.requirements.iter().map(|requirement| requirement.metric.index());
+    let objectives = plan.campaign.objectives.iter().map(|id| id.index());
+    let mut order: Vec<usize> = Vec::new();
+    for id in bounded.chain(objectives).chain(0..plan.metrics.len()) {
+        // The time spent fuzzing is what the lanes above show; a robustness is known at the end only.
+        let source = &plan.metrics[id].source;
+        let drawn = !matches!(source, MetricSource::FuzzingTime | MetricSource::Robustness { .. })
+            && record.observation.metrics.get(id).is_some_and(|shown| !shown.series.is_empty());
+        if drawn && !order.contains(&id) {
+            order.push(id);
+        }
+    }
+    order
+}
+
+fn series(
+    markup: &mut Markup,
+    plan: &CampaignPlan,
+    time: &Axis,
+    id: usize,
+    shown: &MetricObservation,
+    (end, broke_off): (f64, Option<f64>),
+) {
+    let metric: &Metric = &plan.metrics[id];
+    let unit = metric.unit.as_deref();
+    let bounds: Vec<(&str, Bound)> = plan
+        .requirements
+        .iter()
+        .filter(|requirement| requirement.metric.index() == id)
+        .map(|requirement| (requirement.name.as_str(), requirement.bound))
+        .collect();
+    let lines: Vec<(&str, Bound, f64)> = bounds
+        .iter()
+        .flat_map(|&(name, bound)| {
+            let (low, _, high, _) = ends(bound);
+            let both = if low == high { [low, None] } else { [low, high] };
+            both.into_iter().flatten().map(move |at| (name, bound, at))
+        })
+        .collect();
+    let points = thin(&shown.series, end);
+    let values = || points.iter().map(|point| point.1).chain(lines.iter().map(|line| line.2));
+    let extent = Axis::exact(values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max), 2);
+    // The default holds until the first change; one far away (999 s for "never") would flatten all else.
+    let default = metric.default.filter(|&default| (-1.0..=2.0).contains(&extent.share(default)));
+    let reach = extent.high.max(default.unwrap_or(extent.high));
+    let extent = Axis::exact(extent.low.min(default.unwrap_or(extent.low)), reach, 2);
+    let height = |value: f64| MARGIN + (1.0 - extent.share(value)) * (SERIES - 2.0 * MARGIN);
+
+    row(markup, |markup| {
+        markup.element("b", &[], &metric.name);
+        let value = shown.value.map_or("unmeasured".to_owned(), |value| number::quantity(value, unit));
+        markup.element("span", &[("class", "quiet")], &value);
+    });
+    let broken: Vec<Span> = bounds.iter().flat_map(|&(_, bound)| violation_spans(&shown.series, bound, end)).collect();
+    let mut title =
+        format!("{} from {} to {}", metric.name, number::number(extent.low), number::quantity(extent.high, unit));
+    if !broken.is_empty() {
+        let _ = write!(title, "; outside its bound {}", spans_text(&broken));
+    }
+    let tall = coordinate(SERIES);
+    markup.open("svg", &[("class", "plot"), ("height", &tall), ("role", "img"), ("aria-label", &title)]);
+    backdrop(markup, time, broke_off);
+    for span in &broken {
+        let (x, width) = (percent(time.share(span.start)), percent(time.share(span.end) - time.share(span.start)));
+        markup.leaf("rect", &[("class", "outside"), ("x", &x), ("y", "0"), ("width", &width), ("height", &tall)]);
+    }
+    for &(_, _, at) in &lines {
+        let y = coordinate(height(at));
+        markup.leaf("line", &[("class", "bound"), ("x1", "0"), ("x2", "100%"), ("y1", &y), ("y2", &y)]);
+    }
+    let viewport = format!("0 0 {} {tall}", coordinate(time.high));
+    let frame =
+        [("viewBox", viewport.as_str()), ("height", &tall), ("preserveAspectRatio", "none"), ("aria-hidden", "true")];
+    markup.open("svg", &frame);
+    if let Some(default) = default {
+        let y = coordinate(height(default));
+        let path = format!("M0 {y}H{}V{}", coordinate(points[0].0), coordinate(height(points[0].1)));
+        markup.leaf("path", &[("class", "line default"), ("d", &path)]);
+    }
+    markup.leaf("path", &[("class", "line"), ("d", &step_path(&points, end, height, |_| true))]);
+    let bad = step_path(&points, end, height, |value| bounds.iter().any(|(_, bound)| !bound.holds(value)));
+    if !bad.is_empty() {
+        markup.leaf("path", &[("class", "line bad"), ("d", &bad)]);
+    }
+    markup.close();
+    // A value set at the very end has no line, only a place.
+    if let Some(&(at, value)) = points.last()
+        && at >= end
+    {
+        let bad = bounds.iter().any(|(_, bound)| !bound.holds(value));
+        let (x, y) = (percent(time.share(at)), coordinate(height(value)));
+        let class = if bad { "at-end bad" } else { "at-end" };
+        markup.leaf("circle", &[("class", class), ("cx", &x), ("cy", &y), ("r", "3")]);
+    }
+    // After the lines, so that none strikes a name out.
+    for &(name, bound, at) in &lines {
+        let y = coordinate(height(at));
+        // On the side where there is room, which is also where an unbroken line is not.
+        let dy = if height(at) < SERIES / 2.0 { "-4" } else { "12" };
+        let words = format!("{name} {}", number::bound(bound, unit));
+        markup.element("text", &[("class", "bound-name"), ("x", "100%"), ("dx", "-2"), ("y", &y), ("dy", dy)], &words);
+    }
+    let decimals = number::decimals([extent.low, extent.high]);
+    for value in [extent.high, extent.low] {
+        let y = coordinate(height(value));
+        markup.element(
+            "text",
+            &[("class", "tick end"), ("x", "-8"), ("y", &y), ("dy", "4")],
+            &number::fixed(value, decimals),
+        );
+    }
+    markup.close();
+    markup.close();
+}
+
+/// The time axis's lines, and what lies behind the end of a run that broke off.
+fn backdrop(markup: &mut Markup, time: &Axis, broke_off: Option<f64>) {
+    for tick in &time.ticks {
+        let x = percent(time.share(*tick));
+        markup.leaf("line", &[("class", "grid"), ("x1", &x), ("x2", &x), ("y1", "0"), ("y2", "100%")]);
+    }
+    if let Some(at) = broke_off {
+        let (x, width) = (percent(time.share(at)), percent(1.0 - time.share(at)));
+        markup.leaf("rect", &[("class", "after"), ("x", &x), ("y", "0"), ("width", &width), ("height", "100%")]);
+        markup.leaf("line", &[("class", "ended"), ("x1", &x), ("x2", &x), ("y1", "0"), ("y2", "100%")]);
+    }
+}
+
+/// A line that holds each value until the next change, where the value is to be drawn.
+fn step_path(points: &[(f64, f64)], end: f64, height: impl Fn(f64) -> f64, drawn: impl Fn(f64) -> bool) -> String {
+    let mut path = String::new();
+    let mut going = false;
+    for (at, &(time, value)) in points.iter().enumerate() {
+        let until = points.get(at + 1).map_or(end, |next| next.0).min(end);
+        if !drawn(value) || time >= end {
+            going = false;
+            continue;
+        }
+        let (y, until) = (coordinate(height(value)), coordinate(until));
+        if going {
+            let _ = write!(path, "V{y}H{until}");
+        } else {
+            let _ = write!(path, "M{} {y}H{until}", coordinate(time));
+        }
+        going = true;
+    }
+    path
+}
+
+/// The change points that make a difference to the eye: of each narrow column the first, the last, the least and the
+/// largest.
+fn thin(series: &[(f64, f64)], end: f64) -> Vec<(f64, f64)> {
+    let width = (end / COLUMNS).max(f64::MIN_POSITIVE);
+    let column = |point: &(f64, f64)| libm::floor(point.0 / width);
+    let mut kept: Vec<(f64, f64)> = Vec::new();
+    for group in series.chunk_by(|a, b| column(a) == column(b)) {
+        let extreme = |ordering: fn(&f64, &f64) -> std::cmp::Ordering| {
+            (0..group.len()).max_by(|&a, &b| ordering(&group[a].1, &group[b].1).then(b.cmp(&a))).unwrap_or(0)
+        };
+        let mut chosen = vec![0, group.len() - 1, extreme(f64::total_cmp), extreme(|a, b| b.total_cmp(a))];
+        chosen.sort_unstable();
+        chosen.dedup();
+        kept.extend(chosen.into_iter().map(|at| group[at]));
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::record::{Origin, sample};
+    use crate::report::facts::show::report_on;
+
+    #[test]
+    fn a_line_holds_its_value_until_the_next_change() {
+        let points = [(1.0, 2.0), (3.0, 0.0), (4.0, 5.0), (5.0, 6.0)];
+        assert_eq!(step_path(&points, 7.0, |value| value, |_| true), "M1 2H3V0H4V5H5V6H7");
+        assert_eq!(step_path(&points, 7.0, |value| value, |value| value > 1.0), "M1 2H3M4 5H5V6H7");
+        assert_eq!(step_path(&points, 4.5, |value| value, |_| true), "M1 2H3V0H4V5H4.5");
+    }
+
+    #[test]
+    fn planned_and_observed_windows_and_violations_are_drawn() {
+        let plan = sample::plan();
+        let mut record = sample::record(&plan, 1, Origin::Search, plan.tests[0].test.clone());
+        record.observation.operations[0].intervals[0].end = 40.0;
+        record.observation.outcome = Outcome::Crash { message: "gone".to_owned() };
+        record.observation.end = 60.0;
+        record.observation.metrics.iter_mut().for_each(|metric| metric.series.truncate(3));
+        let mut markup = Markup::default();
+        timeline(&mut markup, &plan, &record, &report_on(&plan, &record, &[], true));
+        insta::assert_snapshot!("timeline", markup.finish().replace("><", ">\n<"));
+    }
+
+    #[test]
+    fn where_conditions_decide_what_was_seen_is_what_was_planned() {
+        let plan = sample::plan();
+        let record = sample::record(&plan, 1, Origin::Search, sample::conditional_test());
+        let mut markup = Markup::default();
+        let report = report_on(&plan, &record, &[], true);
+        timeline(&mut markup, &plan, &record, &report);
+        let drawn = markup.finish();
+        assert_eq!(drawn.matches(r#"class="planned""#).count(), 3, "{drawn}");
+        assert!(
+            drawn.contains("planned when 1.5m/s &lt; top_speed for 0.30000000000000004s at most 3 times"),
+            "{drawn}"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn thinning_keeps_ends_and_extremes(
+            steps in prop::collection::vec((1u32..40, -1000i32..1000), 1..3000),
+        ) {
+            let mut time = 0;
+            let series: Vec<(f64, f64)> = steps.iter().map(|&(step, value)| {
+                time += step;
+                (f64::from(time) / 1000.0, f64::from(value))
+            }).collect();
+            let end = series[series.len() - 1].0 + 0.001;
+            let kept = thin(&series, end);
+            prop_assert!(kept.len() <= 1604);
+            prop_assert!(kept.windows(2).all(|pair| pair[0].0 < pair[1].0));
+            prop_assert!(kept.iter().all(|point| series.contains(point)));
+            prop_assert_eq!((kept[0], kept[kept.len() - 1]), (series[0], series[series.len() - 1]));
+            let most = |points: &[(f64, f64)]| points.iter().map(|point| point.1).fold(f64::NEG_INFINITY, f64::max);
+            let least = |points: &[(f64, f64)]| points.iter().map(|point| point.1).fold(f64::INFINITY, f64::min);
+            prop_assert_eq!((most(&kept), least(&kept)), (most(&series), least(&series)));
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! The prose of reports, which text and HTML share.
+
+use std::fmt::Write as _;
+
+use sesame_base::observation::Counters;
+use sesame_plan::{Confirmation, Span, Typical};
+
+use crate::analysis::confirmed::ConfirmedTest;
+use crate::present::number::{self, fixed, join_words, plural};
+use crate::present::table::visible;
+use crate::record::{Standing, Verdict};
+use crate::report::facts::coverage::CoverageSummary;
+use crate::report::facts::repetition::ViolationRate;
+use crate::report::facts::show::{OperationReport, TestReport};
+use crate::report::facts::shrinking::Shrinking;
+use crate::report::facts::summary::Summary;
+
+/// The whole in one sentence: `Front of 6 tests, 2 requirements violated (R1 by 31 tests, R4 by 3)`.
+pub fn headline(summary: &Summary) -> String {
+    let mut violated: Vec<String> = Vec::new();
+    for requirement in summary.requirements.iter().filter(|requirement| requirement.violated > 0) {
+        let count = match violated.len() {
+            0 => plural(requirement.violated, "test", "tests"),
+            _ => requirement.violated.to_string(),
+        };
+        violated.push(format!("{} by {count}", requirement.requirement));
+    }
+    let mut parts = Vec::new();
+    if !summary.objectives.is_empty() {
+        parts.push(format!("front of {}", plural(summary.front.len(), "test", "tests")));
+    }
+    parts.push(match violated.len() {
+        0 if summary.requirements.is_empty() => "no requirements".to_owned(),
+        0 => "no requirement violated".to_owned(),
+        n => format!("{} violated ({})", plural(n, "requirement", "requirements"), violated.join(", ")),
+    });
+    let satisfied = summary.expectations.iter().filter(|expectation| expectation.verdict == Verdict::Satisfied).count();
+    match summary.expectations.len() {
+        0 => {}
+        all if satisfied == all => parts.push(plural(all, "expectation satisfied", "expectations satisfied")),
+        all => parts.push(format!("{satisfied} of {} satisfied", plural(all, "expectation", "expectations"))),
+    }
+    for (word, several) in [("crash", "crashes"), ("timeout", "timeouts")] {
+        let count = summary.failures.iter().filter(|failure| failure.outcome == word && failure.stands()).count();
+        if count > 0 {
+            parts.push(plural(count, word, several));
+        }
+    }
+    let mut sentence = parts.join(", ");
+    if let Some(first) = sentence.get_mut(..1) {
+        first.make_ascii_uppercase();
+    }
+    sentence
+}
+
+/// How many tests ran, and how many of these say nothing about the system.
+pub(crate) fn counts_sentence(summary: &Summary) -> String {
+    let counts = &summary.counts;
+    let mut left_out = Vec::new();
+    if counts.no_effect > 0 {
+        let share = 100.0 * counts.no_effect as f64 / counts.evaluations as f64;
+        left_out.push(format!("{} with no effect ({share:.0} %)", counts.no_effect));
+    }
+    if counts.unmeasured > 0 {
+        left_out.push(format!("{} unmeasured (a metric without value)", counts.unmeasured));
+    }
+    if counts.duplicates > 0 {
+        left_out.push(plural(counts.duplicates, "duplicate (not simulated again)", "duplicates (not simulated again)"));
+    }
+    let mut sentence = plural(counts.evaluations, "evaluation", "evaluations");
+    if !left_out.is_empty() {
+        let _ = write!(sentence, ", of these {}", join_words(&left_out));
+    }
+    if summary.stop.is_none() {
+        sentence.push_str("; the run is unfinished");
+    }
+    sentence
+}
+
+/// The coverage in words: `54 of 108 cells covered (50 %), 56 % of the 96 that can be reached`.
+pub(crate) fn coverage_sentence(coverage: &CoverageSummary) -> String {
+    let CoverageSummary { covered, cells, feasible, .. } = *coverage;
+    let percent = |share: f64| fixed(100.0 * share, usize::from(share < 0.1));
+    let known = if coverage.feasible_exact { "" } else { ", as far as known" };
+    format!(
+        "{covered} of {cells} cells covered ({} %), {} % of the {feasible} that can be reached{known}",
+        percent(coverage.coverage),
+        percent(coverage.feasible_coverage),
+    )
+}
+
+/// How many runs confirmed findings of how many tests, in a sentence; `None` if no test was run again.
+pub(crate) fn confirmation_sentence(tests: &[ConfirmedTest]) -> Option<String> {
+    let runs: usize = tests.iter().map(|test| test.repetitions).sum();
+    if tests.is_empty() {
+        return None;
+    }
+    let mut sentence =
+        format!("{} of {}", plural(runs, "further run", "further runs"), plural(tests.len(), "test", "tests"));
+    let front = standings(&tests.iter().filter(|test| test.front).collect::<Vec<_>>());
+    let all = standings(&tests.iter().collect::<Vec<_>>());
+    if !all.is_empty() {
+        let _ = write!(sentence, " to confirm them: {all}");
+        if front.is_empty() {
+            sentence.push_str("; none of these on the front");
+        } else if front != all {
+            let _ = write!(sentence, "; on the front {front}");
+        }
+    }
+    let surprises = tests.iter().filter(|test| test.findings.iter().any(|finding| !finding.first)).count();
+    if surprises > 0 {
+        let tests = plural(surprises, "test shows", "tests show");
+        let _ = write!(sentence, "; {tests} a finding that its first run did not");
+    }
+    Some(sentence)
+}
+
+/// How many of these tests are confirmed, flaky and not confirmed, as in `4 confirmed, 1 flaky`; empty for tests without
+/// findings.
+fn standings(tests: &[&ConfirmedTest]) -> String {
+    let words = [Standing::Confirmed, Standing::Flaky, Standing::NotConfirmed].into_iter().filter_map(|standing| {
+        let count = tests.iter().filter(|test| test.standing == Some(standing)).count();
+        (count > 0).then(|| format!("{count} {}", standing.words()))
+    });
+    join_words(&words.collect::<Vec<_>>())
+}
+
+/// How many tests with violations were run once only, in a sentence; `None` if there are none, and if a reader does not
+/// expect that tests were run again.
+pub(crate) fn once_sentence(summary: &Summary) -> Option<String> {
+    let expected = summary.confirmation.is_some() || !summary.confirmed.is_empty();
+    let tests = plural(summary.once, "test that violates a requirement was", "tests that violate a requirement were");
+    (expected && summary.once > 0).then(|| format!("{tests} run once only"))
+}
+
+/// How the values of a confirmed front were computed, in a sentence.
+pub(crate) fn values_sentence(confirmation: Confirmation) -> String {
+    let runs = plural(confirmation.times as usize, "fresh run", "fresh runs");
+    match confirmation.by {
+        Typical::Mean => format!("Values are means of {runs} of each test."),
+        Typical::Median => format!("Values are medians of {runs} of each test."),
+        Typical::Quantile { share } => {
+            format!("Values are those that {} % of {runs} of each test reach or exceed.", number::number(100.0 * share))
+        }
+    }
+}
+
+/// How a test ended, in a sentence.
+pub(crate) fn outcome_sentence(test: &TestReport) -> String {
+    let mut sentence = match &test.detail {
+        Some(detail) => format!("{} at {} s: {}", test.outcome, fixed(test.end, 2), visible(detail)),
+        None => format!("{} at {} s", outcome_words(&test.outcome), fixed(test.end, 2)),
+    };
+    let _ =
+        write!(sentence, ", {}", plural(usize::try_from(test.messages).unwrap_or(usize::MAX), "message", "messages"));
+    if let Some(generation) = test.generation {
+        let _ = write!(sentence, ", generation {generation}");
+    }
+    if let Some(original) = &test.duplicate_of {
+        let _ = write!(sentence, ", result taken from the equal test {original}");
+    }
+    if test.front {
+        sentence.push_str(", on the front");
+    }
+    sentence
+}
+
+/// The word of an outcome as prose has it.
+pub(crate) fn outcome_words(word: &str) -> String {
+    word.replace('_', " ")
+}
+
+/// When an operation was to be active: its window, or the conditions that switched it; a dash for an offline one.
+pub(crate) fn planned_text(operation: &OperationReport) -> String {
+    match (&operation.conditions, operation.planned) {
+        (Some(conditions), _) => conditions.clone(),
+        (None, planned) => spans_text(planned.as_slice()),
+    }
+}
+
+/// Spans in seconds, as in `8.00–57.00 s`; a dash for none.
+pub(crate) fn spans_text(spans: &[Span]) -> String {
+    if spans.is_empty() {
+        return "–".to_owned();
+    }
+    let words: Vec<String> = spans.iter().take(4).map(|span| format!("{:.2}–{:.2}", span.start, span.end)).collect();
+    let more = if spans.len() > 4 { format!(" and {} more", spans.len() - 4) } else { String::new() };
+    format!("{} s{more}", words.join(", "))
+}
+
+/// What an operation's parameters are, in words.
+pub(crate) fn choices_text(operation: &OperationReport) -> String {
+    let words: Vec<&str> = operation.choices.iter().map(|choice| choice.text.as_str()).collect();
+    if words.is_empty() { "–".to_owned() } else { words.join(", ") }
+}
+
+/// What an operation did, in words, as in `2450 seen, 2450 changed from 8.00 to 56.98 s`.
+pub(crate) fn effect_text(operation: &OperationReport) -> String {
+    let Some(counters) = operation.counters else { return "unknown".to_owned() };
+    let Counters { seen, changed, dropped, delayed, queued, injected, side_effects, unheard } = counters;
+    let mut words = vec![format!("{seen} seen")];
+    let named = [
+        (changed, "changed"),
+        (dropped, "dropped"),
+        (delayed, "delayed"),
+        (queued, "queued behind them"),
+        (injected, "injected"),
+        (side_effects, "side effects"),
+        (unheard, "disturbed without a receiver"),
+    ];
+    words.extend(named.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}")));
+    if !counters.any_effect() {
+        words.push("no effect".to_owned());
+    }
+    let mut text = words.join(", ");
+    if let (Some(first), Some(last)) = (operation.first_touch, operation.last_touch) {
+        let _ = write!(text, " from {first:.2} to {last:.2} s");
+    }
+    text
+}
+
+/// How often a requirement was violated, as in `7 of 10 [40 %, 89 %]`.
+pub(crate) fn rate_text(rate: &ViolationRate) -> String {
+    let Some(interval) = rate.interval else { return "all runs inconclusive".to_owned() };
+    let [low, high] = interval.map(|share| format!("{:.0} %", share * 100.0));
+    format!("{} of {} [{low}, {high}]", rate.violated, rate.conclusive)
+}
+
+/// Whether it is as expected.
+pub(crate) fn as_expected(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Satisfied => "yes",
+        Verdict::Violated => "no",
+        Verdict::Inconclusive => "inconclusive",
+    }
+}
+
+/// The result of a shrink, in a sentence.
+pub(crate) fn shrinking_sentence(shrinking: &Shrinking) -> String {
+    let tried = plural(shrinking.steps.len(), "test was tried", "tests were tried");
+    match (&shrinking.before, &shrinking.after) {
+        (None, _) => format!("{} has not run yet", shrinking.test),
+        (Some(_), None) => {
+            format!("{} did not fail again, so nothing was shrunk; it {} once", shrinking.test, shrinking.fails)
+        }
+        (Some(_), Some(after)) if shrinking.minimal => {
+            format!("{} {}; {tried}, and it cannot be shrunk by one more step", after.test, shrinking.fails)
+        }
+        (Some(_), Some(after)) => {
+            format!("{} {}; {tried}, and more evaluations could perhaps shrink it further", after.test, shrinking.fails)
+        }
+    }
+}
