@@ -92,7 +92,7 @@ const SMALL: &[(&str, Expected)] = &[
     (
         "exits_with_3",
         Crash(
-            "ended (exit status: 3) while the end of its step to 0.150 s was awaited; its last words:\nthe gripper is stuck",
+            "ended (exit status: 3) while the end of its step to 0.150 s was awaited; the last lines of its standard error:\nthe gripper is stuck",
         ),
     ),
     ("exits_with_0", Crash("ended (exit status: 0)")),
@@ -116,7 +116,7 @@ const SMALL: &[(&str, Expected)] = &[
     (
         "starts_a_child_that_holds_its_output_and_exits",
         Crash(
-            "ended (exit status: 3) while the end of its step to 0.150 s was awaited; its last words:\nthe child has it now",
+            "ended (exit status: 3) while the end of its step to 0.150 s was awaited; the last lines of its standard error:\nthe child has it now",
         ),
     ),
     ("starts_a_session", Completed),

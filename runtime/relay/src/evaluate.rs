@@ -7,10 +7,10 @@ use sesame_base::observation::{Observation, Outcome, WallTime};
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Moment, Test};
 
-use crate::changed_files::ChangedFiles;
+use crate::files::{NoFiles, SpaceFiles};
 use crate::fuzz::{ChoiceError, OperationEntry};
 use crate::metric::MetricTable;
-use crate::panic_capture as last_panic;
+use crate::panic_capture;
 use crate::relay::{Relay, Tap};
 use crate::simulator::Progress;
 use crate::transport::{Transport, TransportError};
@@ -52,20 +52,21 @@ pub fn evaluate_tapped(
     custom: &mut Custom<'_>,
     tap: Option<&mut dyn Tap>,
 ) -> Result<Observation, ChoiceError> {
+    #[expect(clippy::disallowed_methods, reason = "how long a run took is recorded, and decides nothing")]
     let started = Instant::now();
     let mut relay = Relay::new(plan, wires, test, metrics.start(), custom.hooks)?;
     if let Some(tap) = tap {
         relay = relay.tapped(tap);
     }
     let until = SimTime::from_seconds(plan.campaign.end_after);
-    let files = &mut custom.files;
+    let files = custom.files.as_mut();
     let driven = AssertUnwindSafe(|| drive(transport, &mut relay, simulator_seed, until, files));
     let mut failure = match panic::catch_unwind(driven) {
         Ok(driven) => driven.err(),
-        Err(_) => Some(last_panic::take()),
+        Err(_) => Some(panic_capture::take()),
     };
     if plan.operations.iter().any(|operation| operation.kind.is_offline())
-        && let Err(error) = custom.files.put_back()
+        && let Err(error) = custom.files.restore()
     {
         failure.get_or_insert_with(|| error.to_string());
     }
@@ -97,13 +98,13 @@ pub struct Custom<'h> {
     /// The hooks of the runner.
     pub hooks: &'h [OperationEntry],
     /// The files of the space.
-    pub files: ChangedFiles,
+    pub files: Box<dyn SpaceFiles>,
 }
 
 impl Custom<'static> {
     /// For plans without custom operations.
     pub fn none() -> Self {
-        Custom { hooks: &[], files: ChangedFiles::unlocked(std::path::Path::new(".")) }
+        Custom { hooks: &[], files: Box::new(NoFiles) }
     }
 }
 
@@ -113,7 +114,7 @@ fn drive(
     relay: &mut Relay<'_>,
     seed: u64,
     end: SimTime,
-    files: &mut ChangedFiles,
+    files: &mut dyn SpaceFiles,
 ) -> Result<(), String> {
     let words = |error: TransportError| error.to_string();
     relay.beside_run(Moment::BeforeStart, files)?;

@@ -8,18 +8,16 @@
 // These macros panic where nothing can be written: on a full disk, or after the reader has gone.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
-pub mod changed_files;
-#[cfg(feature = "programs")]
-pub mod descendants;
 pub mod evaluate;
+pub mod files;
 pub mod fuzz;
 #[cfg(any(feature = "process", feature = "mcap"))]
 mod json;
+#[cfg(feature = "programs")]
+pub mod lifecycle;
 pub mod message;
 pub mod metric;
 pub mod panic_capture;
-#[cfg(feature = "programs")]
-pub mod process_group;
 pub mod relay;
 pub mod simulator;
 pub mod stl;

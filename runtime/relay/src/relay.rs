@@ -25,7 +25,7 @@ use sesame_base::time::SimTime;
 use sesame_plan::condition::Operand;
 use sesame_plan::{CampaignPlan, Copies, Drain, Moment, OperationId, Side, Span, Test, TopicId};
 
-use crate::changed_files::ChangedFiles;
+use crate::files::SpaceFiles;
 use crate::fuzz::{ChoiceError, Disturbance, Draws, Encounter, Fate, OperationEntry, RunContext};
 use crate::metric::Metrics;
 use crate::value::Value;
@@ -532,7 +532,7 @@ impl<'a> Relay<'a> {
 impl Relay<'_> {
     /// Calls the custom operations of the test before the start, or those after the end, in priority, then declaration
     /// order. The error says which could not do what.
-    pub fn beside_run(&mut self, moment: Moment, files: &mut ChangedFiles) -> Result<(), String> {
+    pub fn beside_run(&mut self, moment: Moment, files: &mut dyn SpaceFiles) -> Result<(), String> {
         for at in self.order.clone() {
             let stage = &mut self.operations[at];
             let Disturbance::Custom(custom) = &mut stage.disturbance else { continue };

@@ -1,13 +1,15 @@
-//! Traces: the messages of one run and what operations did to them, in a file of the MCAP format.
+//! Traces: the messages of one run and the actions of operations on them, in a file of the MCAP format.
 //!
-//! A trace holds every message as it was published, on a channel of its topic's name; where an operation of the
-//! campaign may touch a topic, also every message as it was delivered, on a channel `TOPIC/delivered`. The operations'
-//! activity is on `sesame/operations`, the change points of each metric on `sesame/metrics/NAME`. Everything is JSON
-//! with a JSON Schema, numbers exact, at simulation time in nanoseconds. A metadata record `sesame` says which run it
-//! is, a metadata record `sesame.run` how it ended.
+//! A trace contains every message as it was published, on a channel with the name of its topic; if an operation of the
+//! campaign may act on a topic, also every message as it was delivered, on a channel `TOPIC/delivered`. The actions of
+//! operations are on `sesame/operations`, the change points of each metric on `sesame/metrics/NAME`. Everything is JSON
+//! with a JSON Schema, numbers are exact, and times are simulation time in nanoseconds. A metadata record `sesame`
+//! identifies the run, a metadata record `sesame.run` says how it ended.
 //!
-//! A trace is written while the test runs, under a name that nobody takes for a trace, and gets its own name when it
-//! is complete. Of a run whose process died what was written until then is saved.
+//! A trace is written while the test runs, under a temporary name, and gets its own name when it is complete. If the
+//! process dies during a run, the part that was written until then is recovered.
+
+#![expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "an adapter: it writes and reads files")]
 
 mod recording;
 mod records;

@@ -15,7 +15,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use sesame_base::observation::{Observation, Outcome};
-use sesame_relay::process_group::was_killed;
+use sesame_relay::lifecycle::process_group::was_killed;
 
 use crate::campaign::link::{self, Stream};
 use crate::campaign::protocol::{self, Reply};
@@ -196,8 +196,8 @@ impl Lane {
         let (observation, notes, trace_failure) = match worker.ask(job, timeout, &self.stop) {
             Ok(reply) => {
                 self.worker = Some(worker);
-                killed = reply.aside.killed.then_some("simulator");
-                (reply.observation, reply.aside.notes, reply.trace_failure)
+                killed = reply.incidents.killed.then_some("simulator");
+                (reply.observation, reply.incidents.notes, reply.trace_failure)
             }
             Err(error) if error.kind() == io::ErrorKind::TimedOut => {
                 let outcome = Outcome::Timeout { limit: timeout.as_secs_f64() };

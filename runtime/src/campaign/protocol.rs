@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use sesame_base::observation::Observation;
 use sesame_plan::Test;
-use sesame_relay::transport::Aside;
+use sesame_relay::transport::Incidents;
 
 use crate::campaign::traces::TraceOrder;
 
@@ -47,8 +47,8 @@ pub(super) struct Reply {
     pub(super) observation: Observation,
     /// Why the trace that was asked for could not be written.
     pub(super) trace_failure: Option<String>,
-    /// What befell the simulator meanwhile.
-    pub(super) aside: Aside,
+    /// What happened to the simulator's process meanwhile.
+    pub(super) incidents: Incidents,
 }
 
 pub(super) fn send(stream: &mut impl Write, message: &impl Serialize) -> io::Result<()> {

@@ -12,7 +12,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use std::{io, thread};
 
-use sesame_relay::{descendants, process_group};
+use sesame_relay::lifecycle::{descendants, process_group};
 
 use crate::campaign::pool::WORKER;
 

@@ -11,13 +11,14 @@ use clap::Args;
 use serde::Serialize;
 
 use sesame_plan::{CampaignPlan, Domain};
-use sesame_relay::changed_files::ChangedFiles;
+use sesame_relay::files::SpaceFiles as _;
 use sesame_relay::fuzz::unimplemented_operations;
 use sesame_relay::metric::unimplemented_hooks;
 use sesame_results::record::{self, Recorder, Repository};
 use sesame_results::report::{self, Summary};
 
 use crate::campaign::{Conducted, Settings, conduct};
+use crate::changed_files::ChangedFiles;
 use crate::cli::gate::Gate;
 use crate::cli::progress::{Display, Waiting, wait};
 use crate::cli::terminal::{print, print_json, say, text_options};
@@ -136,9 +137,9 @@ pub(super) fn refuse_unfilled(runner: &Runner, plan: &CampaignPlan, allowed: boo
 pub(super) fn claim_files(runner: &Runner, plan: &CampaignPlan) -> Result<Files, Failure> {
     let space = Path::new(runner.directory).join(runner.space);
     let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
-    let (files, put_back) = ChangedFiles::for_supervisor(&space, may_change)?;
-    for path in put_back {
-        say(format_args!("note: an earlier run was ended while {} was changed; it is put back", path.display()));
+    let (files, restored) = ChangedFiles::for_supervisor(&space, may_change)?;
+    for path in restored {
+        say(format_args!("note: an earlier run was ended while {} was changed; it has been restored", path.display()));
     }
     for operation in &plan.operations {
         for parameter in &operation.parameters {
@@ -168,7 +169,7 @@ impl Files {
     /// Puts back what the last worker could not; workers have ended by then.
     pub(super) fn finish(mut self) -> Result<(), Failure> {
         if self.may_change {
-            self.files.put_back()?;
+            self.files.restore_all()?;
         }
         Ok(())
     }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Choice, Moment, Operation, OperationId, OperationKind};
 
-use crate::changed_files::ChangedFiles;
+use crate::files::SpaceFiles;
 use crate::fuzz::Draws;
 use crate::message::{FromValue, Mismatch, ToValue};
 use crate::value::{Text, Value};
@@ -202,7 +202,7 @@ impl<'a> MessageCall<'a> {
 #[derive(Debug)]
 pub struct RunContext<'a> {
     /// `None` while it is only asked whether the hook is filled in.
-    files: Option<&'a mut ChangedFiles>,
+    files: Option<&'a mut dyn SpaceFiles>,
     draws: Draws,
     next_draw: u64,
     pub(crate) side_effects: u64,
@@ -211,7 +211,7 @@ pub struct RunContext<'a> {
 }
 
 impl<'a> RunContext<'a> {
-    pub(crate) fn new(files: &'a mut ChangedFiles, draws: Draws) -> Self {
+    pub(crate) fn new(files: &'a mut dyn SpaceFiles, draws: Draws) -> Self {
         RunContext { files: Some(files), draws, next_draw: 0, side_effects: 0, failure: None, unimplemented: false }
     }
 
@@ -222,9 +222,9 @@ impl<'a> RunContext<'a> {
     }
 
     /// The files, or the end of a probe.
-    fn files(&mut self) -> &mut ChangedFiles {
+    fn files(&mut self) -> &mut dyn SpaceFiles {
         match &mut self.files {
-            Some(files) => files,
+            Some(files) => *files,
             None => std::panic::resume_unwind(Box::new("a probe ends here")),
         }
     }

@@ -313,9 +313,9 @@ fn draw(n: u32, at: u64) -> f64 {
     Draws::new(SEED, 0, u64::from(n)).unit(at)
 }
 
-/// Box and Muller's, written once more.
+/// The Box-Muller transform, a second time.
 fn normal(n: u32, at: u64) -> f64 {
-    (-2.0 * (1.0 - draw(n, at)).ln()).sqrt() * (std::f64::consts::TAU * draw(n, at + 1)).cos()
+    libm::sqrt(-2.0 * libm::log(1.0 - draw(n, at))) * libm::cos(std::f64::consts::TAU * draw(n, at + 1))
 }
 
 fn chosen(case: &Case, name: &str) -> f64 {

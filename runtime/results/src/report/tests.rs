@@ -1,5 +1,7 @@
 //! Reports on a made-up campaign, read as a user reads them.
 
+#![expect(clippy::disallowed_types, reason = "starts a browser")]
+
 use sha2::Digest as _;
 
 use super::*;

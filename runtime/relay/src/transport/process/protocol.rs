@@ -16,31 +16,31 @@ use crate::transport::TransportError;
 /// The longest line either side may write, in bytes.
 pub(super) const LINE_LIMIT: usize = 16 << 20;
 
-/// What a simulator says.
+/// A line of the simulator.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub(super) enum Said<'a> {
+pub(super) enum SimulatorMessage<'a> {
     /// It is at time zero: the answer to `reset`.
     #[serde(borrow)]
     Ready(Ready<'a>),
-    /// Messages of the present whose deliveries it waits for.
+    /// Messages of the current step, whose deliveries it waits for.
     #[serde(borrow)]
     Publish(Vec<Message<'a>>),
     /// The step is over.
     #[serde(borrow)]
     Done(Done<'a>),
-    /// It cannot go on, in its own words.
+    /// It cannot continue, with its reason.
     Failed(String),
 }
 
-impl Said<'_> {
-    /// The word it is said with.
-    pub(super) fn word(&self) -> &'static str {
+impl SimulatorMessage<'_> {
+    /// The keyword of the line.
+    pub(super) fn keyword(&self) -> &'static str {
         match self {
-            Said::Ready(_) => "ready",
-            Said::Publish(_) => "publish",
-            Said::Done(_) => "done",
-            Said::Failed(_) => "failed",
+            SimulatorMessage::Ready(_) => "ready",
+            SimulatorMessage::Publish(_) => "publish",
+            SimulatorMessage::Done(_) => "done",
+            SimulatorMessage::Failed(_) => "failed",
         }
     }
 }
@@ -52,10 +52,10 @@ pub(super) struct Ready<'a> {
     /// Topics it publishes.
     #[serde(default)]
     pub(super) publishes: Vec<String>,
-    /// Topics whose messages it wants delivered.
+    /// Topics to which it subscribes.
     #[serde(default)]
     pub(super) subscribes: Vec<String>,
-    /// Whether it can be reset again; if not, it is started anew for each test.
+    /// Whether it can be reset again; if not, it is restarted for each test.
     #[serde(default)]
     pub(super) resets: bool,
     /// Messages of time zero.
@@ -67,10 +67,10 @@ pub(super) struct Ready<'a> {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Done<'a> {
-    /// Messages of the step for which no answer is needed.
+    /// Messages of the step that need no answer.
     #[serde(default, borrow)]
     pub(super) messages: Vec<Message<'a>>,
-    /// Whether the scenario has come to its own end.
+    /// Whether the scenario has ended.
     #[serde(default)]
     pub(super) ended: bool,
 }
@@ -100,12 +100,12 @@ impl<R: BufRead> Lines<R> {
         Lines { reader, line: Vec::new(), count: 0, limit }
     }
 
-    /// Where the lines come from.
+    /// The stream of the lines.
     pub(super) fn reader(&self) -> &R {
         &self.reader
     }
 
-    /// The beginning of the line that was read last, for a message.
+    /// The beginning of the last line that was read, for an error message.
     pub(super) fn shown(&self) -> String {
         shown(&String::from_utf8_lossy(&self.line))
     }
@@ -115,7 +115,7 @@ impl<R: BufRead> Lines<R> {
         self.count = 0;
     }
 
-    /// Reads the next line; `false` when there is none: the output was closed, be it in the middle of a line.
+    /// Reads the next line; `false` at the end of the output, even in the middle of a line.
     pub(super) fn read(&mut self) -> Result<bool, TransportError> {
         self.line.clear();
         self.count += 1;
@@ -123,7 +123,7 @@ impl<R: BufRead> Lines<R> {
             let available = match self.reader.fill_buf() {
                 Ok(available) => available,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                // The other end is gone, whatever the system says of the way it went.
+                // The other end is closed, whatever error the system reports.
                 Err(_) => return Ok(false),
             };
             if available.is_empty() {
@@ -143,8 +143,8 @@ impl<R: BufRead> Lines<R> {
         }
     }
 
-    /// What the line says that was read last.
-    pub(super) fn said(&self) -> Result<Said<'_>, TransportError> {
+    /// Parses the last line that was read.
+    pub(super) fn parse(&self) -> Result<SimulatorMessage<'_>, TransportError> {
         let Ok(text) = std::str::from_utf8(&self.line) else {
             return Err(self.wrong("is not UTF-8".to_owned(), "the protocol is JSON in UTF-8"));
         };
@@ -156,30 +156,30 @@ impl<R: BufRead> Lines<R> {
         if serde_json::from_str::<IgnoredAny>(text).is_ok() {
             let why = error.to_string();
             let why = why.split(" at line ").next().unwrap_or_default();
-            let remedy = "a simulator says `ready`, `publish`, `done` or `failed`, as docs/process.md has them";
+            let remedy = "a simulator sends `ready`, `publish`, `done` or `failed`, as docs/process.md describes";
             return self.wrong(format!("is not of the protocol ({why}): {shown}"), remedy);
         }
-        // What Python and JavaScript make of numbers that JSON does not have.
+        // As Python and JavaScript write numbers that JSON does not have.
         if ["NaN", "Infinity"].iter().any(|name| has_bare_word(text, name)) {
-            let remedy = "write such a number as the text \"NaN\", \"Infinity\" or \"-Infinity\"";
+            let remedy = "write such a number as the string \"NaN\", \"Infinity\" or \"-Infinity\"";
             return self.wrong(format!("holds a number that JSON does not have: {shown}"), remedy);
         }
-        let remedy = "standard output carries the protocol alone, print everything else to standard error";
+        let remedy = "standard output is reserved for the protocol, print everything else to standard error";
         self.wrong(format!("is not JSON: {shown}"), remedy)
     }
 
-    /// An error about the line that was read last.
+    /// An error about the last line that was read.
     pub(super) fn wrong(&self, problem: String, remedy: impl Into<String>) -> TransportError {
         TransportError::Protocol { line: self.count, problem, remedy: remedy.into() }
     }
 }
 
-/// Whether a word stands in JSON outside of quotes, as far as an error message needs to know.
+/// Whether a word occurs in JSON outside of strings; an approximation that is good enough for an error message.
 fn has_bare_word(text: &str, word: &str) -> bool {
     text.split('"').step_by(2).any(|outside| outside.contains(word))
 }
 
-/// The beginning of a line, for a message.
+/// The beginning of a line, for an error message.
 fn shown(text: &str) -> String {
     const LENGTH: usize = 100;
     let start: String = text.chars().take(LENGTH).collect();
@@ -188,8 +188,8 @@ fn shown(text: &str) -> String {
     format!("`{plain}`{rest}")
 }
 
-/// What the runner says, written to a line.
-pub(super) mod order {
+/// The runner's requests, written to a line.
+pub(super) mod request {
     use super::{SimTime, number, quoted};
 
     /// `{"reset":{"seed":1,"step":0.02,"topics":["a"]}}`

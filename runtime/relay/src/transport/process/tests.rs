@@ -1,4 +1,6 @@
-//! Simulators that are real processes, good and bad ones. They are written in Python.
+//! Simulators that are real processes, correct and faulty ones. They are written in Python.
+
+#![expect(clippy::disallowed_types, reason = "a test that looks for Python starts it")]
 
 use std::path::Path;
 use std::process::Command;
@@ -157,7 +159,7 @@ fn a_simulator_that_closes_its_output_and_stays_is_ended() {
     let step = "    import os, time\n    os.close(1)\n    time.sleep(1000)";
     let Some(crash) = crash(step) else { return };
     assert!(
-        crash.contains("closed its standard output, but did not end, while the end of its step to 0.100 s"),
+        crash.contains("closed its standard output, but did not exit, while the end of its step to 0.100 s"),
         "{crash}"
     );
 }
@@ -179,8 +181,8 @@ fn a_simulator_that_ends_has_ended_even_if_a_child_holds_its_output() {
     let Some(crash) = crash(step) else { return };
     assert_eq!(
         crash,
-        "the simulator `python3 sim.py` ended (exit status: 3) while the end of its step to 0.100 s was awaited; its last \
-         words:\nthe last words"
+        "the simulator `python3 sim.py` ended (exit status: 3) while the end of its step to 0.100 s was awaited; the last \
+         lines of its standard error:\nthe last words"
     );
     assert!(started.elapsed() < Duration::from_secs(60), "and not only when the child ends");
 }
@@ -192,8 +194,8 @@ fn that_a_simulator_was_killed_is_told_apart_from_other_ends() {
         let step = format!("    import os, signal\n    os.kill(os.getpid(), signal.{signal})");
         let Some(mut python) = python_of(&format!("{FRAME}{step}")) else { return };
         assert!(matches!(run(&mut python.transport, 1).outcome, Outcome::Crash { .. }));
-        assert_eq!(python.transport.aside(), Aside { killed, notes: Vec::new() });
-        assert_eq!(python.transport.aside(), Aside::default(), "it is said once");
+        assert_eq!(python.transport.incidents(), Incidents { killed, notes: Vec::new() });
+        assert_eq!(python.transport.incidents(), Incidents::default(), "it is reported once");
     }
 }
 
@@ -212,7 +214,7 @@ fn after_the_last_answer(what: &str) -> Option<(Vec<Option<String>>, Vec<String>
         let outcome = run(&mut python.transport, seed).outcome;
         // What it says late has come by then.
         std::thread::sleep(Duration::from_millis(500));
-        notes.extend(python.transport.aside().notes);
+        notes.extend(python.transport.incidents().notes);
         match outcome {
             Outcome::Crash { message } => Some(message),
             Outcome::Completed => None,
@@ -234,7 +236,7 @@ fn an_answer_too_many_is_the_crash_of_its_own_run_and_no_fault_of_the_next() {
 
 #[test]
 fn what_a_simulator_does_between_two_runs_is_noted_and_the_next_begins_with_a_new_process() {
-    let before = "the simulator was started anew before this test, for what it did after the one before: ";
+    let before = "the simulator was restarted before this test, because of a fault after the previous one: ";
     for (what, noted) in [
         ("sleep(0.3); say({'done': {}})", "comes after everything was answered"),
         (
