@@ -20,8 +20,8 @@ pub const TICK: SimTime = SimTime::from_nanos(1);
 
 /// The activity of one operation in one run: whether it is on now, and when it was.
 ///
-/// It is told of time by [`Activity::follow`], which must stop at each [`Activity::next_edge`], and of values by
-/// [`Activity::weigh`], at each edge and whenever a value changed. To weigh the same values again changes nothing.
+/// It is told of time by [`Activity::advance_to`], which must stop at each [`Activity::next_edge`], and of values by
+/// [`Activity::evaluate`], at each edge and whenever a value changed. To evaluate the same values again changes nothing.
 #[derive(Debug, Clone)]
 pub struct Activity {
     /// A window of time, or `within` where conditions switch: never active outside of it.
@@ -127,7 +127,7 @@ impl Activity {
     }
 
     /// Follows time, which never goes back and stops at each edge: it is active for `start <= t < end`.
-    pub fn follow(&mut self, now: SimTime) -> Edge {
+    pub fn advance_to(&mut self, now: SimTime) -> Edge {
         match self.phase {
             Phase::Before if now >= self.window.0 => match self.switch {
                 Switch::Time => self.begin(self.window.0, self.window.1),
@@ -136,20 +136,20 @@ impl Activity {
                     Edge::None
                 }
             },
-            Phase::Active { since, until } if now >= until => self.cease(since, until),
+            Phase::Active { since, until } if now >= until => self.deactivate(since, until),
             _ => Edge::None,
         }
     }
 
     /// Weighs its conditions at a moment, given the values of metrics then.
-    pub fn weigh(&mut self, now: SimTime, value: &impl Fn(MetricId) -> Option<f64>) -> Edge {
-        let ended = self.weigh_end(now, value);
-        let started = self.weigh_start(now, true, value);
+    pub fn evaluate(&mut self, now: SimTime, value: &impl Fn(MetricId) -> Option<f64>) -> Edge {
+        let ended = self.evaluate_end(now, value);
+        let started = self.evaluate_start(now, true, value);
         if ended == Edge::None { started } else { ended }
     }
 
-    /// The first half of [`Activity::weigh`]: whether its end condition switches it off.
-    pub fn weigh_end(&mut self, now: SimTime, value: &impl Fn(MetricId) -> Option<f64>) -> Edge {
+    /// The first half of [`Activity::evaluate`]: whether its end condition switches it off.
+    pub fn evaluate_end(&mut self, now: SimTime, value: &impl Fn(MetricId) -> Option<f64>) -> Edge {
         self.again = self.again.filter(|&again| again > now);
         match (self.phase, &self.switch) {
             (Phase::Active { since, .. }, Switch::Conditions { end, .. }) if holds(end, value) => {
@@ -157,15 +157,15 @@ impl Activity {
                     self.again = Some(now + TICK);
                     return Edge::None;
                 }
-                self.cease(since, now)
+                self.deactivate(since, now)
             }
             _ => Edge::None,
         }
     }
 
-    /// The second half of [`Activity::weigh`]: whether its conditions switch it on. Where it is not `free` to begin, it
+    /// The second half of [`Activity::evaluate`]: whether its conditions switch it on. Where it is not `free` to begin, it
     /// waits for as long as they hold.
-    pub fn weigh_start(&mut self, now: SimTime, free: bool, value: &impl Fn(MetricId) -> Option<f64>) -> Edge {
+    pub fn evaluate_start(&mut self, now: SimTime, free: bool, value: &impl Fn(MetricId) -> Option<f64>) -> Edge {
         let (holds, length) = match &self.switch {
             Switch::Time => return Edge::None,
             Switch::Conditions { start, end } => (holds(start, value) && !holds(end, value), None),
@@ -207,7 +207,7 @@ impl Activity {
         Edge::Started
     }
 
-    fn cease(&mut self, since: SimTime, at: SimTime) -> Edge {
+    fn deactivate(&mut self, since: SimTime, at: SimTime) -> Edge {
         self.switched = Some(at);
         self.observed.push((since, at));
         self.past = self.past + (at - since);
@@ -256,7 +256,7 @@ mod tests {
             .map(|&t| {
                 let now = SimTime::from_seconds(t);
                 while let Some(edge) = activity.next_edge().filter(|&edge| edge <= now) {
-                    activity.follow(edge);
+                    activity.advance_to(edge);
                 }
                 activity.is_active()
             })
@@ -266,8 +266,8 @@ mod tests {
     /// Carries out all edges up to a moment, each with the value known by then.
     fn carry_out(activity: &mut Activity, now: SimTime, x: Option<f64>) {
         while let Some(edge) = activity.next_edge().filter(|&edge| edge <= now) {
-            activity.follow(edge);
-            activity.weigh(edge, &|_| x);
+            activity.advance_to(edge);
+            activity.evaluate(edge, &|_| x);
         }
     }
 
@@ -279,7 +279,7 @@ mod tests {
             let now = SimTime::from_seconds(t);
             carry_out(&mut activity, now, known);
             known = Some(x);
-            activity.weigh(now, &|_| known);
+            activity.evaluate(now, &|_| known);
             active.push(activity.is_active());
         }
         let end = SimTime::from_seconds(10.0);
@@ -391,17 +391,17 @@ mod tests {
         let at = SimTime::from_seconds;
         let waiting = |until: f64| {
             let mut activity = Activity::new(&lasting(1.0, 9), WITHIN);
-            activity.follow(at(1.0));
-            assert_eq!(activity.weigh_start(at(2.0), false, &|_| Some(6.0)), Edge::None);
-            activity.weigh_start(at(3.0), false, &|_| Some(until));
-            activity.weigh_start(at(4.0), true, &|_| Some(6.0))
+            activity.advance_to(at(1.0));
+            assert_eq!(activity.evaluate_start(at(2.0), false, &|_| Some(6.0)), Edge::None);
+            activity.evaluate_start(at(3.0), false, &|_| Some(until));
+            activity.evaluate_start(at(4.0), true, &|_| Some(6.0))
         };
         assert_eq!(waiting(6.0), Edge::Started, "it begins as soon as it may");
         let mut lost = Activity::new(&lasting(1.0, 9), WITHIN);
-        lost.follow(at(1.0));
-        lost.weigh_start(at(2.0), false, &|_| Some(6.0));
-        lost.weigh_start(at(3.0), false, &|_| Some(4.0));
-        assert_eq!(lost.weigh_start(at(4.0), true, &|_| Some(4.0)), Edge::None, "that occurrence is lost");
+        lost.advance_to(at(1.0));
+        lost.evaluate_start(at(2.0), false, &|_| Some(6.0));
+        lost.evaluate_start(at(3.0), false, &|_| Some(4.0));
+        assert_eq!(lost.evaluate_start(at(4.0), true, &|_| Some(4.0)), Edge::None, "that occurrence is lost");
     }
 
     /// The window of the property below, in nanoseconds.
@@ -463,7 +463,7 @@ mod tests {
                 let now = SimTime::from_nanos(t);
                 carry_out(&mut activity, now, known);
                 known = Some(x);
-                activity.weigh(now, &|_| known);
+                activity.evaluate(now, &|_| known);
             }
             let end = SimTime::from_nanos(100);
             carry_out(&mut activity, end, known);

@@ -11,7 +11,7 @@ use crate::files::{NoFiles, SpaceFiles};
 use crate::fuzz::{ChoiceError, OperationEntry};
 use crate::metric::MetricTable;
 use crate::panic_capture;
-use crate::relay::{Relay, Tap};
+use crate::relay::{Listener, Relay};
 use crate::simulator::Progress;
 use crate::transport::{Transport, TransportError};
 use crate::wire::WireTable;
@@ -42,7 +42,7 @@ pub struct Run<'a> {
     pub simulator_seed: u64,
 }
 
-/// As [`evaluate`], telling a tap what happens.
+/// As [`evaluate`], with a listener besides the metrics.
 pub fn evaluate_tapped(
     plan: &CampaignPlan,
     wires: &WireTable,
@@ -50,7 +50,7 @@ pub fn evaluate_tapped(
     transport: &mut dyn Transport,
     &Run { test, simulator_seed }: &Run<'_>,
     custom: &mut Custom<'_>,
-    tap: Option<&mut dyn Tap>,
+    tap: Option<&mut dyn Listener>,
 ) -> Result<Observation, ChoiceError> {
     #[expect(clippy::disallowed_methods, reason = "how long a run took is recorded, and decides nothing")]
     let started = Instant::now();
@@ -117,12 +117,12 @@ fn drive(
     files: &mut dyn SpaceFiles,
 ) -> Result<(), String> {
     let words = |error: TransportError| error.to_string();
-    relay.beside_run(Moment::BeforeStart, files)?;
+    relay.before_or_after_run(Moment::BeforeStart, files)?;
     relay.begin();
     transport.reset(seed, relay).map_err(words)?;
     while transport.advance(end, relay).map_err(words)? == Progress::Running {}
     relay.end(transport.now());
-    relay.beside_run(Moment::AfterEnd, files)
+    relay.before_or_after_run(Moment::AfterEnd, files)
 }
 
 #[cfg(test)]

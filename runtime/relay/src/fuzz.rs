@@ -1,6 +1,6 @@
 //! Fuzzing operations: what an active operation does to one message.
 //!
-//! Draws are keyed by the operation's draw seed and the message's index on its wire, so they do not depend on what
+//! KeyedRng are keyed by the operation's draw seed and the message's index on its wire, so they do not depend on what
 //! happened before: repeating a test repeats its disturbance, and a shorter window disturbs its messages just the same.
 
 mod bias;
@@ -103,7 +103,7 @@ impl<T> Default for PerWire<T> {
 
 impl<T: Default> PerWire<T> {
     /// What is remembered for a wire; at first the default.
-    pub fn of(&mut self, member: u64) -> &mut T {
+    pub fn entry(&mut self, member: u64) -> &mut T {
         let at = usize::try_from(member).expect("a topic has fewer wires than memory has places");
         if at >= self.0.len() {
             self.0.resize_with(at + 1, T::default);
@@ -114,7 +114,7 @@ impl<T: Default> PerWire<T> {
 
 /// When and on which wire of its topic an operation meets a message.
 #[derive(Debug, Clone, Copy)]
-pub struct Encounter {
+pub struct MessageContext {
     /// The time.
     pub now: SimTime,
     /// How long the operation has been on.
@@ -122,12 +122,12 @@ pub struct Encounter {
     /// The wire's position in the topic.
     pub member: u64,
     /// The operation's draws for the message.
-    pub draws: Draws,
+    pub draws: KeyedRng,
 }
 
 /// What becomes of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fate {
+pub enum Action {
     /// It goes on as it is.
     Unchanged,
     /// It goes on, changed.
@@ -142,16 +142,16 @@ pub enum Fate {
 
 /// The draws of one operation for one message.
 #[derive(Debug, Clone, Copy)]
-pub struct Draws {
+pub struct KeyedRng {
     seed: u64,
     message: u64,
 }
 
-impl Draws {
+impl KeyedRng {
     /// The draws for the `index`th message on the `member`th wire of the operation's topic.
     pub fn new(draw_seed: u64, member: u64, index: u64) -> Self {
         let seed = if member == 0 { draw_seed } else { rng::derive_seed(draw_seed, "member", &[member]) };
-        Draws { seed, message: index }
+        KeyedRng { seed, message: index }
     }
 
     /// The `n`th draw, uniform in `[0, 1)`.
@@ -175,7 +175,7 @@ impl Disturbance {
             return refuse(format!("has {} parameters, not {}", operation.parameters.len(), test.parameters.len()));
         }
         for (parameter, choice) in operation.parameters.iter().zip(&test.parameters) {
-            if let Some(reason) = misfit(&parameter.domain, choice) {
+            if let Some(reason) = mismatch(&parameter.domain, choice) {
                 return refuse(format!("`{}` {reason}", parameter.name));
             }
         }
@@ -199,7 +199,7 @@ impl Disturbance {
             Some(choice @ (Choice::Value { .. } | Choice::Range { .. })) => Ok(bounds(choice)),
             _ => Err(lacks(name)),
         };
-        let amount = |name: &str| chosen(name).and_then(Amount::of).ok_or_else(|| lacks(name));
+        let amount = |name: &str| chosen(name).and_then(Amount::from_choice).ok_or_else(|| lacks(name));
         let places = Places::new(&operation.places);
         Ok(match &operation.kind {
             OperationKind::RandomValue { mode, integer } => {
@@ -267,15 +267,15 @@ impl Disturbance {
     }
 
     /// Whether it has to hear messages that pass while it is off.
-    pub fn listens(&self) -> bool {
+    pub fn observes_inactive(&self) -> bool {
         matches!(self, Disturbance::Freeze(_) | Disturbance::Stale(_))
     }
 
     /// A message passes while the operation is off.
-    pub fn overhear(&mut self, now: SimTime, member: u64, message: &Value) {
+    pub fn observe(&mut self, now: SimTime, member: u64, message: &Value) {
         match self {
-            Disturbance::Freeze(operation) => operation.overhear(member, message),
-            Disturbance::Stale(operation) => operation.overhear(now, member, message),
+            Disturbance::Freeze(operation) => operation.observe(member, message),
+            Disturbance::Stale(operation) => operation.observe(now, member, message),
             _ => {}
         }
     }
@@ -296,7 +296,7 @@ impl Disturbance {
 
     /// What becomes of a message while the operation is active; the message may be changed in place. A custom operation
     /// may do more than that, so the relay calls it itself.
-    pub fn apply(&mut self, at: Encounter, message: &mut Value) -> Fate {
+    pub fn apply(&mut self, at: MessageContext, message: &mut Value) -> Action {
         match self {
             Disturbance::RandomValue(operation) => operation.apply(at.draws, message),
             Disturbance::RandomText(operation) => operation.apply(at.draws, message),
@@ -313,15 +313,15 @@ impl Disturbance {
             Disturbance::RateLimit(operation) => operation.apply(at.now, at.member),
             Disturbance::Latency(operation) => operation.apply(at.draws),
             Disturbance::Reorder(operation) => operation.apply(at.draws),
-            Disturbance::Duplicate(copies) => Fate::Duplicated(*copies),
-            Disturbance::Blackhole => Fate::Dropped,
-            Disturbance::Custom(_) => Fate::Unchanged,
+            Disturbance::Duplicate(copies) => Action::Duplicated(*copies),
+            Disturbance::Blackhole => Action::Dropped,
+            Disturbance::Custom(_) => Action::Unchanged,
         }
     }
 }
 
 /// Why a choice is not one that is permitted; `None` if it is.
-fn misfit(domain: &Domain, choice: &Choice) -> Option<String> {
+fn mismatch(domain: &Domain, choice: &Choice) -> Option<String> {
     match (domain, choice) {
         (Domain::Number { low: least, high: most, shape, integer }, Choice::Value { .. } | Choice::Range { .. }) => {
             let (low, high) = bounds(choice);

@@ -13,7 +13,7 @@
 
 mod recording;
 mod records;
-mod salvage;
+mod recover;
 mod schema;
 mod writer;
 
@@ -28,7 +28,7 @@ use sesame_base::observation::{Observation, Outcome};
 use sesame_plan::{CampaignPlan, Test};
 
 pub use recording::{Fed, RecordedMetric, RecordedRun, RecordingError, feed};
-pub use salvage::salvage;
+pub use recover::recover;
 pub use writer::TraceWriter;
 
 /// Name of the metadata record that says which run a trace is of.

@@ -45,7 +45,7 @@ pub(super) fn run(
     let what = Run { test, simulator_seed: *simulator_seed };
     let Some(order) = &job.trace else {
         let observed = evaluate_tapped(plan, wires, metrics, transport, &what, custom, None);
-        return (observed.unwrap_or_else(|misfit| crashed(misfit.to_string())), None);
+        return (observed.unwrap_or_else(|mismatch| crashed(mismatch.to_string())), None);
     };
     #[cfg(feature = "mcap")]
     {
@@ -57,7 +57,7 @@ pub(super) fn run(
             Err(error) => return (crashed("there was no trace to write to".to_owned()), Some(error.to_string())),
         };
         let observed = evaluate_tapped(plan, wires, metrics, transport, &what, custom, Some(&mut writer));
-        let observation = observed.unwrap_or_else(|misfit| crashed(misfit.to_string()));
+        let observation = observed.unwrap_or_else(|mismatch| crashed(mismatch.to_string()));
         let settled = if is_kept(plan, order.keep, &observation) {
             writer.keep(&observation, &order.file).map_err(|error| error.to_string())
         } else {
@@ -77,7 +77,7 @@ pub(super) fn run(
 pub(super) fn save(order: &TraceOrder, directory: &Path, outcome: &Outcome) -> Result<(), String> {
     #[cfg(feature = "mcap")]
     {
-        sesame_relay::trace::salvage(&directory.join(UNFINISHED), outcome, &order.file)
+        sesame_relay::trace::recover(&directory.join(UNFINISHED), outcome, &order.file)
             .map_err(|error| error.to_string())
     }
     #[cfg(not(feature = "mcap"))]

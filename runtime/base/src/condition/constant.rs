@@ -16,7 +16,7 @@ const PATIENCE: u32 = 20_000;
 /// one that can have both.
 pub fn constant(condition: &Condition, variables: &[Variable]) -> Option<bool> {
     let possible = |holds| {
-        let bounds = Bounds::of(condition, variables)?;
+        let bounds = Bounds::new(condition, variables)?;
         satisfiable(Some(&Goals { condition, holds, rest: None }), &bounds, &mut { PATIENCE }).then_some(())
     };
     match (possible(true), possible(false)) {
@@ -87,7 +87,7 @@ struct Bounds {
 
 impl Bounds {
     /// What the ranges of a condition's variables say; `None` where they are empty.
-    fn of(condition: &Condition, variables: &[Variable]) -> Option<Self> {
+    fn new(condition: &Condition, variables: &[Variable]) -> Option<Self> {
         let mut metrics = Vec::new();
         collect(condition, &mut metrics);
         let size = metrics.len() + 1;

@@ -1,7 +1,7 @@
 //! Bias: adds one and the same. On time stamps that is the skew of a clock.
 
 use crate::fuzz::change::{Amount, add};
-use crate::fuzz::{Fate, Places};
+use crate::fuzz::{Action, Places};
 use crate::value::Value;
 
 /// A bias or clock skew operation.
@@ -15,7 +15,7 @@ pub struct Bias {
 
 impl Bias {
     /// Adds the bias to the values.
-    pub fn apply(&self, message: &mut Value) -> Fate {
+    pub fn apply(&self, message: &mut Value) -> Action {
         self.places.change(message, |value, _| add(value, |axis| self.bias.on(axis)))
     }
 }

@@ -1,10 +1,10 @@
 //! Burst loss: drops messages in bursts (Gilbert 1960, Elliott 1963).
 //!
 //! A chain of two states per wire: in the good one messages pass, in the bad one each is dropped with probability `loss`.
-//! It begins in the good state when the operation goes on, and moves with each message before its fate is decided. In the
+//! It begins in the good state when the operation goes on, and moves with each message before its action is decided. In the
 //! long run `loss * enter / (enter + leave)` of all messages are dropped, and a burst is `1 / leave` messages long.
 
-use crate::fuzz::{Draws, Fate, PerWire};
+use crate::fuzz::{Action, KeyedRng, PerWire};
 
 /// A burst loss operation.
 #[derive(Debug)]
@@ -21,10 +21,10 @@ pub struct BurstLoss {
 
 impl BurstLoss {
     /// Moves the chain and drops the message or lets it pass.
-    pub fn apply(&mut self, draws: Draws, member: u64) -> Fate {
-        let bursting = self.bursting.of(member);
+    pub fn apply(&mut self, draws: KeyedRng, member: u64) -> Action {
+        let bursting = self.bursting.entry(member);
         let turns = draws.unit(0) < if *bursting { self.leave } else { self.enter };
         *bursting ^= turns;
-        if *bursting && draws.unit(1) < self.loss { Fate::Dropped } else { Fate::Unchanged }
+        if *bursting && draws.unit(1) < self.loss { Action::Dropped } else { Action::Unchanged }
     }
 }

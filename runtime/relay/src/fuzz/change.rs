@@ -21,7 +21,7 @@ pub enum Amount {
 
 impl Amount {
     /// What a test chose; `None` for texts and ranges.
-    pub(super) fn of(choice: &Choice) -> Option<Self> {
+    pub(super) fn from_choice(choice: &Choice) -> Option<Self> {
         match choice {
             Choice::Value { value } => Some(Amount::Number(*value)),
             Choice::Point { point } => Some(Amount::Point(*point)),

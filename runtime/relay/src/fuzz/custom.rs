@@ -1,7 +1,7 @@
 //! Custom operations: the user's Rust code, called with each message, before the start or after the end of a run.
 //!
 //! Generated code puts the user's typed hook behind [`OperationHook`]; every use of an operation in a test gets a hook
-//! of its own for each run. Draws come from the context alone, keyed like those of every other operation.
+//! of its own for each run. KeyedRng come from the context alone, keyed like those of every other operation.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Choice, Moment, Operation, OperationId, OperationKind};
 
 use crate::files::SpaceFiles;
-use crate::fuzz::Draws;
+use crate::fuzz::KeyedRng;
 use crate::message::{FromValue, Mismatch, ToValue};
 use crate::value::{Text, Value};
 
@@ -21,7 +21,7 @@ pub trait OperationHook {
         let _ = (message, call);
     }
     /// Before the start or after the end of a run, as the operation's declaration says.
-    fn beside_run(&mut self, ctx: &mut RunContext<'_>) {
+    fn before_or_after_run(&mut self, ctx: &mut RunContext<'_>) {
         let _ = ctx;
     }
 }
@@ -85,7 +85,7 @@ pub fn chosen<T: FromChoice>(choices: &[Choice], position: usize) -> T {
 pub struct OperationContext<'a, M> {
     now: SimTime,
     topic: &'a str,
-    draws: Draws,
+    draws: KeyedRng,
     next_draw: u64,
     dropped: bool,
     injected: Vec<M>,
@@ -103,7 +103,7 @@ impl<M> OperationContext<'_, M> {
         self.topic
     }
 
-    /// The next draw for this message, uniform in `[0, 1)`. Draws depend on the operation's draw seed, the message's
+    /// The next draw for this message, uniform in `[0, 1)`. KeyedRng depend on the operation's draw seed, the message's
     /// index and how many were made for this message before, so a test that is run again draws the same.
     pub fn draw(&mut self) -> f64 {
         self.next_draw += 1;
@@ -136,7 +136,7 @@ impl<M> OperationContext<'_, M> {
 pub struct MessageCall<'a> {
     now: SimTime,
     topic: &'a str,
-    draws: Draws,
+    draws: KeyedRng,
     pub(crate) changed: bool,
     pub(crate) dropped: bool,
     pub(crate) injected: Vec<Value>,
@@ -145,7 +145,7 @@ pub struct MessageCall<'a> {
 }
 
 impl<'a> MessageCall<'a> {
-    pub(crate) fn new(now: SimTime, topic: &'a str, draws: Draws) -> Self {
+    pub(crate) fn new(now: SimTime, topic: &'a str, draws: KeyedRng) -> Self {
         MessageCall {
             now,
             topic,
@@ -203,7 +203,7 @@ impl<'a> MessageCall<'a> {
 pub struct RunContext<'a> {
     /// `None` while it is only asked whether the hook is filled in.
     files: Option<&'a mut dyn SpaceFiles>,
-    draws: Draws,
+    draws: KeyedRng,
     next_draw: u64,
     pub(crate) side_effects: u64,
     pub(crate) failure: Option<String>,
@@ -211,13 +211,13 @@ pub struct RunContext<'a> {
 }
 
 impl<'a> RunContext<'a> {
-    pub(crate) fn new(files: &'a mut dyn SpaceFiles, draws: Draws) -> Self {
+    pub(crate) fn new(files: &'a mut dyn SpaceFiles, draws: KeyedRng) -> Self {
         RunContext { files: Some(files), draws, next_draw: 0, side_effects: 0, failure: None, unimplemented: false }
     }
 
     /// A context that changes nothing: a hook that asks anything of it is filled in, and stopped there.
     pub(crate) fn probing() -> Self {
-        let draws = Draws::new(0, 0, 0);
+        let draws = KeyedRng::new(0, 0, 0);
         RunContext { files: None, draws, next_draw: 0, side_effects: 0, failure: None, unimplemented: false }
     }
 
@@ -314,7 +314,7 @@ impl Custom {
         &mut self,
         now: SimTime,
         topic: &'c str,
-        draws: Draws,
+        draws: KeyedRng,
         message: &mut Value,
     ) -> MessageCall<'c> {
         let mut call = MessageCall::new(now, topic, draws);

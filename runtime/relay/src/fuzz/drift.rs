@@ -3,7 +3,7 @@
 use sesame_base::time::SimTime;
 
 use crate::fuzz::change::{Amount, add};
-use crate::fuzz::{Fate, Places};
+use crate::fuzz::{Action, Places};
 use crate::value::Value;
 
 /// A drift operation.
@@ -17,7 +17,7 @@ pub struct Drift {
 
 impl Drift {
     /// Adds to the values what has accumulated in the time that the operation is on.
-    pub fn apply(&self, active: SimTime, message: &mut Value) -> Fate {
+    pub fn apply(&self, active: SimTime, message: &mut Value) -> Action {
         let seconds = active.seconds();
         self.places.change(message, |value, _| add(value, |axis| self.rate.on(axis) * seconds))
     }

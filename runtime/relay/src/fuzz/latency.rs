@@ -3,7 +3,7 @@
 use sesame_base::time::SimTime;
 use sesame_plan::{Distribution, Drain};
 
-use crate::fuzz::{Draws, Fate};
+use crate::fuzz::{Action, KeyedRng};
 
 /// How often a normal delay is drawn again before its middle is taken; that all leave the range has a probability of 1e-21.
 const TRIES: u64 = 16;
@@ -21,7 +21,7 @@ pub struct Latency {
 
 impl Latency {
     /// How long the message is held, if nothing before it is held longer.
-    pub fn apply(self, draws: Draws) -> Fate {
+    pub fn apply(self, draws: KeyedRng) -> Action {
         let (low, high) = self.delay;
         let delay = if low == high {
             low
@@ -33,6 +33,6 @@ impl Latency {
         } else {
             low + draws.unit(0) * (high - low)
         };
-        Fate::Delayed(SimTime::from_seconds(delay))
+        Action::Delayed(SimTime::from_seconds(delay))
     }
 }

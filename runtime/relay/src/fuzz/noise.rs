@@ -1,7 +1,7 @@
 //! Noise: adds a fresh normal draw of mean zero per message and number.
 
 use crate::fuzz::change::add;
-use crate::fuzz::{Draws, Fate, Places};
+use crate::fuzz::{Action, KeyedRng, Places};
 use crate::value::Value;
 
 /// A noise operation.
@@ -15,7 +15,7 @@ pub struct Noise {
 
 impl Noise {
     /// Adds noise to the values; to each coordinate of a point a draw of its own.
-    pub fn apply(&self, draws: Draws, message: &mut Value) -> Fate {
+    pub fn apply(&self, draws: KeyedRng, message: &mut Value) -> Action {
         self.places
             .change(message, |value, first| add(value, |axis| self.sigma * draws.normal(first + 2 * axis as u64)))
     }

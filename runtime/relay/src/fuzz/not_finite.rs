@@ -3,7 +3,7 @@
 use sesame_plan::NotFinite;
 
 use crate::fuzz::change::map;
-use crate::fuzz::{Fate, Places};
+use crate::fuzz::{Action, Places};
 use crate::value::Value;
 
 /// An operation that replaces reals by what is no finite number.
@@ -17,7 +17,7 @@ pub struct MakeNotFinite {
 
 impl MakeNotFinite {
     /// Replaces reals and all coordinates of points; whole numbers have no such values and stay.
-    pub fn apply(&self, message: &mut Value) -> Fate {
+    pub fn apply(&self, message: &mut Value) -> Action {
         let new = match self.number {
             NotFinite::Nan => f64::NAN,
             NotFinite::Infinity => f64::INFINITY,

@@ -2,7 +2,7 @@
 
 use sesame_plan::{Place, Step};
 
-use crate::fuzz::Fate;
+use crate::fuzz::Action;
 use crate::value::Value;
 
 /// How many draws each value of a message may make.
@@ -24,13 +24,13 @@ impl Places {
     ///
     /// What a message does not have is left out: elements behind the end of a list, and whatever is not of its declared
     /// type.
-    pub fn change(&self, message: &mut Value, mut change: impl FnMut(&mut Value, u64) -> bool) -> Fate {
+    pub fn change(&self, message: &mut Value, mut change: impl FnMut(&mut Value, u64) -> bool) -> Action {
         let mut changed = false;
         for (at, place) in (0u64..).zip(&self.0) {
             let mut next = (at << 32) * DRAWS_PER_VALUE;
             changed |= visit(message, place, &mut next, &mut change);
         }
-        if changed { Fate::Changed } else { Fate::Unchanged }
+        if changed { Action::Changed } else { Action::Unchanged }
     }
 
     /// Remembers the values at these places, in the place of what was remembered.
@@ -43,7 +43,7 @@ impl Places {
     }
 
     /// Puts remembered values back into their places; elements that the list had not then stay as they are.
-    pub fn recall(&self, message: &mut Value, memory: &Memory) -> Fate {
+    pub fn recall(&self, message: &mut Value, memory: &Memory) -> Action {
         let mut remembered = memory.0.iter().peekable();
         self.change(message, |value, at| {
             while remembered.next_if(|(before, _)| *before < at).is_some() {}

@@ -5,7 +5,7 @@ use std::panic::{self, AssertUnwindSafe};
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Choice, Domain, Moment, OperationId};
 
-use crate::fuzz::{Draws, MessageCall, OperationEntry, RunContext, custom_operations};
+use crate::fuzz::{KeyedRng, MessageCall, OperationEntry, RunContext, custom_operations};
 use crate::metric::sample;
 
 /// The custom operations of the plan whose hook says, when called with a made-up message, that it is not filled in. A
@@ -22,13 +22,13 @@ pub fn unimplemented_operations(plan: &CampaignPlan, hooks: &[OperationEntry]) -
             let choices: Vec<Choice> = operation.parameters.iter().map(|it| first(&it.domain)).collect();
             let topic = operation.topic.map(|topic| plan.topic(topic));
             let path = topic.and_then(|topic| topic.paths.first()).map_or("", String::as_str);
-            let mut call = MessageCall::new(SimTime::ZERO, path, Draws::new(0, 0, 0));
+            let mut call = MessageCall::new(SimTime::ZERO, path, KeyedRng::new(0, 0, 0));
             let mut ctx = RunContext::probing();
             let called = panic::catch_unwind(AssertUnwindSafe(|| {
                 let mut hook = (entry.build)(&choices);
                 match (moment, topic) {
                     (Moment::OnMessage, Some(topic)) => hook.on_message(&mut sample(plan, &topic.ty), &mut call),
-                    _ => hook.beside_run(&mut ctx),
+                    _ => hook.before_or_after_run(&mut ctx),
                 }
             }));
             // What it said before a panic counts.

@@ -4,7 +4,7 @@
 use sesame_plan::ValueMode;
 
 use crate::fuzz::change::{add, map, put};
-use crate::fuzz::{Draws, Fate, Places};
+use crate::fuzz::{Action, KeyedRng, Places};
 use crate::value::{Text, Value};
 
 /// A random value operation on numbers or points, with its sub-ranges.
@@ -24,7 +24,7 @@ pub struct RandomValue {
 impl RandomValue {
     /// Changes the numbers, where the message has them as the space says; whole numbers stay whole. A message that comes
     /// out as it went in counts as unchanged.
-    pub fn apply(&self, draws: Draws, message: &mut Value) -> Fate {
+    pub fn apply(&self, draws: KeyedRng, message: &mut Value) -> Action {
         self.places.change(message, |value, first| {
             let draw = |axis: usize| self.draw(axis, draws.unit(first + axis as u64));
             match self.mode {
@@ -51,7 +51,7 @@ pub struct RandomText {
 
 impl RandomText {
     /// Replaces the texts.
-    pub fn apply(&self, draws: Draws, message: &mut Value) -> Fate {
+    pub fn apply(&self, draws: KeyedRng, message: &mut Value) -> Action {
         self.places.change(message, |value, first| {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is below their number")]
             let at = (draws.unit(first) * self.texts.len() as f64) as usize;

@@ -2,7 +2,7 @@
 
 use sesame_base::time::SimTime;
 
-use crate::fuzz::{Fate, PerWire};
+use crate::fuzz::{Action, PerWire};
 
 /// A rate limit operation.
 #[derive(Debug)]
@@ -15,12 +15,12 @@ pub struct RateLimit {
 
 impl RateLimit {
     /// Drops the message or lets it pass.
-    pub fn apply(&mut self, now: SimTime, member: u64) -> Fate {
-        let passed = self.passed.of(member);
+    pub fn apply(&mut self, now: SimTime, member: u64) -> Action {
+        let passed = self.passed.entry(member);
         if passed.is_some_and(|before| now < before + self.period) {
-            return Fate::Dropped;
+            return Action::Dropped;
         }
         *passed = Some(now);
-        Fate::Unchanged
+        Action::Unchanged
     }
 }

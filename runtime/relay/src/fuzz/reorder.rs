@@ -3,7 +3,7 @@
 use sesame_base::time::SimTime;
 use sesame_plan::Drain;
 
-use crate::fuzz::{Draws, Fate};
+use crate::fuzz::{Action, KeyedRng};
 
 /// A reorder operation.
 #[derive(Debug, Clone, Copy)]
@@ -16,7 +16,7 @@ pub struct Reorder {
 
 impl Reorder {
     /// How long the message is held, whatever is held before it.
-    pub fn apply(self, draws: Draws) -> Fate {
-        Fate::Delayed(SimTime::from_seconds(draws.unit(0) * self.window))
+    pub fn apply(self, draws: KeyedRng) -> Action {
+        Action::Delayed(SimTime::from_seconds(draws.unit(0) * self.window))
     }
 }

@@ -1,7 +1,7 @@
 //! Scale: multiplies.
 
 use crate::fuzz::change::map;
-use crate::fuzz::{Fate, Places};
+use crate::fuzz::{Action, Places};
 use crate::value::Value;
 
 /// A scale operation.
@@ -16,9 +16,9 @@ pub struct Scale {
 impl Scale {
     /// Multiplies the values; points coordinate by coordinate.
     #[expect(clippy::float_cmp, reason = "exactly one changes nothing, not even whole numbers beyond 2^53")]
-    pub fn apply(&self, message: &mut Value) -> Fate {
+    pub fn apply(&self, message: &mut Value) -> Action {
         if self.factor == 1.0 {
-            return Fate::Unchanged;
+            return Action::Unchanged;
         }
         self.places.change(message, |value, _| map(value, |_, x| x * self.factor))
     }

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use sesame_base::time::SimTime;
 
 use crate::fuzz::places::Memory;
-use crate::fuzz::{Fate, PerWire, Places};
+use crate::fuzz::{Action, PerWire, Places};
 use crate::relay::HELD_LIMIT;
 use crate::value::Value;
 
@@ -26,8 +26,8 @@ impl Stale {
     /// A message passes, whether the operation is on or off.
     ///
     /// What is remembered: the last values that are old enough, and all after them.
-    pub fn overhear(&mut self, now: SimTime, member: u64, message: &Value) {
-        let past = self.past.of(member);
+    pub fn observe(&mut self, now: SimTime, member: u64, message: &Value) {
+        let past = self.past.entry(member);
         let mut spare = None;
         while past.get(1).is_some_and(|(time, _)| *time + self.age <= now) || past.len() >= HELD_LIMIT {
             spare = past.pop_front();
@@ -43,11 +43,11 @@ impl Stale {
 
     /// Gives the message the values of the last one before it that is old enough; while there is none, those of the first
     /// one that passed.
-    pub fn apply(&mut self, now: SimTime, member: u64, message: &mut Value) -> Fate {
-        self.overhear(now, member, message);
-        match self.past.of(member).front() {
+    pub fn apply(&mut self, now: SimTime, member: u64, message: &mut Value) -> Action {
+        self.observe(now, member, message);
+        match self.past.entry(member).front() {
             Some((_, memory)) => self.places.recall(message, memory),
-            None => Fate::Unchanged,
+            None => Action::Unchanged,
         }
     }
 }

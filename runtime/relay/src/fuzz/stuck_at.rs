@@ -1,7 +1,7 @@
 //! Stuck-at: a value is one and the same, whatever it was.
 
 use crate::fuzz::change::{Amount, map, put};
-use crate::fuzz::{Fate, Places};
+use crate::fuzz::{Action, Places};
 use crate::value::{Text, Value};
 
 /// A stuck-at operation.
@@ -26,7 +26,7 @@ pub enum Stuck {
 
 impl StuckAt {
     /// Replaces the values, where the message has them as the space says.
-    pub fn apply(&self, message: &mut Value) -> Fate {
+    pub fn apply(&self, message: &mut Value) -> Action {
         self.places.change(message, |value, _| match (&self.at, value) {
             (Stuck::Amount(amount), value) => map(value, |axis, _| amount.on(axis)),
             (Stuck::Text(at), Value::Text(text)) => put(text, at.clone()),

@@ -154,14 +154,19 @@ impl Metrics<'_> {
     /// Time has come to `now`: all messages of the instants before are known. Formulas over several topics have their values of
     /// those instants from here on, for conditions too. Messages tell their time themselves; whoever weighs conditions, or
     /// knows that time has passed without a message, calls this first.
-    pub fn follow_time(&mut self, now: SimTime) {
+    pub fn advance_to(&mut self, now: SimTime) {
         if now > self.now {
             self.settle();
             self.now = now;
         }
     }
 
-    /// The instant at hand is over: all its messages are known. Whether a formula waited for that.
+    /// Whether a formula waits for the end of the current instant.
+    pub(crate) fn is_waiting(&self) -> bool {
+        !self.waiting.is_empty()
+    }
+
+    /// The current instant is over: all its messages are known. Returns whether a formula waited for that.
     pub fn settle(&mut self) -> bool {
         let waited = !self.waiting.is_empty();
         for at in self.waiting.drain(..) {
@@ -177,7 +182,7 @@ impl Metrics<'_> {
 
     /// Tells hooks and formulas that the run has come to its end. After a failure nobody does.
     pub fn end(&mut self, now: SimTime) {
-        self.follow_time(now);
+        self.advance_to(now);
         self.settle();
         for State { hook, formula, robustness, context, ended, .. } in &mut self.states {
             context.now = now;
@@ -196,7 +201,7 @@ impl Metrics<'_> {
 
     /// A message, as the simulator sent it.
     pub fn message(&mut self, now: SimTime, wire: Wire, value: &Value) {
-        self.follow_time(now);
+        self.advance_to(now);
         for &(at, input) in &self.table.taps[wire.index()] {
             let State { hook, formula, robustness, context, waits, .. } = &mut self.states[at];
             if let Some(robustness) = robustness {
@@ -262,8 +267,8 @@ impl Metrics<'_> {
     }
 
     /// A message, as it is delivered.
-    pub fn delivered(&mut self, now: SimTime, wire: Wire, value: &Value) {
-        self.follow_time(now);
+    pub fn delivery(&mut self, now: SimTime, wire: Wire, value: &Value) {
+        self.advance_to(now);
         for &at in &self.table.delivered[wire.index()] {
             let State { formula, robustness, context, waits, .. } = &mut self.states[at];
             let (path, topic, member) = &self.table.wires[wire.index()];

@@ -13,7 +13,7 @@ use sesame_plan::{
     Type, ValueMode,
 };
 
-use crate::fuzz::Draws;
+use crate::fuzz::KeyedRng;
 use crate::metric::MetricTable;
 use crate::relay::{Exchange as _, Finished, Relay};
 use crate::value::{Fields, Record, Value};
@@ -21,7 +21,7 @@ use crate::wire::WireTable;
 
 const MESSAGES: u32 = 81;
 const SEED: u64 = 77;
-/// Draws per value of a message, as `Places` documents.
+/// KeyedRng per value of a message, as `Places` documents.
 const PER_VALUE: u64 = 8;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -279,7 +279,7 @@ fn relayed(payload: Payload, case: &Case, switch: Switch) -> (Vec<(u32, Value)>,
     let used =
         TestOperation { operation: OperationId(0), activation: switch.activation(), parameters, draw_seed: SEED };
     let test = Test { operations: vec![used] };
-    let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).unwrap().heard_everywhere();
+    let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).unwrap().received_everywhere();
     let [payload_wire, switch_wire] = ["payload", "switch"].map(|name| wires.find(name).unwrap());
     let mut delivered = Vec::new();
     for tenth in 0..=100 {
@@ -310,7 +310,7 @@ fn active(n: u32) -> bool {
 }
 
 fn draw(n: u32, at: u64) -> f64 {
-    Draws::new(SEED, 0, u64::from(n)).unit(at)
+    KeyedRng::new(SEED, 0, u64::from(n)).unit(at)
 }
 
 /// The Box-Muller transform, a second time.

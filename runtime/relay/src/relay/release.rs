@@ -6,7 +6,7 @@ use std::collections::BinaryHeap;
 use sesame_base::time::SimTime;
 use sesame_rng::derive_seed;
 
-use crate::relay::Touched;
+use crate::relay::MessageRef;
 use crate::value::Value;
 use crate::wire::Wire;
 
@@ -25,8 +25,8 @@ pub(super) struct Held {
 
 impl Held {
     /// Which message it is, for a tap.
-    pub(super) fn touched(&self) -> Touched {
-        Touched { wire: self.wire, index: self.published }
+    pub(super) fn message_ref(&self) -> MessageRef {
+        MessageRef { wire: self.wire, index: self.published }
     }
 
     /// A message that an operation makes up beside this one, its `number`th. It goes on where this one does, with an index

@@ -100,11 +100,11 @@ impl Node {
             Formula::And { left, right } => and(Node::new(left, asked, used)?, Node::new(right, asked, used)?),
             Formula::Or { left, right } => {
                 let (left, right) = (Node::new(left, asked, used)?, Node::new(right, asked, used)?);
-                return Ok(Node::of(asked, and(left.negated(), right.negated())).negated());
+                return Ok(Node::from_operator(asked, and(left.negated(), right.negated())).negated());
             }
             Formula::Implies { left, right } => {
                 let (left, right) = (Node::new(left, asked, used)?, Node::new(right, asked, used)?);
-                return Ok(Node::of(asked, and(left, right.negated())).negated());
+                return Ok(Node::from_operator(asked, and(left, right.negated())).negated());
             }
             Formula::Always { interval, of } => {
                 let window = window(*interval)?;
@@ -113,7 +113,7 @@ impl Node {
             Formula::Eventually { interval, of } => {
                 let window = window(*interval)?;
                 let of = Node::new(of, asked.seen_through(window), used)?;
-                return Ok(Node::of(asked, always(window, asked, of.negated())).negated());
+                return Ok(Node::from_operator(asked, always(window, asked, of.negated())).negated());
             }
             Formula::Until { interval, left, right } => {
                 let window = window(*interval)?;
@@ -132,10 +132,10 @@ impl Node {
                 }))
             }
         };
-        Ok(Node::of(asked, operator))
+        Ok(Node::from_operator(asked, operator))
     }
 
-    fn of(asked: Span, operator: Operator) -> Self {
+    fn from_operator(asked: Span, operator: Operator) -> Self {
         Node { asked, told: asked.start, operator }
     }
 
@@ -143,7 +143,7 @@ impl Node {
     fn negated(self) -> Self {
         match self.operator {
             Operator::Not { of, .. } => *of,
-            _ => Node::of(self.asked, Operator::Not { of: Box::new(self), input: VecDeque::new() }),
+            _ => Node::from_operator(self.asked, Operator::Not { of: Box::new(self), input: VecDeque::new() }),
         }
     }
 

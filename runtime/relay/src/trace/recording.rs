@@ -331,13 +331,13 @@ impl Feeder<'_> {
             path: self.path.to_owned(),
         })?;
         if delivered {
-            self.metrics.delivered(time, wire, &value);
+            self.metrics.delivery(time, wire, &value);
             return Ok(());
         }
         self.messages += 1;
         self.metrics.message(time, wire, &value);
         if !self.delivered_apart[wire.index()] {
-            self.metrics.delivered(time, wire, &value);
+            self.metrics.delivery(time, wire, &value);
         }
         Ok(())
     }
@@ -376,7 +376,7 @@ impl Feeder<'_> {
                 _ => None,
             };
             if let (None, Some(broken_off)) = (end, ending.get("end_s").and_then(|end| end.parse().ok())) {
-                self.metrics.follow_time(SimTime::from_seconds(broken_off));
+                self.metrics.advance_to(SimTime::from_seconds(broken_off));
             }
             run = Some(RecordedRun {
                 space: text(subject, "space"),

@@ -16,7 +16,7 @@ use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Test, TopicId, Type};
 
 use crate::json::{encode, number, quoted};
-use crate::relay::{Deed, Tap, Touched};
+use crate::relay::{Listener, MessageRef, OperationEvent};
 use crate::trace::{
     ROLE, ROLE_DELIVERED, ROLE_METRIC, ROLE_OPERATIONS, ROLE_PUBLISHED, Subject, TraceError, ending, owned, publish,
     schema,
@@ -258,7 +258,7 @@ impl TraceWriter<'_> {
     }
 }
 
-impl Tap for TraceWriter<'_> {
+impl Listener for TraceWriter<'_> {
     fn published(&mut self, now: SimTime, wire: Wire, index: u64, value: &Value) {
         self.payload(wire, value);
         self.shared.lock().message(self.channels.published[wire.index()], index, now, &self.payload);
@@ -270,21 +270,21 @@ impl Tap for TraceWriter<'_> {
         self.shared.lock().message(channel, index, now, &self.payload);
     }
 
-    fn operated(&mut self, now: SimTime, operation: usize, deed: Deed) {
-        let (did, touched, until) = match deed {
-            Deed::Started => ("started", None, None),
-            Deed::Ended => ("ended", None, None),
-            Deed::Changed(touched) => ("changed", Some(touched), None),
-            Deed::Dropped(touched) => ("dropped", Some(touched), None),
-            Deed::Injected(touched) => ("injected", Some(touched), None),
-            Deed::Delayed(touched, until) => ("delayed", Some(touched), Some(until)),
+    fn operated(&mut self, now: SimTime, operation: usize, event: OperationEvent) {
+        let (did, touched, until) = match event {
+            OperationEvent::Started => ("started", None, None),
+            OperationEvent::Ended => ("ended", None, None),
+            OperationEvent::Changed(touched) => ("changed", Some(touched), None),
+            OperationEvent::Dropped(touched) => ("dropped", Some(touched), None),
+            OperationEvent::Injected(touched) => ("injected", Some(touched), None),
+            OperationEvent::Delayed(touched, until) => ("delayed", Some(touched), Some(until)),
         };
         let payload = &mut self.payload;
         payload.clear();
         payload.extend_from_slice(b"{\"operation\":");
         quoted(&self.plan.operation(self.test.operations[operation].operation).name, payload);
         payload.extend_from_slice(format!(",\"position\":{operation},\"did\":\"{did}\"").as_bytes());
-        if let Some(Touched { wire, index }) = touched {
+        if let Some(MessageRef { wire, index }) = touched {
             payload.extend_from_slice(b",\"topic\":");
             quoted(self.wires.path(wire), payload);
             payload.extend_from_slice(format!(",\"message\":{index}").as_bytes());

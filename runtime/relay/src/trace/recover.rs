@@ -19,7 +19,7 @@ const LIMIT: usize = 1 << 28;
 
 /// Makes a trace of what was written into an unfinished one, up to its last whole chunk, and gives it this name, in a
 /// folder that exists. Without an unfinished one there is none. The unfinished one is gone then.
-pub fn salvage(unfinished: &Path, outcome: &Outcome, file: &Path) -> Result<(), TraceError> {
+pub fn recover(unfinished: &Path, outcome: &Outcome, file: &Path) -> Result<(), TraceError> {
     if !unfinished.exists() {
         return Ok(());
     }
