@@ -38,6 +38,10 @@ const FIRST_TIMEOUT: Duration = Duration::from_secs(600);
 /// How many recorded tests are read at once when a campaign is taken up again.
 const READ_TOGETHER: u32 = 50;
 
+/// The warning of a campaign whose simulator nobody steps.
+const FREE_RUNNING: &str = "the simulator runs freely, so equal tests may give different results: equal tests are simulated \
+     again, and neither a replay nor the digest of a second run is expected to be the same";
+
 /// How long a test may take, in wall time, when one like it took so many seconds.
 pub fn patience(seconds: f64) -> Duration {
     Duration::from_secs_f64(seconds * PATIENCE).max(LEAST_TIMEOUT)
@@ -173,6 +177,7 @@ pub fn conduct(
     };
     let mut desk = Desk { recorder: &mut recorder, recorded, repeated, pool, traces, interrupted };
 
+    let lock_stepped = desk.pool.lock_stepped();
     let mut ended = None;
     if !desk.evaluate(vec![undisturbed(0, settings.seed)], &mut |record| ended = Some(record.observation.clone()))? {
         return interrupt(recorder);
@@ -196,6 +201,9 @@ pub fn conduct(
     }
     for text in reference_warnings(plan, &reference) {
         desk.recorder.put_event(&Event { kind: EventKind::Warning, test: Some(0), text })?;
+    }
+    if !lock_stepped {
+        desk.recorder.put_event(&Event { kind: EventKind::Warning, test: None, text: FREE_RUNNING.to_owned() })?;
     }
     if settings.timeout.is_none() {
         desk.pool.set_timeout(patience(reference.wall.run));
@@ -243,7 +251,7 @@ pub fn conduct(
                 origin: known.map_or(Origin::Search, Origin::Known),
                 generation: known.is_none().then_some(generation),
                 parents,
-                duplicate_of: if own_seed.is_some() { None } else { earlier.same(&test, numbered) },
+                duplicate_of: if own_seed.is_some() || !lock_stepped { None } else { earlier.same(&test, numbered) },
                 test,
                 simulator_seed: own_seed.unwrap_or_else(|| simulator_seed(settings.seed)),
             });
@@ -366,7 +374,11 @@ pub fn conduct(
     if !desk.evaluate(vec![last], &mut |record| ended = Some(record.observation.clone()))? {
         return interrupt(recorder);
     }
-    let differing = ended.map(|ended| differences(plan, &Test::default(), &reference, &ended)).unwrap_or_default();
+    // A simulator that runs freely differs in any case, and the campaign has said so.
+    let differing = ended
+        .filter(|_| lock_stepped)
+        .map(|ended| differences(plan, &Test::default(), &reference, &ended))
+        .unwrap_or_default();
     if let Some(Difference { what, before, after }) = differing.first() {
         let text = format!(
             "an undisturbed run after the campaign differs from the one before it: {what} was {before} and is {after}; \
@@ -567,7 +579,7 @@ impl Desk<'_> {
             if self.interrupted.load(Ordering::Relaxed) {
                 return Ok(false);
             }
-            let Some(Ended { number, observation, notes, trace_failure, killed }) =
+            let Some(Ended { number, observation, notes, trace_failure, killed, lock_stepped: _ }) =
                 self.pool.next(Duration::from_millis(100))?
             else {
                 continue;

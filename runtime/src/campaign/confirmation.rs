@@ -149,7 +149,7 @@ impl Desk<'_> {
             if self.interrupted.load(Ordering::Relaxed) {
                 return Ok(false);
             }
-            let Some(Ended { number: job, observation, notes, trace_failure: _, killed: _ }) =
+            let Some(Ended { number: job, observation, notes, trace_failure: _, killed: _, lock_stepped: _ }) =
                 self.pool.next(Duration::from_millis(100))?
             else {
                 continue;

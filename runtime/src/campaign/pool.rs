@@ -18,7 +18,7 @@ use sesame_base::observation::{Observation, Outcome};
 use sesame_relay::lifecycle::process_group::was_killed;
 
 use crate::campaign::link::{self, Stream};
-use crate::campaign::protocol::{self, Reply};
+use crate::campaign::protocol::{self, Hello, Reply};
 use crate::campaign::traces;
 use crate::campaign::worker::{crashed, empty};
 use crate::campaign::worker_process::WorkerProcess;
@@ -72,6 +72,8 @@ pub struct Ended {
     /// Whether its worker or its simulator was killed, and again when it was run once more. The observation says so; it
     /// may say nothing of the test, but only of this machine today.
     pub killed: bool,
+    /// Whether its simulator is stepped, so that running the test again gives the same result.
+    pub lock_stepped: bool,
 }
 
 /// Worker processes and the threads that talk to them.
@@ -82,6 +84,7 @@ pub struct Pool {
     stop: Arc<AtomicBool>,
     /// Wall time after which a test is stopped, in milliseconds.
     timeout: Arc<AtomicU64>,
+    lock_stepped: bool,
 }
 
 impl Pool {
@@ -93,11 +96,13 @@ impl Pool {
         let stop = Arc::new(AtomicBool::new(false));
         let timeout = Arc::new(AtomicU64::new(millis(settings.timeout)));
         // Dropped if a worker cannot be started, which ends those that were.
-        let mut pool = Pool { jobs: Some(jobs), results, lanes: Vec::new(), stop, timeout };
+        let mut pool = Pool { jobs: Some(jobs), results, lanes: Vec::new(), stop, timeout, lock_stepped: true };
         for number in 1..=settings.workers.max(1) {
             let (stop, timeout) = (Arc::clone(&pool.stop), Arc::clone(&pool.timeout));
             let mut lane = Lane { number, settings: settings.clone(), worker: None, stop, timeout };
-            lane.worker = Some(lane.start()?);
+            let worker = lane.start()?;
+            pool.lock_stepped &= worker.lock_stepped;
+            lane.worker = Some(worker);
             let (queue, sender) = (Arc::clone(&queue), sender.clone());
             pool.lanes.push(thread::spawn(move || lane.work(&queue, &sender)));
         }
@@ -107,6 +112,11 @@ impl Pool {
     /// Changes the wall time after which a test is stopped, for tests not begun yet.
     pub fn set_timeout(&self, timeout: Duration) {
         self.timeout.store(millis(timeout), Ordering::Relaxed);
+    }
+
+    /// Whether the simulators are stepped, so that equal tests give equal results.
+    pub fn lock_stepped(&self) -> bool {
+        self.lock_stepped
     }
 
     /// Hands out a test.
@@ -190,6 +200,7 @@ impl Lane {
             Some(worker) => worker,
             None => self.start()?,
         };
+        let lock_stepped = worker.lock_stepped;
         let printed = fs::metadata(output_file(&self.directory())).map_or(0, |file| file.len());
         let timeout = Duration::from_millis(self.timeout.load(Ordering::Relaxed));
         let mut killed = None;
@@ -219,7 +230,7 @@ impl Lane {
                 (observation, words.into_iter().collect(), lost)
             }
         };
-        Ok((Ended { number: job.number, observation, notes, trace_failure, killed: false }, killed))
+        Ok((Ended { number: job.number, observation, notes, trace_failure, killed: false, lock_stepped }, killed))
     }
 
     /// Saves what a dead worker wrote of a trace that was asked for; why not, otherwise.
@@ -238,6 +249,7 @@ struct Worker {
     /// Closed before the process is waited for: that is its sign to end.
     stream: Stream,
     process: WorkerProcess,
+    lock_stepped: bool,
 }
 
 /// Why a worker could not be started.
@@ -270,7 +282,7 @@ impl Worker {
             if process.ended().is_some() { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(()) }
         });
         match taken {
-            Ok(stream) => Ok(Worker { stream, process }),
+            Ok((stream, Hello { lock_stepped, .. })) => Ok(Worker { stream, process, lock_stepped }),
             Err(error) if error.kind() == io::ErrorKind::TimedOut => Err(error.into()),
             // It closed the connection, so it is about to end: how says more.
             Err(error) => Err(process.wait(DEATH_LIMIT).map_or_else(

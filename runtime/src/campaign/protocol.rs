@@ -20,9 +20,11 @@ const FRAME_LIMIT: u32 = 1 << 30;
 /// The largest frame that is taken from a connection before it is known whose it is.
 const GREETING_LIMIT: usize = 1 << 10;
 
-/// A worker's first words.
+/// The first message of a worker.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Hello {
+    /// Whether its simulator is stepped, so that equal tests give equal results.
+    pub(super) lock_stepped: bool,
     /// Proves that the worker is the one the supervisor started, where anybody could have connected.
     pub(super) token: Option<String>,
 }

@@ -24,7 +24,9 @@ use crate::runner::Runner;
 /// A panic of the simulator or of a hook is the outcome of its test; the worker goes on with a fresh connection to the
 /// simulator.
 pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::Result<()> {
-    let mut stream = link::connect(supervisor)?;
+    // Nothing is started before the first test.
+    let transport = runner.connect.transport(plan);
+    let mut stream = link::connect(supervisor, transport.capabilities().lock_stepped)?;
     panic_capture::install();
     // So that what leaves its parents can be found when it is to end. Where the system cannot do that, groups have to do.
     descendants::adopt_orphans();
@@ -36,7 +38,7 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
     let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
     let files = if may_change { ChangedFiles::for_worker(&space) } else { Ok(ChangedFiles::unlocked(&space)) };
     let mut custom = Custom { hooks: runner.operations, files: Box::new(files.map_err(io::Error::other)?) };
-    let mut transport = None;
+    let mut transport = Some(transport);
     let directory = std::env::current_dir()?;
     for job in jobs {
         let simulator = transport.get_or_insert_with(|| runner.connect.transport(plan));

@@ -46,13 +46,30 @@ impl<'a> Resolver<'a> {
             }
             ast::Transport::Process(process) => {
                 let program = self.program(&process.program);
-                let step_ns = self.step_of(name, &process.steps, process.damaged);
+                let step_ns = self.pace_of(name, process);
                 // Empty texts were reported where they were read.
                 let arguments = process.arguments.iter().map(|argument| argument.text.clone()).collect();
                 Transport::Process { program: program?, arguments, step_ns: step_ns? }
             }
         };
         Some(Simulator { declaration: self.declaration(&simulator.head), transport })
+    }
+
+    /// The step of a program, or `None` for one that runs freely; nothing if that is not clear.
+    fn pace_of(&mut self, name: &Name, process: &'a ast::Process) -> Option<Option<u64>> {
+        let Some((free, ())) = process.free_running.first() else {
+            return self.step_of(name, &process.steps, process.damaged).map(Some);
+        };
+        self.single(&process.free_running, "free running");
+        if let Some((step, _)) = process.steps.first() {
+            let title = "a simulator that runs freely has no step".to_owned();
+            let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, *step, title)
+                .label("remove `step`, or `free running`")
+                .also(*free, "it runs freely");
+            self.report(diagnostic);
+            return None;
+        }
+        Some(None)
     }
 
     fn step_of(&mut self, name: &Name, steps: &'a [(Span, ast::Quantity)], damaged: bool) -> Option<u64> {

@@ -84,6 +84,8 @@ pub(crate) struct Process {
     pub(crate) program: Text,
     pub(crate) arguments: Vec<Text>,
     pub(crate) steps: Vec<(Span, Quantity)>,
+    /// Where it says `free running`.
+    pub(crate) free_running: Vec<(Span, ())>,
     pub(crate) damaged: bool,
 }
 

@@ -1,4 +1,4 @@
-//! A simulator that is a program of its own, in any language, stepped in lock-step by lines of JSON.
+//! A simulator that is a program of its own, in any language: stepped in lock-step by lines of JSON, or running freely.
 //!
 //! The runner starts it without a shell, once per worker if it can be reset and once per test otherwise, and ends it
 //! with all that it started. The relay sits between the simulator's publishers and its subscribers: what is published
@@ -9,6 +9,7 @@
     reason = "an adapter: it waits for a program, and measures how long its steps take"
 )]
 
+mod free_running;
 mod protocol;
 mod session;
 
@@ -27,6 +28,7 @@ use std::time::{Duration, Instant};
 use sesame_base::time::SimTime;
 use sesame_plan::CampaignPlan;
 
+use self::free_running::FreeRunning;
 use self::session::{Fault, Session};
 use crate::lifecycle::{self, Input, PostMortem, Program, Running, StartError};
 use crate::relay::Exchange;
@@ -74,13 +76,46 @@ fn connect(plan: &CampaignPlan, place: Place) -> Box<dyn Transport> {
     let folder = Path::new(place.runner).join(place.space);
     // Shown in messages, so without `..`. If the folder does not exist, starting the simulator reports it.
     let folder = folder.canonicalize().unwrap_or(folder);
-    Box::new(Process::new(plan, folder, true))
+    transport(plan, folder, true)
+}
+
+/// The transport to the program of a plan, in this folder.
+fn transport(plan: &CampaignPlan, folder: PathBuf, in_runner: bool) -> Box<dyn Transport> {
+    let sesame_plan::Transport::Process { program, arguments, step_ns } = &plan.simulator.transport else {
+        unreachable!("the generator connects each kind of simulator by its own transport")
+    };
+    let program = Program { name: program.clone(), arguments: arguments.clone(), folder, in_runner };
+    match step_ns {
+        Some(step) => {
+            Box::new(Process::new(plan, program, SimTime::from_nanos(i64::try_from(*step).unwrap_or(i64::MAX))))
+        }
+        None => Box::new(FreeRunning::new(plan, program)),
+    }
+}
+
+/// The error about a simulator that closed its output although something was awaited.
+fn disconnected(
+    program: &Program,
+    running: Option<Running>,
+    awaited: String,
+    incidents: &mut Incidents,
+) -> TransportError {
+    let Some(running) = running else { unreachable!("only a connected simulator can disconnect") };
+    let PostMortem { how, last_lines, killed } = running.post_mortem();
+    incidents.killed |= killed;
+    TransportError::Disconnected { command: program.shown(), how, awaited, last_lines }
+}
+
+/// The note about a simulator that was restarted, because of a fault that may belong to the previous test.
+fn restarted(reason: &TransportError) -> String {
+    format!("the simulator was restarted before this test, because of a fault after the previous one: {reason}")
 }
 
 /// How long the end of a run waits for a surplus answer: two steps, within these limits.
 const SHORTEST_WAIT: Duration = Duration::from_millis(1);
 const LONGEST_WAIT: Duration = Duration::from_millis(100);
 
+/// A program that is stepped in lock-step.
 struct Process {
     program: Program,
     connection: Option<Connection>,
@@ -100,33 +135,27 @@ struct Connection {
 }
 
 impl Process {
-    fn new(plan: &CampaignPlan, folder: PathBuf, in_runner: bool) -> Self {
-        let sesame_plan::Transport::Process { program, arguments, step_ns } = &plan.simulator.transport else {
-            unreachable!("the generator connects each kind of simulator by its own transport")
-        };
+    fn new(plan: &CampaignPlan, program: Program, step: SimTime) -> Self {
         Process {
-            program: Program { name: program.clone(), arguments: arguments.clone(), folder, in_runner },
+            program,
             connection: None,
             plan: plan.clone(),
             now: SimTime::ZERO,
-            step: SimTime::from_nanos(i64::try_from(*step_ns).unwrap_or(i64::MAX)),
+            step,
             incidents: Incidents::default(),
         }
     }
 
     /// The error for a fault. The connection is closed: a simulator is never used after a fault.
     fn explain(&mut self, fault: Fault) -> TransportError {
-        let connection = self.connection.take();
-        match (fault, connection) {
-            (Fault::Disconnected(awaited), Some(Connection { session, running, .. })) => {
-                // The simulator may be waiting for the end of its input.
-                drop(session);
-                let PostMortem { how, last_lines, killed } = running.post_mortem();
-                self.incidents.killed |= killed;
-                TransportError::Disconnected { command: self.program.shown(), how, awaited, last_lines }
-            }
-            (Fault::Disconnected(_), None) => unreachable!("only a connected simulator can disconnect"),
-            (Fault::Wrong(error), _) => error,
+        let running = self.connection.take().map(|Connection { session, running, .. }| {
+            // The simulator may be waiting for the end of its input.
+            drop(session);
+            running
+        });
+        match fault {
+            Fault::Disconnected(awaited) => disconnected(&self.program, running, awaited, &mut self.incidents),
+            Fault::Wrong(error) => error,
         }
     }
 
@@ -198,9 +227,7 @@ impl Transport for Process {
             let why = self.explain(fault);
             // That the old process was killed does not concern this run.
             self.incidents.killed = killed;
-            self.incidents.notes.push(format!(
-                "the simulator was restarted before this test, because of a fault after the previous one: {why}"
-            ));
+            self.incidents.notes.push(restarted(&why));
         }
         self.begin(seed, relay).map_err(|fault| self.explain(fault))
     }

@@ -14,7 +14,7 @@ use crate::json::{self, Shapes};
 use crate::message::Mismatch;
 use crate::relay::{Delivery, Exchange};
 use crate::simulator::Progress;
-use crate::transport::process::protocol::{LINE_LIMIT, Lines, Message, Ready, SimulatorMessage, request};
+use crate::transport::process::protocol::{LINE_LIMIT, Line, Lines, Message, Ready, SimulatorMessage, request};
 use crate::transport::{TransportError, unknown_topic};
 use crate::wire::Wire;
 
@@ -51,15 +51,16 @@ pub(super) struct Session<R, W> {
 
 /// The topics of one run, and the messages that wait for delivery.
 #[derive(Default)]
-struct Topics {
+pub(super) struct Topics {
     by_path: BTreeMap<String, Topic>,
     /// Per wire of the relay: whether the simulator subscribes to it.
     subscribed: Vec<bool>,
     shapes: Shapes,
-    deliveries: Vec<Delivery>,
+    pub(super) deliveries: Vec<Delivery>,
     /// Messages to be delivered, as JSON for the next line to the simulator.
-    outbox: Vec<u8>,
-    published: u64,
+    pub(super) outbox: Vec<u8>,
+    /// Messages since the last step began.
+    pub(super) published: u64,
 }
 
 /// One topic of the simulator.
@@ -93,10 +94,10 @@ impl<R: BufRead, W: Write> Session<R, W> {
     pub(super) fn surplus_answer(&mut self) -> TransportError {
         match self.lines.read() {
             Ok(true) => {
-                let problem = format!("comes after everything was answered: {}", self.lines.shown());
-                self.lines.wrong(problem, TURNS)
+                let problem = format!("comes after everything was answered: {}", self.lines.line().shown());
+                self.lines.line().wrong(problem, TURNS)
             }
-            Ok(false) => self.lines.wrong("begins after everything was answered".to_owned(), TURNS),
+            Ok(false) => self.lines.line().wrong("begins after everything was answered".to_owned(), TURNS),
             Err(error) => error,
         }
     }
@@ -116,23 +117,33 @@ impl<R: BufRead, W: Write> Session<R, W> {
     ) -> Result<(), Fault> {
         self.lines.recount();
         self.ready = false;
-        self.topics = Topics { shapes: mem::take(&mut self.topics.shapes), ..Topics::default() };
+        self.topics.clear();
         let wires = relay.wires();
-        request::reset(&mut self.line, seed, step, wires.iter().map(|wire| wires.path(wire)));
+        request::reset(&mut self.line, seed, Some(step), wires.iter().map(|wire| wires.path(wire)));
         self.send();
         let awaited = || "its answer to `reset`".to_owned();
         if !self.lines.read()? {
             return Err(Fault::Disconnected(awaited()));
         }
-        let ready = match self.lines.parse()? {
+        let ready = match self.lines.line().parse()? {
             SimulatorMessage::Ready(ready) => ready,
             SimulatorMessage::Failed(reason) => return Err(TransportError::Simulator(reason).into()),
-            other => return Err(self.out_of_turn(&other, &awaited(), "answer `reset` with `ready`").into()),
+            other => {
+                return Err(self.lines.line().out_of_turn(&other, &awaited(), "answer `reset` with `ready`").into());
+            }
         };
+        if ready.clock {
+            let problem = "says `clock`, but the space steps this simulator".to_owned();
+            return Err(self
+                .lines
+                .line()
+                .wrong(problem, "leave `clock` out, or declare the simulator `free running`")
+                .into());
+        }
         self.resets = ready.resets;
         self.ready = true;
         self.topics.open(&ready, relay)?;
-        self.topics.publish(plan, SimTime::ZERO, &ready.messages, relay, &self.lines)?;
+        self.topics.publish(plan, SimTime::ZERO, &ready.messages, relay, self.lines.line())?;
         Ok(())
     }
 
@@ -154,20 +165,20 @@ impl<R: BufRead, W: Write> Session<R, W> {
             if !self.lines.read()? {
                 return Err(Fault::Disconnected(awaited()));
             }
-            match self.lines.parse()? {
+            match self.lines.line().parse()? {
                 SimulatorMessage::Publish(messages) => {
-                    self.topics.publish(plan, now, &messages, relay, &self.lines)?;
+                    self.topics.publish(plan, now, &messages, relay, self.lines.line())?;
                     request::deliver(&mut self.line, &self.topics.outbox);
                     self.topics.outbox.clear();
                     self.send();
                 }
                 SimulatorMessage::Done(done) => {
-                    self.topics.publish(plan, now, &done.messages, relay, &self.lines)?;
+                    self.topics.publish(plan, now, &done.messages, relay, self.lines.line())?;
                     return Ok(if done.ended { Progress::Ended } else { Progress::Running });
                 }
                 SimulatorMessage::Failed(reason) => return Err(TransportError::Simulator(reason).into()),
-                ready @ SimulatorMessage::Ready(_) => {
-                    return Err(self.out_of_turn(&ready, &awaited(), "end a step with `done`").into());
+                other @ (SimulatorMessage::Ready(_) | SimulatorMessage::Time(_)) => {
+                    return Err(self.lines.line().out_of_turn(&other, &awaited(), "end a step with `done`").into());
                 }
             }
         }
@@ -179,15 +190,16 @@ impl<R: BufRead, W: Write> Session<R, W> {
         self.output.write_all(&self.line).and_then(|()| self.output.flush()).ok();
         self.line.clear();
     }
-
-    fn out_of_turn(&self, message: &SimulatorMessage<'_>, awaited: &str, remedy: &str) -> TransportError {
-        self.lines.wrong(format!("says `{}` while {awaited} was awaited", message.keyword()), remedy)
-    }
 }
 
 impl Topics {
+    /// Forgets the topics of the last run.
+    pub(super) fn clear(&mut self) {
+        *self = Topics { shapes: mem::take(&mut self.shapes), ..Topics::default() };
+    }
+
     /// Takes the simulator's topics; all topics of the space must be among them. Tells the relay which have subscribers.
-    fn open(&mut self, ready: &Ready<'_>, relay: &mut dyn Exchange) -> Result<(), TransportError> {
+    pub(super) fn open(&mut self, ready: &Ready<'_>, relay: &mut dyn Exchange) -> Result<(), TransportError> {
         let wires = relay.wires();
         for path in ready.publishes.iter().chain(&ready.subscribes) {
             let topic = Topic { wire: wires.find(path), publishes: false, subscribes: false };
@@ -213,23 +225,23 @@ impl Topics {
     }
 
     /// Passes messages through the relay; deliveries to subscribers go to the outbox.
-    fn publish<R: BufRead>(
+    pub(super) fn publish(
         &mut self,
         plan: &CampaignPlan,
         now: SimTime,
         messages: &[Message<'_>],
         relay: &mut dyn Exchange,
-        lines: &Lines<R>,
+        line: &Line,
     ) -> Result<(), TransportError> {
         self.published += messages.len() as u64;
         if self.published > STEP_LIMIT {
             let problem = format!("has more than {STEP_LIMIT} messages in the step to {now}");
-            return Err(lines.wrong(problem, "end a step with `done`"));
+            return Err(line.wrong(problem, "end a step with `done`"));
         }
         for Message { topic: path, value } in messages {
             let Some(topic) = self.by_path.get(path.as_ref()).filter(|topic| topic.publishes) else {
                 let problem = format!("has a message on `{path}`, which the simulator did not say it publishes");
-                return Err(lines.wrong(problem, "list it in `publishes` of `ready`"));
+                return Err(line.wrong(problem, "list it in `publishes` of `ready`"));
             };
             let Some(wire) = topic.wire else {
                 if topic.subscribes {
@@ -249,7 +261,7 @@ impl Topics {
 
     /// Puts the relay's deliveries to subscribers into the outbox. A message that no operation intercepts is passed on byte
     /// for byte.
-    fn deliver(&mut self, relay: &dyn Exchange, published: Option<(Wire, &RawValue)>) {
+    pub(super) fn deliver(&mut self, relay: &dyn Exchange, published: Option<(Wire, &RawValue)>) {
         for Delivery { wire, value } in self.deliveries.drain(..) {
             if !self.subscribed.get(wire.index()).copied().unwrap_or(false) {
                 continue;
