@@ -1,4 +1,4 @@
-//! One test, one run: relay, metrics and transport put together.
+//! The run of one test: relay, metrics and transport put together.
 
 use std::panic::{self, AssertUnwindSafe};
 use std::time::Instant;
@@ -16,11 +16,11 @@ use crate::simulator::Progress;
 use crate::transport::{Transport, TransportError};
 use crate::wire::WireTable;
 
-/// Runs a test and reports what was observed. A simulator that fails, or a panic in it or in a hook, is an observation
-/// too, with what was seen until then; only a test that does not fit the plan is an error. After a crash the transport
-/// is in an unknown state and must not be used again.
+/// Runs a test and returns what was observed. If the simulator fails, or the simulator or a hook panics, this is an
+/// observation too, with everything seen until then; only a test that does not match the plan is an error. After a
+/// crash the transport is in an unknown state and must not be used again.
 ///
-/// Files that operations of the test changed are put back; where that fails, the run counts as a crash.
+/// Files that operations of the test changed are restored; if that fails, the run counts as a crash.
 pub fn evaluate(
     plan: &CampaignPlan,
     wires: &WireTable,
@@ -33,7 +33,7 @@ pub fn evaluate(
     evaluate_tapped(plan, wires, metrics, transport, &Run { test, simulator_seed }, custom, None)
 }
 
-/// What is run.
+/// The input of a run.
 #[derive(Debug, Clone, Copy)]
 pub struct Run<'a> {
     /// The test.
@@ -92,7 +92,7 @@ pub fn evaluate_tapped(
     })
 }
 
-/// What custom operations need: the user's code and the files it may change.
+/// What custom operations need: the user's code, and the files that they may change.
 #[derive(Debug)]
 pub struct Custom<'h> {
     /// The hooks of the runner.
@@ -108,7 +108,7 @@ impl Custom<'static> {
     }
 }
 
-/// The error says what failed.
+/// The error gives the reason.
 fn drive(
     transport: &mut dyn Transport,
     relay: &mut Relay<'_>,

@@ -20,8 +20,8 @@ pub trait SpaceFiles: Debug {
     /// created. Returns false if the file already had these contents.
     fn replace(&mut self, path: &Path, contents: &[u8]) -> Result<bool, SpaceFileError>;
 
-    /// Restores all files that were replaced, and removes those that were created. If it is interrupted at any point, it
-    /// can be called again.
+    /// Restores all files that were replaced, and removes those that were created. If it is interrupted at any point,
+    /// it can be called again.
     fn restore(&mut self) -> Result<(), SpaceFileError>;
 }
 

@@ -1,15 +1,15 @@
 //! The relay: the man in the middle, for one run of one test.
 //!
-//! Sans-IO. Messages and time go in, deliveries come out; a transport passes messages and time to it and carries out its
-//! deliveries. Within one event the order is: due releases, inbound metrics, conditions, operations (including on the
-//! message that caused the event), outbound metrics, then delivery. A message on a wire on which no operation of the test
-//! acts is passed on unchanged.
+//! Sans-IO. Messages and time go in, deliveries come out; a transport passes messages and time to it and carries out
+//! its deliveries. Within one event the order is: due releases, inbound metrics, conditions, operations (including on
+//! the message that caused the event), outbound metrics, then delivery. A message on a wire on which no operation of
+//! the test acts is passed on unchanged.
 //!
 //! Conditions are evaluated when a metric that they read may have changed: after the inbound metrics of a message and
-//! before its operations, after a message has been delivered, and at the end of an instant, for values that are known only
-//! then. They are also evaluated at edges, and when the fuzzing time reaches a number with which it is compared. Evaluating
-//! the same values again changes nothing, so no message that a condition does not read, and no step of time, switches an
-//! operation. A test without conditions has no cost for them.
+//! before its operations, after a message has been delivered, and at the end of an instant, for values that are known
+//! only then. They are also evaluated at edges, and when the fuzzing time reaches a number with which it is compared.
+//! Evaluating the same values again changes nothing, so no message that a condition does not read, and no step of time,
+//! switches an operation. A test without conditions has no cost for them.
 //!
 //! A change of a message is an effect only if its wire has a receiver: a subscriber, or an outbound metric. Changes on
 //! other wires are counted separately.
@@ -55,8 +55,9 @@ pub trait Exchange {
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>);
     /// A message was published at `now`.
     fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>);
-    /// The next moment at which the relay has something to do even without a message: a held message is due, or an operation
-    /// may be switched. Until then, advancing time has no effect. `None` if only a message can cause anything.
+    /// The next moment at which the relay has something to do even without a message: a held message is due, or an
+    /// operation may be switched. Until then, advancing time has no effect. `None` if only a message can cause
+    /// anything.
     ///
     /// A transport that does not step its simulator waits until this moment or until the next message, whichever is
     /// first. A message may change the moment.
@@ -367,8 +368,8 @@ impl<'a> Relay<'a> {
         self.evaluate_conditions();
     }
 
-    /// Ends an instant, when time advances: some values are known only now. They switch operations one nanosecond later,
-    /// since the instant to which they belong is over.
+    /// Ends an instant, when time advances: some values are known only now. They switch operations one nanosecond
+    /// later, since the instant to which they belong is over.
     fn leave(&mut self) {
         if self.metrics.settle() {
             self.now = self.now + TICK;
@@ -377,8 +378,8 @@ impl<'a> Relay<'a> {
         self.evaluate_conditions();
     }
 
-    /// Evaluates the conditions of all operations on the same values: first which operations become inactive, then which
-    /// become active, so that an operation can begin when its copy ends.
+    /// Evaluates the conditions of all operations on the same values: first which operations become inactive, then
+    /// which become active, so that an operation can begin when its copy ends.
     fn evaluate_conditions(&mut self) {
         if self.conditions.operations.is_empty() {
             return;

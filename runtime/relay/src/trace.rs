@@ -31,20 +31,20 @@ pub use recording::{Fed, RecordedMetric, RecordedRun, RecordingError, feed};
 pub use recover::recover;
 pub use writer::TraceWriter;
 
-/// Name of the metadata record that says which run a trace is of.
+/// Name of the metadata record that identifies the run of a trace.
 const SUBJECT: &str = "sesame";
 
 /// Name of the metadata record that says how the run ended.
 const RUN: &str = "sesame.run";
 
-/// Key of a channel's metadata that says what it carries: one of the `ROLE_…`.
+/// Key of a channel's metadata for its contents: one of the `ROLE_…`.
 const ROLE: &str = "sesame_role";
 const ROLE_PUBLISHED: &str = "published";
 const ROLE_DELIVERED: &str = "delivered";
 const ROLE_OPERATIONS: &str = "operations";
 const ROLE_METRIC: &str = "metric";
 
-/// Which run a trace is of.
+/// The run of a trace.
 #[derive(Debug, Clone, Copy)]
 pub struct Subject<'a> {
     /// Its campaign.
@@ -107,7 +107,7 @@ fn owned<const N: usize>(entries: [(&str, String); N]) -> BTreeMap<String, Strin
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write the trace: {reason}: {}", path.display())]
 pub struct TraceError {
-    /// Why not.
+    /// The reason.
     pub reason: String,
     /// The file.
     pub path: PathBuf,
@@ -123,7 +123,7 @@ impl TraceError {
     }
 }
 
-/// Gives a complete trace its name; what was there under it is replaced.
+/// Gives a complete trace its name and replaces an older file of that name.
 fn publish(unfinished: &Path, file: &Path) -> Result<(), TraceError> {
     fs::rename(unfinished, file).map_err(|error| TraceError::new(file, error.into()))
 }

@@ -1,7 +1,7 @@
 //! How a runner reaches its simulator.
 //!
-//! A transport is a thin adapter: it advances the simulation, passes every message and every moment of time to the relay,
-//! and carries out the relay's deliveries. It decides nothing.
+//! A transport is a thin adapter: it advances the simulation, passes every message and every moment of time to the
+//! relay, and carries out the relay's deliveries. It decides nothing.
 
 #[cfg(feature = "in-process")]
 mod in_process;
@@ -55,8 +55,8 @@ pub trait Transport {
 /// What happened to a simulator's process apart from its run. It concerns one session only, and is not part of results.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Incidents {
-    /// Its process was killed (`SIGKILL`) by a user, or by the system when memory ran out. Then the run says nothing about
-    /// the test.
+    /// Its process was killed (`SIGKILL`) by a user, or by the system when memory ran out. Then the run says nothing
+    /// about the test.
     pub killed: bool,
     /// Other incidents, in words for the user.
     pub notes: Vec<String>,

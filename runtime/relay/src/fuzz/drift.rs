@@ -1,4 +1,4 @@
-//! Drift: adds what grows with the time since the operation went on.
+//! Drift: adds an offset that grows with the time since the operation became active.
 
 use sesame_base::time::SimTime;
 
@@ -9,14 +9,14 @@ use crate::value::Value;
 /// A drift operation.
 #[derive(Debug, Clone)]
 pub struct Drift {
-    /// What is changed.
+    /// The values to change.
     pub places: Places,
     /// How fast the offset grows, in the field's unit per second.
     pub rate: Amount,
 }
 
 impl Drift {
-    /// Adds to the values what has accumulated in the time that the operation is on.
+    /// Adds the offset that has accumulated while the operation is active.
     pub fn apply(&self, active: SimTime, message: &mut Value) -> Action {
         let seconds = active.seconds();
         self.places.change(message, |value, _| add(value, |axis| self.rate.on(axis) * seconds))

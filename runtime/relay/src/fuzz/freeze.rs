@@ -1,4 +1,4 @@
-//! Freeze: repeats the values that were there last before the operation went on.
+//! Freeze: repeats the last values from before the operation became active.
 
 use crate::fuzz::places::Memory;
 use crate::fuzz::{Action, PerWire, Places};
@@ -17,12 +17,12 @@ impl Freeze {
         Freeze { places, last: PerWire::default() }
     }
 
-    /// A message passes while the operation is off.
+    /// A message passes while the operation is inactive.
     pub fn observe(&mut self, member: u64, message: &Value) {
         self.places.remember(message, self.last.entry(member).get_or_insert_default());
     }
 
-    /// Puts the frozen values into the message. Where none passed before, its own are those that freeze.
+    /// Replaces the values by the frozen ones. If no message passed before, the values of this one are frozen.
     pub fn apply(&mut self, member: u64, message: &mut Value) -> Action {
         if let Some(memory) = self.last.entry(member) {
             return self.places.recall(message, memory);

@@ -1,4 +1,4 @@
-//! Packet loss: drops each message independently (paper §3.8, `PacketLossNetworkOperation`).
+//! Packet loss: drops each message independently ([SESAME 2023, §3.8], `PacketLossNetworkOperation`).
 
 use crate::fuzz::{Action, KeyedRng};
 

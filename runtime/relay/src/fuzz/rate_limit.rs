@@ -1,4 +1,4 @@
-//! Rate limit: drops what comes too soon after the last message that passed.
+//! Rate limit: drops messages that come too soon after the last one that passed.
 
 use sesame_base::time::SimTime;
 
@@ -9,7 +9,7 @@ use crate::fuzz::{Action, PerWire};
 pub struct RateLimit {
     /// The least time between two messages that pass on a wire.
     pub period: SimTime,
-    /// When the last one passed since the operation went on.
+    /// Per wire: when the last message passed since the operation became active.
     pub passed: PerWire<Option<SimTime>>,
 }
 

@@ -1,8 +1,8 @@
 //! Processes that a process started, directly and indirectly, and how they are ended.
 //!
 //! A process group contains only the processes that stay in it: one that calls `setsid` leaves it, and a process whose
-//! parent ends is no longer below its grandparent. On Linux this process can become the parent of such orphans, so that it
-//! finds all of them by walking `/proc`. On other systems nothing is found here, and only groups can be ended.
+//! parent ends is no longer below its grandparent. On Linux this process can become the parent of such orphans, so that
+//! it finds all of them by walking `/proc`. On other systems nothing is found here, and only groups can be ended.
 
 use std::time::{Duration, Instant};
 
@@ -37,8 +37,8 @@ pub fn adopt_orphans() -> bool {
     }
 }
 
-/// The children that this process adopted, with all processes below them. Children for which `is_own` holds are those that
-/// it started itself.
+/// The children that this process adopted, with all processes below them. Children for which `is_own` holds are those
+/// that it started itself.
 pub fn adopted(is_own: impl Fn(u32) -> bool) -> Vec<Process> {
     #[cfg(target_os = "linux")]
     {
@@ -51,9 +51,9 @@ pub fn adopted(is_own: impl Fn(u32) -> bool) -> Vec<Process> {
     }
 }
 
-/// Waits up to `patience` until all these processes have ended; then ends the remaining ones, all processes below them, and
-/// all in groups and sessions that they lead. Returns how many remain: processes that the system blocks, or does not permit
-/// us to end. Children of this process among them are reaped, so no other code may wait for them.
+/// Waits up to `patience` until all these processes have ended; then ends the remaining ones, all processes below them,
+/// and all in groups and sessions that they lead. Returns how many remain: processes that the system blocks, or does
+/// not permit us to end. Children of this process among them are reaped, so no other code may wait for them.
 fn end(processes: Vec<Process>, patience: Duration) -> usize {
     #[cfg(target_os = "linux")]
     {

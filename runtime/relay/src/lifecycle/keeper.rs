@@ -2,9 +2,10 @@
 //! whichever of them ends first. Linux only.
 //!
 //! It becomes the parent of every process below the program whose own parent ends, whatever its session. It waits until
-//! the program has exited, or until the program's input is closed: by the worker, or because the worker has ended. In that
-//! case the program has its time to exit by itself. Then the keeper ends all remaining processes, reports how the program
-//! ended, and exits. If the keeper is killed, the system ends the program, and the program's children become the worker's.
+//! the program has exited, or until the program's input is closed: by the worker, or because the worker has ended. In
+//! that case the program has its time to exit by itself. Then the keeper ends all remaining processes, reports how the
+//! program ended, and exits. If the keeper is killed, the system ends the program, and the program's children become
+//! the worker's.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
@@ -50,8 +51,8 @@ impl Report {
         format!("/proc/{}/fd/{}", std::process::id(), self.writer.as_raw_fd())
     }
 
-    /// The status of a program that exited by itself, as its keeper reported it; the keeper has ended. Without a report,
-    /// because the keeper was killed or could not open the pipe, the keeper's own status is used.
+    /// The status of a program that exited by itself, as its keeper reported it; the keeper has ended. Without a
+    /// report, because the keeper was killed or could not open the pipe, the keeper's own status is used.
     pub(super) fn read(mut self, of_keeper: Option<ExitStatus>) -> Option<ExitStatus> {
         drop(self.writer);
         // Another process may have opened the pipe and hold it open.
@@ -84,8 +85,8 @@ enum Stage {
     Ended,
 }
 
-/// Starts a program, waits until it has ended, and ends everything it leaves behind. If it cannot be started, `failed` is
-/// called with the reason, with the program's standard output.
+/// Starts a program, waits until it has ended, and ends everything it leaves behind. If it cannot be started, `failed`
+/// is called with the reason, with the program's standard output.
 pub(crate) fn keep(worker: u32, report: &Path, program: &OsStr, arguments: &[OsString], failed: fn(&str)) -> ExitCode {
     descendants::adopt_orphans();
     // Without it the keeper's own status is used.
@@ -168,8 +169,8 @@ fn reap_until_ended(child: Pid, (stage, changed): &(Mutex<Stage>, Condvar)) -> O
     }
 }
 
-/// Replaces this process by a program that ends when its keeper does, even if the keeper is killed while the program hangs.
-/// Only returns if that fails, after it has called `failed` with the reason.
+/// Replaces this process by a program that ends when its keeper does, even if the keeper is killed while the program
+/// hangs. Only returns if that fails, after it has called `failed` with the reason.
 pub(crate) fn become_program(keeper: u32, program: &OsStr, arguments: &[OsString], failed: fn(&str)) -> ExitCode {
     if let Err(error) = set_parent_process_death_signal(Some(Signal::KILL)) {
         failed(&format!("it cannot be made to end with its keeper: {error}"));

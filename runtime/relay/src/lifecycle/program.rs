@@ -1,8 +1,8 @@
 //! A program: started without a shell in a process group of its own, and ended with everything it started.
 //!
-//! In every case its input is closed first, and it has [`END_LIMIT`] to exit by itself. Everything that it leaves behind
-//! when it exits is ended at once, so no process holds its output open, and the end of the output means the end of the
-//! program. On Linux its [keeper](super::keeper) does this, even after the worker has ended.
+//! In every case its input is closed first, and it has [`END_LIMIT`] to exit by itself. Everything that it leaves
+//! behind when it exits is ended at once, so no process holds its output open, and the end of the output means the end
+//! of the program. On Linux its [keeper](super::keeper) does this, even after the worker has ended.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -319,8 +319,8 @@ impl Handle {
         process.status
     }
 
-    /// Ends the processes that a killed keeper left behind: this process is now their parent. Other children of a worker,
-    /// started by hooks, are in the worker's own group.
+    /// Ends the processes that a killed keeper left behind: this process is now their parent. Other children of a
+    /// worker, started by hooks, are in the worker's own group.
     fn end_orphans(&self) {
         #[cfg(target_os = "linux")]
         if self.kept {
@@ -343,8 +343,8 @@ impl Handle {
         }
     }
 
-    /// Waits until the process has ended, and returns whether a signal ended it. The process is not reaped, so its id is
-    /// not reused.
+    /// Waits until the process has ended, and returns whether a signal ended it. The process is not reaped, so its id
+    /// is not reused.
     #[cfg(unix)]
     fn wait_for_end(&self) -> bool {
         use rustix::io::Errno;

@@ -1,5 +1,5 @@
-//! When conditions switch operations, beside a model that looks at every nanosecond; what depends on it and what does not:
-//! copies of an operation, the tail of a delay, and who hears a message.
+//! When conditions switch operations, beside a model that looks at every nanosecond; what depends on it and what does
+//! not: copies of an operation, the tail of a delay, and who hears a message.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -106,8 +106,8 @@ impl Listener for Logger<'_> {
     }
 }
 
-/// The log of a run until `END`. Time advances to each moment that is due, or to every nanosecond; in that case `None` if
-/// anything happened at a nanosecond that was not due.
+/// The log of a run until `END`. Time advances to each moment that is due, or to every nanosecond; in that case `None`
+/// if anything happened at a nanosecond that was not due.
 fn logged(plan: &CampaignPlan, test: Vec<TestOperation>, events: &[Event], every: bool) -> Option<Vec<(i64, String)>> {
     let wires = WireTable::new(plan);
     let metrics = MetricTable::new(plan, &wires, &[]).unwrap();

@@ -1,5 +1,5 @@
-//! What single operations do beyond the table of `matrix`: on groups, in lists, in several activations, together, and in
-//! the long run.
+//! What single operations do beyond the table of `matrix`: on groups, in lists, in several activations, together, and
+//! in the long run.
 
 use proptest::prelude::*;
 
@@ -303,6 +303,6 @@ fn a_disturbance_that_lacks_a_parameter_is_refused() {
     let refused = Disturbance::new(&stripped, &use_of(0, 0.0, 1.0, choices(&[0.5, 0.5]), 1), &[]).unwrap_err();
     assert_eq!(
         refused.to_string(),
-        "operation `burst_loss` has no parameter `enter`, or of another kind: run `sesamec generate` again"
+        "operation `burst_loss` has no parameter `enter` of the expected kind: run `sesamec generate` again"
     );
 }

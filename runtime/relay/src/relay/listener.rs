@@ -8,13 +8,14 @@ use crate::wire::Wire;
 
 /// Observes one run and changes nothing. Metrics and traces are listeners.
 ///
-/// The metrics of a run are part of its relay, since conditions read them; the relay calls them directly. Other listeners,
-/// such as a trace, are added with [`Relay::tapped`](super::Relay::tapped); a run without them pays nothing for them.
+/// The metrics of a run are part of its relay, since conditions read them; the relay calls them directly. Other
+/// listeners, such as a trace, are added with [`Relay::tapped`](super::Relay::tapped); a run without them pays nothing
+/// for them.
 pub trait Listener {
     /// The `index`th message of this wire, counted from 0, was published. This is the message as the simulator sent it.
     fn published(&mut self, now: SimTime, wire: Wire, index: u64, value: &Value);
-    /// A message is delivered. It comes from the `index`th message published on this wire, and operations may have changed
-    /// it.
+    /// A message is delivered. It comes from the `index`th message published on this wire, and operations may have
+    /// changed it.
     fn delivered(&mut self, now: SimTime, wire: Wire, index: u64, value: &Value);
     /// Simulation time is `now` from here on: all messages of earlier moments are known.
     fn advanced(&mut self, now: SimTime) {

@@ -21,7 +21,7 @@ use crate::wire::WireTable;
 
 const MESSAGES: u32 = 81;
 const SEED: u64 = 77;
-/// KeyedRng per value of a message, as `Places` documents.
+/// Random numbers per value of a message, as `Places` documents.
 const PER_VALUE: u64 = 8;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -453,8 +453,8 @@ fn expected(payload: Payload, case: &Case, switch: Switch) -> Expected {
                     release = release.max(tail);
                     tail = release;
                 }
-                // At the moment of an edge, what is due then is still held; an end condition is weighed in the event of its
-                // message, after what is due.
+                // At the moment of an edge, what is due then is still held; an end condition is weighed in the event of
+                // its message, after what is due.
                 let late = if matches!(switch, Switch::Condition) { release > nanos(50) } else { release >= nanos(50) };
                 if late && *drain == Drain::Drop {
                     *dropped += 1;
@@ -473,8 +473,8 @@ fn expected(payload: Payload, case: &Case, switch: Switch) -> Expected {
             }
         }
     }
-    // Flushed messages go at the end of the window, in the order in which they would have gone, and before what is published
-    // then.
+    // Flushed messages go at the end of the window, in the order in which they would have gone, and before what is
+    // published then.
     let flushes = |n: u32| {
         let (OperationKind::Latency { drain, .. } | OperationKind::Reorder { drain }) = case.kind else { return false };
         active(n) && drain == Drain::Flush

@@ -13,7 +13,7 @@ use crate::stl::minimum::SlidingMinimum;
 use crate::stl::piece::{Pair, Piece, Span, Window, put};
 use crate::stl::until::SlidingUntil;
 
-/// The next part of the trace, on which no signal changes.
+/// The next part of the trace, in which no signal changes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stretch {
     /// Where it ends, excluded.
@@ -23,7 +23,7 @@ pub(super) struct Stretch {
     /// Where nothing is known of the signals: what stands for the robustness of their predicates, negative or positive
     /// infinity.
     pub(super) unknown: Option<f64>,
-    /// Whether only windows count that lie in the trace as a whole.
+    /// Whether only windows count that are completely within the trace.
     pub(super) whole: bool,
 }
 
@@ -38,18 +38,18 @@ impl Stretch {
         self.last && !self.whole && self.unknown.is_none()
     }
 
-    /// What stands for all that depends on where the trace will end, where only whole windows count and nothing is known: the
-    /// end decides what belongs to the formula at all.
+    /// What stands for all that depends on where the trace will end, where only whole windows count and nothing is
+    /// known: the end decides what belongs to the formula at all.
     fn undecided(self) -> Option<f64> {
         self.unknown.filter(|_| self.whole)
     }
 }
 
-/// An operator, and what of it is asked.
+/// An operator, and the span for which its robustness is needed.
 #[derive(Debug, Clone)]
 pub(super) struct Node {
     asked: Span,
-    /// Up to where its robustness has been told.
+    /// The time up to which its robustness is known.
     told: i64,
     operator: Operator,
 }
@@ -263,7 +263,7 @@ fn window(interval: Interval) -> Result<Window, FormulaError> {
     Ok(Window { from: nanos(from), to: to.map(nanos) })
 }
 
-/// By how much a value keeps a comparison; never NaN.
+/// By how much a value satisfies a comparison; never NaN.
 fn margin(value: f64, comparison: Comparison, constant: f64) -> f64 {
     if value.is_nan() {
         return f64::NEG_INFINITY;

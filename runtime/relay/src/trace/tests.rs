@@ -306,8 +306,8 @@ fn a_compressed_recording_is_refused_with_a_remedy() {
     assert!(said.contains("compressed (`lz4`)") && said.contains("mcap compress --compression none"), "{said}");
 }
 
-/// The same recording without its checksums, which are then not looked at: what is changed in it is not refused for being
-/// changed.
+/// The same recording without its checksums, which are then not looked at: what is changed in it is not refused for
+/// being changed.
 fn without_checksums(whole: &[u8]) -> Vec<u8> {
     use mcap::records::op;
     let mut bytes = whole.to_vec();
@@ -351,8 +351,8 @@ fn changed(whole: &[u8], stream: &mut Stream) -> Vec<u8> {
     bytes
 }
 
-/// Feeds changed recordings, and insists on an answer in time: neither a panic nor memory for a length that a damaged file
-/// claims.
+/// Feeds changed recordings, and insists on an answer in time: neither a panic nor memory for a length that a damaged
+/// file claims.
 fn all_are_fed_or_refused(numbers: std::ops::Range<u64>) {
     let folder = tempfile::tempdir().unwrap();
     let (plan, test) = awkward_plan();

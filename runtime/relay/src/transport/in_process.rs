@@ -12,7 +12,7 @@ use crate::transport::{Capabilities, Connect, Place, Transport, TransportError, 
 use crate::value::Value;
 use crate::wire::Wire;
 
-/// Reaches a simulator that is a Rust type inside the runner.
+/// Connects to a simulator that is a Rust type inside the runner.
 pub const fn in_process<S: Simulator + 'static>() -> Connect {
     Connect { make: connect::<S>, place: Place { runner: "", space: "" } }
 }
@@ -30,7 +30,7 @@ fn connect<S: Simulator + 'static>(plan: &CampaignPlan, _: Place) -> Box<dyn Tra
     })
 }
 
-/// Messages in one step beyond which a simulator is taken to have lost its mind; what is more is not kept.
+/// The most messages that a simulator may publish in one step; further ones are not kept, and the test is a crash.
 const STEP_LIMIT: u64 = 100_000;
 
 struct InProcess<S> {
@@ -88,7 +88,8 @@ fn failed(error: SimulatorError) -> TransportError {
     TransportError::Simulator(error.0)
 }
 
-/// The bus of one run: the simulator's topics, which of them the relay knows, and what has arrived on them.
+/// The bus of one run: the simulator's topics, which of them the relay knows, and the messages that have arrived on
+/// them.
 #[derive(Default)]
 struct InProcessBus {
     by_path: BTreeMap<String, usize>,
@@ -105,7 +106,7 @@ struct InProcessBus {
 struct Line {
     path: String,
     wire: Option<Wire>,
-    /// What has arrived for the subscribers; `None` when there are none.
+    /// The messages that have arrived for the subscribers; `None` without subscribers.
     inbox: Option<VecDeque<Value>>,
     /// Whether a message has been compared with the declared type.
     checked: bool,
@@ -137,7 +138,7 @@ impl InProcessBus {
     }
 }
 
-/// The bus with the relay inside it, as the simulator sees it during one call.
+/// The bus with the relay, as the simulator sees it during one call.
 struct RelayedBus<'a> {
     board: &'a mut InProcessBus,
     plan: &'a CampaignPlan,

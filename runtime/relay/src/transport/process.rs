@@ -35,21 +35,21 @@ use crate::relay::Exchange;
 use crate::simulator::Progress;
 use crate::transport::{Capabilities, Connect, Incidents, Place, Transport, TransportError};
 
-/// Ends all simulators of this process with everything they started. It does the same as closing each of them, but may be
-/// called from any thread, even while another one communicates with them.
+/// Ends all simulators of this process with everything they started. It does the same as closing each of them, but may
+/// be called from any thread, even while another one communicates with them.
 pub fn end_simulators() {
     lifecycle::end_programs();
 }
 
-/// Starts a simulator, waits until it has ended, and ends everything it leaves behind: what a runner does as the keeper of
-/// its worker's simulator.
+/// Starts a simulator, waits until it has ended, and ends everything it leaves behind: what a runner does as the keeper
+/// of its worker's simulator.
 #[cfg(target_os = "linux")]
 pub fn keep_simulator(worker: u32, report: &Path, program: &OsStr, arguments: &[OsString]) -> ExitCode {
     lifecycle::keep(worker, report, program, arguments, send_failed)
 }
 
-/// Replaces this process by a simulator that ends when its keeper does, even if the keeper is killed while the simulator
-/// hangs. Only returns if that fails.
+/// Replaces this process by a simulator that ends when its keeper does, even if the keeper is killed while the
+/// simulator hangs. Only returns if that fails.
 #[cfg(target_os = "linux")]
 pub fn become_simulator(keeper: u32, program: &OsStr, arguments: &[OsString]) -> ExitCode {
     lifecycle::become_program(keeper, program, arguments, send_failed)
@@ -181,11 +181,12 @@ impl Process {
         self.connection.as_ref().is_some_and(|connection| connection.session.is_ready())
     }
 
-    /// Checks that the simulator sends nothing more at the end of its run. A surplus answer would be taken for an answer to
-    /// the first request of the next run, although it is an error of this run.
+    /// Checks that the simulator sends nothing more at the end of its run. A surplus answer would be taken for an
+    /// answer to the first request of the next run, although it is an error of this run.
     fn check_no_surplus_answer(&mut self) -> Result<(), TransportError> {
         let Some(Connection { session, steps, stepping, .. }) = &mut self.connection else { return Ok(()) };
-        // If every answer of a run comes one request too early, the surplus one is sent only after the last step's computation.
+        // If every answer of a run comes one request too early, the surplus one is sent only after the last step's
+        // computation.
         let step = stepping.elapsed() / (*steps).max(1);
         if !waiting::for_a_while(session.input(), (2 * step).clamp(SHORTEST_WAIT, LONGEST_WAIT)) {
             return Ok(());

@@ -1,8 +1,9 @@
 //! A simulator that is a program and runs freely: nobody steps it, and it receives messages as they are delivered.
 //!
 //! Simulation time is the simulator's own clock, if it sends its time, and wall time since its answer to `reset`
-//! otherwise. The transport sleeps until the next line of the simulator or until the relay has something to do, whichever
-//! is first: a message that an operation holds back is delivered when it is due, even if the simulator is silent.
+//! otherwise. The transport sleeps until the next line of the simulator or until the relay has something to do,
+//! whichever is first: a message that an operation holds back is delivered when it is due, even if the simulator is
+//! silent.
 
 use std::io::{BufReader, Write};
 use std::mem;

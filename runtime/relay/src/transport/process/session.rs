@@ -1,5 +1,5 @@
-//! The runner's side of the protocol, over any pair of streams: the order of requests and answers, and the way of messages
-//! through the relay.
+//! The runner's side of the protocol, over any pair of streams: the order of requests and answers, and the way of
+//! messages through the relay.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, Write};
@@ -184,8 +184,8 @@ impl<R: BufRead, W: Write> Session<R, W> {
         }
     }
 
-    /// Sends the line. An error is ignored: a simulator that has closed its input may still have sent the reason, and the
-    /// next read returns it.
+    /// Sends the line. An error is ignored: a simulator that has closed its input may still have sent the reason, and
+    /// the next read returns it.
     fn send(&mut self) {
         self.output.write_all(&self.line).and_then(|()| self.output.flush()).ok();
         self.line.clear();
@@ -198,7 +198,8 @@ impl Topics {
         *self = Topics { shapes: mem::take(&mut self.shapes), ..Topics::default() };
     }
 
-    /// Takes the simulator's topics; all topics of the space must be among them. Tells the relay which have subscribers.
+    /// Takes the simulator's topics; all topics of the space must be among them. Tells the relay which have
+    /// subscribers.
     pub(super) fn open(&mut self, ready: &Ready<'_>, relay: &mut dyn Exchange) -> Result<(), TransportError> {
         let wires = relay.wires();
         for path in ready.publishes.iter().chain(&ready.subscribes) {
@@ -259,8 +260,8 @@ impl Topics {
         Ok(())
     }
 
-    /// Puts the relay's deliveries to subscribers into the outbox. A message that no operation intercepts is passed on byte
-    /// for byte.
+    /// Puts the relay's deliveries to subscribers into the outbox. A message that no operation intercepts is passed on
+    /// byte for byte.
     pub(super) fn deliver(&mut self, relay: &dyn Exchange, published: Option<(Wire, &RawValue)>) {
         for Delivery { wire, value } in self.deliveries.drain(..) {
             if !self.subscribed.get(wire.index()).copied().unwrap_or(false) {

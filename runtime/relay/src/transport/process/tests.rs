@@ -232,7 +232,8 @@ fn that_a_simulator_was_killed_is_told_apart_from_other_ends() {
     }
 }
 
-/// Runs a simulator three times that does this at the end of its first run; the crashes, and what is noted of the others.
+/// Runs a simulator three times that does this at the end of its first run; the crashes, and what is noted of the
+/// others.
 fn after_the_last_answer(what: &str) -> Option<(Vec<Option<String>>, Vec<String>)> {
     let program = format!(
         "from time import sleep\n{}",
@@ -354,8 +355,8 @@ fn connections_of_several_threads_do_not_meet() {
     assert_eq!(values, [Some(10.0), Some(11.0), Some(12.0)]);
 }
 
-/// A simulator that runs freely and does this after its answer to `reset`, in a run of at most an hour in which `lag` holds
-/// commands back for 0.3 s; what its run showed.
+/// A simulator that runs freely and does this after its answer to `reset`, in a run of at most an hour in which `lag`
+/// holds commands back for 0.3 s; what its run showed.
 fn free_running(ready: &str, after: &str) -> Option<(Observation, f64)> {
     if !python() {
         return None;
