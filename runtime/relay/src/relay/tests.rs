@@ -403,7 +403,7 @@ fn only_an_offline_operation_is_offline_in_a_test() {
         Relay::new(&plan, &wires, &test, metrics.start(), &raising()).err().expect("it does not fit").to_string()
     };
     let window = refused(Moment::AfterEnd, Activation::Time { start: 1.0, end: 2.0 });
-    assert!(window.contains("has no activation: it acts beside the run"), "{window}");
+    assert!(window.contains("has no activation: it acts before or after the run"), "{window}");
     let offline = refused(Moment::OnMessage, Activation::Offline);
     assert!(offline.contains("lacks an activation: it acts during the run"), "{offline}");
 }
