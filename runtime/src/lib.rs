@@ -1,4 +1,5 @@
-//! What a generated SESAME test runner links: one name for the crates of the runtime, the campaign, and the command line.
+//! What a generated SESAME test runner links: one name for the crates of the runtime, the campaign, and the command
+//! line.
 //!
 //! The crates below this one are re-exported under the names of their rooms, so that a runner, its hooks and its
 //! simulator depend on `sesame-runtime` alone. Nothing here knows the `.sesame` language: a runner gets its campaign as
@@ -20,7 +21,9 @@ mod runner;
 mod tampered;
 
 #[cfg(feature = "campaign")]
-pub use runner::{Runner, main};
+pub use cli::main;
+#[cfg(feature = "campaign")]
+pub use runner::Runner;
 pub use sesame_base::{activation, condition, observation, time, verdict};
 #[cfg(feature = "campaign")]
 pub use sesame_optimise as optimise;

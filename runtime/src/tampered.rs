@@ -1,9 +1,9 @@
-//! Results that something was done to, before all that reads results: each is read, or refused in words, and stays as it
-//! is.
+//! Results that something was done to, before all that reads results: each is read, or refused in words, and stays as
+//! it is.
 //!
-//! What is done to them: bytes are overwritten or cut off; values, rows and tables are changed in SQL; the plan inside is
-//! changed token by token and branch by branch. A change is known by its number, so that one which is too much for a reader
-//! can be made again.
+//! What is done to them: bytes are overwritten or cut off; values, rows and tables are changed in SQL; the plan inside
+//! is changed token by token and branch by branch. A change is known by its number, so that one which is too much for a
+//! reader can be made again.
 
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};

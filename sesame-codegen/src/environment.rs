@@ -1,5 +1,5 @@
-//! What emitted crates need of the world: the runtime, the simulator's crate, and what `sesame.toml` lists. Reads files,
-//! writes none.
+//! What emitted crates need of the world: the runtime, the simulator's crate, and what `sesame.toml` lists. Reads
+//! files, writes none.
 //!
 //! Paths are written as seen from a runner's folder, relative wherever there is a relative way, so that a checkout or
 //! a project can be moved as a whole.
@@ -47,7 +47,7 @@ pub enum Error {
         problem: String,
     },
     /// The folder that the `.sesame` file names holds no crate.
-    #[error("{source_file} says the simulator's crate is in `{folder}`, but there is no {}", manifest.display())]
+    #[error("{source_file} places the simulator's crate in `{folder}`, but {} does not exist", manifest.display())]
     NoSimulator {
         /// File name of the `.sesame` file.
         source_file: String,
@@ -58,7 +58,7 @@ pub enum Error {
     },
     /// Nothing says where the simulator's crate comes from.
     #[error(
-        "nothing says where the crate `{name}` of the simulator `{path}` comes from: \
+        "the location of the crate `{name}` of the simulator `{path}` is unknown: \
          add `crate \"its/folder\"` to the simulator in {source_file}, or `{name}` to [dependencies] in {SETTINGS}"
     )]
     UnknownSimulator {
@@ -70,13 +70,13 @@ pub enum Error {
         source_file: String,
     },
     /// There is no runtime where one was said to be.
-    #[error("there is no {RUNTIME} in {}: give the folder of its Cargo.toml", folder.display())]
+    #[error("no {RUNTIME} in {}: give the folder of its Cargo.toml", folder.display())]
     NoRuntime {
         /// Where.
         folder: PathBuf,
     },
     /// The program that the `.sesame` file gives by its path is not there.
-    #[error("{source_file} says the simulator's program is `{program}`, but there is no {}", file.display())]
+    #[error("{source_file} gives the simulator's program as `{program}`, but {} does not exist", file.display())]
     NoProgram {
         /// File name of the `.sesame` file.
         source_file: String,
@@ -95,7 +95,7 @@ pub enum Error {
     },
     /// A runtime that is in no folder cannot be copied.
     #[error(
-        "`--vendor` copies the runtime, and so needs its source in a folder: give it with `--runtime path:FOLDER`, or as \
+        "`--vendor` copies the runtime, so it needs the source in a folder: give it with `--runtime path:FOLDER`, or as \
          `path` in [runtime] of {SETTINGS}"
     )]
     RuntimeHasNoFolder,
@@ -108,7 +108,7 @@ pub enum Error {
         problem: String,
     },
     /// A path that TOML cannot hold.
-    #[error("the path {} is not UTF-8, and so cannot stand in a Cargo.toml", path.display())]
+    #[error("the path {} is not UTF-8 and cannot be written into a Cargo.toml", path.display())]
     NotText {
         /// Which.
         path: PathBuf,
@@ -134,15 +134,16 @@ pub enum RuntimeChoice {
 /// What a command line says of the surroundings.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Options {
-    /// Where runners take the runtime from; if not said: `[runtime]` in `sesame.toml`, else the checkout that sesamec was
-    /// built from, else the released version.
+    /// Where runners take the runtime from; if not said: `[runtime]` in `sesame.toml`, else the checkout that sesamec
+    /// was built from, else the released version.
     pub runtime: Option<RuntimeChoice>,
     /// A folder, relative to the working directory, with templates in place of this project's; if not said: `templates`
     /// in `sesame.toml`, which is relative to that.
     pub templates: Option<PathBuf>,
     /// Each runner has the hooks in its own folder.
     pub self_contained: bool,
-    /// Each runner has the hooks, the runtime, the simulator, and every other crate that is in a folder in its own folder.
+    /// Each runner has the hooks, the runtime, the simulator, and every other crate that is in a folder in its own
+    /// folder.
     pub vendor: bool,
 }
 
@@ -212,7 +213,8 @@ pub fn environment(
     let home = source
         .parent()
         .map_or_else(|| Path::new("."), |parent| if parent == Path::new("") { Path::new(".") } else { parent });
-    let runner_folder = settled(out).map_err(|error| vec![error])?.join("runner");
+    let out_folder = settled(out).map_err(|error| vec![error])?;
+    let runner_folder = out_folder.join("runner");
     let mut errors = Vec::new();
     let settings = settings(&home.join(SETTINGS)).unwrap_or_else(|error| {
         errors.push(error);
@@ -220,16 +222,18 @@ pub fn environment(
     });
     let mut dependencies = BTreeMap::new();
     let mut lock = None;
+    let mut target = None;
     match runtime_dependency(&runner_folder, home, runtime, settings.runtime.as_ref()) {
         Ok((value, folder)) => {
             dependencies.insert(RUNTIME.to_owned(), value);
+            target = folder.as_deref().and_then(|folder| checkout_target(&out_folder, folder));
             lock = first_lock(out).or_else(|| folder.and_then(|folder| workspace_lock(&folder)));
         }
         Err(error) => errors.push(error),
     }
     for (name, value) in &settings.dependencies {
         if name.replace('_', "-") == RUNTIME {
-            let problem = format!("`{name}` does not belong into [dependencies]: choose it in [runtime]");
+            let problem = format!("`{name}` does not belong in [dependencies]: choose it in [runtime]");
             errors.push(Error::Settings { path: home.join(SETTINGS), problem });
             continue;
         }
@@ -292,7 +296,17 @@ pub fn environment(
     let system = plans.first().map_or_else(|| home.to_owned(), |first| home.join(first.system_folder()));
     let space_folder = relative(&runner_folder, home).map_err(|error| vec![error])?;
     let simulator_folder = relative(&runner_folder, &system).map_err(|error| vec![error])?;
-    Ok(Environment { dependencies, lock, options: said, space_folder, simulator_folder, hooks, vendored, templates })
+    Ok(Environment {
+        dependencies,
+        lock,
+        target,
+        options: said,
+        space_folder,
+        simulator_folder,
+        hooks,
+        vendored,
+        templates,
+    })
 }
 
 /// The runtime as a dependency of a crate in `folder`, which need not exist yet.
@@ -461,7 +475,7 @@ fn package_name(manifest: &Path) -> Result<String, Error> {
     let text = input::text(manifest).map_err(|cause| Error::Read { path: manifest.to_owned(), cause })?;
     let table: Table = toml::from_str(&text).map_err(|error| failed(error.to_string()))?;
     let name = table.get("package").and_then(|package| package.get("name")).and_then(Value::as_str);
-    name.map(str::to_owned).ok_or_else(|| failed("it names no package".to_owned()))
+    name.map(str::to_owned).ok_or_else(|| failed("it has no package name".to_owned()))
 }
 
 /// A dependency whose path, if it has one, is as seen from a runner and not from `sesame.toml`.
@@ -488,6 +502,17 @@ fn first_lock(out: &Path) -> Option<String> {
 /// leaves out what a runner does not use.
 fn workspace_lock(runtime: &Path) -> Option<String> {
     runtime.ancestors().take(3).find_map(|folder| input::text(&folder.join("Cargo.lock")).ok())
+}
+
+/// The target folder of the checkout that the runtime is of, as seen from a runners' folder in this checkout: SQLite,
+/// and more of what `sesamec` was made of, need not be compiled again. Runners elsewhere have one of their own.
+fn checkout_target(out: &Path, runtime: &Path) -> Option<String> {
+    let root =
+        settled(runtime).ok()?.ancestors().take(3).find(|folder| folder.join("Cargo.lock").is_file())?.to_owned();
+    if !out.starts_with(&root) {
+        return None;
+    }
+    relative(out, &root.join("target")).ok()
 }
 
 /// An absolute path without links and `..`; its last parts need not exist.

@@ -188,7 +188,8 @@ impl Project {
 
     /// Generates and builds the runner of a campaign, without running it.
     pub fn build(&self, campaign: &str) -> Runner {
-        // A copy of the program is this project's own: in the target folder, another project of the same name overwrites it.
+        // A copy of the program is this project's own: in the target folder, another project of the same name
+        // overwrites it.
         static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
         self.sesamec("generate", &["--campaign", campaign]).expect(0);
         let _turn = ONE_AT_A_TIME.lock();

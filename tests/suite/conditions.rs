@@ -63,7 +63,8 @@ fn conditions_that_a_search_grows_switch_operations_on_and_off() {
     holds_together(&space, &records);
     let depths: BTreeSet<u32> = conditions(&records).into_iter().map(depth).collect();
     assert_eq!(depths.last(), Some(&space.depth), "{depths:?}");
-    // Some activation ended while the run went on: by its end condition, as nothing else ends it before its window does.
+    // Some activation ended while the run went on: by its end condition, as nothing else ends it before its window
+    // does.
     let effects = records.iter().flat_map(|record| &record.observation.operations);
     assert!(effects.flat_map(|effect| &effect.intervals).any(|span| span.end < 60.0));
     let shown = runner.run(&["show", "T2", "--results", "r/5"]).expect(0).out;

@@ -1,5 +1,5 @@
-//! Findings that are run again with fresh seeds of the simulator: what that shows, that it survives anything, and what it
-//! brings where a simulator is noisy.
+//! Findings that are run again with fresh seeds of the simulator: what that shows, that it survives anything, and what
+//! it brings where a simulator is noisy.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -290,8 +290,8 @@ struct Believed {
 }
 
 impl Believed {
-    /// Adds a run's front, of which only tests whose own repetitions `believes` is content with are findings: how many of
-    /// them there are, and how many violate again.
+    /// Adds a run's front, of which only tests whose own repetitions `believes` is content with are findings: how many
+    /// of them there are, and how many violate again.
     fn add(&mut self, repository: &Repository, believes: impl Fn(usize, usize) -> bool) {
         let plan = repository.plan();
         let rows = repository.tests().unwrap();

@@ -19,8 +19,8 @@ struct Disk(PathBuf);
 /// Set where a test runs once more, in a namespace of its own.
 const WITHIN: &str = "SESAME_TEST_NAMESPACE";
 
-/// Runs a test that mounts disks. A user who may not mount any may in a user namespace, where Linux permits those: there
-/// the test, which has this name, runs once more. Where neither is permitted it is skipped, which is said.
+/// Runs a test that mounts disks. A user who may not mount any may in a user namespace, where Linux permits those:
+/// there the test, which has this name, runs once more. Where neither is permitted it is skipped, which is said.
 fn with_disks(test: &str, body: fn()) {
     let may_mount = |command: &mut Command| {
         let place = tempfile::tempdir().unwrap();

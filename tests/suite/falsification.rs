@@ -1,4 +1,5 @@
-//! How often the strategies violate a requirement within 80 evaluations, on published problems beside published figures.
+//! How often the strategies violate a requirement within 80 evaluations, on published problems beside published
+//! figures.
 
 use std::fmt::Write as _;
 
@@ -345,8 +346,8 @@ fn campaigns_of_vectors_find_violations_as_the_vectors_themselves_do() {
     }
 }
 
-/// Prints the tables of docs/falsification.md. Nothing is asserted of the car disturbed in windows: there falsification does
-/// no better than chance.
+/// Prints the tables of docs/falsification.md. Nothing is asserted of the car disturbed in windows: there falsification
+/// does no better than chance.
 #[test]
 #[ignore = "long: 1,200 searches, half of them of a simulated car"]
 fn strategies_on_published_falsification_problems_as_campaigns() {

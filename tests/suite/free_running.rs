@@ -18,7 +18,7 @@ fn equal_tests_of_a_free_running_simulator_are_simulated_again_and_a_replay_may_
     let runner = Project::new("free_running", &space.replace("NAME", "free_running"), "free_running").build("freely");
 
     let ran = runner.run(&["known", "--workers", "1", "--results", "known"]).expect(0);
-    let repository = Repository::open(&runner.folder.join("known/1")).unwrap();
+    let repository = Repository::open(&runner.folder.join("known/known")).unwrap();
     let tests = repository.tests().unwrap();
     assert!(tests.iter().all(|test| test.outcome == Outcome::Completed), "{tests:?}\n{}", ran.err);
     let known: Vec<u32> =
@@ -40,7 +40,7 @@ fn equal_tests_of_a_free_running_simulator_are_simulated_again_and_a_replay_may_
     let [warning] = &warnings[..] else { panic!("{warnings:?}") };
     assert!(warning.starts_with("the simulator runs freely"), "{warning}");
 
-    let replayed = runner.run(&["replay", "T2", "--results", "known/1"]).expect(0);
+    let replayed = runner.run(&["replay", "T2", "--results", "known/known"]).expect(0);
     assert!(replayed.err.contains("the simulator runs freely"), "{}", replayed.err);
     assert!(replayed.out.contains("1.5"), "the difference is shown: {}", replayed.out);
 }

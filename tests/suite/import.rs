@@ -1,6 +1,6 @@
 //! Old data comes along: files of the original platform, imported as a user would. They are not ours to keep, so
-//! `SESAME_LEGACY_DIR` names the folder they lie in; without it these tests say so and check nothing, and small files of
-//! our own stand in for them where the importer is tested by itself.
+//! `SESAME_LEGACY_DIR` names the folder they lie in; without it these tests say so and check nothing, and small files
+//! of our own stand in for them where the importer is tested by itself.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

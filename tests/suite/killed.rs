@@ -1,5 +1,5 @@
-//! Campaigns on a simulator that starts other processes, which are ended in every way there is: nothing is left of them, and
-//! results are what they would have been.
+//! Campaigns on a simulator that starts other processes, which are ended in every way there is: nothing is left of
+//! them, and results are what they would have been.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -193,7 +193,8 @@ fn simulators_have_time_to_end_once_their_input_is_closed() {
     }
 }
 
-/// A shell may start others before it becomes the runner; one of these may leave something behind while the runner runs.
+/// A shell may start others before it becomes the runner; one of these may leave something behind while the runner
+/// runs.
 #[test]
 fn what_a_runner_has_below_it_from_the_start_is_left_alone() {
     let Some(runner) = breeding("earlier_children", "quiet") else { return };
@@ -269,7 +270,7 @@ fn a_simulator_that_is_killed_each_time_is_a_crash_that_says_so() {
     assert!(crashes.len() >= 3, "{rows:?}");
     for row in crashes {
         let detail = row.outcome.detail().unwrap();
-        assert!(detail.starts_with("killed twice, by somebody or by the system for want of memory: "), "{detail}");
+        assert!(detail.starts_with("killed twice, by a user or by the system because memory was short: "), "{detail}");
         let shown = runner.run(&["show", &format!("T{}", row.number), "--results", "results/3"]).expect(0).out;
         assert!(shown.contains("the simulator was killed while it ran this test"), "{shown}");
     }
@@ -332,8 +333,8 @@ impl Work {
         Work { arguments: arguments(into), folder: format!("{into}/{name}"), whole: said.digest(), takes }
     }
 
-    /// Kills it after this share of its time, resumes it if there is something to resume, and compares. Says how many tests
-    /// were recorded when it was killed; `None` if it had ended, or hardly begun.
+    /// Kills it after this share of its time, resumes it if there is something to resume, and compares. Says how many
+    /// tests were recorded when it was killed; `None` if it had ended, or hardly begun.
     fn killed(&self, runner: &Runner, victim: Victim, moment: f64) -> Option<usize> {
         let words: Vec<&str> = self.arguments.iter().map(String::as_str).collect();
         let process = start(runner, &words, "");

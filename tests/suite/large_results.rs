@@ -67,8 +67,8 @@ fn plan(objectives: u32) -> CampaignPlan {
     plan
 }
 
-/// Values that come nearer to a sphere (a circle, of two objectives) around the ideal the later the test: fronts of a search
-/// that goes on getting better, with very many tests on them.
+/// Values that come nearer to a sphere (a circle, of two objectives) around the ideal the later the test: fronts of a
+/// search that goes on getting better, with very many tests on them.
 fn values(objectives: u32, number: u32, stream: &mut Stream) -> [f64; 3] {
     let mut place: [f64; 3] = std::array::from_fn(|_| stream.uniform(0.01, 1.0));
     if objectives == 2 {

@@ -1,6 +1,8 @@
 //! Behaviour across crates, as a user meets it.
 #![cfg(test)]
 
+mod architecture;
+mod building;
 mod commands;
 mod conditions;
 mod confirm;

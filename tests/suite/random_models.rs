@@ -7,11 +7,10 @@ use std::panic::catch_unwind;
 use std::path::{Path, PathBuf};
 
 use proc_macro2::{TokenStream, TokenTree};
-use sesame_codegen::cli::Look;
 use sesame_codegen::emit::emit;
 use sesame_codegen::environment::{Options, environment};
 use sesame_codegen::files::Tree;
-use sesame_codegen::language::SESAME;
+use sesame_codegen::frontend::{Look, SESAME};
 use sesame_codegen::output::{Mode, apply};
 use sesame_codegen::plan::RunnerPlan;
 use sesame_plan::CampaignPlan;

@@ -10,8 +10,8 @@ use serde_json::Value;
 use sesame_results::record::{Repository, Verdict, verdict};
 use sesame_tests::{Project, Runner};
 
-/// Tests of the latest run that violate a requirement and had an effect, the one with most collisions first, then evenly
-/// chosen.
+/// Tests of the latest run that violate a requirement and had an effect, the one with most collisions first, then
+/// evenly chosen.
 fn violations(runner: &Runner, count: usize) -> Vec<u32> {
     let repository = Repository::open(&runner.folder.join("found/42")).unwrap();
     let plan = repository.plan();

@@ -3,8 +3,8 @@
 //! On such traces our dense time and rtamt's discrete time are the same: all interval ends are whole samples, and no
 //! robustness changes between samples. There is one difference of meaning, and one of notation. rtamt asks of
 //! `left until right` that `left` hold up to the sample before the one at which `right` does; ours, as Donzé and Maler
-//! define it, that it hold at that one too. So ours is written `left until (left and right)` for rtamt. And rtamt has no
-//! unbounded interval that begins later than now, so the length of the trace stands for infinity.
+//! define it, that it hold at that one too. So ours is written `left until (left and right)` for rtamt. And rtamt has
+//! no unbounded interval that begins later than now, so the length of the trace stands for infinity.
 
 use std::fmt::Write as _;
 

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use sesame_tests::{Project, command, done, sesamec, workspace};
 
-/// A folder outside of this checkout, another one for each. It stays when the test is over: files that come out the same
-/// are not written again, and so cargo need not compile them again.
+/// A folder outside of this checkout, another one for each. It stays when the test is over: files that come out the
+/// same are not written again, and so cargo need not compile them again.
 fn far_away() -> PathBuf {
     let name = workspace().display().to_string().replace(['/', '\\', ':'], "-");
     std::env::temp_dir().join(format!("sesame-vendored{name}"))

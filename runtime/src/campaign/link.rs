@@ -1,8 +1,8 @@
 //! How supervisor and worker are connected.
 //!
-//! On Unix a worker inherits one end of a pair of sockets as its standard input. The pair has no name and no address, so
-//! nobody else can connect to it. Other systems have nothing like it in the standard library: there the worker connects
-//! to a [`port`](super::port) and proves with a token that it is the one that was started.
+//! On Unix a worker inherits one end of a pair of sockets as its standard input. The pair has no name and no address,
+//! so nobody else can connect to it. Other systems have nothing like it in the standard library: there the worker
+//! connects to a [`port`](super::port) and proves with a token that it is the one that was started.
 
 use std::io;
 use std::process::Command;

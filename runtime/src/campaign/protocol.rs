@@ -9,10 +9,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use sesame_base::observation::Observation;
-use sesame_plan::Test;
 use sesame_relay::transport::Incidents;
-
-use crate::campaign::traces::TraceOrder;
 
 /// The largest frame either side accepts; time series of a long test are the largest thing sent.
 const FRAME_LIMIT: u32 = 1 << 30;
@@ -20,26 +17,13 @@ const FRAME_LIMIT: u32 = 1 << 30;
 /// The largest frame that is taken from a connection before it is known whose it is.
 const GREETING_LIMIT: usize = 1 << 10;
 
-/// The first message of a worker.
+/// A worker's first words.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Hello {
     /// Whether its simulator is stepped, so that equal tests give equal results.
     pub(super) lock_stepped: bool,
-    /// Proves that the worker is the one the supervisor started, where anybody could have connected.
+    /// Proves that the worker is the one that the supervisor started, where other programs could connect.
     pub(super) token: Option<String>,
-}
-
-/// What the supervisor asks for.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Job {
-    /// The test's number, given back with the result.
-    pub number: u32,
-    /// The test.
-    pub test: Test,
-    /// Seed of the simulator's own randomness.
-    pub simulator_seed: u64,
-    /// The trace that is asked for, if any.
-    pub trace: Option<TraceOrder>,
 }
 
 /// What the worker answers.
@@ -84,8 +68,8 @@ pub(super) struct Greeting {
 }
 
 impl Greeting {
-    /// Takes what has come of it, and nothing that follows it; `None` while it is not whole and the stream has no more for
-    /// now. What is longer than a kilobyte, or is no greeting, is an error.
+    /// Takes what has come of it, and nothing that follows it; `None` while it is not whole and the stream has no more
+    /// for now. Anything longer than a kilobyte is an error, and so is anything that is not a greeting.
     pub(super) fn hear(&mut self, stream: &mut impl Read) -> io::Result<Option<Hello>> {
         loop {
             let whole = match self.heard.first_chunk() {
@@ -93,7 +77,7 @@ impl Greeting {
                 Some(length) => {
                     let length = usize::try_from(u32::from_le_bytes(*length)).unwrap_or(usize::MAX);
                     if length == 0 || length > GREETING_LIMIT {
-                        return Err(io::Error::other(format!("a greeting of {length} bytes is none")));
+                        return Err(io::Error::other(format!("{length} bytes are not a greeting")));
                     }
                     size_of::<u32>() + length
                 }

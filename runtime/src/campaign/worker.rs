@@ -5,7 +5,7 @@ use std::sync::{Mutex, mpsc};
 use std::time::Duration;
 use std::{io, thread};
 
-use sesame_base::observation::{Observation, Outcome, WallTime};
+use sesame_base::observation::Outcome;
 use sesame_plan::CampaignPlan;
 use sesame_relay::evaluate::Custom;
 use sesame_relay::lifecycle::descendants;
@@ -13,13 +13,15 @@ use sesame_relay::metric::MetricTable;
 use sesame_relay::panic_capture;
 use sesame_relay::wire::WireTable;
 
+use crate::campaign::executor::Job;
 use crate::campaign::link::{self, Address, Stream};
-use crate::campaign::protocol::{self, Job, Reply};
+use crate::campaign::protocol::{self, Reply};
 use crate::campaign::traces;
 use crate::changed_files::ChangedFiles;
 use crate::runner::Runner;
 
-/// Serves the supervisor that started this process until it closes the connection, and then ends what was started for it.
+/// Serves the supervisor that started this process until it closes the connection, and then ends what was started for
+/// it.
 ///
 /// A panic of the simulator or of a hook is the outcome of its test; the worker goes on with a fresh connection to the
 /// simulator.
@@ -28,7 +30,8 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
     let transport = runner.connect.transport(plan);
     let mut stream = link::connect(supervisor, transport.capabilities().lock_stepped)?;
     panic_capture::install();
-    // So that what leaves its parents can be found when it is to end. Where the system cannot do that, groups have to do.
+    // So that what leaves its parents can be found when it is to end. Where the system cannot do that, groups have to
+    // do.
     descendants::adopt_orphans();
 
     let wires = WireTable::new(plan);
@@ -57,8 +60,9 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
     unreachable!("jobs come until the process is ended")
 }
 
-/// Reads jobs in a thread of its own. When the supervisor is gone, this thread ends what the worker started, and then the
-/// worker, even in the middle of a test that hangs: so no worker outlives its supervisor, and no simulator its worker.
+/// Reads jobs in a thread of its own. When the supervisor is gone, this thread ends what the worker started, and then
+/// the worker, even in the middle of a test that hangs: so no worker outlives its supervisor, and no simulator its
+/// worker.
 fn read_jobs(mut stream: Stream) -> mpsc::Receiver<Job> {
     let (sender, jobs) = mpsc::channel();
     thread::spawn(move || {
@@ -73,8 +77,8 @@ fn read_jobs(mut stream: Stream) -> mpsc::Receiver<Job> {
     jobs
 }
 
-/// Ends simulators, after the time that they are given to end by themselves, and then everything else that is below this
-/// process.
+/// Ends simulators, after the time that they are given to end by themselves, and then everything else that is below
+/// this process.
 fn end_what_was_started() {
     // Of the two threads that may get here, the later one waits until the earlier one is done.
     static TURN: Mutex<()> = Mutex::new(());
@@ -82,22 +86,4 @@ fn end_what_was_started() {
     #[cfg(feature = "process")]
     sesame_relay::transport::end_simulators();
     descendants::end_adopted(|_| false, Duration::ZERO);
-}
-
-/// The observation of a run that left nothing but its cause.
-pub(super) fn crashed(message: String) -> Observation {
-    empty(Outcome::Crash { message })
-}
-
-pub(super) fn empty(outcome: Outcome) -> Observation {
-    Observation {
-        outcome,
-        end: 0.0,
-        operations: Vec::new(),
-        unheard: Vec::new(),
-        metrics: Vec::new(),
-        messages: 0,
-        warnings: Vec::new(),
-        wall: WallTime::default(),
-    }
 }

@@ -1,10 +1,11 @@
 //! A worker as a process: started, waited for, and ended with everything that it started.
 //!
 //! A worker ends what it started by itself, once its connection is closed: its simulator's input is closed, and what is
-//! left a second later is killed. The supervisor waits for that, and kills what remains: the worker's group of processes,
-//! and on Linux also what left the group. For that the supervisor becomes the parent of processes whose own parent ended
-//! ("subreaper"), as each worker is while it lives. What comes to the supervisor therefore comes of a worker that has
-//! ended, whichever it was, and can be ended without asking which: orphans of workers that live stay with them.
+//! left a second later is killed. The supervisor waits for that, and kills what remains: the worker's group of
+//! processes, and on Linux also what left the group. For that the supervisor becomes the parent of processes whose own
+//! parent ended ("subreaper"), as each worker is while it lives. What comes to the supervisor therefore comes of a
+//! worker that has ended, whichever it was, and can be ended without asking which: orphans of workers that live stay
+//! with them.
 
 use std::collections::BTreeSet;
 use std::process::{Child, Command, ExitStatus};
@@ -14,20 +15,22 @@ use std::{io, thread};
 
 use sesame_relay::lifecycle::{descendants, process_group};
 
-use crate::campaign::pool::WORKER;
+/// The environment variable with a worker's number, which everything inherits that the worker starts.
+pub(super) const WORKER: &str = "SESAME_WORKER";
 
-/// How long a worker whose connection is closed may take to end what it started, and itself; and how long what outlives it
-/// may take after that.
+/// How long a worker whose connection is closed may take to end what it started, and itself; and how long what outlives
+/// it may take after that.
 const END_LIMIT: Duration = Duration::from_secs(2);
 
-/// The children of this process that are not to be taken for orphans. A process adopts orphans as a whole, so there is one
-/// list for all pools in it.
+/// The children of this process that are not to be taken for orphans. A process adopts orphans as a whole, so there is
+/// one list for all pools in it.
 static CHILDREN: Mutex<Children> = Mutex::new(Children { workers: BTreeSet::new(), earlier: None });
 
 struct Children {
     /// Ids of workers that are not reaped yet.
     workers: BTreeSet<u32>,
-    /// Ids of what there was below this process before its first worker: children of the shell that became this process.
+    /// Ids of what there was below this process before its first worker: children of the shell that became this
+    /// process.
     earlier: Option<BTreeSet<u32>>,
 }
 

@@ -7,7 +7,8 @@ use clap::Args;
 
 use sesame_plan::CampaignPlan;
 
-use crate::cli::{Failure, Format};
+use crate::cli::failure::Failure;
+use crate::cli::terminal::Format;
 use crate::runner::Runner;
 
 /// Which recording is fed.
@@ -41,8 +42,8 @@ pub(super) fn replay_recording(runner: &Runner, plan: &CampaignPlan, options: &O
     use sesame_relay::{panic_capture, trace};
     use sesame_results::report::recording_text;
 
-    use super::NOT_AS_REQUIRED;
     use super::execution::refuse_unfilled;
+    use super::failure::NOT_AS_REQUIRED;
     use super::terminal::{print, print_json, say, text_options};
 
     refuse_unfilled(runner, plan, true)?;

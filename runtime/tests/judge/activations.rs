@@ -1,4 +1,5 @@
-//! When operations are active, by the words of the documentation: from the values that metrics have had, message by message.
+//! When operations are active, by the words of the documentation: from the values that metrics have had, message by
+//! message.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,8 +18,8 @@ struct Change {
     end: bool,
 }
 
-/// Intervals that are not where the documentation has them. Conditions over several topics at once, over active time, and
-/// copies that wait for each other are left to other tests.
+/// Intervals that are not where the documentation has them. Conditions over several topics at once, over active time,
+/// and copies that wait for each other are left to other tests.
 pub(crate) fn contradictions(case: &Case, observed: &Observation, ledger: &Ledger) -> Vec<String> {
     let mut wrong = Vec::new();
     for (used, effect) in case.test.operations.iter().zip(&observed.operations) {

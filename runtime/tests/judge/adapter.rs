@@ -268,8 +268,8 @@ pub(crate) fn digest(folder: &Path) -> String {
 }
 
 /// Takes all that a wider plan added out of the results in a folder, row by row: what is left is to be what the plan
-/// without it leaves, in another folder. `metrics` has for each metric of that plan its place in the wider one, and `unread`
-/// is the number of messages on topics that were added.
+/// without it leaves, in another folder. `metrics` has for each metric of that plan its place in the wider one, and
+/// `unread` is the number of messages on topics that were added.
 pub(crate) fn leave_out_additions(folder: &Path, without: &Path, metrics: &[usize], unread: usize) {
     let database = Connection::open(folder.join(DATABASE)).expect("the results are there");
     let narrow = Connection::open(without.join(DATABASE)).expect("the results are there");

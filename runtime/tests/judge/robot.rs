@@ -1,8 +1,8 @@
 //! The simulator of all cases: a robot that publishes what a script says, hears what it subscribes to, and has faults.
 //!
-//! What it publishes depends on its script, the step, and a state that only the messages it receives change. So the same
-//! script without faults is the same robot: up to a crash it publishes the same, and a number that is none stands in the
-//! place of the number that the other publishes.
+//! What it publishes depends on its script, the step, and a state that only the messages it receives change. So the
+//! same script without faults is the same robot: up to a crash it publishes the same, and a number that is none stands
+//! in the place of the number that the other publishes.
 
 use std::cell::RefCell;
 

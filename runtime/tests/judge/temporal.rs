@@ -1,17 +1,17 @@
-//! The robustness of a temporal formula on a whole trace, by its definition: at each time at which anything may change, the
-//! least or greatest over all of the window.
+//! The robustness of a temporal formula on a whole trace, by its definition: at each time at which anything may change,
+//! the least or greatest over all of the window.
 //!
-//! Time is whole nanoseconds. A signal is a list of pieces `(from, value)`, each up to the next one, the last up to the end
-//! of the trace, that time included. Over whole windows a signal ends earlier: where the window of its operator, or of one
-//! inside, would go beyond the end of what it is about.
+//! Time is whole nanoseconds. A signal is a list of pieces `(from, value)`, each up to the next one, the last up to the
+//! end of the trace, that time included. Over whole windows a signal ends earlier: where the window of its operator, or
+//! of one inside, would go beyond the end of what it is about.
 
 use sesame_plan::Comparison;
 use sesame_plan::stl::{Formula, Interval};
 
 type Pieces = Vec<(i64, f64)>;
 
-/// The robustness at the beginning of a trace: samples `(time, value of each signal)` in the order of their times, each at a
-/// time of its own, and the end. `None` without a sample.
+/// The robustness at the beginning of a trace: samples `(time, value of each signal)` in the order of their times, each
+/// at a time of its own, and the end. `None` without a sample.
 pub(crate) fn robustness(formula: &Formula, samples: &[(i64, Vec<f64>)], end: i64, whole: bool) -> Option<f64> {
     samples.first()?;
     let trace = Trace { samples, end, whole };

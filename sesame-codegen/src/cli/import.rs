@@ -5,18 +5,20 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail};
+use sesame_legacy::{Imported, Kind, Recorded};
 
-use super::shell::{self, Shell};
-use super::{Checked, Format, Language, commands};
-use crate::import::{Imported, Kind, Recorded};
-use crate::output;
+use super::commands;
+use super::shell::{self, Format, Shell};
+use crate::frontend::{Checked, Language};
+use crate::{input, output};
 
 /// Notes of one kind that are shown at most; files repeat themselves.
 const MOST_NOTES: usize = 40;
 
 /// `sesamec import`
 pub(super) fn import(shell: Shell, language: &Language, file: &Path, out: &Path) -> anyhow::Result<ExitCode> {
-    let mut imported = Imported::read(file)?;
+    let opened = input::open(file).map_err(|error| anyhow!("{}: cannot be read: {error}", file.display()))?;
+    let mut imported = Imported::read(file, opened)?;
     // A stem as it is would be a path that anybody may have written.
     let stem: String = file
         .file_stem()

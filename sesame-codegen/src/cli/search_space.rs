@@ -12,7 +12,7 @@ use sesame_search::sspr::extent;
 
 /// A number that may be anything in a range counts as so many values.
 const STEPS: f64 = 100.0;
-/// Undisturbed runs of a campaign, one before and one after its tests.
+/// Reference runs of a campaign, one before and one after its tests.
 const REFERENCE_RUNS: u64 = 2;
 
 /// The space that a campaign searches, and its cost in simulated time, as comments of a `.sesame` file.
@@ -40,7 +40,7 @@ pub(super) fn described(plan: &CampaignPlan) -> String {
     lines.push((
         "cost",
         format!(
-            "at most {runs} runs of {end} s, {REFERENCE_RUNS} of them undisturbed: {} of simulated time",
+            "at most {runs} runs of {end} s, {REFERENCE_RUNS} of them reference runs: {} of simulated time",
             duration(runs as f64 * end)
         ),
     ));
@@ -62,8 +62,8 @@ fn space(plan: &CampaignPlan, permitted: &Permitted, lines: &mut Vec<(&str, Stri
     let ways = total(&chosen(&vec![0.0; kinds.len()], &copies, most)[fewest..]);
     let count = if fewest == most { format!("{fewest}") } else { format!("{fewest} to {most}") };
     let apart = match plan.campaign.copies {
-        Copies::Apart => "; copies of one never act at the same time",
-        Copies::MayOverlap => "; copies of one may act at the same time",
+        Copies::Apart => "; copies of one are never active at the same time",
+        Copies::MayOverlap => "; copies of one may be active at the same time",
         Copies::Once => ", each at most once",
     };
     let ways = format!("{} ways to choose them", power(ways));
@@ -113,8 +113,8 @@ fn confirming(confirmation: Confirmation, tests: u32, objectives: usize) -> Stri
 /// independent of each other and of the other tests'.
 ///
 /// Of n such tests with m objectives, E(n, m) are expected to be on the front: E(n, 1) = 1, and E(n, m) is the sum of
-/// E(i, m − 1) / i over i up to n (Bentley et al. 1978). The nth is as likely on it as each other, so E(n, m) / n is the
-/// probability that it enters, and the sum of these is E(n, m + 1).
+/// E(i, m − 1) / i over i up to n (Bentley et al. 1978). The nth is as likely on it as each other, so E(n, m) / n is
+/// the probability that it enters, and the sum of these is E(n, m + 1).
 fn entering(tests: u32, objectives: usize) -> f64 {
     let mut expected = vec![1.0; tests as usize];
     for _ in 0..objectives {
@@ -190,8 +190,8 @@ fn conditions(space: &ConditionSpace) -> f64 {
 }
 
 /// Per number of operations, from none to `most`, the decimal logarithm of the number of ways to choose them, of kinds
-/// each of which has so many variants (a logarithm too). Their order does not matter, and each kind may come as often as
-/// `copies` says.
+/// each of which has so many variants (a logarithm too). Their order does not matter, and each kind may come as often
+/// as `copies` says.
 fn chosen(kinds: &[f64], copies: &[usize], most: usize) -> Vec<f64> {
     let mut ways = vec![f64::NEG_INFINITY; most + 1];
     ways[0] = 0.0;

@@ -5,7 +5,20 @@ use std::io::{self, IsTerminal as _, Write as _};
 
 use sesame_dsl::diagnostic::{shortened, visible};
 
-use super::{Format, Look};
+use crate::frontend::Look;
+
+/// How diagnostics are shown, as the command line names it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Format {
+    /// With the lines of the source.
+    Human,
+    /// One line each: `file:line:column: error[E0203]: …`.
+    Short,
+    /// One JSON object and line each.
+    Json,
+    /// Annotations for GitHub's workflows.
+    Github,
+}
 
 /// Where messages go: standard error, so that standard output is free for what is asked for.
 #[derive(Debug, Clone, Copy)]
@@ -43,14 +56,20 @@ impl Shell {
         self.say("1;32", &format!("{verb:>10}"), what);
     }
 
-    /// Something is being done; the next line replaces this one. Only on a terminal.
+    /// Whether a line of [`doing`](Self::doing) is replaced by the next one, as only a terminal can.
+    pub(super) fn rewrites(self) -> bool {
+        self.terminal
+    }
+
+    /// Something is being done. On a terminal the next line replaces this one; elsewhere it stays.
     pub(super) fn doing(self, verb: &str, what: impl Display) {
-        if self.terminal {
-            let what = what.to_string();
-            let text = format!("\r\x1b[K{} {}", self.painted("1;36", &format!("{verb:>10}")), visible(&what));
-            // A terminal that is gone is no reason to stop.
-            let _ = io::stderr().write_all(text.as_bytes());
+        if !self.terminal {
+            return self.say("1;36", &format!("{verb:>10}"), what);
         }
+        let what = what.to_string();
+        let text = format!("\r\x1b[K{} {}", self.painted("1;36", &format!("{verb:>10}")), visible(&what));
+        // A terminal that is gone is no reason to stop.
+        let _ = io::stderr().write_all(text.as_bytes());
     }
 
     /// Something the user should know.
@@ -90,8 +109,8 @@ impl Shell {
         Ok(())
     }
 
-    /// A line that begins with a painted word. What is said may quote anything, so no sign of it reaches a terminal as a
-    /// command, and no line of it fills the screen.
+    /// A line that begins with a painted word. What is said may quote anything, so no sign of it reaches a terminal as
+    /// a command, and no line of it fills the screen.
     fn say(self, style: &str, word: &str, what: impl Display) {
         let text: Vec<String> = what.to_string().split('\n').map(|line| shortened(line.to_owned())).collect();
         self.line(&format!("{} {}", self.painted(style, word), visible(&text.join("\n"))));
@@ -115,7 +134,8 @@ impl Shell {
     }
 }
 
-/// What was asked for, on standard output. A reader that has seen enough, such as `head`, is not a failure; a full disk is.
+/// What was asked for, on standard output. A reader that has seen enough, such as `head`, is not a failure; a full disk
+/// is.
 pub(super) fn asked_for(text: &str) -> anyhow::Result<()> {
     let mut output = io::stdout().lock();
     match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {

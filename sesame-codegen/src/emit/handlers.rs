@@ -76,7 +76,8 @@ pub(super) fn inputs(plan: &CampaignPlan, types: &Messages<'_>, inputs: &[TopicI
     lines
 }
 
-/// The names on the wire of a topic as the `.sesame` file has them: a group in braces if its members differ in one part.
+/// The names on the wire of a topic as the `.sesame` file has them: a group in braces if its members differ in one
+/// part.
 pub(super) fn paths(topic: &Topic) -> String {
     let [first, rest @ ..] = topic.paths.as_slice() else { return String::new() };
     if rest.is_empty() {

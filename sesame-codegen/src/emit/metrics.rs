@@ -1,4 +1,5 @@
-//! `metrics.rs` (a trait for each hook metric of the space) and `registry.rs` (the hooks of a campaign for the runtime).
+//! `metrics.rs` (a trait for each hook metric of the space) and `registry.rs` (the hooks of a campaign for the
+//! runtime).
 
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};

@@ -1,14 +1,14 @@
-//! `operations.rs` (parameters and a trait for each custom operation of the space), `operation_registry.rs` (the hooks of
-//! a campaign for the runtime), and the stubs of these hooks.
+//! `operations.rs` (parameters and a trait for each custom operation of the space), `operation_registry.rs` (the hooks
+//! of a campaign for the runtime), and the stubs of these hooks.
 
 use proc_macro2::TokenStream;
 use quote::quote;
 use serde::Serialize;
 use sesame_plan::{Domain, Moment, Parameter, Topic, Type};
 
-use super::Problem;
 use super::handlers::{self, handlers, paths};
 use super::messages::{self, Messages, Place};
+use super::problem::Problem;
 use super::registry::{self, Registered};
 use super::rust::{self, one_line};
 use super::text::Templates;

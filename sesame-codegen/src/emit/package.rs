@@ -5,6 +5,12 @@ use std::fmt::Write as _;
 
 use toml::{Table, Value};
 
+/// What a campaign hardly uses and the compiler would optimise for long, with the level it gets instead of 3.
+///
+/// SQLite's is that of the workspace, which builds it for `sesamec` in the same way: runners in a checkout share that.
+const LESS_OPTIMISED: [(&str, u8); 5] =
+    [("clap_builder", 0), ("console", 0), ("indicatif", 0), ("libsqlite3-sys", 1), ("sesame-plan", 1)];
+
 /// The dependencies, with these features of the runtime.
 pub(super) fn with_features(dependencies: &BTreeMap<String, Value>, features: &[&str]) -> BTreeMap<String, Value> {
     let mut dependencies = dependencies.clone();
@@ -64,11 +70,10 @@ pub(super) fn cargo_toml(note: &str, package: &str, dependencies: &BTreeMap<Stri
     );
     let own = format!("[profile.dev.package.{package}]\nopt-level = 1\ndebug = \"line-tables-only\"\n\n");
     text.push_str(&own);
-    text.push_str(
-        "# SQLite would take long to optimise, and has little to do in a campaign.\n\
-         [profile.dev.package.libsqlite3-sys]\n\
-         opt-level = 1\n",
-    );
+    text.push_str("# What has little to do in a campaign, and would take long to optimise.\n");
+    for (name, level) in LESS_OPTIMISED {
+        writeln!(text, "[profile.dev.package.{name}]\nopt-level = {level}").expect("text grows as needed");
+    }
     text
 }
 

@@ -8,9 +8,10 @@ use sesame_plan::{Direction, Type};
 
 use super::handlers::{Handler, handlers, paths};
 use super::messages::{self, Messages, Place};
+use super::metrics;
+use super::problem::Problem;
 use super::rust::one_line;
 use super::text::Templates;
-use super::{Problem, metrics};
 use crate::names;
 use crate::plan::{HookPlan, RunnerPlan};
 

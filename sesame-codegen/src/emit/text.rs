@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use tera::{Context, Tera};
 
-use super::Problem;
+use super::problem::Problem;
 
 /// The templates to fill in. Those of this project hold loops and no logic.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -33,7 +33,8 @@ impl Templates {
 
     /// Fills in the template of a name. Only one of the user's can fail.
     ///
-    /// That this project's templates fit what they are given is an invariant of this crate; its tests render each of them.
+    /// That this project's templates fit what they are given is an invariant of this crate; its tests render each of
+    /// them.
     pub(crate) fn render(&self, name: &str, values: &impl Serialize) -> Result<String, Problem> {
         let ours = || sesame_templates::ALL.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
         let replaced = self.replaced.get(name).map(String::as_str);

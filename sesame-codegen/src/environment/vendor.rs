@@ -1,9 +1,9 @@
 //! Crates that are copied into a runner, so that it builds where there is neither a checkout nor a project.
 //!
-//! Copied are the runtime, the simulator's crate, and every crate they or the hooks reach by a path. Manifests are written
-//! anew: what they inherit from a workspace stands in them, paths lead to the copies beside them, and what only serves
-//! tests is left out. A dependency on the runtime, wherever it came from, is on the copy. Dependencies on registries stay
-//! what they are.
+//! Copied are the runtime, the simulator's crate, and every crate they or the hooks reach by a path. Manifests are
+//! written anew: what they inherit from a workspace stands in them, paths lead to the copies beside them, and what only
+//! serves tests is left out. A dependency on the runtime, wherever it came from, is on the copy. Dependencies on
+//! registries stay what they are.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -26,8 +26,8 @@ const LEFT_OUT: [&str; 9] =
 /// Folders of a crate that only serve its development.
 const LEFT_OUT_FOLDERS: [&str; 4] = ["target", "tests", "benches", "examples"];
 
-/// The files of the copies, by path inside a runner; and lets `dependencies`, whose paths are as seen from `runner`, lead to
-/// them.
+/// The files of the copies, by path inside a runner; and lets `dependencies`, whose paths are as seen from `runner`,
+/// lead to them.
 pub(super) fn vendor(
     runner: &Path,
     dependencies: &mut BTreeMap<String, Value>,

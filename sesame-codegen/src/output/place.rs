@@ -1,9 +1,9 @@
 //! Places below a folder, looked at and written to without following any link.
 //!
-//! The folder itself is as the user named it, and may be a link. Below it every part of a path is looked at before it is
-//! used, so that a folder with links in it, from whomever it comes, cannot lead a generation elsewhere. Whoever could
-//! exchange a folder for a link between the look and the write could as well write what is built and run next, so no
-//! more than that is done about it.
+//! The folder itself is as the user named it, and may be a link. Below it every part of a path is looked at before it
+//! is used, so that a folder with links in it, from whomever it comes, cannot lead a generation elsewhere. Whoever
+//! could exchange a folder for a link between the look and the write could as well write what is built and run next, so
+//! no more than that is done about it.
 
 use std::fs::{self, File, Permissions};
 use std::io::{self, Write as _};
@@ -78,8 +78,8 @@ impl Place<'_> {
         }
     }
 
-    /// Writes the file, and makes the folders on the way: beside its place and then renamed into it, so that a reader sees
-    /// the old file or the new one, never half of it. A link in its place is replaced, never followed.
+    /// Writes the file, and makes the folders on the way: beside its place and then renamed into it, so that a reader
+    /// sees the old file or the new one, never half of it. A link in its place is replaced, never followed.
     pub(super) fn write(self, contents: &[u8]) -> Result<(), Error> {
         if self.look()? == Found::Other {
             return Err(Error::InTheWay { path: self.path(), what: "a file" });

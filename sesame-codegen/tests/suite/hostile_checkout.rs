@@ -1,5 +1,5 @@
-//! A project from somebody else, with links and manifests made to lead a generation elsewhere: whatever lies in the output
-//! folder, nothing outside of it is touched.
+//! A project from somebody else, with links and manifests made to lead a generation elsewhere: whatever lies in the
+//! output folder, nothing outside of it is touched.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -238,11 +238,12 @@ fn links_and_manifests_that_lead_outside_are_refused_or_replaced_and_never_follo
     generate(Mode::Write).unwrap();
     assert!(fs::symlink_metadata(out.join("day/Cargo.toml")).unwrap().is_file());
 
-    // A generated file that is a link: edited by hand for all anybody knows, replaced by force, and its text is not shown.
+    // A generated file that is a link: edited by hand for all anybody knows, replaced by force, and its text is not
+    // shown.
     clear(&out.join("day/Cargo.toml"));
     symlink(&victim, out.join("day/Cargo.toml")).unwrap();
     let refused = generate(Mode::Write).unwrap_err().to_string();
-    assert!(refused.contains("day/Cargo.toml\nit is a link") && !refused.contains("mine"), "{refused}");
+    assert!(refused.contains("day/Cargo.toml\nit is now a link") && !refused.contains("mine"), "{refused}");
     generate(Mode::Force).unwrap();
     assert!(fs::symlink_metadata(out.join("day/Cargo.toml")).unwrap().is_file());
 
@@ -387,7 +388,8 @@ fn what_is_not_a_space_is_never_quoted() {
     let imports = format!("import \"secret\" import \"leak.sesame\" import \"{}\"", absolute.display());
     fs::write(at("importing.sesame"), format!("{SPACE}{imports}")).unwrap();
     for format in ["human", "short", "json", "github"] {
-        for (file, words) in [("importing.sesame", "ends in `.sesame`"), ("leak.sesame", "a file of another kind")] {
+        for (file, words) in [("importing.sesame", "must end in `.sesame`"), ("leak.sesame", "a file of another kind")]
+        {
             let (done, text) = said(folder.path(), &["check", file, "--format", format]);
             assert!(!done && !text.contains("tell_nobody") && text.contains(words), "{text}");
         }

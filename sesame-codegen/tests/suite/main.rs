@@ -7,6 +7,7 @@ mod emitted;
 mod hostile_checkout;
 mod mutated_imports;
 mod options;
+mod originals;
 mod plans;
 mod regeneration;
 mod surroundings;

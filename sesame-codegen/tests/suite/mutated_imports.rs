@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use sesame_codegen::cli::{Shell, run};
-use sesame_codegen::language::SESAME;
+use sesame_codegen::frontend::SESAME;
 use sesame_results::record::Repository;
 
 const WHOLE: &str = include_str!("../originals/arm.model");

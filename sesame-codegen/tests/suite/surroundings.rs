@@ -131,7 +131,7 @@ fn a_program_that_is_given_by_its_path_must_be_there() {
     let missing = dependencies(folder.path(), plan.clone(), Some("1.0.0")).unwrap_err();
     assert_eq!(
         missing,
-        "kuka_cell.sesame says the simulator's program is `bin/robots`, but there is no PROJECT/bin/robots"
+        "kuka_cell.sesame gives the simulator's program as `bin/robots`, but PROJECT/bin/robots does not exist"
     );
     fs::create_dir(folder.path().join("bin")).unwrap();
     fs::write(folder.path().join("bin/robots"), "").unwrap();
@@ -151,4 +151,26 @@ fn a_runtime_is_a_folder_or_a_version() {
     assert_eq!(RuntimeChoice::parse("=0.1.0"), Ok(RuntimeChoice::Version("=0.1.0".into())));
     assert!(RuntimeChoice::parse("../runtime").is_err());
     assert!(RuntimeChoice::parse("path:").is_err());
+}
+
+#[test]
+fn runners_in_the_checkout_of_their_runtime_share_its_target_folder_and_others_have_their_own() {
+    let target = |out: &Path, runtime: &Path| {
+        let runtime = RuntimeChoice::parse(&format!("path:{}", runtime.display())).unwrap();
+        let options = Options { runtime: Some(runtime), ..Options::default() };
+        environment(&out.with_file_name("kuka_cell.sesame"), out, &[small("c")], &options).unwrap().target
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let checkout = folder.path().join("checkout");
+    let (inside, outside) = (checkout.join("examples/cell"), folder.path().join("cell"));
+    project(&inside, "");
+    project(&outside, "");
+    fs::create_dir(checkout.join("runtime")).unwrap();
+    fs::write(checkout.join("runtime/Cargo.toml"), "[package]\nname = \"sesame-runtime\"\n").unwrap();
+    fs::write(checkout.join("Cargo.lock"), "").unwrap();
+    let runtime = checkout.join("runtime");
+    assert_eq!(target(&inside.join("runners"), &runtime).as_deref(), Some("../../../target"));
+    assert_eq!(target(&outside.join("runners"), &runtime), None);
+    fs::remove_file(checkout.join("Cargo.lock")).unwrap();
+    assert_eq!(target(&inside.join("runners"), &runtime), None, "a runtime by itself is not a checkout");
 }

@@ -1,5 +1,5 @@
-//! Advisories in the format of the RustSec database: a file `crates/PACKAGE/RUSTSEC-YYYY-NNNN.md` each, which begins with
-//! facts in TOML.
+//! Advisories in the format of the RustSec database: a file `crates/PACKAGE/RUSTSEC-YYYY-NNNN.md` each, which begins
+//! with facts in TOML.
 //!
 //! RustSec's own library reads the same files, but needs 36 more packages than this; what the audit compares are two
 //! lists of versions.
@@ -153,8 +153,8 @@ pub fn read(folder: &Path, packages: &[Package]) -> Result<Database, AuditError>
     Ok(Database { advisories, covers })
 }
 
-/// The packages that an advisory affects and no exception names, then the exceptions that name nothing of the kind, then
-/// the packages from elsewhere that the database does not cover.
+/// The packages that an advisory affects and no exception names, then the exceptions that name nothing of the kind,
+/// then the packages from elsewhere that the database does not cover.
 ///
 /// Every kind counts: vulnerable, unsound, unmaintained, or a mere notice.
 pub fn problems(packages: &[Package], database: &Database, exceptions: &[Exception]) -> Vec<Problem> {

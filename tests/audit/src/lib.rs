@@ -1,8 +1,8 @@
 //! Holds what the workspace depends on against security advisories, licences and sources.
 //!
-//! [`locked`] reads `Cargo.lock`, [`licence`] what `cargo metadata` says of licences, [`advisory`] a folder in the format
-//! of the RustSec advisory database, and [`agreed`] what this project accepts. [`audit`] compares them and returns every
-//! [`Problem`]; none means that all packages may stay.
+//! [`locked`] reads `Cargo.lock`, [`licence`] what `cargo metadata` says of licences, [`advisory`] a folder in the
+//! format of the RustSec advisory database, and [`agreed`] what this project accepts. [`audit`] compares them and
+//! returns every [`Problem`]; none means that all packages may stay.
 
 pub mod advisory;
 pub mod agreed;

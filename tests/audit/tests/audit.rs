@@ -5,8 +5,8 @@ use std::process::Command;
 
 use sesame_audit::{Problem, advisory, agreed, audit, licence, locked};
 
-/// With `SESAME_ADVISORY_DB`, a folder, against that database; a relative one is looked for from the workspace. Without,
-/// against the project's snapshot.
+/// With `SESAME_ADVISORY_DB`, a folder, against that database; a relative one is looked for from the workspace.
+/// Without, against the project's snapshot.
 #[test]
 fn no_dependency_has_an_advisory_a_licence_or_a_source_that_was_not_agreed_to() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -1,8 +1,8 @@
-//! What large campaigns cost afterwards: their size on disk, taking one up again, reporting on it, its digest; and what the
-//! supervisor holds in memory while one runs.
+//! What large campaigns cost afterwards: their size on disk, taking one up again, reporting on it, its digest; and what
+//! the supervisor holds in memory while one runs.
 //!
-//! A runner is generated, built and run with one worker. Its tests last 500 steps, and two metrics change with each step that
-//! is disturbed: one to two hundred points a test.
+//! A runner is generated, built and run with one worker. Its tests last 500 steps, and two metrics change with each
+//! step that is disturbed: one to two hundred points a test.
 
 use std::fs;
 use std::path::Path;

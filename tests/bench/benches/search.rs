@@ -1,6 +1,6 @@
 //! What the search costs without any simulation: hypervolumes of many objectives, exact and as a campaign has them; and
-//! evaluations per second of NSGA-II on published problems, and the hypervolume they reach. Beside it, where `SESAME_OPTIMISERS_PYTHON` names a Python with them, pygmo and pymoo in the
-//! same run, turn by turn.
+//! evaluations per second of NSGA-II on published problems, and the hypervolume they reach. Beside it, where
+//! `SESAME_OPTIMISERS_PYTHON` names a Python with them, pygmo and pymoo in the same run, turn by turn.
 
 use std::hint::black_box;
 use std::time::Instant;

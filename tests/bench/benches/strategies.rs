@@ -1,5 +1,6 @@
-//! What strategies cost beside the simulations: seconds spent in whole campaigns of 100, 1,000 and 10,000 tests in which
-//! nothing is simulated, and how they grow. With each test come its point, the front, the cells, and the rules that stop.
+//! What strategies cost beside the simulations: seconds spent in whole campaigns of 100, 1,000 and 10,000 tests in
+//! which nothing is simulated, and how they grow. With each test come its point, the front, the cells, and the rules
+//! that stop.
 
 use std::time::{Duration, Instant};
 
@@ -162,8 +163,8 @@ fn main() {
     for (name, search, exploration) in strategies {
         let row = counts.iter().map(|&count| {
             let plan = plan(search(count), exploration.clone());
-            // Of five, the quickest is the one least disturbed by whatever else the machine does; one that takes long is
-            // disturbed little.
+            // Of five, the quickest is the one least disturbed by whatever else the machine does; one that takes long
+            // is disturbed little.
             let first = spent(&plan);
             let more = if measured && first < Duration::from_secs(1) { 4 } else { 0 };
             let quickest = (0..more).map(|_| spent(&plan)).fold(first, Duration::min);

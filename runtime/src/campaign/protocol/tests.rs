@@ -45,7 +45,8 @@ fn heard(stream: &mut InParts) -> Result<Option<String>, ()> {
 }
 
 proptest! {
-    /// However a greeting comes in parts, it is the one that would have been read in one go, and nothing after it is taken.
+    /// However a greeting comes in parts, it is the one that would have been read in one go, and nothing after it is
+    /// taken.
     #[test]
     fn a_greeting_in_parts_is_what_it_is_in_one_go(
         token in proptest::option::of(".{0,300}"),

@@ -1,0 +1,300 @@
+//! From the tests that a campaign performed to records of the results repository.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use sesame_base::observation::{MetricObservation, Observation, OperationEffect, Outcome, WallTime};
+use sesame_plan::{CampaignPlan, Choice, MetricId, OperationId, Span, TestOperation, condition as plan_condition};
+use sesame_results::record::{Origin, RecordError, Recorder, ResultSet, Status, TestRecord};
+
+use crate::notes::{Kind, Notes};
+use crate::original::{
+    Activation, Campaign, Comparison, Condition, Domain, Operand, Operation, OperationKind, Original, Test,
+};
+use crate::parts::{Effect, Part, matching};
+use crate::writer::Mapped;
+use crate::xml::{cleaned, printable};
+
+/// How much was recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Recorded {
+    /// Tests.
+    pub tests: usize,
+    /// Sets of them.
+    pub sets: usize,
+}
+
+/// One campaign of a file beside its plan.
+struct Importer<'o> {
+    original: &'o Original,
+    mapped: &'o Mapped,
+    plan: &'o CampaignPlan,
+    metrics: BTreeMap<&'o str, MetricId>,
+    operations: BTreeMap<&'o str, OperationId>,
+}
+
+/// Records what a campaign performed into a folder that holds no results.
+pub(crate) fn record(
+    original: &Original,
+    mapped: &Mapped,
+    at: usize,
+    plan: &CampaignPlan,
+    folder: &Path,
+    notes: &mut Notes,
+) -> Result<Recorded, RecordError> {
+    let campaign = &original.campaigns[at];
+    let metrics = (0..).zip(&plan.metrics).map(|(id, metric)| (metric.name.as_str(), MetricId(id))).collect();
+    let operations =
+        (0..).zip(&plan.operations).map(|(id, operation)| (operation.name.as_str(), OperationId(id))).collect();
+    let importer = Importer { original, mapped, plan, metrics, operations };
+    let mut recorder = Recorder::create(folder, plan, plan.campaign.seed, 0)?;
+    for (index, test) in campaign.tests.iter().enumerate() {
+        recorder.commit(&importer.test(at, index, test, notes))?;
+    }
+    let names: Vec<(u32, String)> =
+        campaign.tests.iter().enumerate().map(|(index, test)| (number_of(index), printable(&test.name))).collect();
+    recorder.put_original_names(names.iter().map(|(number, name)| (*number, name.as_str())))?;
+    let sets = importer.sets(at, campaign, notes);
+    for set in &sets {
+        recorder.put_result_set(set)?;
+    }
+    recorder.finish("it was imported")?;
+    Ok(Recorded { tests: campaign.tests.len(), sets: sets.len() })
+}
+
+/// The number of a performed test: T0 is the undisturbed run, which the original never made.
+fn number_of(index: usize) -> u32 {
+    u32::try_from(index + 1).expect("a file holds fewer than 2^32 tests")
+}
+
+impl Importer<'_> {
+    fn test(&self, campaign: usize, index: usize, test: &Test, notes: &mut Notes) -> TestRecord {
+        let mut operations = Vec::new();
+        let mut effects = Vec::new();
+        for operation in &test.operations {
+            for (held, effect) in self.operations(operation, notes) {
+                operations.push(held);
+                effects.push(effect);
+            }
+        }
+        let mut metrics = vec![MetricObservation::default(); self.plan.metrics.len()];
+        for &(metric, value) in &test.values {
+            let at = self.original.metric(metric).and_then(|at| self.mapped.metrics[at].as_deref());
+            let Some(&id) = at.and_then(|name| self.metrics.get(name)) else {
+                notes.say(Kind::LeftOut, "values of what is no metric");
+                continue;
+            };
+            if !value.is_finite() {
+                notes.say(
+                    Kind::LeftOut,
+                    format!("values of `{}` that are no finite numbers", self.plan.metric(id).name),
+                );
+                continue;
+            }
+            let default = self.original.metric(metric).and_then(|at| self.original.metrics[at].default);
+            metrics[id.index()] = MetricObservation::whole(Some(value), default != Some(value), Vec::new());
+        }
+        let mut parents = Vec::new();
+        for &parent in &test.parents {
+            match self.original.test(parent) {
+                Some((of, at)) if of == campaign => parents.push(number_of(at)),
+                _ => notes.say(Kind::LeftOut, "parents of tests that are in no list of the same campaign"),
+            }
+        }
+        TestRecord {
+            number: number_of(index),
+            origin: Origin::Search,
+            generation: None,
+            parents,
+            test: sesame_plan::Test { operations },
+            simulator_seed: 0,
+            duplicate_of: None,
+            observation: Observation {
+                outcome: Outcome::Unknown,
+                end: self.plan.campaign.end_after,
+                operations: effects,
+                unheard: Vec::new(),
+                metrics,
+                messages: 0,
+                warnings: Vec::new(),
+                wall: WallTime::default(),
+            },
+        }
+    }
+
+    /// What an operation of a test became: one for each part that can be said.
+    fn operations(&self, operation: &Operation, notes: &mut Notes) -> Vec<(TestOperation, OperationEffect)> {
+        let Some(at) = self.mapped.holders.find(self.original, operation) else { return Vec::new() };
+        let template = &self.mapped.holders.operations[at];
+        if self.mapped.parts[at].is_empty() {
+            notes.say(Kind::LeftOut, "operations of performed tests whose operation of the space was left out");
+        }
+        let mut held = Vec::new();
+        for part in &self.mapped.parts[at] {
+            match self.part(operation, template, part) {
+                Ok(done) => held.push(done),
+                Err(why) => notes.say(Kind::LeftOut, format!("`{}` in performed tests where {why}", part.name)),
+            }
+        }
+        held
+    }
+
+    fn part(
+        &self,
+        operation: &Operation,
+        template: &Operation,
+        part: &Part,
+    ) -> Result<(TestOperation, OperationEffect), String> {
+        let id = *self.operations.get(part.name.as_str()).ok_or("the campaign does not use it")?;
+        let parameters = choices(operation, template, &part.effect)?;
+        let offline = matches!(part.effect, Effect::Custom { offline: true, .. });
+        let (activation, planned) =
+            if offline { (sesame_plan::Activation::Offline, None) } else { self.activation(&operation.activation)? };
+        // Activity by time was never measured: the original switched by the clock alone.
+        let active = operation.recorded.filter(|_| !offline).or(planned);
+        let intervals = active.and_then(|(start, end)| {
+            let (start, end) = (start.max(0.0), end.min(self.plan.campaign.end_after));
+            (start < end).then_some(Span { start, end })
+        });
+        let test_operation =
+            TestOperation { operation: id, activation, parameters, draw_seed: operation.seed.cast_unsigned() };
+        let effect = OperationEffect { intervals: intervals.into_iter().collect(), ..OperationEffect::default() };
+        Ok((test_operation, effect))
+    }
+
+    /// When an operation was to be active, and the window if time decided it.
+    fn activation(&self, activation: &Activation) -> Result<(sesame_plan::Activation, Option<(f64, f64)>), String> {
+        let condition = |condition: &Option<Condition>| match condition {
+            Some(condition) => self.condition(condition).map(Some),
+            None => Ok(None),
+        };
+        match activation {
+            Activation::Time(start, end) => {
+                let (start, end) = (start.min(*end), start.max(*end));
+                Ok((sesame_plan::Activation::Time { start, end }, Some((start, end))))
+            }
+            Activation::Condition(start, end) => match (condition(start)?, condition(end)?) {
+                (Some(start), Some(end)) => Ok((sesame_plan::Activation::Condition { start, end, times: 1 }, None)),
+                (Some(start), None) => {
+                    let length = self.plan.campaign.end_after;
+                    Ok((sesame_plan::Activation::ConditionFor { start, length, times: 1 }, None))
+                }
+                (None, _) => Err("nothing starts it".to_owned()),
+            },
+            Activation::ConditionFor(start, length) => match condition(start)? {
+                Some(start) => Ok((sesame_plan::Activation::ConditionFor { start, length: *length, times: 1 }, None)),
+                None => Err("nothing starts it".to_owned()),
+            },
+            Activation::Unsaid => Err("it does not say when it is active".to_owned()),
+        }
+    }
+
+    fn condition(&self, condition: &Condition) -> Result<plan_condition::Condition, String> {
+        let metric = |reference| {
+            let name = self.original.metric(reference).and_then(|at| self.mapped.metrics[at].as_deref());
+            let id = name.and_then(|name| self.metrics.get(name)).copied();
+            id.ok_or_else(|| "its condition compares what is no metric".to_owned())
+        };
+        Ok(match condition {
+            Condition::Compare(left, by, right) => plan_condition::Condition::Compare {
+                left: plan_condition::Operand::Variable(metric(*left)?),
+                by: match by {
+                    Comparison::Less => plan_condition::Comparison::Below,
+                    Comparison::Greater => plan_condition::Comparison::Above,
+                    Comparison::Equal => plan_condition::Comparison::Equal,
+                },
+                right: match *right {
+                    Operand::Metric(right) => plan_condition::Operand::Variable(metric(right)?),
+                    Operand::Integer(value) => plan_condition::Operand::Number(value as f64),
+                },
+            },
+            Condition::And(a, b) => {
+                plan_condition::Condition::And(Box::new(self.condition(a)?), Box::new(self.condition(b)?))
+            }
+            Condition::Or(a, b) => {
+                plan_condition::Condition::Or(Box::new(self.condition(a)?), Box::new(self.condition(b)?))
+            }
+        })
+    }
+
+    /// The sets of a campaign, under names of their own, their generations in the order of evaluations.
+    fn sets(&self, campaign: usize, of: &Campaign, notes: &mut Notes) -> Vec<ResultSet> {
+        let evaluations = |name: &str| name.rsplit('-').next().and_then(|last| last.parse::<u64>().ok());
+        let mut generations: Vec<u64> = of.sets.iter().filter_map(|set| evaluations(&set.name)).collect();
+        generations.sort_unstable();
+        generations.dedup();
+        let mut taken: BTreeMap<String, usize> = BTreeMap::new();
+        let mut sets = Vec::new();
+        for set in &of.sets {
+            let plain = printable(&set.name);
+            let plain = if plain.is_empty() { "set".to_owned() } else { plain };
+            let times = taken.entry(plain.clone()).or_default();
+            *times += 1;
+            let name = if *times == 1 { plain } else { format!("{plain}-{times}") };
+            let mut members = Vec::new();
+            for &member in &set.members {
+                match self.original.test(member) {
+                    Some((at, index)) if at == campaign => members.push(number_of(index)),
+                    _ => notes.say(Kind::LeftOut, "members of result sets that are no tests of the same campaign"),
+                }
+            }
+            let generation = evaluations(&set.name).and_then(|it| generations.binary_search(&it).ok());
+            sets.push(ResultSet {
+                name,
+                generation: generation.and_then(|it| u32::try_from(it).ok()),
+                status: if set.last { Status::Final } else { Status::Intermediate },
+                members,
+            });
+        }
+        sets
+    }
+}
+
+/// What a test chose for the parameters of a part.
+fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Result<Vec<Choice>, String> {
+    let domain = |at: usize| {
+        let (
+            OperationKind::RandomValue { values: held, .. } | OperationKind::Custom { parameters: held },
+            OperationKind::RandomValue { values: permitted, .. } | OperationKind::Custom { parameters: permitted },
+        ) = (&operation.kind, &template.kind)
+        else {
+            return Err("it does something else".to_owned());
+        };
+        matching(held, permitted, at).map(|set| &set.domain).ok_or_else(|| "it has no value of its own".to_owned())
+    };
+    Ok(match (effect, &operation.kind) {
+        (&Effect::Value { set, .. }, _) => match *domain(set)? {
+            Domain::Reals(low, high) => vec![Choice::Range { low: low.min(high), high: low.max(high) }],
+            Domain::Integers(low, high) => {
+                vec![Choice::Range { low: low.min(high) as f64, high: low.max(high) as f64 }]
+            }
+            _ => return Err("it does not choose numbers".to_owned()),
+        },
+        // What the original used of a range is its lower end.
+        (Effect::Loss, OperationKind::PacketLoss { keep }) => vec![Choice::Value { value: 1.0 - keep.0.min(keep.1) }],
+        (Effect::Delay { randomised: false }, OperationKind::Latency { delay, .. }) => {
+            vec![Choice::Value { value: delay.0.min(delay.1) }]
+        }
+        (Effect::Delay { randomised: true }, OperationKind::Latency { delay, .. }) => {
+            vec![Choice::Range { low: delay.0.min(delay.1), high: delay.0.max(delay.1) }]
+        }
+        (Effect::Custom { parameters, .. }, _) => {
+            let mut chosen = Vec::new();
+            for (_, at) in parameters {
+                chosen.push(match domain(*at)? {
+                    Domain::Reals(low, high) => Choice::Value { value: low.min(*high) },
+                    Domain::Integers(low, high) => Choice::Value { value: *low.min(high) as f64 },
+                    Domain::Points(low, _) => Choice::Point { point: *low },
+                    Domain::Texts(texts) => match texts.first() {
+                        Some(text) => Choice::Text { text: cleaned(text) },
+                        None => return Err("it chooses no text".to_owned()),
+                    },
+                    Domain::Other(_) => return Err("it chooses something that nothing is like".to_owned()),
+                });
+            }
+            chosen
+        }
+        (Effect::Blackhole, _) => Vec::new(),
+        (Effect::Loss | Effect::Delay { .. }, _) => return Err("it does something else".to_owned()),
+    })
+}

@@ -1,0 +1,74 @@
+//! What the parts of a space share while they are written: names that were given, and what of the original became what.
+
+use crate::naming::Names;
+use crate::notes::{Kind, Notes};
+use crate::original::{Original, Reference};
+use crate::parts::{Holders, Part};
+use crate::types::{Messages, Type};
+use crate::xml::{cleaned, printable};
+
+/// What of the original became what.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Mapped {
+    /// The `.sesame` file.
+    pub(crate) text: String,
+    /// Names of metrics, by position in the original.
+    pub(crate) metrics: Vec<Option<String>>,
+    /// What tests hold.
+    pub(crate) holders: Holders,
+    /// What each of those became.
+    pub(crate) parts: Vec<Vec<Part>>,
+    /// Names of campaigns, by position in the original.
+    pub(crate) campaigns: Vec<Option<String>>,
+}
+
+/// What is known while the text is written.
+pub(crate) struct Writer<'o> {
+    pub(crate) original: &'o Original,
+    pub(crate) notes: &'o mut Notes,
+    pub(crate) names: Names,
+    pub(crate) mapped: Mapped,
+    /// Types of messages, as far as the file and the operations tell them.
+    pub(crate) messages: Messages,
+    /// By position of what tests hold: the earliest end of a test that may hold it, in seconds.
+    pub(crate) first_ends: Vec<f64>,
+    /// By position of the variable.
+    pub(crate) topics: Vec<Option<(String, Type)>>,
+}
+
+impl Writer<'_> {
+    /// A name for something of a kind, like the one it had; that it is another one is told.
+    pub(crate) fn name(&mut self, kind: &str, original: &str) -> String {
+        let name = self.names.take(original, kind);
+        if !original.is_empty() && name != original {
+            self.notes.say(Kind::Renamed, format!("{kind} `{}` is `{name}` here", printable(original)));
+        }
+        name
+    }
+
+    /// The topic that a reference to a variable became.
+    pub(crate) fn topic(&self, variable: Reference) -> Option<&(String, Type)> {
+        self.topics[self.original.variable(variable)?].as_ref()
+    }
+
+    /// The name of the metric that a reference to one became.
+    pub(crate) fn metric(&self, metric: Reference) -> Option<&str> {
+        self.mapped.metrics[self.original.metric(metric)?].as_deref()
+    }
+}
+
+/// A number as the language writes it.
+pub(crate) fn number(value: f64) -> String {
+    // Zero has no sign.
+    format!("{}", value + 0.0)
+}
+
+/// A share as the language writes it, with the digits that were meant.
+pub(crate) fn percent(share: f64) -> String {
+    format!("{}%", number((share * 1e11).round() / 1e9))
+}
+
+/// A text as the language writes it.
+pub(crate) fn quoted_text(text: &str) -> String {
+    sesame_dsl::quoted(&cleaned(text))
+}

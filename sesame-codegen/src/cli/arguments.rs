@@ -1,0 +1,74 @@
+//! Arguments that several commands share.
+
+use std::path::PathBuf;
+
+use super::shell::Format;
+use crate::environment::{Options, RuntimeChoice};
+
+/// Which diagnostics fail the command besides errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Deny {
+    /// Warnings.
+    Warnings,
+}
+
+/// How diagnostics are shown.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct Diagnostics {
+    /// How errors and warnings of the space are shown: `human` and `short` on standard error, `json` and `github` on
+    /// standard output.
+    #[arg(long, value_enum, default_value_t = Format::Human)]
+    pub(super) format: Format,
+}
+
+/// How a definition and its uses are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub(super) enum ExplainFormat {
+    /// Text.
+    #[default]
+    Human,
+    /// One JSON object.
+    Json,
+}
+
+/// What is generated, and where.
+#[derive(Debug, clap::Args)]
+pub(super) struct Generation {
+    /// The `.sesame` file.
+    pub(super) file: PathBuf,
+    /// The campaign; if omitted, all of them for `generate`, and the only one for `run`.
+    #[arg(long, short)]
+    pub(super) campaign: Option<String>,
+    /// The folder for the runners; if omitted, `runners` beside the file.
+    #[arg(long, short = 'o', value_name = "FOLDER")]
+    pub(super) out: Option<PathBuf>,
+    /// Overwrite generated files that were edited by hand. Hooks are never overwritten.
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Where the runtime comes from: `path:FOLDER`, `git:URL`, `git:URL?tag=TAG` (or `branch=`, `rev=`), or a version.
+    /// If omitted: [runtime] in sesame.toml, else the checkout that sesamec was built from, else the released version.
+    #[arg(long, value_parser = RuntimeChoice::parse)]
+    pub(super) runtime: Option<RuntimeChoice>,
+    /// A folder with templates in place of sesamec's own, by their names; if omitted, `templates` in sesame.toml.
+    #[arg(long, value_name = "FOLDER")]
+    pub(super) templates: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) diagnostics: Diagnostics,
+}
+
+/// What `generate` does beside writing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Purpose {
+    /// Writing.
+    Write,
+    /// Telling by the exit code whether anything would be written.
+    Check,
+    /// Showing what would be written.
+    DryRun,
+}
+
+impl Generation {
+    pub(super) fn options(&self) -> Options {
+        Options { runtime: self.runtime.clone(), templates: self.templates.clone(), ..Options::default() }
+    }
+}

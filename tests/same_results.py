@@ -1,0 +1,162 @@
+#!/usr/bin/env python3
+"""Runs every campaign of both examples with two versions of Sesame and compares what they recorded.
+
+    tests/same_results.py BEFORE [AFTER]
+
+BEFORE and AFTER are git revisions; AFTER is the current commit if omitted. `coverage_experiment` runs with the seeds 1 to
+10, every other campaign with its own seed. The exit code is 0 if the results are equal, 1 otherwise.
+
+What is compared: every row of every table, column by column, with the words of an earlier results schema translated
+(RENAMED_COLUMNS, RENAMED_VALUES). What is not: columns that hold versions, wall times, hosts, or the plan as JSON
+(IGNORED), and the sentences of warnings. Columns that only one version has are listed. Both digests are printed too: they
+are equal if the schema and the words are.
+
+Needs Python 3.9, git and cargo. Everything it makes lies in target/same_results.
+"""
+
+import hashlib
+import pathlib
+import sqlite3
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+FOLDER = ROOT / "target" / "same_results"
+
+EXAMPLES = ["kuka_cell", "two_robots"]
+SEEDS = {"coverage_experiment": range(1, 11)}
+
+# Earlier name -> name today.
+RENAMED_COLUMNS = {
+    ("operations", "draw_seed"): "operation_seed",
+    ("indicators", "void"): "no_effect",
+}
+RENAMED_VALUES = {
+    ("tests", "outcome"): {"void": "no_effect"},
+    ("repetitions", "outcome"): {"void": "no_effect"},
+}
+# Tables and columns that differ from run to run or from version to version.
+IGNORED_TABLES = {"sessions", "wall_times", "meta"}
+IGNORED = {
+    ("campaign", "plan"),
+    ("campaign", "schema"),
+    ("campaign", "generator"),
+    ("campaign", "runtime"),
+    ("campaign", "task"),
+    ("tests", "time_limit_s"),
+    ("repetitions", "time_limit_s"),
+    ("events", "text"),
+    ("events", "id"),
+}
+
+
+def call(*command, folder=ROOT):
+    print("   ", " ".join(str(word) for word in command), flush=True)
+    subprocess.run([str(word) for word in command], cwd=folder, check=True, stdin=subprocess.DEVNULL)
+
+
+def campaigns(folder, example):
+    """The campaigns of an example, as `sesamec generate` makes a runner of each."""
+    call("target/debug/sesamec", "generate", f"examples/{example}/{example}.sesame", folder=folder)
+    runners = folder / "examples" / example / "runners"
+    return sorted(runner.parent for runner in runners.glob("*/Cargo.toml"))
+
+
+def results_of(revision):
+    """Checks a revision out, builds it, and runs everything; returns the results files by campaign and seed."""
+    commit = subprocess.run(
+        ["git", "rev-parse", "--verify", revision + "^{commit}"], cwd=ROOT, check=True, capture_output=True, text=True
+    ).stdout.strip()
+    folder = FOLDER / commit
+    if not folder.exists():
+        call("git", "worktree", "add", "--detach", folder, commit)
+    call("cargo", "build", "--quiet", "--locked", "--package", "sesame-codegen", folder=folder)
+    results = {}
+    for example in EXAMPLES:
+        for runner in campaigns(folder, example):
+            for seed in SEEDS.get(runner.name, [None]):
+                place = f"same_{seed if seed is not None else 'own'}"
+                found = runner / "results" / place / "results.sqlite"
+                if not found.exists():
+                    seeds = [] if seed is None else ["--seed", seed]
+                    options = ["--results", runner / "results" / place, "--fail-on", "nothing"]
+                    call("cargo", "run", "--quiet", "--", "run", *seeds, *options, folder=runner)
+                results[example, runner.name, seed] = (runner, runner / "results" / place)
+    return results
+
+
+def rows(connection, table):
+    """The columns of a table by the names of today, and its rows, sorted, with the words of today."""
+    cursor = connection.execute(f'SELECT * FROM "{table}"')
+    names = [column[0] for column in cursor.description]
+    kept = [(at, name) for at, name in enumerate(names) if (table, name) not in IGNORED]
+    columns = [RENAMED_COLUMNS.get((table, name), name) for _, name in kept]
+    words = [RENAMED_VALUES.get((table, name), {}) for name in columns]
+    found = [tuple(word.get(row[at], row[at]) for (at, _), word in zip(kept, words)) for row in cursor]
+    return columns, found
+
+
+def content(folder):
+    """Every table of a results file: its columns, and a hash for each column over the rows in their order."""
+    files = list(folder.rglob("results.sqlite"))
+    if len(files) != 1:
+        raise SystemExit(f"error: {folder} holds {len(files)} results files, not one")
+    connection = sqlite3.connect(f"file:{files[0]}?mode=ro", uri=True)
+    tables = [name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name")]
+    made = {}
+    for table in tables:
+        if table in IGNORED_TABLES or table.startswith("sqlite_"):
+            continue
+        columns, found = rows(connection, table)
+        # By the columns in the order of their names, so that a column that moved changes nothing.
+        order = sorted(range(len(columns)), key=lambda at: columns[at])
+        found = sorted((tuple(repr(row[at]) for at in order) for row in found))
+        made[table] = {
+            columns[at]: hashlib.sha256("\n".join(row[place] for row in found).encode()).hexdigest()
+            for place, at in enumerate(order)
+        }
+        made[table]["(number of rows)"] = str(len(found))
+    return made
+
+
+def digest(runner, folder):
+    place = next(folder.rglob("results.sqlite")).parent
+    words = ["cargo", "run", "--quiet", "--", "digest", "--results", str(place)]
+    return subprocess.run(words, cwd=runner, check=True, capture_output=True, text=True).stdout.strip()
+
+
+def main():
+    if len(sys.argv) not in (2, 3) or sys.argv[1] in ("-h", "--help"):
+        print(__doc__)
+        return 0 if len(sys.argv) == 2 else 2
+    before = results_of(sys.argv[1])
+    after = results_of(sys.argv[2] if len(sys.argv) == 3 else "HEAD")
+    differing = 0
+    one_sided = set()
+    for key in sorted(before.keys() | after.keys(), key=str):
+        named = "/".join(str(part) for part in key if part is not None)
+        if key not in before or key not in after:
+            print(f"{named}: only {'before' if key in before else 'after'}")
+            differing += 1
+            continue
+        old, new = content(before[key][1]), content(after[key][1])
+        found = []
+        for table in sorted(old.keys() | new.keys()):
+            for column in sorted(old.get(table, {}).keys() | new.get(table, {}).keys()):
+                sides = old.get(table, {}).get(column), new.get(table, {}).get(column)
+                if None in sides:
+                    one_sided.add(f"{table}.{column}: only {'before' if sides[1] is None else 'after'}")
+                elif sides[0] != sides[1]:
+                    found.append(f"{table}.{column}")
+        differing += bool(found)
+        digests = digest(*before[key]), digest(*after[key])
+        same = "equal digests" if digests[0] == digests[1] else f"digests {digests[0][:12]} and {digests[1][:12]}"
+        print(f"{named}: {'DIFFERS in ' + ', '.join(found) if found else 'equal'}, {same}", flush=True)
+    for line in sorted(one_sided):
+        print(line)
+    print(f"{len(before.keys() | after.keys())} campaigns, {differing} of them differ")
+    return 1 if differing else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,303 @@
+//! The crates depend on each other as ARCHITECTURE.md says, and the files of a crate on each other in one direction.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use syn::visit::{self, Visit};
+
+use sesame_tests::workspace;
+
+/// What each crate links of the others, as its manifest says: dependencies of tests are left out.
+fn manifests() -> BTreeMap<String, BTreeSet<String>> {
+    let root: toml::Table = toml::from_str(&fs::read_to_string(workspace().join("Cargo.toml")).unwrap()).unwrap();
+    let members = root["workspace"]["members"].as_array().unwrap();
+    let mut crates = BTreeMap::new();
+    for member in members {
+        let manifest = fs::read_to_string(workspace().join(member.as_str().unwrap()).join("Cargo.toml")).unwrap();
+        let manifest: toml::Table = toml::from_str(&manifest).unwrap();
+        let name = manifest["package"]["name"].as_str().unwrap().to_owned();
+        let ours = |table: &toml::Table| -> BTreeSet<String> {
+            table.keys().filter(|name| name.starts_with("sesame-")).cloned().collect()
+        };
+        crates.insert(name, manifest.get("dependencies").and_then(toml::Value::as_table).map(ours).unwrap_or_default());
+    }
+    crates
+}
+
+/// The graph as ARCHITECTURE.md prints it: a crate and what it links on each line, the lowest first.
+fn graph(text: &str) -> Vec<(String, BTreeSet<String>)> {
+    let block = text.split("```crates\n").nth(1).and_then(|rest| rest.split("```").next());
+    let lines = block.expect("ARCHITECTURE.md has a block of crates").lines();
+    lines
+        .map(|line| {
+            let (name, links) = line.split_once('→').unwrap_or((line, ""));
+            let links = links.split(',').map(str::trim).filter(|link| !link.is_empty()).map(str::to_owned);
+            (name.trim().to_owned(), links.collect())
+        })
+        .collect()
+}
+
+/// What a graph says against these manifests, or against itself, in sentences.
+fn objections(graph: &[(String, BTreeSet<String>)], crates: &BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
+    let mut objections = Vec::new();
+    let mut below = BTreeSet::new();
+    for (name, links) in graph {
+        for up in links.iter().filter(|link| !below.contains(*link)) {
+            objections.push(format!("{name} links {up}, which is not above it in the list: an arrow that runs up"));
+        }
+        below.insert(name.clone());
+        match crates.get(name) {
+            None => objections.push(format!("{name} is in ARCHITECTURE.md and not in the workspace")),
+            Some(linked) if linked != links => objections.push(format!(
+                "{name} links {linked:?}, and ARCHITECTURE.md says {links:?}: change the list only if the idea of the crate changed"
+            )),
+            Some(_) => {}
+        }
+    }
+    let missing = crates.keys().filter(|name| !below.contains(*name));
+    objections.extend(missing.map(|name| format!("{name} is missing in ARCHITECTURE.md")));
+    objections
+}
+
+#[test]
+fn crates_link_each_other_as_the_architecture_says() {
+    let text = fs::read_to_string(workspace().join("ARCHITECTURE.md")).unwrap();
+    let objections = objections(&graph(&text), &manifests());
+    assert!(objections.is_empty(), "{objections:#?}");
+}
+
+#[test]
+fn an_arrow_that_runs_up_a_missing_crate_and_another_link_are_objected_to() {
+    let links = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<BTreeSet<_>>();
+    let crates = BTreeMap::from([
+        ("low".to_owned(), links(&[])),
+        ("high".to_owned(), links(&["low"])),
+        ("new".to_owned(), links(&[])),
+    ]);
+    let listed = |low: &[&str], high: &[&str]| {
+        vec![("low".to_owned(), links(low)), ("high".to_owned(), links(high)), ("new".to_owned(), links(&[]))]
+    };
+    assert!(objections(&listed(&[], &["low"]), &crates).is_empty());
+    assert!(objections(&listed(&["high"], &["low"]), &crates)[0].contains("runs up"));
+    assert!(objections(&listed(&[], &[]), &crates)[0].contains("high links {\"low\"}"));
+    assert_eq!(objections(&listed(&[], &["low"])[..2], &crates), ["new is missing in ARCHITECTURE.md"]);
+}
+
+/// A file of a crate as the path of its module.
+type Module = Vec<String>;
+
+/// Which module names which, in the code that is not for tests.
+#[derive(Default)]
+struct Files {
+    sources: BTreeMap<Module, syn::File>,
+    /// What a module re-exports: a name, and where it comes from.
+    reexports: BTreeMap<Module, BTreeMap<String, Module>>,
+}
+
+impl Files {
+    fn read(crate_folder: &Path) -> Files {
+        let mut files = Files::default();
+        let mut waiting = vec![crate_folder.join("src")];
+        while let Some(folder) = waiting.pop() {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    waiting.push(path);
+                } else if path.extension().is_some_and(|extension| extension == "rs") {
+                    files.add(&path, &crate_folder.join("src"));
+                }
+            }
+        }
+        let modules: Vec<Module> = files.sources.keys().cloned().collect();
+        for module in modules {
+            let mut found = BTreeMap::new();
+            for item in &files.sources[&module].items {
+                let syn::Item::Use(used) = item else { continue };
+                if matches!(used.vis, syn::Visibility::Inherited) {
+                    continue;
+                }
+                for path in paths(&used.tree) {
+                    let Some(target) = files.absolute(&module, &path) else { continue };
+                    if let Some(name) = path.last() {
+                        found.insert(name.clone(), target);
+                    }
+                }
+            }
+            files.reexports.insert(module, found);
+        }
+        files
+    }
+
+    fn add(&mut self, path: &Path, src: &Path) {
+        let relative: PathBuf = path.strip_prefix(src).unwrap().with_extension("");
+        let mut module: Module = relative.iter().map(|part| part.to_str().unwrap().to_owned()).collect();
+        if module == ["lib"] || module == ["main"] {
+            module.clear();
+        }
+        let for_tests = |part: &String| part == "tests" || part == "testing";
+        if module.iter().any(for_tests) || module.first().is_some_and(|part| part == "bin") {
+            return;
+        }
+        let file = syn::parse_file(&fs::read_to_string(path).unwrap()).unwrap_or_else(|e| panic!("{path:?}: {e}"));
+        self.sources.insert(module, file);
+    }
+
+    /// A path as seen from a module, from the crate's root; `None` if it leads out of the crate.
+    fn absolute(&self, module: &Module, path: &[String]) -> Option<Module> {
+        let (first, rest) = path.split_first()?;
+        let base = match first.as_str() {
+            "crate" => Module::new(),
+            "self" => module.clone(),
+            "super" => module[..module.len().checked_sub(1)?].to_vec(),
+            child => {
+                let mut child_module = module.clone();
+                child_module.push(child.to_owned());
+                return self.sources.contains_key(&child_module).then(|| [child_module, rest.to_vec()].concat());
+            }
+        };
+        Some([base, rest.to_vec()].concat())
+    }
+
+    /// The file in which what this path names is defined.
+    fn file_of(&self, path: &[String], depth: usize) -> Module {
+        let at = (0..=path.len()).rev().find(|&at| self.sources.contains_key(&path[..at])).unwrap_or(0);
+        let (module, rest) = path.split_at(at);
+        let reexported = rest.first().and_then(|name| self.reexports.get(module)?.get(name));
+        match reexported {
+            Some(target) if depth < 8 => self.file_of(target, depth + 1),
+            _ => module.to_vec(),
+        }
+    }
+
+    /// The files that a file names.
+    fn named_by(&self, module: &Module) -> BTreeSet<Module> {
+        let mut named = Named { paths: Vec::new() };
+        named.visit_file(&self.sources[module]);
+        let absolute = named.paths.iter().filter_map(|path| self.absolute(module, path));
+        absolute.map(|path| self.file_of(&path, 0)).filter(|file| file != module).collect()
+    }
+
+    /// Sets of more than two files each of which leads to each other one.
+    fn circles(&self) -> Vec<Vec<String>> {
+        let named: BTreeMap<&Module, BTreeSet<Module>> =
+            self.sources.keys().map(|module| (module, self.named_by(module))).collect();
+        let reached = |from: &Module| {
+            let mut reached = BTreeSet::new();
+            let mut waiting = vec![from.clone()];
+            while let Some(module) = waiting.pop() {
+                for next in &named[&module] {
+                    if reached.insert(next.clone()) {
+                        waiting.push(next.clone());
+                    }
+                }
+            }
+            reached
+        };
+        let reach: BTreeMap<&Module, BTreeSet<Module>> =
+            self.sources.keys().map(|module| (module, reached(module))).collect();
+        let mut circles = BTreeSet::new();
+        for (module, far) in &reach {
+            let circle: BTreeSet<&Module> = far.iter().filter(|other| reach[other].contains(*module)).collect();
+            if circle.len() > 2 {
+                circles.insert(circle.into_iter().map(|module| module.join("::")).collect::<Vec<_>>());
+            }
+        }
+        circles.into_iter().collect()
+    }
+}
+
+/// The paths of a `use`.
+fn paths(tree: &syn::UseTree) -> Vec<Vec<String>> {
+    let under = |name: &syn::Ident, rest: Vec<Vec<String>>| {
+        rest.into_iter().map(|path| [vec![name.to_string()], path].concat()).collect()
+    };
+    match tree {
+        syn::UseTree::Path(path) => under(&path.ident, paths(&path.tree)),
+        syn::UseTree::Name(name) if name.ident == "self" => vec![Vec::new()],
+        syn::UseTree::Name(name) => vec![vec![name.ident.to_string()]],
+        syn::UseTree::Rename(renamed) if renamed.ident == "self" => vec![Vec::new()],
+        syn::UseTree::Rename(renamed) => vec![vec![renamed.ident.to_string()]],
+        syn::UseTree::Glob(_) => vec![Vec::new()],
+        syn::UseTree::Group(group) => group.items.iter().flat_map(paths).collect(),
+    }
+}
+
+/// Collects the paths that code names. A re-export is not a use.
+struct Named {
+    paths: Vec<Vec<String>>,
+}
+
+impl<'ast> Visit<'ast> for Named {
+    fn visit_item(&mut self, item: &'ast syn::Item) {
+        let attributes = match item {
+            syn::Item::Mod(module) => &module.attrs[..],
+            syn::Item::Fn(function) => &function.attrs[..],
+            syn::Item::Impl(implementation) => &implementation.attrs[..],
+            syn::Item::Use(used) => &used.attrs[..],
+            _ => &[],
+        };
+        let for_tests = |attribute: &syn::Attribute| {
+            matches!(&attribute.meta, syn::Meta::List(list)
+                if list.path.is_ident("cfg") && list.tokens.to_string().split_whitespace().any(|word| word == "test"))
+        };
+        if !attributes.iter().any(for_tests) {
+            visit::visit_item(self, item);
+        }
+    }
+
+    fn visit_item_use(&mut self, used: &'ast syn::ItemUse) {
+        if matches!(used.vis, syn::Visibility::Inherited) {
+            self.paths.extend(paths(&used.tree));
+        }
+    }
+
+    fn visit_path(&mut self, path: &'ast syn::Path) {
+        if path.segments.len() > 1 {
+            self.paths.push(path.segments.iter().map(|segment| segment.ident.to_string()).collect());
+        }
+        visit::visit_path(self, path);
+    }
+}
+
+#[test]
+fn no_circle_of_files_is_larger_than_two() {
+    let folders = [
+        "runtime/plan",
+        "runtime/rng",
+        "runtime/base",
+        "runtime/optimise",
+        "runtime/search",
+        "runtime/relay",
+        "runtime/results",
+        "runtime",
+        "sesame-dsl",
+        "sesame-codegen",
+    ];
+    let mut found = Vec::new();
+    for folder in folders {
+        found.extend(Files::read(&workspace().join(folder)).circles().into_iter().map(|circle| (folder, circle)));
+    }
+    assert!(found.is_empty(), "files that depend on each other in a circle, move what ties them: {found:#?}");
+}
+
+#[test]
+fn a_circle_is_found_through_re_exports_and_not_through_tests() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join("src").join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    };
+    write("lib.rs", "mod a; mod b; mod c;");
+    write("a.rs", "mod inner; pub use inner::Thing; pub fn of(_: crate::b::B) {}");
+    write("a/inner.rs", "pub struct Thing;");
+    write("b.rs", "use crate::c::C; pub struct B(C);");
+    write("c.rs", "pub struct C; #[cfg(test)] mod tests { use crate::a::of; }");
+    let circles = || Files::read(folder.path()).circles();
+    assert!(circles().is_empty());
+    write("c.rs", "use crate::a::Thing; pub struct C(Thing);");
+    assert!(circles().is_empty(), "{:?}: a re-export leads to where the thing is", circles());
+    write("a/inner.rs", "pub struct Thing(crate::b::B);");
+    assert_eq!(circles(), [["a::inner", "b", "c"]]);
+}

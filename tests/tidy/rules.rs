@@ -1,0 +1,197 @@
+//! The rules of a tidy tree, each a function from files to complaints. A complaint names the file, what is wrong, and
+//! what to do.
+
+/// The columns that a line of comment may fill, as rustfmt has it for code.
+const COLUMNS: usize = 120;
+
+/// What test runners, merges and patches leave behind.
+const LEFT_BEHIND: [&str; 4] = [".pending-snap", ".snap.new", ".orig", ".rej"];
+
+/// A file of the tree.
+#[derive(Debug, Clone)]
+pub(crate) struct File {
+    /// Its path from the root, with `/` between its parts.
+    pub(crate) path: String,
+    /// What it holds; empty where that is not text.
+    pub(crate) text: String,
+}
+
+impl File {
+    fn name(&self) -> &str {
+        self.path.rsplit('/').next().unwrap_or(&self.path)
+    }
+
+    /// What follows the last dot of its name.
+    fn ending(&self) -> Option<&str> {
+        self.name().rsplit_once('.').map(|(_, ending)| ending)
+    }
+}
+
+/// A crate of the workspace.
+#[derive(Debug, Clone)]
+pub(crate) struct Crate {
+    /// Its name.
+    pub(crate) name: String,
+    /// Its manifest's path from the root.
+    pub(crate) manifest: String,
+    /// Whether the manifest says what it is for.
+    pub(crate) described: bool,
+}
+
+/// Files that some program left behind.
+pub(crate) fn left_behind(files: &[File]) -> Vec<String> {
+    let found = files.iter().filter(|file| LEFT_BEHIND.iter().any(|ending| file.path.ends_with(ending)));
+    found.map(|file| format!("{0}: a program left it behind; remove it with `git rm {0}`", file.path)).collect()
+}
+
+/// Kinds of such files that git does not ignore.
+pub(crate) fn not_ignored(gitignore: &str) -> Vec<String> {
+    let ignored = |ending: &str| gitignore.lines().any(|line| line.trim() == format!("*{ending}"));
+    let missing = LEFT_BEHIND.iter().filter(|ending| !ignored(ending));
+    missing.map(|ending| format!(".gitignore: add the line `*{ending}`")).collect()
+}
+
+/// Lines of comment that are too wide.
+pub(crate) fn wide_comments(files: &[File]) -> Vec<String> {
+    let mut complaints = Vec::new();
+    for file in files {
+        let Some(mark) = comment_mark(file) else { continue };
+        for (number, line) in (1..).zip(file.text.lines()) {
+            let columns = line.chars().count();
+            if line.trim_start().starts_with(mark) && columns > COLUMNS {
+                complaints
+                    .push(format!("{}:{number}: the comment fills {columns} columns; wrap it at {COLUMNS}", file.path));
+            }
+        }
+    }
+    complaints
+}
+
+/// What begins a line of comment in a file of this kind; `None` for kinds that have none, or have other widths.
+fn comment_mark(file: &File) -> Option<&'static str> {
+    match file.ending() {
+        Some("rs" | "pest") => Some("//"),
+        Some("toml" | "sh" | "py") => Some("#"),
+        _ if file.text.starts_with("#!") => Some("#"),
+        _ => None,
+    }
+}
+
+/// Crates without a description, or without a row in the map of ARCHITECTURE.md.
+pub(crate) fn not_on_the_map(crates: &[Crate], architecture: &str) -> Vec<String> {
+    let map = architecture.split("\n## ").find(|section| section.starts_with("The map\n")).unwrap_or_default();
+    let rows: Vec<&str> = map.lines().filter(|line| line.starts_with('|')).collect();
+    let mut complaints = Vec::new();
+    for Crate { name, manifest, described } in crates {
+        if !described {
+            complaints.push(format!("{manifest}: add a `description`: what {name} is, in one sentence"));
+        }
+        if !rows.iter().any(|row| row.contains(&format!("`{name}`"))) {
+            complaints
+                .push(format!("ARCHITECTURE.md: add a row for `{name}` ({manifest}) to the table under `The map`"));
+        }
+    }
+    complaints
+}
+
+/// Modules in files called `mod.rs`. What tests of a crate share is one by need: `tests/shared.rs` would be a test.
+pub(crate) fn mod_files(files: &[File]) -> Vec<String> {
+    let of_tests = |file: &File| file.path.rsplit('/').nth(2) == Some("tests");
+    let found = files.iter().filter(|file| file.name() == "mod.rs" && !of_tests(file));
+    let beside = |file: &File| file.path.trim_end_matches("/mod.rs").to_owned() + ".rs";
+    found.map(|file| format!("{}: move it to {}", file.path, beside(file))).collect()
+}
+
+/// Modules that do not begin with what they are for. The tests of a module, in `tests.rs`, need not.
+pub(crate) fn without_purpose(files: &[File]) -> Vec<String> {
+    let modules = files.iter().filter(|file| file.ending() == Some("rs") && file.name() != "tests.rs");
+    let silent = modules.filter(|file| !file.text.starts_with("//!"));
+    silent.map(|file| format!("{}: begin it with `//!` and a sentence on what it is for", file.path)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(path: &str, text: &str) -> File {
+        File { path: path.to_owned(), text: text.to_owned() }
+    }
+
+    #[test]
+    fn what_programs_leave_behind_is_found() {
+        let files = [".a.rs.pending-snap", "b.snap.new", "c.rs.orig", "d.rej", "e.snap", "orig.rs"];
+        let found = left_behind(&files.map(|path| file(path, "")));
+        assert_eq!(found.len(), 4, "{found:?}");
+        assert_eq!(found[1], "b.snap.new: a program left it behind; remove it with `git rm b.snap.new`");
+    }
+
+    #[test]
+    fn git_is_to_ignore_each_kind() {
+        assert_eq!(
+            not_ignored("target/\n*.snap.new\n*.orig\n"),
+            [".gitignore: add the line `*.pending-snap`", ".gitignore: add the line `*.rej`"]
+        );
+        assert_eq!(not_ignored("*.pending-snap\n*.snap.new\n*.orig\n*.rej\n"), [""; 0]);
+    }
+
+    #[test]
+    fn comments_are_measured_in_characters() {
+        let fits = format!("    // {}", "ü".repeat(COLUMNS - 7));
+        let wide = format!("{fits}x");
+        let code = format!("let text = \"{}\";", "x".repeat(COLUMNS));
+        let rust = file("a.rs", &format!("{code}\n{fits}\n{wide}\n"));
+        assert_eq!(wide_comments(&[rust]), ["a.rs:3: the comment fills 121 columns; wrap it at 120"]);
+        let long = "x".repeat(COLUMNS);
+        let hash = format!("# {long}\n");
+        assert_eq!(wide_comments(&[file("a.toml", &hash), file("run", &format!("#!/bin/sh\n{hash}"))]).len(), 2);
+        assert_eq!(wide_comments(&[file("a.md", &hash), file("LICENCE", &hash)]), [""; 0], "headings are not comments");
+        assert_eq!(wide_comments(&[file("a.pest", &format!("// {long}"))]).len(), 1);
+    }
+
+    #[test]
+    fn a_crate_needs_a_description_and_a_row() {
+        let of =
+            |name: &str, described| Crate { name: name.to_owned(), manifest: format!("{name}/Cargo.toml"), described };
+        let page =
+            "# Architecture\n\n## The map\n\n| `a/` | `a` | one |\n\nAlso `b`.\n\n## Other\n\n| `c/` | `c` | |\n";
+        assert_eq!(not_on_the_map(&[of("a", true)], page), [""; 0]);
+        let complaints = not_on_the_map(&[of("a", false), of("b", true), of("c", true)], page);
+        assert_eq!(
+            complaints,
+            [
+                "a/Cargo.toml: add a `description`: what a is, in one sentence",
+                "ARCHITECTURE.md: add a row for `b` (b/Cargo.toml) to the table under `The map`",
+                "ARCHITECTURE.md: add a row for `c` (c/Cargo.toml) to the table under `The map`",
+            ]
+        );
+    }
+
+    #[test]
+    fn a_module_lies_beside_its_folder() {
+        let files = [
+            file("src/a/mod.rs", ""),
+            file("src/a.rs", ""),
+            file("src/mod_of_a.rs", ""),
+            file("a/tests/shared/mod.rs", ""),
+        ];
+        assert_eq!(mod_files(&files), ["src/a/mod.rs: move it to src/a.rs"]);
+    }
+
+    #[test]
+    fn a_module_begins_with_its_purpose() {
+        let files = [
+            file("a.rs", "//! Something.\n"),
+            file("b.rs", "use a;\n"),
+            file("a/tests.rs", "use super::*;\n"),
+            file("b.toml", ""),
+            file("c.rs", ""),
+        ];
+        assert_eq!(
+            without_purpose(&files),
+            [
+                "b.rs: begin it with `//!` and a sentence on what it is for",
+                "c.rs: begin it with `//!` and a sentence on what it is for",
+            ]
+        );
+    }
+}
