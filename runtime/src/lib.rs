@@ -11,6 +11,8 @@
 #[cfg(feature = "campaign")]
 pub mod campaign;
 #[cfg(feature = "campaign")]
+mod changed_files;
+#[cfg(feature = "campaign")]
 mod cli;
 #[cfg(feature = "campaign")]
 mod runner;
@@ -28,7 +30,7 @@ pub use sesame_optimise as optimise;
 pub use sesame_plan as plan;
 #[cfg(feature = "mcap")]
 pub use sesame_relay::trace;
-pub use sesame_relay::{changed_files, evaluate, fuzz, message, metric, relay, simulator, stl, transport, value, wire};
+pub use sesame_relay::{evaluate, fuzz, message, metric, relay, simulator, stl, transport, value, wire};
 #[cfg(feature = "campaign")]
 pub use sesame_results::{analysis, record, report};
 pub use sesame_rng as rng;

@@ -199,10 +199,10 @@ fn files_changed_when_all_was_killed_are_put_back_by_the_next_start() {
     assert_eq!(fs::read_to_string(&calibration).unwrap(), "91\n", "nobody was left to put it back");
 
     let said = runner.run(&["known", "moved", "--results", "next"]).expect(0);
-    assert!(said.err.contains("calibration.txt was changed; it is put back"), "{}", said.err);
+    assert!(said.err.contains("calibration.txt was changed; it has been restored"), "{}", said.err);
     assert_eq!(fs::read_to_string(&calibration).unwrap(), "1\n");
     let again = runner.run(&["known", "moved", "--results", "after"]).expect(0);
-    assert!(!again.err.contains("put back"), "{}", again.err);
+    assert!(!again.err.contains("restored"), "{}", again.err);
 
     // A worker that is stopped because its test takes too long leaves nothing either.
     runner.run(&["repeat", "stuck", "1", "--into", "slow", "--timeout", "1"]).expect(0);

@@ -53,7 +53,7 @@ const SMALL: &[(&str, Expected)] = &[
     ("says_an_unknown_field", Crash("unknown field `message`")),
     ("says_deliver", Crash("is not of the protocol")),
     ("says_ready_in_a_step", Crash("says `ready` while the end of its step to 0.150 s was awaited")),
-    ("publishes_without_end", Crash("makes more than 100000 messages in the step to 0.150 s")),
+    ("publishes_without_end", Crash("has more than 100000 messages in the step to 0.150 s")),
     ("publishes_nothing", Completed),
     ("publishes_on_a_topic_it_did_not_name", Crash("has a message on `nowhere`")),
     ("publishes_a_topic_twice_in_a_message", Crash("duplicate field `topic`")),
@@ -61,7 +61,7 @@ const SMALL: &[(&str, Expected)] = &[
     ("publishes_a_field_twice", Crash("is not of its declared type: field `speed`")),
     ("publishes_a_message_without_a_field", Crash("is not of its declared type")),
     ("publishes_a_point_of_two_numbers", Crash("is not of its declared type: field `position`")),
-    ("publishes_nan_bare", Crash("write such a number as the text \"NaN\"")),
+    ("publishes_nan_bare", Crash("write such a number as the string \"NaN\"")),
     ("publishes_nan_as_text", Completed),
     ("publishes_infinity_as_text", Completed),
     ("publishes_a_number_beyond_reals", Crash("is not of its declared type")),
@@ -92,7 +92,7 @@ const SMALL: &[(&str, Expected)] = &[
     (
         "exits_with_3",
         Crash(
-            "ended (exit status: 3) while the end of its step to 0.150 s was awaited; its last words:\nthe gripper is stuck",
+            "ended (exit status: 3) while the end of its step to 0.150 s was awaited; the last lines of its standard error:\nthe gripper is stuck",
         ),
     ),
     ("exits_with_0", Crash("ended (exit status: 0)")),
@@ -108,7 +108,7 @@ const SMALL: &[(&str, Expected)] = &[
     ("never_answers", Timeout),
     ("answers_late", Timeout),
     ("never_reads", Timeout),
-    ("closes_its_output", Crash("closed its standard output, but did not end, while")),
+    ("closes_its_output", Crash("closed its standard output, but did not exit, while")),
     ("closes_its_input", Crash("ended (exit status: 0)")),
     ("closes_its_standard_error", Completed),
     ("starts_children", Completed),
@@ -116,7 +116,7 @@ const SMALL: &[(&str, Expected)] = &[
     (
         "starts_a_child_that_holds_its_output_and_exits",
         Crash(
-            "ended (exit status: 3) while the end of its step to 0.150 s was awaited; its last words:\nthe child has it now",
+            "ended (exit status: 3) while the end of its step to 0.150 s was awaited; the last lines of its standard error:\nthe child has it now",
         ),
     ),
     ("starts_a_session", Completed),

@@ -14,6 +14,7 @@ mod exported;
 mod falsification;
 mod faults;
 mod first_front;
+mod free_running;
 mod hostile;
 mod import;
 mod interruption;

@@ -1,13 +1,13 @@
-//! When an operation of a test is active: in a window of time, or from one condition until another or for a length.
+//! When an operation of a test is active: in a window of time, or from one condition until another, or for a length.
 //!
-//! An activation by condition begins when what begins it *becomes* true: the start condition without the end condition,
-//! or the start condition alone where the activation has a length. Before the operation's window nothing is true, so what
-//! holds from the beginning of the window begins an activation there, once. What becomes true while the operation is
-//! active begins nothing.
+//! An activation by condition begins when its start *becomes* true: the start condition without the end condition, or
+//! the start condition alone if the activation has a length. Before the operation's window nothing counts as true, so a
+//! start that holds at the beginning of the window begins one activation there. A start that becomes true while the
+//! operation is active begins nothing.
 //!
-//! At one instant of simulation time an operation switches at most once. What would switch it again waits until the
-//! instant is over, and does so one nanosecond later (the resolution of simulation time) if it still holds then. So every
-//! activation has a length.
+//! At one instant of simulation time an operation switches at most once. A second switch waits until the instant is
+//! over, and happens one nanosecond later (the resolution of simulation time) if its condition still holds then. So
+//! every activation has a length.
 
 use sesame_plan::condition::Condition;
 use sesame_plan::{Activation, MetricId, Span};
@@ -15,35 +15,36 @@ use sesame_plan::{Activation, MetricId, Span};
 use crate::condition::holds;
 use crate::time::SimTime;
 
-/// The resolution of simulation time: when an instant is over.
+/// The resolution of simulation time: how long an instant lasts.
 pub const TICK: SimTime = SimTime::from_nanos(1);
 
-/// The activity of one operation in one run: whether it is on now, and when it was.
+/// The activity of one operation in one run: whether it is active now, and when it was.
 ///
-/// It is told of time by [`Activity::follow`], which must stop at each [`Activity::next_edge`], and of values by
-/// [`Activity::weigh`], at each edge and whenever a value changed. To weigh the same values again changes nothing.
+/// It follows time by [`Activity::advance_to`], which must stop at each [`Activity::next_edge`], and the values of
+/// metrics by [`Activity::evaluate`], at each edge and whenever a value changed. Evaluating the same values again
+/// changes nothing.
 #[derive(Debug, Clone)]
 pub struct Activity {
-    /// A window of time, or `within` where conditions switch: never active outside of it.
+    /// A window of time, or `within` if conditions switch it: it is never active outside of it.
     window: (SimTime, SimTime),
     switch: Switch,
     phase: Phase,
-    /// How often it may still go on.
+    /// How many activations are left.
     left: u32,
-    /// Whether what begins an activation held when it was last weighed.
+    /// Whether its start held at the last evaluation.
     held: bool,
-    /// What begins an activation became true and holds, but the activation could not begin yet.
+    /// Its start became true and holds, but the activation could not begin yet.
     waiting: bool,
-    /// When it last went on or off.
+    /// When it last became active or inactive.
     switched: Option<SimTime>,
-    /// When it is to be weighed again, since something waits for an instant to be over.
+    /// When it has to be evaluated again, because something waits for the end of an instant.
     again: Option<SimTime>,
     observed: Vec<(SimTime, SimTime)>,
-    /// The length of all observed intervals together.
+    /// The total length of all observed intervals.
     past: SimTime,
 }
 
-/// What switches it on and off, besides the window.
+/// How it is switched, apart from the window.
 #[derive(Debug, Clone)]
 enum Switch {
     Time,
@@ -57,26 +58,26 @@ enum Phase {
     Before,
     /// A condition can switch it on.
     Waiting,
-    /// It goes off at `until` at the latest.
+    /// It becomes inactive at `until` at the latest.
     Active { since: SimTime, until: SimTime },
     /// It is never active again.
     Over,
 }
 
-/// What a moment did to an activity.
+/// The effect of a moment on an activity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Edge {
-    /// Nothing.
+    /// No change.
     None,
-    /// It went on.
+    /// It became active.
     Started,
-    /// It went off.
+    /// It became inactive.
     Ended,
 }
 
 impl Activity {
-    /// An activity that has not begun. `within` is a hard limit: outside of it the operation is never active. An offline
-    /// operation never is.
+    /// An activity that has not begun. `within` is a hard limit: outside of it the operation is never active. An
+    /// offline operation is never active.
     pub fn new(activation: &Activation, within: Span) -> Self {
         let (from, to, left, switch) = match activation {
             Activation::Time { start, end } => (start.max(within.start), end.min(within.end), 1, Switch::Time),
@@ -106,17 +107,17 @@ impl Activity {
         }
     }
 
-    /// Whether it is on.
+    /// Whether it is active.
     pub fn is_active(&self) -> bool {
         matches!(self.phase, Phase::Active { .. })
     }
 
-    /// Whether conditions switch it, so that it must be told of values.
+    /// Whether conditions switch it, so that it has to be evaluated.
     pub fn is_conditional(&self) -> bool {
         !matches!(self.switch, Switch::Time)
     }
 
-    /// When time alone will next change it, or it is to be weighed again, as far as is known.
+    /// The next moment at which time alone changes it, or at which it has to be evaluated again, as far as is known.
     pub fn next_edge(&self) -> Option<SimTime> {
         let edge = match self.phase {
             Phase::Before => Some(self.window.0),
@@ -126,8 +127,8 @@ impl Activity {
         edge.into_iter().chain(self.again).min()
     }
 
-    /// Follows time, which never goes back and stops at each edge: it is active for `start <= t < end`.
-    pub fn follow(&mut self, now: SimTime) -> Edge {
+    /// Advances time, which never goes back and stops at each edge: it is active for `start <= t < end`.
+    pub fn advance_to(&mut self, now: SimTime) -> Edge {
         match self.phase {
             Phase::Before if now >= self.window.0 => match self.switch {
                 Switch::Time => self.begin(self.window.0, self.window.1),
@@ -136,20 +137,20 @@ impl Activity {
                     Edge::None
                 }
             },
-            Phase::Active { since, until } if now >= until => self.cease(since, until),
+            Phase::Active { since, until } if now >= until => self.deactivate(since, until),
             _ => Edge::None,
         }
     }
 
-    /// Weighs its conditions at a moment, given the values of metrics then.
-    pub fn weigh(&mut self, now: SimTime, value: &impl Fn(MetricId) -> Option<f64>) -> Edge {
-        let ended = self.weigh_end(now, value);
-        let started = self.weigh_start(now, true, value);
+    /// Evaluates its conditions at a moment, given the values of metrics at that moment.
+    pub fn evaluate(&mut self, now: SimTime, value: &impl Fn(MetricId) -> Option<f64>) -> Edge {
+        let ended = self.evaluate_end(now, value);
+        let started = self.evaluate_start(now, true, value);
         if ended == Edge::None { started } else { ended }
     }
 
-    /// The first half of [`Activity::weigh`]: whether its end condition switches it off.
-    pub fn weigh_end(&mut self, now: SimTime, value: &impl Fn(MetricId) -> Option<f64>) -> Edge {
+    /// The first half of [`Activity::evaluate`]: whether its end condition makes it inactive.
+    pub fn evaluate_end(&mut self, now: SimTime, value: &impl Fn(MetricId) -> Option<f64>) -> Edge {
         self.again = self.again.filter(|&again| again > now);
         match (self.phase, &self.switch) {
             (Phase::Active { since, .. }, Switch::Conditions { end, .. }) if holds(end, value) => {
@@ -157,15 +158,15 @@ impl Activity {
                     self.again = Some(now + TICK);
                     return Edge::None;
                 }
-                self.cease(since, now)
+                self.deactivate(since, now)
             }
             _ => Edge::None,
         }
     }
 
-    /// The second half of [`Activity::weigh`]: whether its conditions switch it on. Where it is not `free` to begin, it
-    /// waits for as long as they hold.
-    pub fn weigh_start(&mut self, now: SimTime, free: bool, value: &impl Fn(MetricId) -> Option<f64>) -> Edge {
+    /// The second half of [`Activity::evaluate`]: whether its conditions make it active. If it is not `free` to begin,
+    /// it waits for as long as they hold.
+    pub fn evaluate_start(&mut self, now: SimTime, free: bool, value: &impl Fn(MetricId) -> Option<f64>) -> Edge {
         let (holds, length) = match &self.switch {
             Switch::Time => return Edge::None,
             Switch::Conditions { start, end } => (holds(start, value) && !holds(end, value), None),
@@ -207,7 +208,7 @@ impl Activity {
         Edge::Started
     }
 
-    fn cease(&mut self, since: SimTime, at: SimTime) -> Edge {
+    fn deactivate(&mut self, since: SimTime, at: SimTime) -> Edge {
         self.switched = Some(at);
         self.observed.push((since, at));
         self.past = self.past + (at - since);
@@ -216,7 +217,7 @@ impl Activity {
         Edge::Ended
     }
 
-    /// How long it has been active until now, which is not before anything it was told of.
+    /// How long it has been active until now, which is not before any moment it knows.
     pub fn active_time(&self, now: SimTime) -> SimTime {
         match self.phase {
             Phase::Active { since, .. } => self.past + (now - since),
@@ -224,7 +225,7 @@ impl Activity {
         }
     }
 
-    /// Observed active intervals in seconds, clipped to a run that ended at `end`. Each has a length.
+    /// The observed active intervals in seconds, clipped to a run that ended at `end`. None is empty.
     pub fn intervals(&self, end: SimTime) -> Vec<Span> {
         let open = match self.phase {
             Phase::Active { since, .. } => Some((since, end)),
@@ -256,7 +257,7 @@ mod tests {
             .map(|&t| {
                 let now = SimTime::from_seconds(t);
                 while let Some(edge) = activity.next_edge().filter(|&edge| edge <= now) {
-                    activity.follow(edge);
+                    activity.advance_to(edge);
                 }
                 activity.is_active()
             })
@@ -266,12 +267,12 @@ mod tests {
     /// Carries out all edges up to a moment, each with the value known by then.
     fn carry_out(activity: &mut Activity, now: SimTime, x: Option<f64>) {
         while let Some(edge) = activity.next_edge().filter(|&edge| edge <= now) {
-            activity.follow(edge);
-            activity.weigh(edge, &|_| x);
+            activity.advance_to(edge);
+            activity.evaluate(edge, &|_| x);
         }
     }
 
-    /// Follows time and then weighs a metric's value, at each of these moments.
+    /// Advances time and then evaluates a metric's value, at each of these moments.
     fn weighed(activation: &Activation, moments: &[(f64, f64)]) -> (Vec<bool>, Vec<(f64, f64)>) {
         let mut activity = Activity::new(activation, WITHIN);
         let (mut active, mut known) = (Vec::new(), None);
@@ -279,7 +280,7 @@ mod tests {
             let now = SimTime::from_seconds(t);
             carry_out(&mut activity, now, known);
             known = Some(x);
-            activity.weigh(now, &|_| known);
+            activity.evaluate(now, &|_| known);
             active.push(activity.is_active());
         }
         let end = SimTime::from_seconds(10.0);
@@ -373,7 +374,7 @@ mod tests {
         let (active, intervals) = weighed(&until(2), &moments);
         assert_eq!(active, [true, true, true, false], "the end waits until the instant is over");
         assert_eq!(intervals, [(2.0, 2.000_000_001), (4.0, 5.0)]);
-        // It does not end if its end does not hold any more by then.
+        // It does not end if its end condition does not hold any more by then.
         assert_eq!(weighed(&until(2), &[(2.0, 6.0), (2.0, 2.0), (2.0, 6.0), (3.0, 2.0)]).1, [(2.0, 3.0)]);
     }
 
@@ -391,28 +392,28 @@ mod tests {
         let at = SimTime::from_seconds;
         let waiting = |until: f64| {
             let mut activity = Activity::new(&lasting(1.0, 9), WITHIN);
-            activity.follow(at(1.0));
-            assert_eq!(activity.weigh_start(at(2.0), false, &|_| Some(6.0)), Edge::None);
-            activity.weigh_start(at(3.0), false, &|_| Some(until));
-            activity.weigh_start(at(4.0), true, &|_| Some(6.0))
+            activity.advance_to(at(1.0));
+            assert_eq!(activity.evaluate_start(at(2.0), false, &|_| Some(6.0)), Edge::None);
+            activity.evaluate_start(at(3.0), false, &|_| Some(until));
+            activity.evaluate_start(at(4.0), true, &|_| Some(6.0))
         };
         assert_eq!(waiting(6.0), Edge::Started, "it begins as soon as it may");
         let mut lost = Activity::new(&lasting(1.0, 9), WITHIN);
-        lost.follow(at(1.0));
-        lost.weigh_start(at(2.0), false, &|_| Some(6.0));
-        lost.weigh_start(at(3.0), false, &|_| Some(4.0));
-        assert_eq!(lost.weigh_start(at(4.0), true, &|_| Some(4.0)), Edge::None, "that occurrence is lost");
+        lost.advance_to(at(1.0));
+        lost.evaluate_start(at(2.0), false, &|_| Some(6.0));
+        lost.evaluate_start(at(3.0), false, &|_| Some(4.0));
+        assert_eq!(lost.evaluate_start(at(4.0), true, &|_| Some(4.0)), Edge::None, "that occurrence is lost");
     }
 
     /// The window of the property below, in nanoseconds.
     const FROM: i64 = 8;
     const TO: i64 = 70;
 
-    /// What is said above the module, said plainly: every nanosecond is looked at, and what holds is looked up in a list
-    /// of all moments so far.
+    /// The description of the module, literally: every nanosecond is visited, and the truth of the start is kept for
+    /// all moments so far.
     fn plainly(changes: &[(i64, f64)], times: usize, length: Option<i64>) -> Vec<(i64, i64)> {
         let (mut intervals, mut on): (Vec<(i64, i64)>, Option<i64>) = (Vec::new(), None);
-        // Per moment, from the last one at which it was active: whether what begins it holds.
+        // Per moment, from the last one at which it was active: whether its start holds.
         let mut history = vec![false];
         let mut switched = None;
         for t in FROM..TO {
@@ -463,7 +464,7 @@ mod tests {
                 let now = SimTime::from_nanos(t);
                 carry_out(&mut activity, now, known);
                 known = Some(x);
-                activity.weigh(now, &|_| known);
+                activity.evaluate(now, &|_| known);
             }
             let end = SimTime::from_nanos(100);
             carry_out(&mut activity, end, known);

@@ -1,7 +1,7 @@
-//! Conditions over metrics, which switch operations on and off (paper §3.9.2): whether they hold, whether their truth can
-//! change at all, and how they are written.
+//! Conditions over metrics, which switch operations ([SESAME 2023, §3.9.2]): whether they hold, whether they are
+//! constant, and their notation.
 //!
-//! The plan has their shape ([`sesame_plan::condition`]); here is what can be done with them without a search.
+//! The plan defines them ([`sesame_plan::condition`]); here are the functions over them.
 
 pub mod constant;
 #[cfg(any(test, feature = "testing"))]
@@ -11,8 +11,8 @@ pub mod text;
 use sesame_plan::MetricId;
 use sesame_plan::condition::{Condition, Operand};
 
-/// Whether a condition holds, given the value of each metric at this moment. A comparison with a metric that has no value
-/// does not hold, and `and` and `or` go on with that.
+/// Whether a condition holds, given the value of each metric at this moment. A comparison with a metric that has no
+/// value is false.
 pub fn holds(condition: &Condition, value: &impl Fn(MetricId) -> Option<f64>) -> bool {
     match condition {
         Condition::Compare { left, by, right } => {
@@ -27,7 +27,7 @@ pub fn holds(condition: &Condition, value: &impl Fn(MetricId) -> Option<f64>) ->
     }
 }
 
-/// Levels of a condition's tree; a comparison alone is one.
+/// The number of levels of a condition's tree; a single comparison has one.
 pub fn depth(condition: &Condition) -> u32 {
     match condition {
         Condition::Compare { .. } => 1,
@@ -35,7 +35,7 @@ pub fn depth(condition: &Condition) -> u32 {
     }
 }
 
-/// Whether an operand with some property occurs in a condition.
+/// Whether a condition contains an operand with this property.
 pub fn mentions(condition: &Condition, is_it: &impl Fn(Operand) -> bool) -> bool {
     match condition {
         Condition::Compare { left, right, .. } => is_it(*left) || is_it(*right),

@@ -1,13 +1,13 @@
-//! Numbers as the language writes them: the digits that read back as the very same number.
+//! Numbers in the notation of the language: their digits read back as exactly the same number.
 
-/// A number with its unit glued on, as the language has it.
+/// A number with its unit, without a space, as in the language.
 pub fn quantity(x: f64, unit: Option<&str>) -> String {
     format!("{}{}", decimal(x, 0), unit.unwrap_or_default())
 }
 
-/// The shortest decimal that reads back as this number, its point moved right by so many digits.
+/// The shortest decimal that reads back as this number, with the point moved right by `shift` digits.
 pub fn decimal(x: f64, shift: i32) -> String {
-    // The shortest digits that tell the number from all others, as `d.ddde-x`.
+    // The shortest digits that identify the number, as `d.ddde-x`.
     let scientific = format!("{:e}", x + 0.0);
     let (mantissa, exponent) = scientific.split_once('e').expect("a number in scientific notation has an exponent");
     let exponent = exponent.parse::<i32>().expect("an exponent is a small whole number") + shift;

@@ -1,8 +1,8 @@
-//! What a run is told in, and what all crates above it share.
+//! The terms of a run that all crates above this one share.
 //!
-//! Simulation time; whether a condition over metrics holds, and whether it ever can; when an operation is active; what
-//! one run showed ([`observation`]), and what that says about a requirement ([`verdict`]). Everything here is a
-//! function of its arguments: no files, no clocks, no processes.
+//! Simulation time; whether a condition over metrics holds, and whether it ever can; when an operation is active; the
+//! result of one run ([`observation`]), and its verdicts on requirements ([`verdict`]). Everything here is a function
+//! of its arguments, without files, clocks or processes.
 
 pub mod activation;
 pub mod condition;

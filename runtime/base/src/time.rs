@@ -1,4 +1,4 @@
-//! Simulation time, kept apart from wall time by its type.
+//! Simulation time, a type of its own so that it cannot be confused with wall time.
 
 use std::fmt;
 use std::ops::{Add, Sub};
@@ -15,7 +15,7 @@ pub struct SimTime(i64);
 impl SimTime {
     /// The start of every run.
     pub const ZERO: SimTime = SimTime(0);
-    /// Later than everything.
+    /// The latest time.
     pub const MAX: SimTime = SimTime(i64::MAX);
 
     /// From whole nanoseconds.
@@ -23,7 +23,7 @@ impl SimTime {
         SimTime(nanos)
     }
 
-    /// From seconds, rounded to the nearest nanosecond. What does not fit is clamped; NaN is zero.
+    /// From seconds, rounded to the nearest nanosecond. Values out of range are clamped; NaN is zero.
     #[expect(clippy::cast_possible_truncation, reason = "`as` clamps, which is what is documented")]
     pub fn from_seconds(seconds: f64) -> Self {
         SimTime(libm::round(seconds * 1e9) as i64)
@@ -34,7 +34,7 @@ impl SimTime {
         self.0
     }
 
-    /// Seconds, the unit of all our maths.
+    /// Seconds, the unit of all calculations.
     pub fn seconds(self) -> f64 {
         self.0 as f64 / 1e9
     }

@@ -1,4 +1,4 @@
-//! Text from files and simulators, made fit to be shown: on a terminal, control characters would do more than be read.
+//! Text from files and simulators, made safe to show: a terminal would interpret control characters.
 
 /// Text on one line without control characters.
 pub fn visible(text: &str) -> String {
@@ -8,7 +8,7 @@ pub fn visible(text: &str) -> String {
         .collect()
 }
 
-/// As [`visible`], and with the lines that there are.
+/// As [`visible`], but keeps line breaks.
 pub fn visible_lines(text: &str) -> String {
     text.chars().map(|c| if c.is_control() && c != '\n' { '\u{FFFD}' } else { c }).collect()
 }

@@ -127,15 +127,17 @@ pub enum Transport {
         /// Simulation time of one step, in nanoseconds; positive.
         step_ns: u64,
     },
-    /// A program that the runner starts and talks to in lines of JSON, stepped in lock-step with the relay.
+    /// A program that the runner starts and with which it exchanges lines of JSON.
     Process {
         /// The program: a name to be found on `PATH`, or a path relative to the folder of the `.sesame` file, in which
         /// the program runs. Where that folder is, generated code knows; a plan is the same wherever it lies.
         program: String,
         /// Its arguments, one by one; no shell reads them.
         arguments: Vec<String>,
-        /// Simulation time of one step, in nanoseconds; positive.
-        step_ns: u64,
+        /// Simulation time of one step, in nanoseconds; positive. `None` for a simulator that runs freely: nobody steps it, so
+        /// equal tests need not give equal results.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        step_ns: Option<u64>,
     },
 }
 

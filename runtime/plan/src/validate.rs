@@ -159,8 +159,11 @@ impl CampaignPlan {
         at("schema", require(self.schema == SCHEMA, || format!("is {}, this release knows {SCHEMA}", self.schema)))?;
         at("space", name(&self.space))?;
         at("simulator.name", name(&self.simulator.name))?;
-        let (Transport::InProcess { step_ns, .. } | Transport::Process { step_ns, .. }) = self.simulator.transport;
-        at("simulator.transport.step_ns", require(step_ns > 0, || "must be positive".to_owned()))?;
+        let step_ns = match self.simulator.transport {
+            Transport::InProcess { step_ns, .. } => Some(step_ns),
+            Transport::Process { step_ns, .. } => step_ns,
+        };
+        at("simulator.transport.step_ns", require(step_ns != Some(0), || "must be positive".to_owned()))?;
         self.messages.iter().enumerate().try_for_each(|(index, message)| {
             let field = |field: &crate::Field| {
                 at("name", name(&field.name))?;

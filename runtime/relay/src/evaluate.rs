@@ -1,4 +1,4 @@
-//! One test, one run: relay, metrics and transport put together.
+//! The run of one test: relay, metrics and transport put together.
 
 use std::panic::{self, AssertUnwindSafe};
 use std::time::Instant;
@@ -7,20 +7,20 @@ use sesame_base::observation::{Observation, Outcome, WallTime};
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Moment, Test};
 
-use crate::changed_files::ChangedFiles;
+use crate::files::{NoFiles, SpaceFiles};
 use crate::fuzz::{ChoiceError, OperationEntry};
 use crate::metric::MetricTable;
-use crate::panic_capture as last_panic;
-use crate::relay::{Relay, Tap};
+use crate::panic_capture;
+use crate::relay::{Listener, Relay};
 use crate::simulator::Progress;
 use crate::transport::{Transport, TransportError};
 use crate::wire::WireTable;
 
-/// Runs a test and reports what was observed. A simulator that fails, or a panic in it or in a hook, is an observation
-/// too, with what was seen until then; only a test that does not fit the plan is an error. After a crash the transport
-/// is in an unknown state and must not be used again.
+/// Runs a test and returns what was observed. If the simulator fails, or the simulator or a hook panics, this is an
+/// observation too, with everything seen until then; only a test that does not match the plan is an error. After a
+/// crash the transport is in an unknown state and must not be used again.
 ///
-/// Files that operations of the test changed are put back; where that fails, the run counts as a crash.
+/// Files that operations of the test changed are restored; if that fails, the run counts as a crash.
 pub fn evaluate(
     plan: &CampaignPlan,
     wires: &WireTable,
@@ -33,7 +33,7 @@ pub fn evaluate(
     evaluate_tapped(plan, wires, metrics, transport, &Run { test, simulator_seed }, custom, None)
 }
 
-/// What is run.
+/// The input of a run.
 #[derive(Debug, Clone, Copy)]
 pub struct Run<'a> {
     /// The test.
@@ -42,7 +42,7 @@ pub struct Run<'a> {
     pub simulator_seed: u64,
 }
 
-/// As [`evaluate`], telling a tap what happens.
+/// As [`evaluate`], with a listener besides the metrics.
 pub fn evaluate_tapped(
     plan: &CampaignPlan,
     wires: &WireTable,
@@ -50,22 +50,23 @@ pub fn evaluate_tapped(
     transport: &mut dyn Transport,
     &Run { test, simulator_seed }: &Run<'_>,
     custom: &mut Custom<'_>,
-    tap: Option<&mut dyn Tap>,
+    tap: Option<&mut dyn Listener>,
 ) -> Result<Observation, ChoiceError> {
+    #[expect(clippy::disallowed_methods, reason = "how long a run took is recorded, and decides nothing")]
     let started = Instant::now();
     let mut relay = Relay::new(plan, wires, test, metrics.start(), custom.hooks)?;
     if let Some(tap) = tap {
         relay = relay.tapped(tap);
     }
     let until = SimTime::from_seconds(plan.campaign.end_after);
-    let files = &mut custom.files;
+    let files = custom.files.as_mut();
     let driven = AssertUnwindSafe(|| drive(transport, &mut relay, simulator_seed, until, files));
     let mut failure = match panic::catch_unwind(driven) {
         Ok(driven) => driven.err(),
-        Err(_) => Some(last_panic::take()),
+        Err(_) => Some(panic_capture::take()),
     };
     if plan.operations.iter().any(|operation| operation.kind.is_offline())
-        && let Err(error) = custom.files.put_back()
+        && let Err(error) = custom.files.restore()
     {
         failure.get_or_insert_with(|| error.to_string());
     }
@@ -91,37 +92,37 @@ pub fn evaluate_tapped(
     })
 }
 
-/// What custom operations need: the user's code and the files it may change.
+/// What custom operations need: the user's code, and the files that they may change.
 #[derive(Debug)]
 pub struct Custom<'h> {
     /// The hooks of the runner.
     pub hooks: &'h [OperationEntry],
     /// The files of the space.
-    pub files: ChangedFiles,
+    pub files: Box<dyn SpaceFiles>,
 }
 
 impl Custom<'static> {
     /// For plans without custom operations.
     pub fn none() -> Self {
-        Custom { hooks: &[], files: ChangedFiles::unlocked(std::path::Path::new(".")) }
+        Custom { hooks: &[], files: Box::new(NoFiles) }
     }
 }
 
-/// The error says what failed.
+/// The error gives the reason.
 fn drive(
     transport: &mut dyn Transport,
     relay: &mut Relay<'_>,
     seed: u64,
     end: SimTime,
-    files: &mut ChangedFiles,
+    files: &mut dyn SpaceFiles,
 ) -> Result<(), String> {
     let words = |error: TransportError| error.to_string();
-    relay.beside_run(Moment::BeforeStart, files)?;
+    relay.before_or_after_run(Moment::BeforeStart, files)?;
     relay.begin();
     transport.reset(seed, relay).map_err(words)?;
     while transport.advance(end, relay).map_err(words)? == Progress::Running {}
     relay.end(transport.now());
-    relay.beside_run(Moment::AfterEnd, files)
+    relay.before_or_after_run(Moment::AfterEnd, files)
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! Fuzzing operations: what an active operation does to one message.
 //!
-//! Draws are keyed by the operation's draw seed and the message's index on its wire, so they do not depend on what
-//! happened before: repeating a test repeats its disturbance, and a shorter window disturbs its messages just the same.
+//! Random numbers are keyed by the operation seed and by the message's index on its wire, so they do not depend on what
+//! happened before: repeating a test repeats its disturbance, and a shorter window disturbs its messages in the same
+//! way.
 
 mod bias;
 mod burst_loss;
@@ -50,38 +51,38 @@ pub use scale::Scale;
 pub use stale::Stale;
 pub use stuck_at::{Stuck, StuckAt};
 
-/// An operation with the choices of one test, and what it remembers in one run.
+/// An operation with the choices of one test, and its state in one run.
 #[derive(Debug)]
 pub enum Disturbance {
-    /// Replaces or shifts numbers and points by draws.
+    /// Replaces or shifts numbers and points by random numbers.
     RandomValue(RandomValue),
-    /// Replaces texts by draws.
+    /// Replaces texts by random ones.
     RandomText(RandomText),
-    /// Replaces values by one and the same.
+    /// Replaces values by a constant.
     StuckAt(StuckAt),
-    /// Adds one and the same.
+    /// Adds a constant.
     Bias(Bias),
-    /// Adds what grows with time.
+    /// Adds an offset that grows with time.
     Drift(Drift),
-    /// Adds normal draws.
+    /// Adds normally distributed noise.
     Noise(Noise),
-    /// Multiplies.
+    /// Multiplies by a constant.
     Scale(Scale),
-    /// Replaces numbers by what is none.
+    /// Replaces numbers by NaN or infinity.
     NotFinite(MakeNotFinite),
     /// Repeats old values.
     Freeze(Freeze),
-    /// Gives values of some time ago.
+    /// Replaces values by older ones.
     Stale(Stale),
     /// Drops some messages.
     PacketLoss(PacketLoss),
     /// Drops messages in bursts.
     BurstLoss(BurstLoss),
-    /// Drops messages that come too soon.
+    /// Drops messages that come too soon after the previous one.
     RateLimit(RateLimit),
-    /// Delays messages, order kept.
+    /// Delays messages and keeps their order.
     Latency(Latency),
-    /// Delays messages, order not kept.
+    /// Delays messages and may change their order.
     Reorder(Reorder),
     /// Sends this many copies after each message.
     Duplicate(u32),
@@ -91,7 +92,7 @@ pub enum Disturbance {
     Custom(Custom),
 }
 
-/// What an operation remembers for each wire of its topic; by the wire's position in it.
+/// The state of an operation per wire of its topic, by the wire's position in the topic.
 #[derive(Debug)]
 pub struct PerWire<T>(Vec<T>);
 
@@ -102,8 +103,8 @@ impl<T> Default for PerWire<T> {
 }
 
 impl<T: Default> PerWire<T> {
-    /// What is remembered for a wire; at first the default.
-    pub fn of(&mut self, member: u64) -> &mut T {
+    /// The state for a wire; initially the default.
+    pub fn entry(&mut self, member: u64) -> &mut T {
         let at = usize::try_from(member).expect("a topic has fewer wires than memory has places");
         if at >= self.0.len() {
             self.0.resize_with(at + 1, T::default);
@@ -112,54 +113,54 @@ impl<T: Default> PerWire<T> {
     }
 }
 
-/// When and on which wire of its topic an operation meets a message.
+/// The circumstances of a message: when, and on which wire of its topic, an operation acts on it.
 #[derive(Debug, Clone, Copy)]
-pub struct Encounter {
-    /// The time.
+pub struct MessageContext {
+    /// Simulation time.
     pub now: SimTime,
-    /// How long the operation has been on.
+    /// How long the operation has been active.
     pub active: SimTime,
     /// The wire's position in the topic.
     pub member: u64,
-    /// The operation's draws for the message.
-    pub draws: Draws,
+    /// The operation's random numbers for the message.
+    pub draws: KeyedRng,
 }
 
-/// What becomes of a message.
+/// What an operation does with a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fate {
-    /// It goes on as it is.
+pub enum Action {
+    /// Passes it on unchanged.
     Unchanged,
-    /// It goes on, changed.
+    /// Passes it on, changed.
     Changed,
-    /// It is gone.
+    /// Drops it.
     Dropped,
-    /// It goes on this much later; under latency not before messages held earlier.
+    /// Passes it on this much later; with latency, not before messages that are held already.
     Delayed(SimTime),
-    /// It goes on, and this many copies of it after it.
+    /// Passes it on, followed by this many copies.
     Duplicated(u32),
 }
 
-/// The draws of one operation for one message.
+/// The random numbers of one operation for one message: each is a function of the key.
 #[derive(Debug, Clone, Copy)]
-pub struct Draws {
+pub struct KeyedRng {
     seed: u64,
     message: u64,
 }
 
-impl Draws {
-    /// The draws for the `index`th message on the `member`th wire of the operation's topic.
+impl KeyedRng {
+    /// The random numbers for the `index`th message on the `member`th wire of the operation's topic.
     pub fn new(draw_seed: u64, member: u64, index: u64) -> Self {
         let seed = if member == 0 { draw_seed } else { rng::derive_seed(draw_seed, "member", &[member]) };
-        Draws { seed, message: index }
+        KeyedRng { seed, message: index }
     }
 
-    /// The `n`th draw, uniform in `[0, 1)`.
+    /// The `n`th number, uniform in `[0, 1)`.
     pub fn unit(self, n: u64) -> f64 {
         rng::keyed_unit(self.seed, self.message, n)
     }
 
-    /// A standard normal number (Box–Muller) of the `n`th draw and the one after it.
+    /// A standard normal number (Box–Muller) from the `n`th number and the next one.
     pub fn normal(self, n: u64) -> f64 {
         let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.unit(n)));
         radius * libm::cos(std::f64::consts::TAU * self.unit(n + 1))
@@ -167,20 +168,21 @@ impl Draws {
 }
 
 impl Disturbance {
-    /// Applies a test's choices to an operation of the space, with the user's code for custom ones. A plan guarantees
-    /// that they fit; choices read from elsewhere are refused with a reason.
+    /// Applies a test's choices to an operation of the space, with the user's code for custom operations. In a plan
+    /// they always match; choices from elsewhere that do not match are an error.
     pub fn new(operation: &Operation, test: &TestOperation, hooks: &[OperationEntry]) -> Result<Self, ChoiceError> {
         let refuse = |reason: String| Err(ChoiceError { operation: operation.name.clone(), reason });
         if operation.parameters.len() != test.parameters.len() {
             return refuse(format!("has {} parameters, not {}", operation.parameters.len(), test.parameters.len()));
         }
         for (parameter, choice) in operation.parameters.iter().zip(&test.parameters) {
-            if let Some(reason) = misfit(&parameter.domain, choice) {
+            if let Some(reason) = mismatch(&parameter.domain, choice) {
                 return refuse(format!("`{}` {reason}", parameter.name));
             }
         }
         if operation.kind.is_offline() != (test.activation == Activation::Offline) {
-            let (what, when) = if operation.kind.is_offline() { ("has no", "beside") } else { ("lacks an", "during") };
+            let (what, when) =
+                if operation.kind.is_offline() { ("has no", "before or after") } else { ("lacks an", "during") };
             return refuse(format!("{what} activation: it acts {when} the run"));
         }
         let chosen = |name: &str| {
@@ -189,7 +191,7 @@ impl Disturbance {
         };
         let lacks = |name: &str| ChoiceError {
             operation: operation.name.clone(),
-            reason: format!("has no parameter `{name}`, or of another kind: run `sesamec generate` again"),
+            reason: format!("has no parameter `{name}` of the expected kind: run `sesamec generate` again"),
         };
         let number = |name: &str| match chosen(name) {
             Some(Choice::Value { value }) => Ok(*value),
@@ -199,7 +201,7 @@ impl Disturbance {
             Some(choice @ (Choice::Value { .. } | Choice::Range { .. })) => Ok(bounds(choice)),
             _ => Err(lacks(name)),
         };
-        let amount = |name: &str| chosen(name).and_then(Amount::of).ok_or_else(|| lacks(name));
+        let amount = |name: &str| chosen(name).and_then(Amount::from_choice).ok_or_else(|| lacks(name));
         let places = Places::new(&operation.places);
         Ok(match &operation.kind {
             OperationKind::RandomValue { mode, integer } => {
@@ -257,7 +259,7 @@ impl Disturbance {
         })
     }
 
-    /// The operation goes on: what it makes of messages begins afresh. What it heard while it was off stays.
+    /// The operation becomes active: its state is reset, except for what it observed while it was inactive.
     pub fn begin(&mut self) {
         match self {
             Disturbance::BurstLoss(operation) => operation.bursting = PerWire::default(),
@@ -266,16 +268,16 @@ impl Disturbance {
         }
     }
 
-    /// Whether it has to hear messages that pass while it is off.
-    pub fn listens(&self) -> bool {
+    /// Whether it observes messages that pass while it is inactive.
+    pub fn observes_inactive(&self) -> bool {
         matches!(self, Disturbance::Freeze(_) | Disturbance::Stale(_))
     }
 
-    /// A message passes while the operation is off.
-    pub fn overhear(&mut self, now: SimTime, member: u64, message: &Value) {
+    /// A message passes while the operation is inactive.
+    pub fn observe(&mut self, now: SimTime, member: u64, message: &Value) {
         match self {
-            Disturbance::Freeze(operation) => operation.overhear(member, message),
-            Disturbance::Stale(operation) => operation.overhear(now, member, message),
+            Disturbance::Freeze(operation) => operation.observe(member, message),
+            Disturbance::Stale(operation) => operation.observe(now, member, message),
             _ => {}
         }
     }
@@ -285,7 +287,7 @@ impl Disturbance {
         matches!(self, Disturbance::Latency(_))
     }
 
-    /// What becomes of messages that it holds back when it goes off; `None` if it holds none.
+    /// What happens to the messages that it holds back when it becomes inactive; `None` if it never holds any.
     pub fn drain(&self) -> Option<Drain> {
         match self {
             Disturbance::Latency(operation) => Some(operation.drain),
@@ -294,9 +296,9 @@ impl Disturbance {
         }
     }
 
-    /// What becomes of a message while the operation is active; the message may be changed in place. A custom operation
-    /// may do more than that, so the relay calls it itself.
-    pub fn apply(&mut self, at: Encounter, message: &mut Value) -> Fate {
+    /// Acts on a message while the operation is active; the message may be changed in place. A custom operation may do
+    /// more than that, so the relay calls it itself.
+    pub fn apply(&mut self, at: MessageContext, message: &mut Value) -> Action {
         match self {
             Disturbance::RandomValue(operation) => operation.apply(at.draws, message),
             Disturbance::RandomText(operation) => operation.apply(at.draws, message),
@@ -313,15 +315,15 @@ impl Disturbance {
             Disturbance::RateLimit(operation) => operation.apply(at.now, at.member),
             Disturbance::Latency(operation) => operation.apply(at.draws),
             Disturbance::Reorder(operation) => operation.apply(at.draws),
-            Disturbance::Duplicate(copies) => Fate::Duplicated(*copies),
-            Disturbance::Blackhole => Fate::Dropped,
-            Disturbance::Custom(_) => Fate::Unchanged,
+            Disturbance::Duplicate(copies) => Action::Duplicated(*copies),
+            Disturbance::Blackhole => Action::Dropped,
+            Disturbance::Custom(_) => Action::Unchanged,
         }
     }
 }
 
-/// Why a choice is not one that is permitted; `None` if it is.
-fn misfit(domain: &Domain, choice: &Choice) -> Option<String> {
+/// Why a choice is not permitted; `None` if it is.
+fn mismatch(domain: &Domain, choice: &Choice) -> Option<String> {
     match (domain, choice) {
         (Domain::Number { low: least, high: most, shape, integer }, Choice::Value { .. } | Choice::Range { .. }) => {
             let (low, high) = bounds(choice);
@@ -336,7 +338,7 @@ fn misfit(domain: &Domain, choice: &Choice) -> Option<String> {
         (Domain::Texts { texts: items } | Domain::Files { files: items }, Choice::Text { text }) => {
             (!items.contains(text)).then(|| format!("permits {}, not {text:?}", items.join(", ")))
         }
-        _ => Some("is of another kind than what is chosen".to_owned()),
+        _ => Some("has a domain of another kind than the choice".to_owned()),
     }
 }
 
@@ -348,12 +350,12 @@ fn bounds(choice: &Choice) -> (f64, f64) {
     }
 }
 
-/// A test whose choices do not fit the operation.
+/// A test with choices that do not match the operation.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("operation `{operation}` {reason}")]
 pub struct ChoiceError {
     /// The operation.
     pub operation: String,
-    /// What does not fit.
+    /// The mismatch.
     pub reason: String,
 }

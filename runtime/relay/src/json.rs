@@ -1,8 +1,8 @@
 //! Payloads as JSON, by the types that the space declares.
 //!
-//! Reals and whole numbers are numbers, points are `[x, y, z]`, messages are objects. JSON has no NaN and no infinity:
-//! they are the texts `"NaN"`, `"Infinity"` and `"-Infinity"` in place of a real. What the space does not declare stays
-//! as it was, byte for byte.
+//! Reals and whole numbers are numbers, points are `[x, y, z]`, messages are objects. JSON has neither NaN nor
+//! infinity: instead of a real they are the strings `"NaN"`, `"Infinity"` and `"-Infinity"`. Parts that the space does
+//! not declare are kept byte for byte.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -21,7 +21,7 @@ use crate::value::{Fields, Record, Text, Value};
 /// The largest whole number up to which JSON's reals are exact.
 const EXACT: f64 = 9_007_199_254_740_992.0;
 
-/// The field names seen last per message type, so that all records of a kind share them.
+/// The latest field names per message type, so that all records of a type share them.
 #[derive(Default)]
 pub(crate) struct Shapes(BTreeMap<MessageId, Arc<Fields>>);
 
@@ -89,7 +89,7 @@ fn record(plan: &CampaignPlan, shapes: &mut Shapes, id: MessageId, text: &str) -
     Ok(Record::new(&fields, values))
 }
 
-/// The entries of an object, in their order, doubles included.
+/// The entries of an object, in their order, including duplicates.
 struct Object<'a>(Vec<(Cow<'a, str>, &'a RawValue)>);
 
 impl<'de> Deserialize<'de> for Object<'de> {
@@ -125,7 +125,7 @@ fn real(text: &str) -> Result<f64, Mismatch> {
     }
 }
 
-/// A whole number, however it is written: some languages know no other numbers than reals.
+/// A whole number in any notation: some languages have no other numbers than reals.
 fn int(text: &str) -> Result<i64, Mismatch> {
     if let Ok(whole) = serde_json::from_str(text) {
         return Ok(whole);
@@ -188,7 +188,7 @@ fn row<T>(items: &[T], out: &mut Vec<u8>, each: fn(&T, &mut Vec<u8>)) {
     out.push(b']');
 }
 
-/// Writes a real number, or the text that stands for it.
+/// Writes a real number, or the string that represents it.
 pub(crate) fn number(x: f64, out: &mut Vec<u8>) {
     if x.is_finite() {
         serde_json::to_writer(out, &x).expect("memory takes all that is written");
@@ -204,7 +204,7 @@ pub(crate) fn number(x: f64, out: &mut Vec<u8>) {
     }
 }
 
-/// Writes a text in quotes.
+/// Writes a string in quotes.
 pub(crate) fn quoted(text: &str, out: &mut Vec<u8>) {
     serde_json::to_writer(out, text).expect("memory takes all that is written");
 }
@@ -221,7 +221,8 @@ mod tests {
     const INT: Type = Type::Int { unit: None };
     const POINT: Type = Type::Point { unit: None };
 
-    /// Message 0 is `Inner { level: real, count: int }`, message 1 `Outer { inner: Inner, at: point, tags: list of text }`.
+    /// Message 0 is `Inner { level: real, count: int }`, message 1 `Outer { inner: Inner, at: point, tags: list of text
+    /// }`.
     fn plan() -> CampaignPlan {
         let mut plan = sesame_plan::testing::plan(Vec::new());
         let field = |name: &str, ty| Field { name: name.into(), doc: String::new(), ty };

@@ -1,12 +1,12 @@
-//! From dynamic payloads to the typed messages of generated code, and back.
+//! Conversion between dynamic payloads and the typed messages of generated code.
 
 use sesame_plan::{CampaignPlan, Type};
 
 use crate::value::{Fields, Record, Text, Value};
 
-/// A type that generated code and hooks see a payload as.
+/// A type as which generated code and hooks read a payload.
 pub trait FromValue: Sized {
-    /// Reads the payload; a mismatch says where and what.
+    /// Reads the payload; the mismatch gives the place and the reason.
     fn from_value(value: &Value) -> Result<Self, Mismatch>;
 }
 
@@ -16,9 +16,9 @@ pub trait FromValue: Sized {
 pub struct Mismatch {
     /// Field names from the message inwards.
     pub path: Vec<String>,
-    /// What the space declares.
+    /// The declared type.
     pub expected: &'static str,
-    /// What came.
+    /// The kind of value that came.
     pub found: &'static str,
 }
 
@@ -32,12 +32,12 @@ impl Mismatch {
         Mismatch { path: Vec::new(), expected, found: value.kind() }
     }
 
-    /// A declared field that is not there.
+    /// A missing field.
     pub(crate) fn missing(name: &str) -> Self {
         Mismatch { path: vec![name.to_owned()], expected: "a value", found: "nothing" }
     }
 
-    /// The same, seen from the message or list around it.
+    /// The same mismatch, inside of a message or list.
     pub(crate) fn inside(mut self, name: &str) -> Self {
         self.path.insert(0, name.to_owned());
         self
@@ -79,7 +79,7 @@ pub fn field<T: FromValue>(message: &Value, name: &str) -> Result<T, Mismatch> {
 }
 
 impl FromValue for f64 {
-    /// A whole number is a real number too: JSON does not tell them apart.
+    /// A whole number is a real number too: JSON does not distinguish them.
     fn from_value(value: &Value) -> Result<Self, Mismatch> {
         match value {
             Value::Real(x) => Ok(*x),
@@ -136,13 +136,13 @@ impl<T: FromValue> FromValue for Vec<T> {
     }
 }
 
-/// A type that generated code and hooks make payloads of.
+/// A type from which generated code and hooks create payloads.
 pub trait ToValue {
-    /// A payload of nothing but this.
+    /// A new payload.
     fn to_value(&self) -> Value;
 
-    /// Puts this into the place of a payload it was read from, and says whether that changed anything. What the
-    /// declared type does not know of stays: further fields of a message, and that a number was written as a whole one.
+    /// Writes this into a payload from which it was read, and returns whether this changed anything. Parts that the
+    /// declared type does not know stay: further fields of a message, and that a number was written as a whole number.
     fn write_to(&self, value: &mut Value) -> bool;
 }
 
@@ -171,7 +171,7 @@ impl ToValue for f64 {
     fn to_value(&self) -> Value {
         Value::Real(*self)
     }
-    /// Numbers are compared by their bits: a NaN that is left alone is unchanged.
+    /// Numbers are compared by their bits: a NaN that was not replaced is unchanged.
     fn write_to(&self, value: &mut Value) -> bool {
         let same = f64::from_value(value).is_ok_and(|old| old.to_bits() == self.to_bits());
         replace(value, same, || self.to_value())

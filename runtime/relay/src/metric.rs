@@ -25,7 +25,8 @@ pub use probe::unimplemented_hooks;
 pub trait Hook {
     /// Before the first message of a run.
     fn on_start(&mut self, ctx: &mut Context);
-    /// A message on the metric's `input`th topic, as declared; [`Context::topic`] tells the member of a group.
+    /// A message on the metric's `input`th topic, in order of declaration; for a group, [`Context::topic`] is the
+    /// member.
     fn on_message(&mut self, input: usize, value: &Value, ctx: &mut Context);
     /// After the last message of a run.
     fn on_end(&mut self, ctx: &mut Context);
@@ -36,11 +37,11 @@ pub trait Hook {
 pub struct HookEntry {
     /// The metric's name in the space.
     pub metric: &'static str,
-    /// A fresh hook; every run gets its own.
+    /// Creates a hook; every run has its own.
     pub build: fn() -> Box<dyn Hook>,
 }
 
-/// What a hook is told, and where it puts its value.
+/// The context of a hook, in which it sets its value.
 #[derive(Debug, Default)]
 pub struct Context {
     now: SimTime,
@@ -50,7 +51,7 @@ pub struct Context {
     last_times: BTreeMap<String, SimTime>,
     unimplemented: bool,
     problem: Option<String>,
-    /// The only way in which the value may change, and whether it went the other way.
+    /// The only direction in which the value may change, and whether it changed in the other one.
     trend: Option<Trend>,
     turned: bool,
     /// When it first read a number that was not finite, and the value at that time.
@@ -63,7 +64,7 @@ impl Context {
         self.now.seconds()
     }
 
-    /// Name on the wire of the topic the message came on; a member when the input is a group.
+    /// Name on the wire of the message's topic; if the input is a group, the name of the member.
     pub fn topic(&self) -> &str {
         &self.topic
     }
@@ -73,8 +74,8 @@ impl Context {
         self.value
     }
 
-    /// Sets the metric's value. What is not finite is refused and reported as a warning of the run; from then on the run says
-    /// no more of a requirement than if it had broken off.
+    /// Sets the metric's value. A value that is not finite is refused, with a warning of the run; from then on
+    /// requirements on the metric are decided as if the run had broken off.
     pub fn set(&mut self, value: f64) {
         if !value.is_finite() {
             self.note(format!("refused the value {value} at {}", self.now));
@@ -108,13 +109,13 @@ impl Context {
         self.set(self.value.unwrap_or(0.0) + amount);
     }
 
-    /// True the first time and then whenever at least this much simulation time has passed since it was last true:
-    /// makes a count independent of the rate of messages.
+    /// True the first time, and then whenever at least this much simulation time has passed since it was last true.
+    /// This makes a count independent of the rate of messages.
     pub fn every_seconds(&mut self, period: f64) -> bool {
         self.every_seconds_for("", period)
     }
 
-    /// As [`Context::every_seconds`], with a clock of its own for each key.
+    /// As [`Context::every_seconds`], with a separate clock for each key.
     pub fn every_seconds_for(&mut self, key: &str, period: f64) -> bool {
         let period = SimTime::from_seconds(period);
         match self.last_times.get_mut(key) {
@@ -130,23 +131,23 @@ impl Context {
         }
     }
 
-    /// Says that this hook is not filled in yet.
+    /// Marks this hook as not implemented yet.
     pub fn unimplemented(&mut self) {
         self.unimplemented = true;
     }
 
-    /// Says that a message was not of its declared type; generated code does.
+    /// Reports that a message was not of its declared type. For generated code.
     pub fn mismatch(&mut self, mismatch: &crate::message::Mismatch) {
         self.note(format!("a message on `{}` is not of its declared type: {mismatch}", self.topic));
     }
 
-    /// A number that it reads now is not finite.
+    /// It has just read a number that is not finite.
     fn read_not_finite(&mut self) {
         let now = (self.now, self.value);
         self.not_finite.get_or_insert(now);
     }
 
-    /// What is left for the value from some time on, when it was this.
+    /// The values that it can still reach from a time on at which it had this value.
     fn onwards(&self, value: Option<f64>) -> Reach {
         Reach::onwards(self.trend.filter(|_| !self.turned), value)
     }

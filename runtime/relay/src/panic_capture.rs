@@ -1,11 +1,13 @@
-//! The words of the last panic, with its place: `catch_unwind` alone does not tell where it was.
+//! The message and place of the last panic: `catch_unwind` alone does not give the place.
+
+#![expect(clippy::disallowed_methods, reason = "an adapter: it prints panics as they happen")]
 
 use std::sync::Mutex;
 
 static LAST: Mutex<Option<String>> = Mutex::new(None);
 
-/// Keeps the words of every panic from now on, and prints them. For a process of our own, such as a worker.
-pub fn listen() {
+/// From now on, prints every panic and keeps its message. For a process of our own, such as a worker.
+pub fn install() {
     std::panic::set_hook(Box::new(|panic| {
         // A log that cannot be written must not turn a panic into an abort.
         std::io::Write::write_all(&mut std::io::stderr(), format!("{panic}\n").as_bytes()).ok();
@@ -15,8 +17,8 @@ pub fn listen() {
     }));
 }
 
-/// The words of the last panic since they were last taken.
+/// The message of the last panic since the last call.
 pub fn take() -> String {
-    let words = LAST.lock().ok().and_then(|mut last| last.take());
-    words.unwrap_or_else(|| "a panic without words".to_owned())
+    let message = LAST.lock().ok().and_then(|mut last| last.take());
+    message.unwrap_or_else(|| "a panic without a message".to_owned())
 }

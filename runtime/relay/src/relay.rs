@@ -1,21 +1,22 @@
 //! The relay: the man in the middle, for one run of one test.
 //!
-//! Sans-IO. Messages and time go in, deliveries come out; a transport feeds it and carries out what it says. Within one
-//! event the order is: due releases, inbound metrics, conditions, operations (the triggering message included), outbound
-//! metrics, then delivery. A message on a wire that no operation of the test touches is handed on as it came.
+//! Sans-IO. Messages and time go in, deliveries come out; a transport passes messages and time to it and carries out
+//! its deliveries. Within one event the order is: due releases, inbound metrics, conditions, operations (including on
+//! the message that caused the event), outbound metrics, then delivery. A message on a wire on which no operation of
+//! the test acts is passed on unchanged.
 //!
-//! Conditions are weighed when a metric that they read may have changed: after the inbound metrics of a message and
-//! before its operations, once a message is through, and when an instant is over, for what is known only then. They are
-//! weighed at edges too, and when the fuzzing time comes to a number that it is compared with. To weigh the same values
-//! again changes nothing, so no message that a condition does not read, and no step of time, switches an operation. A test
-//! without conditions pays nothing for them.
+//! Conditions are evaluated when a metric that they read may have changed: after the inbound metrics of a message and
+//! before its operations, after a message has been delivered, and at the end of an instant, for values that are known
+//! only then. They are also evaluated at edges, and when the fuzzing time reaches a number with which it is compared.
+//! Evaluating the same values again changes nothing, so no message that a condition does not read, and no step of time,
+//! switches an operation. A test without conditions has no cost for them.
 //!
-//! What an operation does to a message has an effect only where somebody hears the message's wire: a subscriber, or an
-//! outbound metric. What it does on other wires is counted apart.
+//! A change of a message is an effect only if its wire has a receiver: a subscriber, or an outbound metric. Changes on
+//! other wires are counted separately.
 
 mod fuzzing_time;
+mod listener;
 mod release;
-mod tap;
 
 use release::{Held, ReleaseQueue, Why};
 
@@ -25,13 +26,13 @@ use sesame_base::time::SimTime;
 use sesame_plan::condition::Operand;
 use sesame_plan::{CampaignPlan, Copies, Drain, Moment, OperationId, Side, Span, Test, TopicId};
 
-use crate::changed_files::ChangedFiles;
-use crate::fuzz::{ChoiceError, Disturbance, Draws, Encounter, Fate, OperationEntry, RunContext};
+use crate::files::SpaceFiles;
+use crate::fuzz::{Action, ChoiceError, Disturbance, KeyedRng, MessageContext, OperationEntry, RunContext};
 use crate::metric::Metrics;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
-pub use tap::{Deed, Tap, Touched};
+pub use listener::{Listener, MessageRef, OperationEvent};
 
 /// A message that is to reach its subscribers now.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,22 +45,29 @@ pub struct Delivery {
 
 /// The relay as a transport sees it.
 pub trait Exchange {
-    /// The wires it knows; messages of other topics are none of its business.
+    /// The wires that it knows; messages of other topics do not go through it.
     fn wires(&self) -> &WireTable;
     /// Whether messages of this wire must pass through it, because an operation may disturb them.
     fn intercepts(&self, wire: Wire) -> bool;
-    /// From now on the simulator subscribes to this wire, so that what is done to its messages has an effect.
+    /// From now on the simulator subscribes to this wire, so changes of its messages are effects.
     fn subscribed(&mut self, wire: Wire);
-    /// Time has come to `now`; it never goes back.
+    /// Simulation time is `now` from here on; it never goes back.
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>);
     /// A message was published at `now`.
     fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>);
+    /// The next moment at which the relay has something to do even without a message: a held message is due, or an
+    /// operation may be switched. Until then, advancing time has no effect. `None` if only a message can cause
+    /// anything.
+    ///
+    /// A transport that does not step its simulator waits until this moment or until the next message, whichever is
+    /// first. A message may change the moment.
+    fn next_due(&self) -> Option<SimTime>;
 }
 
-/// The most messages that operations may hold back at once; beyond it, the oldest is let go early and the run warned.
+/// The most messages that operations may hold back at once; beyond it, the oldest is released early, with a warning.
 pub const HELD_LIMIT: usize = 100_000;
 
-/// The most copies that operations may make in one event; beyond it, no more are made and the run is warned.
+/// The most copies that operations may make in one event; beyond it, no more are made, with a warning.
 pub const COPIES_LIMIT: u32 = 10_000;
 
 /// The relay of one run.
@@ -74,9 +82,9 @@ pub struct Relay<'a> {
     published: Vec<u64>,
     queue: ReleaseQueue,
     metrics: Metrics<'a>,
-    /// Per wire: whether somebody hears it.
+    /// Per wire: whether it has a receiver.
     heard: Vec<bool>,
-    /// The topics that operations of the plan act on, whether this test has them or not.
+    /// The topics that operations of the plan act on, whether or not this test contains them.
     acted_on: Vec<TopicId>,
     conditions: Conditions,
     /// The instant at hand.
@@ -87,14 +95,15 @@ pub struct Relay<'a> {
     /// Copies made in the event at hand.
     copies: u32,
     flooded: bool,
-    tap: Option<&'a mut dyn Tap>,
+    /// The listeners besides the metrics.
+    taps: Vec<&'a mut dyn Listener>,
 }
 
-/// What switches operations by condition.
+/// How conditions switch operations.
 struct Conditions {
     /// The operations that conditions switch.
     operations: Vec<usize>,
-    /// Those of them that have just gone off; here so that weighing does not allocate.
+    /// Those of them that have just become inactive; kept here so that an evaluation does not allocate.
     ended: Vec<usize>,
     /// Per wire: whether a condition reads a metric of its messages as they are published.
     read: Vec<bool>,
@@ -106,7 +115,7 @@ struct Conditions {
     apart: bool,
 }
 
-/// How far a run is.
+/// The state of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     /// Nothing has happened, not even the edges at time zero.
@@ -121,18 +130,18 @@ struct Stage {
     operation: OperationId,
     name: String,
     disturbance: Disturbance,
-    /// Whether it has to hear messages while it is off.
-    listens: bool,
+    /// Whether it observes messages while it is inactive.
+    observes_inactive: bool,
     holds_order: bool,
     activity: Activity,
-    /// When it last went on.
+    /// When it last became active.
     since: SimTime,
     draw_seed: u64,
     /// Whether it counts in `fuzzing_time()`.
     timed: bool,
     /// Since when it holds messages back without being active.
     tail_since: Option<SimTime>,
-    /// When it did so before.
+    /// Earlier intervals of that kind.
     tails: Vec<(SimTime, SimTime)>,
     counters: Counters,
     first_touch: Option<SimTime>,
@@ -140,7 +149,7 @@ struct Stage {
 }
 
 impl Stage {
-    /// Counts what it did to so many messages on a wire that somebody hears, or nobody.
+    /// Counts an action on this many messages on a wire with or without a receiver.
     fn count(&mut self, heard: bool, now: SimTime, messages: u64, count: impl FnOnce(&mut Counters) -> &mut u64) {
         if messages == 0 {
             return;
@@ -176,7 +185,7 @@ impl<'a> Relay<'a> {
             operations.push(Stage {
                 operation: choice.operation,
                 name: operation.name.clone(),
-                listens: disturbance.listens(),
+                observes_inactive: disturbance.observes_inactive(),
                 holds_order: disturbance.holds_order(),
                 disturbance,
                 activity: Activity::new(&choice.activation, operation.within),
@@ -227,25 +236,34 @@ impl<'a> Relay<'a> {
             overflowed: false,
             copies: 0,
             flooded: false,
-            tap: None,
+            taps: Vec::new(),
         })
     }
 
-    /// The same relay, telling this tap what happens.
-    pub fn tapped(self, tap: &'a mut dyn Tap) -> Self {
-        Relay { tap: Some(tap), ..self }
+    /// Adds a listener, which is told everything that happens from now on.
+    pub fn tapped(mut self, listener: &'a mut dyn Listener) -> Self {
+        self.taps.push(listener);
+        self
     }
 
     /// The same relay with a simulator that subscribes to everything.
     #[cfg(test)]
-    pub(crate) fn heard_everywhere(mut self) -> Self {
+    pub(crate) fn received_everywhere(mut self) -> Self {
         self.heard.fill(true);
         self
     }
 
-    fn tell(&mut self, now: SimTime, operation: usize, deed: Deed) {
-        if let Some(tap) = &mut self.tap {
-            tap.operated(now, operation, deed);
+    fn tell(&mut self, now: SimTime, operation: usize, event: OperationEvent) {
+        for tap in &mut self.taps {
+            tap.operated(now, operation, event);
+        }
+    }
+
+    /// Tells the listeners the time.
+    fn tell_time(&mut self, now: SimTime) {
+        self.metrics.advanced(now);
+        for tap in &mut self.taps {
+            tap.advanced(now);
         }
     }
 
@@ -254,18 +272,18 @@ impl<'a> Relay<'a> {
         self.metrics.begin();
     }
 
-    /// Tells the metrics that the run has come to its end.
+    /// Tells the metrics that the run has ended.
     pub fn end(&mut self, now: SimTime) {
         self.metrics.end(now);
     }
 
-    /// Closes the books at `end`, where the run ended or broke off: what is still held is lost, open intervals are closed.
+    /// The result of a run that ended or broke off at `end`: messages still held are lost, open intervals are closed.
     pub fn finish(mut self, end: SimTime) -> Finished {
         self.begin_time();
         self.phase = Phase::Over;
-        self.follow_time(end, &mut Vec::new());
-        // Whether a message came at the end or not: what a metric may still come to is asked for this time.
-        self.metrics.follow_time(end);
+        self.advance_to(end, &mut Vec::new());
+        // Even if no message came at the end: the reach of metrics is asked for this time.
+        self.tell_time(end);
         let operations: Vec<OperationEffect> = self
             .operations
             .iter()
@@ -305,7 +323,7 @@ impl<'a> Relay<'a> {
 
     /// Carries out, in order of time, every activation edge and every release up to `now`; at one instant edges come
     /// first, since an operation is active for `start <= t < end`.
-    fn follow_time(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
+    fn advance_to(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
         self.begin_time();
         loop {
             self.release_due(deliveries);
@@ -313,17 +331,21 @@ impl<'a> Relay<'a> {
                 return;
             }
             self.leave();
-            let edges = self.operations.iter().filter_map(|stage| stage.activity.next_edge());
-            let moments = edges.chain(self.queue.next_release()).chain(self.next_comparison());
-            let Some(moment) = moments.min().filter(|&moment| moment <= now) else {
+            let Some(moment) = self.next_moment().filter(|&moment| moment <= now) else {
                 self.now = now;
-                self.metrics.follow_time(now);
+                self.tell_time(now);
                 return;
             };
             self.now = moment;
-            self.metrics.follow_time(moment);
+            self.tell_time(moment);
             self.arrive();
         }
+    }
+
+    /// The next edge, release, or moment at which the fuzzing time reaches a number with which it is compared.
+    fn next_moment(&self) -> Option<SimTime> {
+        let edges = self.operations.iter().filter_map(|stage| stage.activity.next_edge());
+        edges.chain(self.queue.next_release()).chain(self.next_comparison()).min()
     }
 
     /// Carries out the edges at time zero, once.
@@ -334,31 +356,31 @@ impl<'a> Relay<'a> {
         }
     }
 
-    /// What an instant begins with, if something is due then: its edges.
+    /// Begins an instant at which something is due: carries out its edges.
     fn arrive(&mut self) {
         for at in 0..self.operations.len() {
-            match self.operations[at].activity.follow(self.now) {
+            match self.operations[at].activity.advance_to(self.now) {
                 Edge::None => {}
                 Edge::Started => self.begin_activity(at, self.now),
                 Edge::Ended => self.end_activity(at, self.now),
             }
         }
-        self.weigh_conditions();
+        self.evaluate_conditions();
     }
 
-    /// What an instant ends with, once time moves on: values that are known only now. What they switch on or off, they do a
-    /// nanosecond later, since the instant they are of is over.
+    /// Ends an instant, when time advances: some values are known only now. They switch operations one nanosecond
+    /// later, since the instant to which they belong is over.
     fn leave(&mut self) {
         if self.metrics.settle() {
             self.now = self.now + TICK;
-            self.metrics.follow_time(self.now);
+            self.tell_time(self.now);
         }
-        self.weigh_conditions();
+        self.evaluate_conditions();
     }
 
-    /// Weighs the conditions of all operations on the same values: first which go off, then which go on, so that one may
-    /// begin where its copy ends.
-    fn weigh_conditions(&mut self) {
+    /// Evaluates the conditions of all operations on the same values: first which operations become inactive, then
+    /// which become active, so that an operation can begin when its copy ends.
+    fn evaluate_conditions(&mut self) {
         if self.conditions.operations.is_empty() {
             return;
         }
@@ -368,7 +390,7 @@ impl<'a> Relay<'a> {
             let metrics = &self.metrics;
             let value = |metric| metrics.value(metric, fuzzing_time);
             for &at in &self.conditions.operations {
-                if self.operations[at].activity.weigh_end(now, &value) == Edge::Ended {
+                if self.operations[at].activity.evaluate_end(now, &value) == Edge::Ended {
                     self.conditions.ended.push(at);
                 }
             }
@@ -376,7 +398,7 @@ impl<'a> Relay<'a> {
                 let at = self.conditions.operations[next];
                 let free = !self.conditions.apart || !self.copy_is_active(at);
                 let value = |metric| self.metrics.value(metric, fuzzing_time);
-                if self.operations[at].activity.weigh_start(now, free, &value) == Edge::Started {
+                if self.operations[at].activity.evaluate_start(now, free, &value) == Edge::Started {
                     self.begin_activity(at, now);
                 }
             }
@@ -390,13 +412,13 @@ impl<'a> Relay<'a> {
         }
     }
 
-    /// Lets go of what is due: each message by itself, since conditions may read what is delivered.
+    /// Releases due messages, one after another, since conditions may read what is delivered.
     fn release_due(&mut self, deliveries: &mut Vec<Delivery>) {
         while self.queue.next_release().is_some_and(|release| release <= self.now) {
             if let Some(held) = self.release() {
                 self.pass(self.now, held, deliveries);
                 if self.conditions.reads_delivered {
-                    self.weigh_conditions();
+                    self.evaluate_conditions();
                 }
             }
         }
@@ -409,7 +431,7 @@ impl<'a> Relay<'a> {
         others.into_iter().any(|(_, stage)| stage.operation == operation && stage.activity.is_active())
     }
 
-    /// The next message that is held back, due or not, taken out of the queue.
+    /// Takes the next held message out of the queue, due or not.
     fn release(&mut self) -> Option<Held> {
         let (operation, held) = self.queue.pop()?;
         if self.queue.holds(operation) == 0 {
@@ -418,18 +440,18 @@ impl<'a> Relay<'a> {
         Some(held)
     }
 
-    /// What happens when an operation goes on: it begins afresh.
+    /// An operation becomes active: it starts from its initial state.
     fn begin_activity(&mut self, at: usize, now: SimTime) {
         let stage = &mut self.operations[at];
         stage.since = now;
         stage.end_tail(now);
         stage.disturbance.begin();
-        self.tell(now, at, Deed::Started);
+        self.tell(now, at, OperationEvent::Started);
     }
 
-    /// What happens when an operation goes off: it is told, and the messages it holds become what they are to become.
+    /// An operation becomes inactive: listeners are told, and the messages that it holds are handled by its `drain`.
     fn end_activity(&mut self, at: usize, now: SimTime) {
-        self.tell(now, at, Deed::Ended);
+        self.tell(now, at, OperationEvent::Ended);
         match self.operations[at].disturbance.drain() {
             None | Some(Drain::Finish) => {}
             Some(Drain::Flush) => return self.queue.release_all(at, now),
@@ -445,7 +467,7 @@ impl<'a> Relay<'a> {
                     counters.dropped += 1;
                 }
                 for (_, held) in lost {
-                    self.tell(now, at, Deed::Dropped(held.touched()));
+                    self.tell(now, at, OperationEvent::Dropped(held.message_ref()));
                 }
             }
         }
@@ -464,35 +486,35 @@ impl<'a> Relay<'a> {
             let active = stage.activity.is_active();
             if active {
                 stage.counters.seen += 1;
-            } else if stage.listens {
-                stage.disturbance.overhear(now, member, &message.value);
+            } else if stage.observes_inactive {
+                stage.disturbance.observe(now, member, &message.value);
             }
             if active && matches!(stage.disturbance, Disturbance::Custom(_)) {
                 return self.pass_custom(now, at, member, message, deliveries);
             }
-            let fate = if active {
-                let draws = Draws::new(stage.draw_seed, member, message.index);
-                let encounter = Encounter { now, active: now - stage.since, member, draws };
-                stage.disturbance.apply(encounter, &mut message.value)
+            let action = if active {
+                let draws = KeyedRng::new(stage.draw_seed, member, message.index);
+                let context = MessageContext { now, active: now - stage.since, member, draws };
+                stage.disturbance.apply(context, &mut message.value)
             } else {
-                Fate::Unchanged
+                Action::Unchanged
             };
-            if let Fate::Duplicated(copies) = fate {
+            if let Action::Duplicated(copies) = action {
                 return self.pass_copies(now, at, message, copies, deliveries);
             }
-            let release = match fate {
-                Fate::Delayed(delay) => now + delay,
+            let release = match action {
+                Action::Delayed(delay) => now + delay,
                 _ => now,
             }
             .max(queued_until.unwrap_or(now));
-            if fate == Fate::Dropped {
+            if action == Action::Dropped {
                 stage.count(heard, now, 1, |counters| &mut counters.dropped);
-                self.tell(now, at, Deed::Dropped(message.touched()));
+                self.tell(now, at, OperationEvent::Dropped(message.message_ref()));
                 return;
             }
-            if fate == Fate::Changed {
+            if action == Action::Changed {
                 stage.count(heard, now, 1, |counters| &mut counters.changed);
-                self.tell(now, at, Deed::Changed(message.touched()));
+                self.tell(now, at, OperationEvent::Changed(message.message_ref()));
             }
             if release > now {
                 let stage = &mut self.operations[at];
@@ -507,7 +529,7 @@ impl<'a> Relay<'a> {
                     1,
                     |counters| if active { &mut counters.delayed } else { &mut counters.queued },
                 );
-                self.tell(now, at, Deed::Delayed(message.touched(), release));
+                self.tell(now, at, OperationEvent::Delayed(message.message_ref(), release));
                 self.queue.push(release, at, why, message);
                 if self.queue.len() > HELD_LIMIT {
                     self.overflowed = true;
@@ -519,8 +541,8 @@ impl<'a> Relay<'a> {
             }
         }
         if self.phase != Phase::Over {
-            self.metrics.delivered(now, message.wire, &message.value);
-            if let Some(tap) = &mut self.tap {
+            self.metrics.delivered(now, message.wire, message.published, &message.value);
+            for tap in &mut self.taps {
                 tap.delivered(now, message.wire, message.published, &message.value);
             }
         }
@@ -528,19 +550,19 @@ impl<'a> Relay<'a> {
     }
 }
 
-/// What the user's code does.
+/// Custom operations.
 impl Relay<'_> {
-    /// Calls the custom operations of the test before the start, or those after the end, in priority, then declaration
-    /// order. The error says which could not do what.
-    pub fn beside_run(&mut self, moment: Moment, files: &mut ChangedFiles) -> Result<(), String> {
+    /// Calls the custom operations of the test before the start, or those after the end, ordered by priority and
+    /// declaration. The error says which operation failed, and why.
+    pub fn before_or_after_run(&mut self, moment: Moment, files: &mut dyn SpaceFiles) -> Result<(), String> {
         for at in self.order.clone() {
             let stage = &mut self.operations[at];
             let Disturbance::Custom(custom) = &mut stage.disturbance else { continue };
             if custom.moment != moment {
                 continue;
             }
-            let mut ctx = RunContext::new(files, Draws::new(stage.draw_seed, 0, 0));
-            custom.hook.beside_run(&mut ctx);
+            let mut ctx = RunContext::new(files, KeyedRng::new(stage.draw_seed, 0, 0));
+            custom.hook.before_or_after_run(&mut ctx);
             stage.counters.side_effects += ctx.side_effects;
             if let Some(failure) = ctx.failure {
                 return Err(format!("operation `{}`: {failure}", stage.name));
@@ -549,25 +571,25 @@ impl Relay<'_> {
         Ok(())
     }
 
-    /// Takes a message through a custom operation and on, then what the operation made up.
+    /// Takes a message through a custom operation and on, followed by the messages that the operation injects.
     fn pass_custom(&mut self, now: SimTime, at: usize, member: u64, mut message: Held, deliveries: &mut Vec<Delivery>) {
         let heard = self.heard[message.wire.index()];
         let stage = &mut self.operations[at];
         let Disturbance::Custom(custom) = &mut stage.disturbance else {
             unreachable!("only custom operations come here")
         };
-        let draws = Draws::new(stage.draw_seed, member, message.index);
+        let draws = KeyedRng::new(stage.draw_seed, member, message.index);
         let call = custom.on_message(now, self.wires.path(message.wire), draws, &mut message.value);
         stage.count(heard, now, call.injected.len() as u64, |counters| &mut counters.injected);
         stage.count(heard, now, u64::from(call.changed && !call.dropped), |counters| &mut counters.changed);
         stage.count(heard, now, u64::from(call.dropped), |counters| &mut counters.dropped);
         if call.dropped {
-            self.tell(now, at, Deed::Dropped(message.touched()));
+            self.tell(now, at, OperationEvent::Dropped(message.message_ref()));
         } else if call.changed {
-            self.tell(now, at, Deed::Changed(message.touched()));
+            self.tell(now, at, OperationEvent::Changed(message.message_ref()));
         }
         for _ in &call.injected {
-            self.tell(now, at, Deed::Injected(message.touched()));
+            self.tell(now, at, OperationEvent::Injected(message.message_ref()));
         }
         let injected = (0u64..).zip(call.injected);
         let injected: Vec<Held> = injected.map(|(number, value)| message.beside(at, number, value)).collect();
@@ -582,7 +604,7 @@ impl Relay<'_> {
 
 /// Copies of messages.
 impl Relay<'_> {
-    /// Takes a message on, then copies of it: as many as the operation makes, and no more than one event may bring.
+    /// Takes a message on, followed by its copies: as many as the operation makes, up to the limit of one event.
     fn pass_copies(&mut self, now: SimTime, at: usize, message: Held, copies: u32, deliveries: &mut Vec<Delivery>) {
         let room = COPIES_LIMIT - self.copies;
         self.flooded |= copies > room;
@@ -593,7 +615,7 @@ impl Relay<'_> {
         let made: Vec<Held> =
             (0..u64::from(copies)).map(|number| message.beside(at, number, message.value.clone())).collect();
         for copy in &made {
-            self.tell(now, at, Deed::Injected(copy.touched()));
+            self.tell(now, at, OperationEvent::Injected(copy.message_ref()));
         }
         self.pass(now, message, deliveries);
         for copy in made {
@@ -617,44 +639,56 @@ impl Exchange for Relay<'_> {
 
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
         self.copies = 0;
-        self.follow_time(now, deliveries);
+        self.advance_to(now, deliveries);
     }
 
     fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>) {
         if now > self.now || self.phase == Phase::New {
-            self.follow_time(now, deliveries);
+            self.advance_to(now, deliveries);
         }
         self.messages += 1;
         self.copies = 0;
         let index = self.published[wire.index()];
         self.published[wire.index()] += 1;
-        if let Some(tap) = &mut self.tap {
+        for tap in &mut self.taps {
             tap.published(self.now, wire, index, &value);
         }
-        self.metrics.message(self.now, wire, &value);
+        self.metrics.published(self.now, wire, index, &value);
         if self.conditions.read[wire.index()] {
-            self.weigh_conditions();
+            self.evaluate_conditions();
             self.release_due(deliveries);
         }
         self.pass(self.now, Held { wire, published: index, index, value, next_stage: 0 }, deliveries);
         if self.conditions.reads_delivered {
-            self.weigh_conditions();
+            self.evaluate_conditions();
             self.release_due(deliveries);
+        }
+    }
+
+    fn next_due(&self) -> Option<SimTime> {
+        match self.phase {
+            Phase::New => Some(self.now),
+            Phase::Over => None,
+            Phase::Running => {
+                // The end of this instant may make values known that conditions read.
+                let settled = !self.conditions.operations.is_empty() && self.metrics.is_waiting();
+                self.next_moment().into_iter().chain(settled.then(|| self.now + TICK)).min()
+            }
         }
     }
 }
 
-/// What a run left behind.
+/// The result of a run.
 pub struct Finished {
     /// Per operation of the test, in its order.
     pub operations: Vec<OperationEffect>,
-    /// Names on the wire that operations of the plan act on and nobody heard, in order of declaration.
+    /// Names on the wire that operations of the plan act on and that had no receiver, in order of declaration.
     pub unheard: Vec<String>,
     /// Per metric of the plan.
     pub metrics: Vec<sesame_base::observation::MetricObservation>,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
-    /// Messages handled.
+    /// The number of messages published.
     pub messages: u64,
 }
 

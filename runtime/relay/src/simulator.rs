@@ -1,8 +1,8 @@
-//! What a simulator written in Rust implements to run inside the runner (`simulator … = in_process "crate::Type"`).
+//! The trait of a simulator in Rust that runs inside the runner (`simulator … = in_process "crate::Type"`).
 //!
-//! The simulator is a small distributed system in one type: its parts talk over named topics through a [`Bus`], and
-//! never around it. The relay sits inside the bus. A message that one part publishes is disturbed, if a test says so,
-//! and is there for its subscribers in the same step: a relay that changes nothing adds no step.
+//! The simulator is a small distributed system in one type: its parts communicate over named topics through a [`Bus`]
+//! only. The relay is part of the bus. A message of one part is disturbed if the test says so, and reaches its
+//! subscribers in the same step: a relay without operations adds no delay.
 
 use sesame_base::time::SimTime;
 
@@ -10,20 +10,20 @@ use crate::value::Value;
 
 /// A simulator that is stepped in lock-step with the relay.
 ///
-/// It must be deterministic: the same seed and the same received messages give the same published messages. All state
-/// belongs to the value, since several may exist at once; a new one is started for each test.
+/// It must be deterministic: the same seed and the same received messages must give the same published messages. All
+/// state must belong to the value, since several may exist at once; each test starts a new one.
 pub trait Simulator: Sized {
-    /// Builds the world at time zero and opens its topics on the bus. It may publish first messages.
+    /// Creates the world at time zero and opens its topics on the bus. It may publish initial messages.
     fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError>;
 
-    /// Advances the world by one step of [`Setup::step`]; afterwards the world is at [`Bus::now`].
+    /// Advances the world by one step of [`Setup::step`], to the time [`Bus::now`].
     fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError>;
 }
 
-/// What a simulator is told when it is started.
+/// The settings with which a simulator is started.
 #[derive(Debug, Clone)]
 pub struct Setup {
-    /// Seed of the simulator's own randomness. It differs from test to test only where a campaign asks for it.
+    /// Seed of the simulator's own randomness. It only differs between tests if a campaign asks for it.
     pub seed: u64,
     /// Length of one step.
     pub step: SimTime,
@@ -32,9 +32,9 @@ pub struct Setup {
 /// Whether there is more to simulate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Progress {
-    /// The world goes on.
+    /// The scenario continues.
     Running,
-    /// The scenario has come to its own end; the test ends here.
+    /// The scenario has ended; this ends the test.
     Ended,
 }
 
@@ -74,18 +74,18 @@ pub struct Bus<'a> {
 }
 
 impl Bus<'_> {
-    /// Opens a topic by its name on the wire. Opening it again gives the same port. Topics that the space does not
-    /// name work just the same; nobody observes or disturbs them.
+    /// Opens a topic by its name on the wire. Opening it again returns the same port. Topics that are not in the space
+    /// work in the same way, but are neither observed nor disturbed.
     pub fn open(&mut self, path: &str) -> Port {
         self.wires.open(path)
     }
 
-    /// Says that messages of this topic are received here; without it they are not kept.
+    /// Subscribes to this topic; messages without a subscriber are not kept.
     pub fn subscribe(&mut self, port: Port) {
         self.wires.subscribe(port);
     }
 
-    /// Publishes a message at the present time.
+    /// Publishes a message at the current time.
     pub fn publish(&mut self, port: Port, value: impl Into<Value>) {
         self.wires.publish(self.now, port, value.into());
     }
@@ -95,13 +95,13 @@ impl Bus<'_> {
         self.wires.receive(port)
     }
 
-    /// The present: the time at the end of the step being simulated.
+    /// The current time: the end of the current step.
     pub fn now(&self) -> SimTime {
         self.now
     }
 }
 
-/// What carries a bus: the in-process transport with its relay, or a plain loopback in a simulator's own tests.
+/// The implementation of a bus: the in-process transport with its relay, or a loopback in a simulator's own tests.
 pub(crate) trait Wires {
     fn open(&mut self, path: &str) -> Port;
     fn subscribe(&mut self, port: Port);

@@ -1,8 +1,7 @@
-//! Robustness of signal temporal logic: by how much a trace keeps a formula (positive) or breaks it (negative).
+//! Robustness of signal temporal logic: by how much a trace satisfies a formula (positive) or violates it (negative).
 //!
-//! A [`Monitor`] is told the samples of a run one after the other and gives the robustness of the whole trace at its
-//! end. It follows the usual definition (Donzé and Maler, "Robust satisfaction of temporal logic over real-valued
-//! signals", FORMATS 2010). Where that leaves a choice, it is made here:
+//! A [`Monitor`] gets the samples of a run in order and gives the robustness of the whole trace at its end. It
+//! implements the usual definition [Donzé and Maler 2010]. Its choices where that definition leaves one:
 //!
 //! **Signals** hold their last value: a sample counts from its own time on, that time included, until the next one. Of
 //! several samples of a signal at one time the last counts.
@@ -12,22 +11,23 @@
 //! the time given to [`Monitor::finish`], that time included: a sample at the very end counts.
 //!
 //! **Predicates**: `x > c` and `x >= c` have the robustness `x - c`, `x < c` and `x <= c` have `c - x`; `x == c` has
-//! `-|x - c|` and `x != c` has `|x - c|`. A signal that is NaN keeps no comparison, by any amount: negative infinity.
+//! `-|x - c|` and `x != c` has `|x - c|`. A signal that is NaN violates every comparison: negative infinity.
 //!
 //! **Windows** are closed: at time `t`, an interval from `a` to `b` is `t + a <= s <= t + b`, both ends included, so a
-//! jump at `t + b` is seen. They are cut at the end of the trace: what lies behind it neither keeps nor breaks anything.
-//! A window that lies behind it altogether is empty: `always` is then positive infinity, `eventually` and `until`
+//! jump at `t + b` is seen. They are cut at the end of the trace: times after it neither satisfy nor violate anything.
+//! A window that is completely after it is empty: `always` is then positive infinity, `eventually` and `until`
 //! negative infinity, the least and greatest element of nothing.
 //!
-//! **Whole windows** are the other reading of the end, by [`Monitor::over_whole_windows`]: an operator with a bounded window
-//! has no robustness at times at which its window would be cut, nor has anything that is computed from it at those times.
-//! Operators around it go over the times at which there is one; an unbounded window has no end that could be cut. So
-//! `always (request implies eventually [0, d] answer)` says nothing of requests in the last `d` of the trace, whether they were
-//! answered or not. A formula without a robustness at the beginning of the trace has infinite robustness, as nothing was asked.
+//! **Whole windows** are the other interpretation of the end, by [`Monitor::over_whole_windows`]: an operator with a
+//! bounded window has no robustness at times at which its window would be cut, nor has anything that is computed from
+//! it at those times. Operators around it go over the times at which there is one; an unbounded window has no end that
+//! could be cut. So `always (request implies eventually [0, d] answer)` says nothing of requests in the last `d` of the
+//! trace, whether they were answered or not. A formula without a robustness at the beginning of the trace has infinite
+//! robustness, as nothing was asked.
 //!
 //! **Until** is non-strict at both ends: for `left until right` at `t` there is a time `s` in the window at which
-//! `right` holds, and `left` holds for `t <= r <= s`. So `left` has to hold at `s` too: a trace on which `left` ends in
-//! the very moment in which `right` begins does not keep it. (It is this that keeps every subformula continuous from
+//! `right` holds, and `left` holds for `t <= r <= s`. So `left` has to hold at `s` too: a trace on which `left` ends at
+//! the moment at which `right` begins does not satisfy it. (It is this that keeps every subformula continuous from
 //! the right, like the signals, so that nothing happens between samples.)
 //!
 //! **Time is dense**, as far as that can be told: simulation time is whole nanoseconds, so all signals jump at whole
@@ -38,9 +38,10 @@
 //!
 //! The cost is constant per sample and operator, amortised, whatever the window: minima and maxima slide on monotonic
 //! deques (Lemire 2006), `until` on a queue made of two stacks. The memory of an operator is bounded by the samples in
-//! its window, and constant for an outermost operator, bounded or not: that one is asked for one time only. An unbounded
-//! operator inside another temporal one (`always (request implies eventually granted)`) has a value at every time that
-//! depends on the end of the trace; it keeps the jumps of the trace over which the outer operator asks for it.
+//! its window, and constant for an outermost operator, bounded or not: that one is asked for one time only. An
+//! unbounded operator inside another temporal one (`always (request implies eventually granted)`) has a value at every
+//! time that depends on the end of the trace; it keeps the jumps of the trace over which the outer operator asks for
+//! it.
 
 use std::collections::VecDeque;
 
@@ -58,13 +59,13 @@ mod piece;
 mod tests;
 mod until;
 
-/// A time behind all that happens, in nanoseconds.
+/// A time after everything, in nanoseconds.
 const FOREVER: i64 = i64::MAX / 2;
 
 /// Why a formula cannot be monitored. The generator writes none of these, so a plan with one was edited.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum FormulaError {
-    /// An interval that is none.
+    /// An invalid interval.
     #[error(
         "an operator has an interval from {from} s to {to} s; its ends must be finite and in rising order from 0 on \
          (leave out the end of an unbounded one)"
@@ -121,12 +122,12 @@ pub struct Monitor {
     start: Option<SimTime>,
     now: SimTime,
     robustness: VecDeque<Piece>,
-    /// Whether only windows count that lie in the trace as a whole.
+    /// Whether only windows count that are completely within the trace.
     whole: bool,
 }
 
 impl Monitor {
-    /// A monitor that has seen nothing yet, for a formula over this many signals.
+    /// A monitor without samples, for a formula over this many signals.
     pub fn new(formula: &Formula, signals: usize) -> Result<Self, FormulaError> {
         let mut used = vec![false; signals];
         let root = Node::new(formula, Span::FIRST_INSTANT, &mut used)?;
@@ -143,8 +144,8 @@ impl Monitor {
         })
     }
 
-    /// The same monitor, for which windows that the end of the trace would cut do not count: see the module's words on whole
-    /// windows.
+    /// The same monitor, for which windows that the end of the trace would cut do not count: see the module's words on
+    /// whole windows.
     pub fn over_whole_windows(self) -> Self {
         Monitor { whole: true, ..self }
     }
@@ -179,14 +180,14 @@ impl Monitor {
         assert!(end >= self.now, "a trace ends no earlier than its last sample, and {end} is before {}", self.now);
         let start = self.start?;
         self.extend((end - start).nanos().saturating_add(1), true, None);
-        // Without it no window is whole that the formula asks for. The sum turns the zero that is negative, a matter of how
-        // often it was negated, into the other.
+        // Without it no window is whole that the formula asks for. The sum turns the zero that is negative, a matter of
+        // how often it was negated, into the other.
         Some(self.robustness.front().map_or(f64::INFINITY, |first| first.value + 0.0))
     }
 
-    /// The least and the greatest robustness that the trace may still come to, when it breaks off at `now`, which is no earlier
-    /// than the last sample: whatever the signals do from `now` on, that time included, and whenever the trace then ends. Never
-    /// too narrow.
+    /// The least and the greatest robustness that the trace may still come to, when it breaks off at `now`, which is no
+    /// earlier than the last sample: whatever the signals do from `now` on, that time included, and whenever the trace
+    /// then ends. Never too narrow.
     pub fn reach(&self, now: SimTime) -> (f64, f64) {
         assert!(
             now >= self.now,

@@ -1,17 +1,19 @@
-//! Traces: the messages of one run and what operations did to them, in a file of the MCAP format.
+//! Traces: the messages of one run and the actions of operations on them, in a file of the MCAP format.
 //!
-//! A trace holds every message as it was published, on a channel of its topic's name; where an operation of the
-//! campaign may touch a topic, also every message as it was delivered, on a channel `TOPIC/delivered`. The operations'
-//! activity is on `sesame/operations`, the change points of each metric on `sesame/metrics/NAME`. Everything is JSON
-//! with a JSON Schema, numbers exact, at simulation time in nanoseconds. A metadata record `sesame` says which run it
-//! is, a metadata record `sesame.run` how it ended.
+//! A trace contains every message as it was published, on a channel with the name of its topic; if an operation of the
+//! campaign may act on a topic, also every message as it was delivered, on a channel `TOPIC/delivered`. The actions of
+//! operations are on `sesame/operations`, the change points of each metric on `sesame/metrics/NAME`. Everything is JSON
+//! with a JSON Schema, numbers are exact, and times are simulation time in nanoseconds. A metadata record `sesame`
+//! identifies the run, a metadata record `sesame.run` says how it ended.
 //!
-//! A trace is written while the test runs, under a name that nobody takes for a trace, and gets its own name when it
-//! is complete. Of a run whose process died what was written until then is saved.
+//! A trace is written while the test runs, under a temporary name, and gets its own name when it is complete. If the
+//! process dies during a run, the part that was written until then is recovered.
+
+#![expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "an adapter: it writes and reads files")]
 
 mod recording;
 mod records;
-mod salvage;
+mod recover;
 mod schema;
 mod writer;
 
@@ -26,23 +28,23 @@ use sesame_base::observation::{Observation, Outcome};
 use sesame_plan::{CampaignPlan, Test};
 
 pub use recording::{Fed, RecordedMetric, RecordedRun, RecordingError, feed};
-pub use salvage::salvage;
+pub use recover::recover;
 pub use writer::TraceWriter;
 
-/// Name of the metadata record that says which run a trace is of.
+/// Name of the metadata record that identifies the run of a trace.
 const SUBJECT: &str = "sesame";
 
 /// Name of the metadata record that says how the run ended.
 const RUN: &str = "sesame.run";
 
-/// Key of a channel's metadata that says what it carries: one of the `ROLE_…`.
+/// Key of a channel's metadata for its contents: one of the `ROLE_…`.
 const ROLE: &str = "sesame_role";
 const ROLE_PUBLISHED: &str = "published";
 const ROLE_DELIVERED: &str = "delivered";
 const ROLE_OPERATIONS: &str = "operations";
 const ROLE_METRIC: &str = "metric";
 
-/// Which run a trace is of.
+/// The run of a trace.
 #[derive(Debug, Clone, Copy)]
 pub struct Subject<'a> {
     /// Its campaign.
@@ -105,7 +107,7 @@ fn owned<const N: usize>(entries: [(&str, String); N]) -> BTreeMap<String, Strin
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write the trace: {reason}: {}", path.display())]
 pub struct TraceError {
-    /// Why not.
+    /// The reason.
     pub reason: String,
     /// The file.
     pub path: PathBuf,
@@ -121,7 +123,7 @@ impl TraceError {
     }
 }
 
-/// Gives a complete trace its name; what was there under it is replaced.
+/// Gives a complete trace its name and replaces an older file of that name.
 fn publish(unfinished: &Path, file: &Path) -> Result<(), TraceError> {
     fs::rename(unfinished, file).map_err(|error| TraceError::new(file, error.into()))
 }

@@ -1,6 +1,6 @@
 //! How a runner reaches its simulator.
 //!
-//! A transport is a thin adapter: it moves the simulation on, hands every message and every moment of time to the
+//! A transport is a thin adapter: it advances the simulation, passes every message and every moment of time to the
 //! relay, and carries out the relay's deliveries. It decides nothing.
 
 #[cfg(feature = "in-process")]
@@ -29,11 +29,11 @@ pub use process::{become_simulator, keep_simulator};
 
 /// A connection to a simulator.
 pub trait Transport {
-    /// What the simulator on the other side can do.
+    /// What the simulator can do.
     fn capabilities(&self) -> Capabilities;
 
-    /// Brings the simulator to time zero for a new run, with this seed for its own randomness. Messages that it
-    /// publishes on the way go through the relay.
+    /// Sets the simulator to time zero for a new run, with this seed for its own randomness. Messages that it publishes
+    /// meanwhile go through the relay.
     fn reset(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<(), TransportError>;
 
     /// Moves the simulation on by one step (lock-stepped), or waits for what comes next (free running). Never goes
@@ -43,31 +43,31 @@ pub trait Transport {
     /// Simulation time now.
     fn now(&self) -> SimTime;
 
-    /// Ends the connection; whatever the transport started is stopped.
+    /// Ends the connection, and everything that the transport started.
     fn close(&mut self);
 
-    /// What befell the simulator since this was last asked.
-    fn aside(&mut self) -> Aside {
-        Aside::default()
+    /// What happened to the simulator's process since the last call.
+    fn incidents(&mut self) -> Incidents {
+        Incidents::default()
     }
 }
 
-/// What befell a simulator beside what its run showed. It is of one session alone, and no part of results.
+/// What happened to a simulator's process apart from its run. It concerns one session only, and is not part of results.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Aside {
-    /// Its process was killed (`SIGKILL`), and not by us: by hand, or by a system that had no memory left. The run says
-    /// nothing about the test then.
+pub struct Incidents {
+    /// Its process was killed (`SIGKILL`) by a user, or by the system when memory ran out. Then the run says nothing
+    /// about the test.
     pub killed: bool,
-    /// What else there is to say, in words for the user.
+    /// Other incidents, in words for the user.
     pub notes: Vec<String>,
 }
 
 /// What a simulator can do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capabilities {
-    /// It is stepped by us: equal tests give equal results.
+    /// The relay steps it: equal tests give equal results.
     pub lock_stepped: bool,
-    /// It can be brought back to time zero without being started anew.
+    /// It can be reset to time zero without a restart.
     pub resets: bool,
 }
 
@@ -92,7 +92,7 @@ pub enum TransportError {
     WrongType {
         /// The topic.
         path: String,
-        /// What does not fit.
+        /// The difference.
         reason: String,
     },
     /// The simulator's program cannot be started.
@@ -102,35 +102,35 @@ pub enum TransportError {
         command: String,
         /// The folder it was to run in.
         folder: PathBuf,
-        /// Why not.
+        /// The reason.
         reason: String,
     },
-    /// The simulator's program went away in the middle of a run.
-    #[error("the simulator `{command}` {how} while {awaited} was awaited{}", quoted(last_words))]
-    Gone {
+    /// The simulator's program ended, or closed its output, in the middle of a run.
+    #[error("the simulator `{command}` {how} while {awaited} was awaited{}", quoted(last_lines))]
+    Disconnected {
         /// The program with its arguments.
         command: String,
         /// How it ended, as a phrase.
         how: String,
-        /// What it was to say next, as a phrase.
+        /// What it was expected to send next, as a phrase.
         awaited: String,
         /// The last lines of its standard error.
-        last_words: String,
+        last_lines: String,
     },
-    /// The simulator's program said something that cannot be understood.
+    /// The simulator's program sent something that is not part of the protocol.
     #[error("line {line} since the simulator's reset {problem}; {remedy}")]
     Protocol {
-        /// Which line of its standard output, from 1: the answer to the last reset.
+        /// The line of its standard output, counted from 1: the answer to the last reset.
         line: u64,
-        /// What is wrong with it, as a phrase.
+        /// The problem, as a phrase.
         problem: String,
-        /// What to do about it.
+        /// The remedy, as an instruction.
         remedy: String,
     },
 }
 
-fn quoted(last_words: &str) -> String {
-    if last_words.is_empty() { String::new() } else { format!("; its last words:\n{last_words}") }
+fn quoted(last_lines: &str) -> String {
+    if last_lines.is_empty() { String::new() } else { format!("; the last lines of its standard error:\n{last_lines}") }
 }
 
 fn hint(near: Option<&str>, known: &[String]) -> String {
@@ -152,20 +152,20 @@ fn unknown_topic<'a>(path: &str, known: impl Iterator<Item = &'a String> + Clone
     TransportError::UnknownTopic { path: path.to_owned(), near, known: known.cloned().collect() }
 }
 
-/// Makes a connection to the simulator; generated code names the one its space declares.
+/// Creates the transport to the simulator; generated code names the one that its space declares.
 #[derive(Clone, Copy)]
 pub struct Connect {
     make: fn(&CampaignPlan, Place) -> Box<dyn Transport>,
     place: Place,
 }
 
-/// Where a simulator lies, for transports that start one.
+/// Where a simulator is, for transports that start one.
 #[derive(Clone, Copy)]
-#[cfg_attr(not(feature = "process"), expect(dead_code, reason = "only a simulator that is a program lies somewhere"))]
+#[cfg_attr(not(feature = "process"), expect(dead_code, reason = "only a simulator that is a program has a place"))]
 struct Place {
     /// Folder of the runner's crate.
     runner: &'static str,
-    /// Folder of the `.sesame` file, as seen from there.
+    /// Folder of the `.sesame` file, relative to it.
     space: &'static str,
 }
 

@@ -1,7 +1,7 @@
 //! The payload of a message: a small dynamic value.
 //!
-//! Topics are known only to the generated crate, the relay serves all of them; so the relay's payload is dynamic, and
-//! generated code turns it into typed messages for the user's hooks.
+//! The relay handles all topics, but only the generated crate knows their types; so payloads are dynamic in the relay,
+//! and generated code converts them to typed messages for the user's hooks.
 
 use std::fmt;
 use std::ops::Deref;
@@ -64,7 +64,7 @@ impl fmt::Debug for Text {
     }
 }
 
-/// The field names shared by all records of one kind, so that a record carries only its values.
+/// The field names shared by all records of one type, so that a record only has its values.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Fields(Box<[Text]>);
 
@@ -109,12 +109,12 @@ impl Record {
         self.fields.position(name).map(|at| &self.values[at])
     }
 
-    /// The value of a field, to be changed.
+    /// The value of a field, mutable.
     pub fn get_mut(&mut self, name: &str) -> Option<&mut Value> {
         self.fields.position(name).map(|at| &mut self.values[at])
     }
 
-    /// Names and values to be changed, in order.
+    /// Names and mutable values, in order.
     #[cfg(test)]
     pub(crate) fn each_mut(&mut self) -> impl Iterator<Item = (&str, &mut Value)> {
         self.fields.names().iter().map(Text::as_str).zip(&mut self.values)
@@ -139,12 +139,12 @@ pub enum Value {
     Text(Text),
     /// A point in space.
     Point([f64; 3]),
-    /// Values in a row.
+    /// A list.
     List(Vec<Value>),
     /// Named values.
     Record(Record),
-    /// A part of a message that the space does not declare, in the words of the wire (JSON, for simulators that are
-    /// programs). Nothing reads or changes it; it is passed on as it came.
+    /// A part of a message that the space does not declare, in the format of the wire (JSON, for simulators that are
+    /// programs). It is neither read nor changed, and passed on as it came.
     Undeclared(Text),
 }
 
@@ -158,7 +158,7 @@ impl Value {
         })
     }
 
-    /// As [`Value::at`], to be changed.
+    /// As [`Value::at`], mutable.
     pub fn at_mut<S: AsRef<str>>(&mut self, path: &[S]) -> Option<&mut Value> {
         path.iter().try_fold(self, |value, name| match value {
             Value::Record(record) => record.get_mut(name.as_ref()),
@@ -187,7 +187,7 @@ impl Value {
         }
     }
 
-    /// Whether it is the same in every bit. It is equal to another then, or both hold NaNs in the same places.
+    /// Whether it is equal in every bit; so NaNs in the same places are equal.
     pub(crate) fn is_same(&self, other: &Value) -> bool {
         let all = |left: &[Value], right: &[Value]| {
             left.len() == right.len() && left.iter().zip(right).all(|(left, right)| left.is_same(right))
@@ -203,7 +203,7 @@ impl Value {
         }
     }
 
-    /// What kind of value this is, in the words of the language.
+    /// The kind of this value, as the language names it.
     pub fn kind(&self) -> &'static str {
         match self {
             Value::Bool(_) => "bool",

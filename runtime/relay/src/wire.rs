@@ -53,12 +53,12 @@ impl WireTable {
         (0u32..).take(self.paths.len()).map(Wire)
     }
 
-    /// How many there are.
+    /// The number of wires.
     pub fn len(&self) -> usize {
         self.paths.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no wires.
     pub fn is_empty(&self) -> bool {
         self.paths.is_empty()
     }

@@ -1,7 +1,8 @@
 //! Randomness: one seed, split by purpose.
 //!
-//! Every stream is derived from the campaign's seed and the path of its purpose, never from another stream's state: so
-//! adding an operation or a worker shifts nobody else's draws, and nothing needs to be saved to go on later.
+//! Every stream is derived from the campaign's seed and the path of its purpose, never from another stream's state. So
+//! an additional operation or worker does not shift the random numbers of others, and no state needs to be saved to
+//! resume.
 
 use rand_core::Rng as _;
 use rand_pcg::Pcg64;
@@ -73,7 +74,8 @@ pub fn derive_seed(seed: u64, purpose: &str, path: &[u64]) -> u64 {
     path.iter().fold(mix(seed ^ mix(name)), |state, &part| mix(state ^ mix(part.wrapping_add(0x9E37_79B9_7F4A_7C15))))
 }
 
-/// A draw in `[0, 1)` keyed by a seed and two indices (message, field): the same key always gives the same draw.
+/// A random number in `[0, 1)` keyed by a seed and two indices (message, field): the same key always gives the same
+/// number.
 pub fn keyed_unit(seed: u64, message: u64, field: u64) -> f64 {
     unit_from_bits(mix(mix(seed ^ mix(message)) ^ field.wrapping_mul(0x9E37_79B9_7F4A_7C15)))
 }

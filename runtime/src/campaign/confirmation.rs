@@ -221,7 +221,8 @@ impl Evaluator<'_> {
         }
         each(repeated.runs);
         while !waiting.is_empty() {
-            let JobResult { number: job, observation, notes, trace_failure: _, killed: _ } = self.next()?;
+            let JobResult { number: job, observation, notes, trace_failure: _, killed: _, lock_stepped: _ } =
+                self.next()?;
             let Some((test, position, simulator_seed)) = waiting.remove(&job) else { continue };
             let repetition = Repetition::of(test, position, simulator_seed, &observation);
             self.recorder.put_repetition(&repetition, &observation.warnings)?;

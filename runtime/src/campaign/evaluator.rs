@@ -107,7 +107,7 @@ impl<'a> Evaluator<'a> {
             }
         }
         while !waiting.is_empty() {
-            let JobResult { number, observation, notes, trace_failure, killed } = self.next()?;
+            let JobResult { number, observation, notes, trace_failure, killed, lock_stepped: _ } = self.next()?;
             let Some(test) = waiting.remove(&number) else { continue };
             if let Some(reason) = trace_failure {
                 return Err(CampaignError::Trace { test: number, reason }.into());

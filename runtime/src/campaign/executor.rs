@@ -21,6 +21,9 @@ pub trait Executor {
 
     /// Changes the wall time after which a test is stopped, for tests that have not begun yet.
     fn set_timeout(&mut self, timeout: Duration);
+
+    /// Whether the simulators are stepped, so that equal tests give equal results.
+    fn lock_stepped(&self) -> bool;
 }
 
 /// A test to be run.
@@ -60,6 +63,8 @@ pub struct JobResult {
     /// Whether its worker or its simulator was killed, and killed again when the test was repeated. The observation
     /// says so; it may say nothing of the test, but only of this machine today.
     pub killed: bool,
+    /// Whether the simulator is stepped, so that running the test again gives the same result.
+    pub lock_stepped: bool,
 }
 
 /// Why tests cannot be run.

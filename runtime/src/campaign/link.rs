@@ -49,14 +49,14 @@ mod system {
             mut self,
             limit: Duration,
             alive: &mut dyn FnMut() -> io::Result<()>,
-        ) -> io::Result<Stream> {
+        ) -> io::Result<(Stream, Hello)> {
             let mut greeting = Greeting::default();
             let started = Instant::now();
             self.ours.set_read_timeout(Some(Duration::from_millis(20)))?;
             while started.elapsed() < limit {
                 match greeting.hear(&mut self.ours) {
                     Ok(None) => alive()?,
-                    Ok(Some(Hello { token: _ })) => return Ok(self.ours),
+                    Ok(Some(hello)) => return Ok((self.ours, hello)),
                     Err(error) => {
                         // It closed its end; that it has ended says more, where it has.
                         alive()?;
@@ -70,12 +70,12 @@ mod system {
 
     /// Takes the standard input of this process, which is a worker, as the connection to its supervisor. Programs that
     /// the worker starts do not inherit it, and hooks that read standard input find it empty.
-    pub(in crate::campaign) fn connect(_: &Address) -> io::Result<Stream> {
+    pub(in crate::campaign) fn connect(_: &Address, lock_stepped: bool) -> io::Result<Stream> {
         let not_started = |_| io::Error::other("`worker` is started by `run`, not by hand");
         let mut stream = UnixStream::from(io::stdin().as_fd().try_clone_to_owned()?);
         stream.peer_addr().map_err(not_started)?;
         rustix::stdio::dup2_stdin(File::open("/dev/null")?)?;
-        protocol::send(&mut stream, &Hello { token: None })?;
+        protocol::send(&mut stream, &Hello { lock_stepped, token: None })?;
         Ok(stream)
     }
 }
@@ -87,6 +87,7 @@ mod system {
 
     use super::{Command, Duration, io};
     use crate::campaign::port::{self, Port};
+    use crate::campaign::protocol::Hello;
 
     /// Where a worker finds its token.
     const TOKEN: &str = "SESAME_WORKER_TOKEN";
@@ -119,15 +120,15 @@ mod system {
             self,
             limit: Duration,
             alive: &mut dyn FnMut() -> io::Result<()>,
-        ) -> io::Result<Stream> {
+        ) -> io::Result<(Stream, Hello)> {
             self.port.accept(limit, alive)
         }
     }
 
     /// Connects this process, which is a worker, to its supervisor.
-    pub(in crate::campaign) fn connect(address: &Address) -> io::Result<Stream> {
+    pub(in crate::campaign) fn connect(address: &Address, lock_stepped: bool) -> io::Result<Stream> {
         let token = std::env::var(TOKEN).map_err(|_| io::Error::other("`worker` is started by `run`, not by hand"))?;
-        port::connect(address.supervisor, token)
+        port::connect(address.supervisor, &Hello { lock_stepped, token: Some(token) })
     }
 }
 

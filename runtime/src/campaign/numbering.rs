@@ -46,18 +46,20 @@ pub(super) struct Numbering {
     /// The simulator's seed, one for the whole campaign; searches that run a test several times bring their own.
     simulator_seed: u64,
     next: u32,
-    seen: SeenTests,
+    /// The tests so far; `None` if an equal test may give another result.
+    seen: Option<SeenTests>,
     /// By duplicate: the test whose result stands for it.
     originals: BTreeMap<u32, u32>,
 }
 
 impl Numbering {
-    /// That of a campaign with this seed. The first number is 0.
-    pub(super) fn new(seed: u64) -> Self {
+    /// That of a campaign with this seed. The first number is 0. Equal tests are only recognised if the simulator is
+    /// stepped.
+    pub(super) fn new(seed: u64, lock_stepped: bool) -> Self {
         Numbering {
             simulator_seed: derive_seed(seed, "simulator", &[0]),
             next: 0,
-            seen: SeenTests::default(),
+            seen: lock_stepped.then(SeenTests::default),
             originals: BTreeMap::new(),
         }
     }
@@ -80,7 +82,8 @@ impl Numbering {
         let Candidate { test, parents, generation, known, simulator_seed } = candidate;
         let number = self.take();
         // Tests with seeds of their own are there to be run each.
-        let duplicate_of = if simulator_seed.is_some() { None } else { self.seen.first_equal(&test, number) };
+        let seen = self.seen.as_mut().filter(|_| simulator_seed.is_none());
+        let duplicate_of = seen.and_then(|seen| seen.first_equal(&test, number));
         if let Some(original) = duplicate_of {
             self.originals.insert(number, original);
         }
@@ -154,7 +157,7 @@ mod tests {
 
     #[test]
     fn tests_with_seeds_of_their_own_are_run_each_and_stand_for_themselves() {
-        let mut numbering = Numbering::new(7);
+        let mut numbering = Numbering::new(7, true);
         let candidate = |simulator_seed| Candidate {
             test: Test::default(),
             parents: Vec::new(),
@@ -169,5 +172,19 @@ mod tests {
         assert_eq!(planned.iter().map(|test| test.duplicate_of).collect::<Vec<_>>(), [None, None, Some(1)]);
         assert_eq!((numbering.stands_for(2), numbering.stands_for(3)), (2, 1));
         assert_eq!((planned[0].simulator_seed, planned[1].simulator_seed), (reference.simulator_seed, 3));
+    }
+
+    #[test]
+    fn equal_tests_are_run_each_if_the_simulator_is_not_stepped() {
+        let mut numbering = Numbering::new(7, false);
+        let candidate = || Candidate {
+            test: Test::default(),
+            parents: Vec::new(),
+            generation: 0,
+            known: None,
+            simulator_seed: None,
+        };
+        let planned = [numbering.candidate(candidate()), numbering.candidate(candidate())];
+        assert_eq!(planned.map(|test| test.duplicate_of), [None, None]);
     }
 }

@@ -15,11 +15,11 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use sesame_base::observation::{Observation, Outcome};
-use sesame_relay::process_group::was_killed;
+use sesame_relay::lifecycle::process_group::was_killed;
 
 use crate::campaign::executor::{Executor, ExecutorError, Job, JobResult};
 use crate::campaign::link::{self, Stream};
-use crate::campaign::protocol::{self, Reply};
+use crate::campaign::protocol::{self, Hello, Reply};
 use crate::campaign::traces;
 use crate::campaign::worker_process::{WORKER, WorkerProcess};
 
@@ -50,6 +50,7 @@ pub struct Pool {
     stop: Arc<AtomicBool>,
     /// Wall time after which a test is stopped, in milliseconds.
     timeout: Arc<AtomicU64>,
+    lock_stepped: bool,
 }
 
 impl Pool {
@@ -61,11 +62,13 @@ impl Pool {
         let stop = Arc::new(AtomicBool::new(false));
         let timeout = Arc::new(AtomicU64::new(millis(settings.timeout)));
         // Dropped if a worker cannot be started, which ends those that were.
-        let mut pool = Pool { jobs: Some(jobs), results, slots: Vec::new(), stop, timeout };
+        let mut pool = Pool { jobs: Some(jobs), results, slots: Vec::new(), stop, timeout, lock_stepped: true };
         for number in 1..=settings.workers.max(1) {
             let (stop, timeout) = (Arc::clone(&pool.stop), Arc::clone(&pool.timeout));
             let mut slot = WorkerSlot { number, settings: settings.clone(), worker: None, stop, timeout };
-            slot.worker = Some(slot.start()?);
+            let worker = slot.start()?;
+            pool.lock_stepped &= worker.lock_stepped;
+            slot.worker = Some(worker);
             let (queue, sender) = (Arc::clone(&queue), sender.clone());
             pool.slots.push(thread::spawn(move || slot.work(&queue, &sender)));
         }
@@ -85,6 +88,10 @@ impl Executor for Pool {
 
     fn set_timeout(&mut self, timeout: Duration) {
         self.timeout.store(millis(timeout), Ordering::Relaxed);
+    }
+
+    fn lock_stepped(&self) -> bool {
+        self.lock_stepped
     }
 }
 
@@ -158,14 +165,15 @@ impl WorkerSlot {
             Some(worker) => worker,
             None => self.start()?,
         };
+        let lock_stepped = worker.lock_stepped;
         let printed = fs::metadata(output_file(&self.directory())).map_or(0, |file| file.len());
         let timeout = Duration::from_millis(self.timeout.load(Ordering::Relaxed));
         let mut killed = None;
         let (observation, notes, trace_failure) = match worker.ask(job, timeout, &self.stop) {
             Ok(reply) => {
                 self.worker = Some(worker);
-                killed = reply.aside.killed.then_some("simulator");
-                (reply.observation, reply.aside.notes, reply.trace_failure)
+                killed = reply.incidents.killed.then_some("simulator");
+                (reply.observation, reply.incidents.notes, reply.trace_failure)
             }
             Err(error) if error.kind() == io::ErrorKind::TimedOut => {
                 let outcome = Outcome::Timeout { limit: timeout.as_secs_f64() };
@@ -187,7 +195,7 @@ impl WorkerSlot {
                 (observation, words.into_iter().collect(), lost)
             }
         };
-        Ok((JobResult { number: job.number, observation, notes, trace_failure, killed: false }, killed))
+        Ok((JobResult { number: job.number, observation, notes, trace_failure, killed: false, lock_stepped }, killed))
     }
 
     /// Saves what a dead worker wrote of a trace that was asked for; why not, otherwise.
@@ -206,6 +214,7 @@ struct Worker {
     /// Closed before the process is waited for: that is its sign to end.
     stream: Stream,
     process: WorkerProcess,
+    lock_stepped: bool,
 }
 
 /// Why a worker could not be started.
@@ -238,7 +247,7 @@ impl Worker {
             if process.ended().is_some() { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(()) }
         });
         match taken {
-            Ok(stream) => Ok(Worker { stream, process }),
+            Ok((stream, Hello { lock_stepped, .. })) => Ok(Worker { stream, process, lock_stepped }),
             Err(error) if error.kind() == io::ErrorKind::TimedOut => Err(error.into()),
             // It closed the connection, so it is about to end: how says more.
             Err(error) => Err(process.wait(DEATH_LIMIT).map_or_else(

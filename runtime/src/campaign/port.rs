@@ -46,7 +46,11 @@ impl Port {
     }
 
     /// Waits for the connection that says the token. `alive` is asked again and again; its error ends the wait.
-    pub(super) fn accept(self, limit: Duration, alive: &mut dyn FnMut() -> io::Result<()>) -> io::Result<TcpStream> {
+    pub(super) fn accept(
+        self,
+        limit: Duration,
+        alive: &mut dyn FnMut() -> io::Result<()>,
+    ) -> io::Result<(TcpStream, Hello)> {
         let mut strangers: VecDeque<Stranger> = VecDeque::new();
         let started = Instant::now();
         while started.elapsed() < limit {
@@ -67,10 +71,10 @@ impl Port {
             for mut stranger in std::mem::take(&mut strangers) {
                 match stranger.greeting.hear(&mut stranger.stream) {
                     Ok(None) => strangers.push_back(stranger),
-                    Ok(Some(Hello { token })) if token.as_ref() == Some(&self.token) => {
+                    Ok(Some(hello)) if hello.token.as_ref() == Some(&self.token) => {
                         stranger.stream.set_nonblocking(false)?;
                         stranger.stream.set_nodelay(true)?;
-                        return Ok(stranger.stream);
+                        return Ok((stranger.stream, hello));
                     }
                     Ok(Some(_)) | Err(_) => {}
                 }
@@ -82,11 +86,11 @@ impl Port {
     }
 }
 
-/// Connects to a port and says its token.
-pub(super) fn connect(port: SocketAddr, token: String) -> io::Result<TcpStream> {
+/// Connects to a port and sends the greeting with its token.
+pub(super) fn connect(port: SocketAddr, hello: &Hello) -> io::Result<TcpStream> {
     let mut stream = TcpStream::connect(port)?;
     stream.set_nodelay(true)?;
-    protocol::send(&mut stream, &Hello { token: Some(token) })?;
+    protocol::send(&mut stream, hello)?;
     Ok(stream)
 }
 

@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use sesame_base::observation::Observation;
-use sesame_relay::transport::Aside;
+use sesame_relay::transport::Incidents;
 
 /// The largest frame either side accepts; time series of a long test are the largest thing sent.
 const FRAME_LIMIT: u32 = 1 << 30;
@@ -20,6 +20,8 @@ const GREETING_LIMIT: usize = 1 << 10;
 /// A worker's first words.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Hello {
+    /// Whether its simulator is stepped, so that equal tests give equal results.
+    pub(super) lock_stepped: bool,
     /// Proves that the worker is the one that the supervisor started, where other programs could connect.
     pub(super) token: Option<String>,
 }
@@ -31,8 +33,8 @@ pub(super) struct Reply {
     pub(super) observation: Observation,
     /// Why the trace that was asked for could not be written.
     pub(super) trace_failure: Option<String>,
-    /// What happened to the simulator meanwhile.
-    pub(super) aside: Aside,
+    /// What happened to the simulator's process meanwhile.
+    pub(super) incidents: Incidents,
 }
 
 pub(super) fn send(stream: &mut impl Write, message: &impl Serialize) -> io::Result<()> {

@@ -25,6 +25,10 @@ use crate::campaign::pool::Pool;
 use crate::campaign::reference::{self, Unheard};
 use crate::campaign::settings::{FIRST_TIMEOUT, Settings, default_timeout};
 
+/// The warning of a campaign whose simulator nobody steps.
+const FREE_RUNNING: &str = "the simulator runs freely, so equal tests may give different results: equal tests are simulated \
+     again, and neither a replay nor the digest of a second run is expected to be the same";
+
 /// How a campaign ended.
 #[derive(Debug)]
 pub enum CampaignEnd {
@@ -107,7 +111,8 @@ impl<'a, 'l> Campaign<'a, 'l> {
         settings: &Settings,
         listener: &'a mut Listener<'l>,
     ) -> Result<Self, Halt> {
-        let mut numbering = Numbering::new(settings.seed);
+        let lock_stepped = evaluator.executor.lock_stepped();
+        let mut numbering = Numbering::new(settings.seed, lock_stepped);
         let reference = reference_run(&mut evaluator, &mut numbering)?;
         if let Outcome::Crash { .. } | Outcome::Timeout { .. } = reference.outcome {
             return Err(CampaignError::Reference(reference.outcome.detail().unwrap_or_default()).into());
@@ -121,6 +126,9 @@ impl<'a, 'l> Campaign<'a, 'l> {
         }
         for text in reference::violations(plan, &reference) {
             evaluator.warn(Some(0), text)?;
+        }
+        if !lock_stepped {
+            evaluator.warn(None, FREE_RUNNING.to_owned())?;
         }
         if settings.timeout.is_none() {
             evaluator.executor.set_timeout(default_timeout(reference.wall.run));
@@ -167,7 +175,9 @@ impl<'a, 'l> Campaign<'a, 'l> {
         }
         self.tell(CampaignEvent::SearchEnded { reason: &reason });
         let last = reference_run(&mut self.evaluator, &mut self.numbering)?;
-        if let Some(text) = reference::difference(self.plan, &self.reference, &last) {
+        // A simulator that runs freely differs in any case, and the campaign has said so.
+        let lock_stepped = self.evaluator.executor.lock_stepped();
+        if let Some(text) = reference::difference(self.plan, &self.reference, &last).filter(|_| lock_stepped) {
             self.evaluator.warn(Some(self.numbering.last()), text)?;
         }
         if !self.plan.campaign.objectives.is_empty() {

@@ -35,7 +35,7 @@ pub(super) fn run(
     let what = Run { test, simulator_seed: *simulator_seed };
     let Some(request) = &job.trace else {
         let observed = evaluate_tapped(plan, wires, metrics, transport, &what, custom, None);
-        return (observed.unwrap_or_else(|misfit| Observation::crashed(misfit.to_string())), None);
+        return (observed.unwrap_or_else(|mismatch| Observation::crashed(mismatch.to_string())), None);
     };
     #[cfg(feature = "mcap")]
     {
@@ -49,7 +49,7 @@ pub(super) fn run(
             }
         };
         let observed = evaluate_tapped(plan, wires, metrics, transport, &what, custom, Some(&mut writer));
-        let observation = observed.unwrap_or_else(|misfit| Observation::crashed(misfit.to_string()));
+        let observation = observed.unwrap_or_else(|mismatch| Observation::crashed(mismatch.to_string()));
         let settled = if is_kept(plan, request.keep, &observation) {
             writer.keep(&observation, &request.file).map_err(|error| error.to_string())
         } else {
@@ -69,7 +69,7 @@ pub(super) fn run(
 pub(super) fn save(request: &TraceRequest, directory: &Path, outcome: &Outcome) -> Result<(), String> {
     #[cfg(feature = "mcap")]
     {
-        sesame_relay::trace::salvage(&directory.join(UNFINISHED), outcome, &request.file)
+        sesame_relay::trace::recover(&directory.join(UNFINISHED), outcome, &request.file)
             .map_err(|error| error.to_string())
     }
     #[cfg(not(feature = "mcap"))]

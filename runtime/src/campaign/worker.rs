@@ -7,16 +7,17 @@ use std::{io, thread};
 
 use sesame_base::observation::Outcome;
 use sesame_plan::CampaignPlan;
-use sesame_relay::changed_files::ChangedFiles;
 use sesame_relay::evaluate::Custom;
+use sesame_relay::lifecycle::descendants;
 use sesame_relay::metric::MetricTable;
+use sesame_relay::panic_capture;
 use sesame_relay::wire::WireTable;
-use sesame_relay::{descendants, panic_capture};
 
 use crate::campaign::executor::Job;
 use crate::campaign::link::{self, Address, Stream};
 use crate::campaign::protocol::{self, Reply};
 use crate::campaign::traces;
+use crate::changed_files::ChangedFiles;
 use crate::runner::Runner;
 
 /// Serves the supervisor that started this process until it closes the connection, and then ends what was started for
@@ -25,8 +26,10 @@ use crate::runner::Runner;
 /// A panic of the simulator or of a hook is the outcome of its test; the worker goes on with a fresh connection to the
 /// simulator.
 pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::Result<()> {
-    let mut stream = link::connect(supervisor)?;
-    panic_capture::listen();
+    // Nothing is started before the first test.
+    let transport = runner.connect.transport(plan);
+    let mut stream = link::connect(supervisor, transport.capabilities().lock_stepped)?;
+    panic_capture::install();
     // So that what leaves its parents can be found when it is to end. Where the system cannot do that, groups have to
     // do.
     descendants::adopt_orphans();
@@ -37,18 +40,18 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
     let space = Path::new(runner.directory).join(runner.space);
     let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
     let files = if may_change { ChangedFiles::for_worker(&space) } else { Ok(ChangedFiles::unlocked(&space)) };
-    let mut custom = Custom { hooks: runner.operations, files: files.map_err(io::Error::other)? };
-    let mut transport = None;
+    let mut custom = Custom { hooks: runner.operations, files: Box::new(files.map_err(io::Error::other)?) };
+    let mut transport = Some(transport);
     let directory = std::env::current_dir()?;
     for job in jobs {
         let simulator = transport.get_or_insert_with(|| runner.connect.transport(plan));
         let (observation, trace_failure) =
             traces::run(plan, &wires, &metrics, simulator.as_mut(), &job, &directory, &mut custom);
-        let aside = simulator.aside();
+        let incidents = simulator.incidents();
         if matches!(observation.outcome, Outcome::Crash { .. }) {
             transport = None;
         }
-        let sent = protocol::send(&mut stream, &Reply { number: job.number, observation, trace_failure, aside });
+        let sent = protocol::send(&mut stream, &Reply { number: job.number, observation, trace_failure, incidents });
         if sent.is_err() {
             end_what_was_started();
             return sent;

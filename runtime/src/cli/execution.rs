@@ -11,13 +11,14 @@ use clap::Args;
 use serde::Serialize;
 
 use sesame_plan::{CampaignPlan, Domain};
-use sesame_relay::changed_files::ChangedFiles;
+use sesame_relay::files::SpaceFiles as _;
 use sesame_relay::fuzz::unimplemented_operations;
 use sesame_relay::metric::unimplemented_hooks;
 use sesame_results::record::{self, Recorder, Repository};
 use sesame_results::report::{self, Summary};
 
 use crate::campaign::{CampaignEnd, Settings, run_campaign};
+use crate::changed_files::ChangedFiles;
 use crate::cli::failure::{Failure, STOPPED};
 use crate::cli::gate::Gate;
 use crate::cli::progress::{Display, Waiting, wait};
@@ -138,8 +139,8 @@ pub(super) fn refuse_unfilled(runner: &Runner, plan: &CampaignPlan, allowed: boo
 pub(super) fn claim_files(runner: &Runner, plan: &CampaignPlan) -> Result<Files, Failure> {
     let space = Path::new(runner.directory).join(runner.space);
     let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
-    let (files, put_back) = ChangedFiles::for_supervisor(&space, may_change)?;
-    for path in put_back {
+    let (files, restored) = ChangedFiles::for_supervisor(&space, may_change)?;
+    for path in restored {
         say(format_args!("note: an earlier run was ended while {} was changed; it is put back", path.display()));
     }
     for operation in &plan.operations {
@@ -170,7 +171,7 @@ impl Files {
     /// Puts back what the last worker could not; workers have ended by then.
     pub(super) fn finish(mut self) -> Result<(), Failure> {
         if self.may_change {
-            self.files.put_back()?;
+            self.files.restore_all()?;
         }
         Ok(())
     }

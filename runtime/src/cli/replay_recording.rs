@@ -49,7 +49,7 @@ pub(super) fn replay_recording(runner: &Runner, plan: &CampaignPlan, options: &O
     refuse_unfilled(runner, plan, true)?;
     let wires = WireTable::new(plan);
     let table = MetricTable::new(plan, &wires, runner.hooks)?;
-    panic_capture::listen();
+    panic_capture::install();
     let fed = AssertUnwindSafe(|| trace::feed(&options.recording, plan, &wires, &table));
     let fed = panic::catch_unwind(fed)
         .map_err(|_| Failure(format!("a hook cannot take this recording: {}", panic_capture::take())))??;

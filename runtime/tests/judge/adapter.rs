@@ -14,7 +14,7 @@ use sesame_plan::{
 };
 use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
 use sesame_relay::metric::MetricTable;
-use sesame_relay::relay::Deed;
+use sesame_relay::relay::OperationEvent;
 use sesame_relay::transport::in_process;
 use sesame_relay::wire::WireTable;
 use sesame_results::record::{DATABASE, MetricValue, Origin, Recorder, TestRecord, Verdict, verdict};
@@ -223,14 +223,15 @@ pub(crate) fn busy(plan: &CampaignPlan, test: &Test, observation: &Observation, 
         let own = || ledger.deeds.iter().filter(|(_, of, _)| *of == at);
         let mut spans: Vec<(i64, i64)> =
             effect.intervals.iter().map(|span| (nanos(span.start), nanos(span.end))).collect();
-        for (held, _, deed) in own() {
-            let Deed::Delayed(_, release) = deed else { continue };
+        for (held, _, event) in own() {
+            let OperationEvent::Delayed(_, release) = event else { continue };
             // What it does not let run its time goes when the activity ends.
             let stays = matches!(
                 operation.kind,
                 OperationKind::Latency { drain: Drain::Finish, .. } | OperationKind::Reorder { drain: Drain::Finish }
             );
-            let ended = own().find(|(time, _, deed)| *deed == Deed::Ended && time >= held).map(|(time, ..)| *time);
+            let ended =
+                own().find(|(time, _, event)| *event == OperationEvent::Ended && time >= held).map(|(time, ..)| *time);
             let until = if stays { release.nanos() } else { ended.unwrap_or(i64::MAX).min(release.nanos()) };
             spans.push((*held, until.min(ledger.end)));
         }

@@ -1,7 +1,7 @@
 //! All messages of a run, as they were published and as they were delivered.
 
 use sesame_base::time::SimTime;
-use sesame_relay::relay::{Deed, Tap};
+use sesame_relay::relay::{Listener, OperationEvent};
 use sesame_relay::value::Value;
 use sesame_relay::wire::{Wire, WireTable};
 
@@ -39,7 +39,7 @@ pub(crate) struct Ledger {
     /// In the order in which it happened: whether a message was delivered, or else published, and its place there.
     pub(crate) order: Vec<(bool, usize)>,
     /// When an operation held back a message, and until when it was to.
-    pub(crate) deeds: Vec<(i64, usize, Deed)>,
+    pub(crate) deeds: Vec<(i64, usize, OperationEvent)>,
     /// When the run ended.
     pub(crate) end: i64,
 }
@@ -62,7 +62,7 @@ impl Ledger {
     }
 }
 
-impl Tap for Ledger {
+impl Listener for Ledger {
     fn published(&mut self, now: SimTime, wire: Wire, _: u64, value: &Value) {
         let path = self.paths[wire.index()].clone();
         self.order.push((false, self.published.len()));
@@ -73,7 +73,7 @@ impl Tap for Ledger {
         self.order.push((true, self.delivered.len()));
         self.delivered.push(Message { time: now.nanos(), path, value: value.clone() });
     }
-    fn operated(&mut self, now: SimTime, operation: usize, deed: Deed) {
-        self.deeds.push((now.nanos(), operation, deed));
+    fn operated(&mut self, now: SimTime, operation: usize, event: OperationEvent) {
+        self.deeds.push((now.nanos(), operation, event));
     }
 }

@@ -53,8 +53,8 @@ pub(crate) fn ledger(ledger: &Ledger) -> String {
     list(&mut text, &ledger.published);
     writeln!(text, "  delivered:").unwrap();
     list(&mut text, &ledger.delivered);
-    for (time, operation, deed) in &ledger.deeds {
-        writeln!(text, "    {:.3} s operation {operation} {deed:?}", *time as f64 / 1e9).unwrap();
+    for (time, operation, event) in &ledger.deeds {
+        writeln!(text, "    {:.3} s operation {operation} {event:?}", *time as f64 / 1e9).unwrap();
     }
     text
 }

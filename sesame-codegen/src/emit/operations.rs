@@ -216,7 +216,7 @@ fn adapter(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPlan)
         }
     } else {
         quote! {
-            fn beside_run(&mut self, ctx: &mut ::sesame_runtime::fuzz::RunContext<'_>) {
+            fn before_or_after_run(&mut self, ctx: &mut ::sesame_runtime::fuzz::RunContext<'_>) {
                 #hook_trait::#method(&mut self.hook, &self.parameters, ctx);
             }
         }

@@ -57,7 +57,7 @@ fn a_program_that_no_system_could_start_is_refused() {
     let transport = |program: &str, argument: &str| sesame_plan::Transport::Process {
         program: program.into(),
         arguments: vec![argument.into()],
-        step_ns: 1,
+        step_ns: Some(1),
     };
     for (program, argument) in [("", "a"), ("a\0", "a"), ("a", "\0")] {
         runner.plan.simulator.transport = transport(program, argument);

@@ -137,7 +137,7 @@ pub(crate) fn with_program(campaign: &str) -> RunnerPlan {
     runner.plan.simulator.transport = Transport::Process {
         program: "python3".into(),
         arguments: vec!["sim.py".into(), "a \"quoted\" {{ one }}".into()],
-        step_ns: 20_000_000,
+        step_ns: Some(20_000_000),
     };
     runner
 }

@@ -27,14 +27,14 @@ pub enum Transport {
         /// Simulation time of one step, in nanoseconds; positive.
         step_ns: u64,
     },
-    /// A program that the runner starts in the folder of the `.sesame` file, stepped in lock-step with the relay.
+    /// A program that the runner starts in the folder of the `.sesame` file.
     Process {
         /// A name to be found on `PATH`, or a path with `/` in it, relative to that folder.
         program: String,
         /// Its arguments, none empty.
         arguments: Vec<String>,
-        /// Simulation time of one step, in nanoseconds; positive.
-        step_ns: u64,
+        /// Simulation time of one step, in nanoseconds; positive. `None` for a simulator that runs freely.
+        step_ns: Option<u64>,
     },
 }
 

@@ -11,6 +11,14 @@ use crate::span::Span;
 use crate::syntax::ast::{self, Name, TypeKind};
 use crate::units::{Dimension, Unit, dimension};
 
+/// How a simulator's program moves on in time.
+enum Pace {
+    /// When it is told to, by this much.
+    LockStepped { step_ns: u64 },
+    /// By its own clock.
+    FreeRunning,
+}
+
 impl<'a> Resolver<'a> {
     pub(super) fn ast_messages(&self) -> impl Iterator<Item = &'a ast::Message> + use<'a> {
         self.file.systems.iter().flat_map(|system| &system.messages)
@@ -46,13 +54,35 @@ impl<'a> Resolver<'a> {
             }
             ast::Transport::Process(process) => {
                 let program = self.program(&process.program);
-                let step_ns = self.step_of(name, &process.steps, process.has_errors);
+                let pace = self.pace_of(name, process);
                 // Empty texts were reported where they were read.
                 let arguments = process.arguments.iter().map(|argument| argument.text.clone()).collect();
-                Transport::Process { program: program?, arguments, step_ns: step_ns? }
+                let step_ns = match pace? {
+                    Pace::LockStepped { step_ns } => Some(step_ns),
+                    Pace::FreeRunning => None,
+                };
+                Transport::Process { program: program?, arguments, step_ns }
             }
         };
         Some(Simulator { declaration: self.declaration(&simulator.head), transport })
+    }
+
+    /// How a program moves on in time; nothing if that is not clear.
+    fn pace_of(&mut self, name: &Name, process: &'a ast::Process) -> Option<Pace> {
+        let Some((free, ())) = process.free_running.first() else {
+            let step_ns = self.step_of(name, &process.steps, process.has_errors)?;
+            return Some(Pace::LockStepped { step_ns });
+        };
+        self.single(&process.free_running, "free running");
+        if let Some((step, _)) = process.steps.first() {
+            let title = "a simulator that runs freely has no step".to_owned();
+            let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, *step, title)
+                .label("remove `step`, or `free running`")
+                .secondary(*free, "it runs freely");
+            self.report(diagnostic);
+            return None;
+        }
+        Some(Pace::FreeRunning)
     }
 
     fn step_of(&mut self, name: &Name, steps: &'a [(Span, ast::Quantity)], has_errors: bool) -> Option<u64> {

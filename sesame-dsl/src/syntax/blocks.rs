@@ -139,7 +139,11 @@ pub(super) const BLOCKS: &[Block] = &[
         "simulator",
         &[Member::new(Rule::setting_crate, "crate"), Member::new(Rule::setting_step, "step")],
     ),
-    Block::settings(Rule::process_settings, "process", &[Member::new(Rule::setting_step, "step")]),
+    Block::settings(
+        Rule::process_settings,
+        "process",
+        &[Member::new(Rule::setting_step, "step"), Member::new(Rule::free_running, "free running")],
+    ),
     Block::settings(Rule::launch_settings, "launch", &[Member::like(Rule::ready, "ready", "ready when topic")]),
     Block::settings(
         Rule::budget_settings,

@@ -1,4 +1,4 @@
-//! Conditions that are always true or never, whatever values their variables take: a run spent on one shows nothing.
+//! Conditions that are always true or always false, for all values of their variables: a run with one is wasted.
 //!
 //! Comparisons and known ranges bound differences between two variables, or between one and a number. A set of such
 //! bounds contradicts itself exactly when the bounds around some cycle add up to less than nothing, so a search through
@@ -7,16 +7,16 @@
 use sesame_plan::MetricId;
 use sesame_plan::condition::{Comparison, Condition, Operand, Variable};
 
-/// Parts of a condition looked at before a question is given up. Conditions of five levels and more can be made that need
-/// more; those a search grows need a few dozen.
+/// Parts of a condition looked at before a question is given up. Conditions of five levels and more can be made that
+/// need more; those a search grows need a few dozen.
 const PATIENCE: u32 = 20_000;
 
 /// The one truth value that a condition can have while all its variables have values in their known ranges; `None` for
-/// one that can have both. Variables that are not listed may have any value. A condition too tangled to decide counts as
-/// one that can have both.
+/// one that can have both. Variables that are not listed may have any value. A condition too tangled to decide counts
+/// as one that can have both.
 pub fn constant(condition: &Condition, variables: &[Variable]) -> Option<bool> {
     let possible = |holds| {
-        let bounds = Bounds::of(condition, variables)?;
+        let bounds = Bounds::new(condition, variables)?;
         satisfiable(Some(&Goals { condition, holds, rest: None }), &bounds, &mut { PATIENCE }).then_some(())
     };
     match (possible(true), possible(false)) {
@@ -26,7 +26,7 @@ pub fn constant(condition: &Condition, variables: &[Variable]) -> Option<bool> {
     }
 }
 
-/// Whether a condition or any part of it is constant: a part that is could as well be left out.
+/// Whether a condition or any part of it is constant: such a part could be omitted.
 pub fn has_constant_part(condition: &Condition, variables: &[Variable]) -> bool {
     let parts = match condition {
         Condition::Compare { .. } => false,
@@ -37,14 +37,14 @@ pub fn has_constant_part(condition: &Condition, variables: &[Variable]) -> bool 
     parts || constant(condition, variables).is_some()
 }
 
-/// What has to hold, or not to hold, all together.
+/// Conditions that must all hold, or not hold, at the same time.
 struct Goals<'a> {
     condition: &'a Condition,
     holds: bool,
     rest: Option<&'a Goals<'a>>,
 }
 
-/// Whether values exist within the bounds that meet all goals.
+/// Whether there are values within the bounds for which all goals hold.
 fn satisfiable(goals: Option<&Goals<'_>>, bounds: &Bounds, patience: &mut u32) -> bool {
     let Some(&Goals { condition, holds, rest }) = goals else { return true };
     if *patience == 0 {
@@ -87,7 +87,7 @@ struct Bounds {
 
 impl Bounds {
     /// What the ranges of a condition's variables say; `None` where they are empty.
-    fn of(condition: &Condition, variables: &[Variable]) -> Option<Self> {
+    fn new(condition: &Condition, variables: &[Variable]) -> Option<Self> {
         let mut metrics = Vec::new();
         collect(condition, &mut metrics);
         let size = metrics.len() + 1;
@@ -108,7 +108,8 @@ impl Bounds {
         Some(bounds)
     }
 
-    /// These bounds with one more: that one operand is at most another, or below it; `None` where that contradicts them.
+    /// These bounds with one more: that one operand is at most another, or below it; `None` where that contradicts
+    /// them.
     fn with(&self, left: Operand, right: Operand, below: bool) -> Option<Self> {
         let size = self.metrics.len() + 1;
         let place = |operand| match operand {

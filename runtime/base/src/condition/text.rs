@@ -1,7 +1,8 @@
-//! Conditions in the words of the language, as `near_zone1 < 3 and (2rad < link0_high or link0_high == 0rad)`.
+//! Conditions in the notation of the language, such as `near_zone1 < 3 and (2rad < link0_high or link0_high == 0rad)`.
 //!
-//! What is written reads back as the same condition: the same tree, the same order, every number bit for bit. `and` binds
-//! tighter than `or`, and equal ones group from the left, so that parentheses stand only where the tree needs them.
+//! What is written reads back as the same condition: the same tree, the same order, every number bit for bit. `and`
+//! binds tighter than `or`, and equal operators associate to the left, so parentheses only occur where the tree needs
+//! them.
 
 use std::iter::Peekable;
 
@@ -10,7 +11,7 @@ use sesame_plan::{Metric, MetricId};
 
 use crate::decimal::quantity;
 
-/// A condition over these metrics. Numbers are in the unit of the variable they are compared with.
+/// A condition over these metrics. Numbers are in the unit of the variable with which they are compared.
 pub fn write(condition: &Condition, metrics: &[Metric]) -> String {
     match condition {
         Condition::Compare { left, by, right } => {
@@ -112,7 +113,7 @@ fn one<'a>(
     }
     let (sign, right) = (next()?, next()?);
     let by = [Comparison::Below, Comparison::Above, Comparison::Equal].into_iter().find(|by| by.sign() == sign);
-    let by = by.ok_or_else(|| format!("`{sign}` is no comparison"))?;
+    let by = by.ok_or_else(|| format!("`{sign}` is not a comparison operator"))?;
     let variable = |word: &str| (0u32..).zip(metrics).find(|(_, metric)| metric.name == word);
     let unit = variable(left).or_else(|| variable(right)).and_then(|(_, metric)| metric.unit.as_deref());
     let operand = |word: &str| match variable(word) {
@@ -121,7 +122,7 @@ fn one<'a>(
             .strip_suffix(unit.unwrap_or_default())
             .and_then(|digits| digits.parse().ok())
             .map(Operand::Number)
-            .ok_or_else(|| format!("`{word}` is neither a metric nor a number in its unit")),
+            .ok_or_else(|| format!("`{word}` is neither a metric nor a number with its unit")),
     };
     Ok((Condition::Compare { left: operand(left)?, by, right: operand(right)? }, 1))
 }
@@ -165,8 +166,8 @@ mod tests {
     #[test]
     fn what_is_no_condition_is_refused() {
         let refused = |text| read(text, &metrics()).unwrap_err();
-        assert_eq!(refused("speed > 3"), "`3` is neither a metric nor a number in its unit");
-        assert_eq!(refused("speed >= 3m/s"), "`>=` is no comparison");
+        assert_eq!(refused("speed > 3"), "`3` is neither a metric nor a number with its unit");
+        assert_eq!(refused("speed >= 3m/s"), "`>=` is not a comparison operator");
         assert_eq!(refused("(near_zone1 > 3 or"), "a condition ends too early");
         assert_eq!(refused("(near_zone1 > 3"), "`the end` where a parenthesis should close");
         assert_eq!(refused("near_zone1 > 3 speed"), "`speed` after the end of a condition");

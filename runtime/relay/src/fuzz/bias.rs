@@ -1,21 +1,21 @@
-//! Bias: adds one and the same. On time stamps that is the skew of a clock.
+//! Bias: adds a constant. On time stamps this is the skew of a clock.
 
 use crate::fuzz::change::{Amount, add};
-use crate::fuzz::{Fate, Places};
+use crate::fuzz::{Action, Places};
 use crate::value::Value;
 
 /// A bias or clock skew operation.
 #[derive(Debug, Clone)]
 pub struct Bias {
-    /// What is changed.
+    /// The values to change.
     pub places: Places,
-    /// What is added, in the field's unit.
+    /// The constant, in the field's unit.
     pub bias: Amount,
 }
 
 impl Bias {
     /// Adds the bias to the values.
-    pub fn apply(&self, message: &mut Value) -> Fate {
+    pub fn apply(&self, message: &mut Value) -> Action {
         self.places.change(message, |value, _| add(value, |axis| self.bias.on(axis)))
     }
 }

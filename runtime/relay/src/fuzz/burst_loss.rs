@@ -1,10 +1,11 @@
 //! Burst loss: drops messages in bursts (Gilbert 1960, Elliott 1963).
 //!
-//! A chain of two states per wire: in the good one messages pass, in the bad one each is dropped with probability `loss`.
-//! It begins in the good state when the operation goes on, and moves with each message before its fate is decided. In the
-//! long run `loss * enter / (enter + leave)` of all messages are dropped, and a burst is `1 / leave` messages long.
+//! A Markov chain of two states per wire: in the good state messages pass, in the bad state each is dropped with
+//! probability `loss`. It starts in the good state when the operation becomes active, and makes a transition at each
+//! message before the message is handled. In the long run `loss * enter / (enter + leave)` of all messages are dropped,
+//! and a burst has a mean length of `1 / leave` messages.
 
-use crate::fuzz::{Draws, Fate, PerWire};
+use crate::fuzz::{Action, KeyedRng, PerWire};
 
 /// A burst loss operation.
 #[derive(Debug)]
@@ -15,16 +16,16 @@ pub struct BurstLoss {
     pub leave: f64,
     /// The probability that a message of a burst is dropped, in `0..=1`.
     pub loss: f64,
-    /// Whether there is a burst on a wire.
+    /// Per wire: whether there is a burst.
     pub bursting: PerWire<bool>,
 }
 
 impl BurstLoss {
-    /// Moves the chain and drops the message or lets it pass.
-    pub fn apply(&mut self, draws: Draws, member: u64) -> Fate {
-        let bursting = self.bursting.of(member);
+    /// Makes a transition, and drops the message or lets it pass.
+    pub fn apply(&mut self, draws: KeyedRng, member: u64) -> Action {
+        let bursting = self.bursting.entry(member);
         let turns = draws.unit(0) < if *bursting { self.leave } else { self.enter };
         *bursting ^= turns;
-        if *bursting && draws.unit(1) < self.loss { Fate::Dropped } else { Fate::Unchanged }
+        if *bursting && draws.unit(1) < self.loss { Action::Dropped } else { Action::Unchanged }
     }
 }

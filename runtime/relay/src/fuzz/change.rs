@@ -1,10 +1,10 @@
-//! Changing a value in place: numbers by themselves, points coordinate by coordinate.
+//! Changes of a value in place: of numbers, and of points coordinate by coordinate.
 
 use sesame_plan::Choice;
 
 use crate::value::Value;
 
-/// The nearest whole number, halves away from zero; what 64 bits do not hold is clamped.
+/// The nearest whole number, with halves rounded away from zero; numbers beyond 64 bits are clamped.
 #[expect(clippy::cast_possible_truncation, reason = "`as` clamps to the integer's range")]
 fn nearest(x: f64) -> i64 {
     libm::round(x) as i64
@@ -20,8 +20,8 @@ pub enum Amount {
 }
 
 impl Amount {
-    /// What a test chose; `None` for texts and ranges.
-    pub(super) fn of(choice: &Choice) -> Option<Self> {
+    /// The choice of a test; `None` for texts and ranges.
+    pub(super) fn from_choice(choice: &Choice) -> Option<Self> {
         match choice {
             Choice::Value { value } => Some(Amount::Number(*value)),
             Choice::Point { point } => Some(Amount::Point(*point)),
@@ -29,7 +29,7 @@ impl Amount {
         }
     }
 
-    /// The amount on an axis; a number is the same on all.
+    /// The amount on an axis; a number is the same on all axes.
     pub(super) fn on(self, axis: usize) -> f64 {
         match self {
             Amount::Number(number) => number,
@@ -38,7 +38,7 @@ impl Amount {
     }
 }
 
-/// Adds to a number or to each coordinate, and says whether that changed anything.
+/// Adds to a number or to each coordinate, and returns whether this changed anything.
 pub(super) fn add(value: &mut Value, mut by: impl FnMut(usize) -> f64) -> bool {
     match value {
         Value::Real(x) => put_real(x, *x + by(0)),
@@ -48,7 +48,7 @@ pub(super) fn add(value: &mut Value, mut by: impl FnMut(usize) -> f64) -> bool {
     }
 }
 
-/// Puts in place of a number or of each coordinate what `new` makes of it, and says whether that changed anything.
+/// Replaces a number or each coordinate by the result of `new`, and returns whether this changed anything.
 pub(super) fn map(value: &mut Value, mut new: impl FnMut(usize, f64) -> f64) -> bool {
     match value {
         Value::Real(x) => put_real(x, new(0, *x)),
@@ -66,7 +66,7 @@ fn each_axis(point: &mut [f64; 3], mut new: impl FnMut(usize, f64) -> f64) -> bo
     changed
 }
 
-/// Numbers are changed by being another number: a zero may change its sign, and a NaN is one NaN.
+/// Numbers differ if their bits differ: the sign of a zero counts, and all NaNs are equal.
 fn put_real(place: &mut f64, new: f64) -> bool {
     let changed = *place != new && !(place.is_nan() && new.is_nan());
     *place = new;

@@ -1,7 +1,7 @@
 //! Custom operations: the user's Rust code, called with each message, before the start or after the end of a run.
 //!
-//! Generated code puts the user's typed hook behind [`OperationHook`]; every use of an operation in a test gets a hook
-//! of its own for each run. Draws come from the context alone, keyed like those of every other operation.
+//! Generated code wraps the user's typed hook in an [`OperationHook`]; each occurrence of an operation in a test has a
+//! hook of its own in each run. Random numbers come from the context only, keyed like those of every other operation.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Choice, Moment, Operation, OperationId, OperationKind};
 
-use crate::changed_files::ChangedFiles;
-use crate::fuzz::Draws;
+use crate::files::SpaceFiles;
+use crate::fuzz::KeyedRng;
 use crate::message::{FromValue, Mismatch, ToValue};
 use crate::value::{Text, Value};
 
@@ -21,7 +21,7 @@ pub trait OperationHook {
         let _ = (message, call);
     }
     /// Before the start or after the end of a run, as the operation's declaration says.
-    fn beside_run(&mut self, ctx: &mut RunContext<'_>) {
+    fn before_or_after_run(&mut self, ctx: &mut RunContext<'_>) {
         let _ = ctx;
     }
 }
@@ -35,9 +35,9 @@ pub struct OperationEntry {
     pub build: fn(&[Choice]) -> Box<dyn OperationHook>,
 }
 
-/// A parameter's choice as generated code reads it.
+/// A choice for a parameter, as generated code reads it.
 pub trait FromChoice: Sized {
-    /// The choice; `None` for one of another kind.
+    /// The choice; `None` if it is of another kind.
     fn from_choice(choice: &Choice) -> Option<Self>;
 }
 
@@ -75,17 +75,17 @@ impl FromChoice for Text {
     }
 }
 
-/// What a test chose for the parameter at this position.
+/// The choice of a test for the parameter at this position.
 pub fn chosen<T: FromChoice>(choices: &[Choice], position: usize) -> T {
     choices.get(position).and_then(T::from_choice).expect("choices are checked before a hook is built")
 }
 
-/// What a hook on messages is told, and what it may do beside changing its message, which is of type `M`.
+/// The context of a hook for messages: what it may do besides changing its message, which has the type `M`.
 #[derive(Debug)]
 pub struct OperationContext<'a, M> {
     now: SimTime,
     topic: &'a str,
-    draws: Draws,
+    draws: KeyedRng,
     next_draw: u64,
     dropped: bool,
     injected: Vec<M>,
@@ -98,45 +98,45 @@ impl<M> OperationContext<'_, M> {
         self.now.seconds()
     }
 
-    /// Name on the wire of the topic the message came on; a member when the operation is on a group.
+    /// Name on the wire of the message's topic; if the operation is on a group, the name of the member.
     pub fn topic(&self) -> &str {
         self.topic
     }
 
-    /// The next draw for this message, uniform in `[0, 1)`. Draws depend on the operation's draw seed, the message's
-    /// index and how many were made for this message before, so a test that is run again draws the same.
+    /// The next random number for this message, uniform in `[0, 1)`. It depends on the operation seed, the message's
+    /// index, and how many numbers were drawn for this message before, so a repeated test draws the same numbers.
     pub fn draw(&mut self) -> f64 {
         self.next_draw += 1;
         self.draws.unit(self.next_draw - 1)
     }
 
-    /// The next draw, uniform in `[low, high)`.
+    /// The next random number, uniform in `[low, high)`.
     pub fn draw_between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.draw()
     }
 
-    /// The message is not to be delivered. What is injected still is.
+    /// Drops the message. Injected messages are still delivered.
     pub fn drop_message(&mut self) {
         self.dropped = true;
     }
 
-    /// Publishes a further message on the same topic, right after this one. Operations that come later disturb it too.
+    /// Publishes a further message on the same topic, directly after this one. Later operations act on it too.
     pub fn inject(&mut self, message: M) {
         self.injected.push(message);
     }
 
-    /// Says that this hook is not filled in yet.
+    /// Marks this hook as not implemented yet.
     pub fn unimplemented(&mut self) {
         self.unimplemented = true;
     }
 }
 
-/// One message's way through a hook, without its type.
+/// The call of a hook for one message, without the message's type.
 #[derive(Debug)]
 pub struct MessageCall<'a> {
     now: SimTime,
     topic: &'a str,
-    draws: Draws,
+    draws: KeyedRng,
     pub(crate) changed: bool,
     pub(crate) dropped: bool,
     pub(crate) injected: Vec<Value>,
@@ -145,7 +145,7 @@ pub struct MessageCall<'a> {
 }
 
 impl<'a> MessageCall<'a> {
-    pub(crate) fn new(now: SimTime, topic: &'a str, draws: Draws) -> Self {
+    pub(crate) fn new(now: SimTime, topic: &'a str, draws: KeyedRng) -> Self {
         MessageCall {
             now,
             topic,
@@ -158,8 +158,8 @@ impl<'a> MessageCall<'a> {
         }
     }
 
-    /// Reads the message, lets the hook at it, and writes it back. A message that is not of its declared type goes on
-    /// as it came, and the run is warned.
+    /// Reads the message, calls the hook, and writes the message back. A message that is not of its declared type is
+    /// passed on unchanged, with a warning of the run.
     pub fn typed<M: FromValue + ToValue>(
         &mut self,
         value: &mut Value,
@@ -185,7 +185,7 @@ impl<'a> MessageCall<'a> {
         self.dropped = ctx.dropped;
         self.unimplemented |= ctx.unimplemented;
         for injected in &ctx.injected {
-            // As the simulator sent it, but for what the hook says.
+            // Undeclared fields are those of the original message.
             let mut copy = value.clone();
             injected.write_to(&mut copy);
             self.injected.push(copy);
@@ -194,16 +194,15 @@ impl<'a> MessageCall<'a> {
     }
 }
 
-/// What a hook before the start or after the end of a run is told, and what it may do.
+/// The context of a hook before the start or after the end of a run.
 ///
-/// Files are named by their path relative to the folder of the `.sesame` file, and put back after the run, whatever
-/// happens. What cannot be done makes the test a crash that says why; the hook goes on, and further changes are not
-/// made.
+/// Files are named by their path relative to the folder of the `.sesame` file, and are always restored after the run.
+/// If an action fails, the test is a crash that gives the reason; the hook continues, but no further changes are made.
 #[derive(Debug)]
 pub struct RunContext<'a> {
-    /// `None` while it is only asked whether the hook is filled in.
-    files: Option<&'a mut ChangedFiles>,
-    draws: Draws,
+    /// `None` in a probe, which only finds out whether the hook is implemented.
+    files: Option<&'a mut dyn SpaceFiles>,
+    draws: KeyedRng,
     next_draw: u64,
     pub(crate) side_effects: u64,
     pub(crate) failure: Option<String>,
@@ -211,20 +210,20 @@ pub struct RunContext<'a> {
 }
 
 impl<'a> RunContext<'a> {
-    pub(crate) fn new(files: &'a mut ChangedFiles, draws: Draws) -> Self {
+    pub(crate) fn new(files: &'a mut dyn SpaceFiles, draws: KeyedRng) -> Self {
         RunContext { files: Some(files), draws, next_draw: 0, side_effects: 0, failure: None, unimplemented: false }
     }
 
-    /// A context that changes nothing: a hook that asks anything of it is filled in, and stopped there.
+    /// A context that changes nothing: a hook that uses it is implemented, and is stopped there.
     pub(crate) fn probing() -> Self {
-        let draws = Draws::new(0, 0, 0);
+        let draws = KeyedRng::new(0, 0, 0);
         RunContext { files: None, draws, next_draw: 0, side_effects: 0, failure: None, unimplemented: false }
     }
 
     /// The files, or the end of a probe.
-    fn files(&mut self) -> &mut ChangedFiles {
+    fn files(&mut self) -> &mut dyn SpaceFiles {
         match &mut self.files {
-            Some(files) => files,
+            Some(files) => *files,
             None => std::panic::resume_unwind(Box::new("a probe ends here")),
         }
     }
@@ -234,8 +233,8 @@ impl<'a> RunContext<'a> {
         self.files().folder().to_owned()
     }
 
-    /// Replaces what a file holds until the run is over; a file that is not there is made, and removed again. It counts
-    /// as a side effect unless the file held just that.
+    /// Replaces the contents of a file until the run is over; a file that does not exist is created, and removed again.
+    /// Counts as a side effect unless the file already had these contents.
     pub fn replace_file(&mut self, path: impl AsRef<Path>, contents: impl AsRef<[u8]>) {
         if self.failure.is_some() {
             return;
@@ -246,7 +245,7 @@ impl<'a> RunContext<'a> {
         }
     }
 
-    /// Changes the text of a file until the run is over: `edit` makes the new text of the old one.
+    /// Changes the text of a file until the run is over: `edit` computes the new text from the old one.
     pub fn edit_file(&mut self, path: impl AsRef<Path>, edit: impl FnOnce(&str) -> String) {
         if self.failure.is_some() {
             return;
@@ -260,25 +259,25 @@ impl<'a> RunContext<'a> {
         }
     }
 
-    /// Counts something else that the hook did, so that the test is not void. Undoing it is up to the hook.
+    /// Counts another side effect of the hook, so that the test has an effect. The hook must undo it itself.
     pub fn count_side_effect(&mut self) {
         self.files();
         self.side_effects += 1;
     }
 
-    /// The next draw, uniform in `[0, 1)`; a test that is run again draws the same.
+    /// The next random number, uniform in `[0, 1)`; a repeated test draws the same numbers.
     pub fn draw(&mut self) -> f64 {
         self.files();
         self.next_draw += 1;
         self.draws.unit(self.next_draw - 1)
     }
 
-    /// The next draw, uniform in `[low, high)`.
+    /// The next random number, uniform in `[low, high)`.
     pub fn draw_between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.draw()
     }
 
-    /// Says that this hook is not filled in yet.
+    /// Marks this hook as not implemented yet.
     pub fn unimplemented(&mut self) {
         self.unimplemented = true;
     }
@@ -314,7 +313,7 @@ impl Custom {
         &mut self,
         now: SimTime,
         topic: &'c str,
-        draws: Draws,
+        draws: KeyedRng,
         message: &mut Value,
     ) -> MessageCall<'c> {
         let mut call = MessageCall::new(now, topic, draws);

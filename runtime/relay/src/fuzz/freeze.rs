@@ -1,7 +1,7 @@
-//! Freeze: repeats the values that were there last before the operation went on.
+//! Freeze: repeats the last values from before the operation became active.
 
 use crate::fuzz::places::Memory;
-use crate::fuzz::{Fate, PerWire, Places};
+use crate::fuzz::{Action, PerWire, Places};
 use crate::value::Value;
 
 /// A freeze operation.
@@ -17,17 +17,17 @@ impl Freeze {
         Freeze { places, last: PerWire::default() }
     }
 
-    /// A message passes while the operation is off.
-    pub fn overhear(&mut self, member: u64, message: &Value) {
-        self.places.remember(message, self.last.of(member).get_or_insert_default());
+    /// A message passes while the operation is inactive.
+    pub fn observe(&mut self, member: u64, message: &Value) {
+        self.places.remember(message, self.last.entry(member).get_or_insert_default());
     }
 
-    /// Puts the frozen values into the message. Where none passed before, its own are those that freeze.
-    pub fn apply(&mut self, member: u64, message: &mut Value) -> Fate {
-        if let Some(memory) = self.last.of(member) {
+    /// Replaces the values by the frozen ones. If no message passed before, the values of this one are frozen.
+    pub fn apply(&mut self, member: u64, message: &mut Value) -> Action {
+        if let Some(memory) = self.last.entry(member) {
             return self.places.recall(message, memory);
         }
-        self.overhear(member, message);
-        Fate::Unchanged
+        self.observe(member, message);
+        Action::Unchanged
     }
 }

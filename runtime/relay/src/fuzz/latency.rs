@@ -1,38 +1,40 @@
-//! Latency: holds each message back (paper §3.6, `LatencyNetworkOperation`). The relay's release queue lets it go.
+//! Latency: holds each message back ([SESAME 2023, §3.6], `LatencyNetworkOperation`). The relay's release queue
+//! releases it.
 
 use sesame_base::time::SimTime;
 use sesame_plan::{Distribution, Drain};
 
-use crate::fuzz::{Draws, Fate};
+use crate::fuzz::{Action, KeyedRng};
 
-/// How often a normal delay is drawn again before its middle is taken; that all leave the range has a probability of 1e-21.
+/// How many times a normal delay is drawn before the middle is used; the probability that all are out of range is
+/// 1e-21.
 const TRIES: u64 = 16;
 
 /// A latency operation.
 #[derive(Debug, Clone, Copy)]
 pub struct Latency {
-    /// What delays are drawn from, in seconds; a fixed delay has equal ends.
+    /// The range of delays, in seconds; a fixed delay has equal bounds.
     pub delay: (f64, f64),
-    /// How.
+    /// Their distribution.
     pub distribution: Distribution,
-    /// What becomes of held messages when the window ends.
+    /// What happens to held messages when the window ends.
     pub drain: Drain,
 }
 
 impl Latency {
-    /// How long the message is held, if nothing before it is held longer.
-    pub fn apply(self, draws: Draws) -> Fate {
+    /// How long the message is held, unless earlier messages are held longer.
+    pub fn apply(self, draws: KeyedRng) -> Action {
         let (low, high) = self.delay;
         let delay = if low == high {
             low
         } else if self.distribution == Distribution::Normal {
-            // The range is two standard deviations to either side.
+            // The range is two standard deviations on either side.
             let (middle, sigma) = (f64::midpoint(low, high), (high - low) / 4.0);
             let drawn = (0..TRIES).map(|attempt| draws.normal(2 * attempt)).find(|normal| normal.abs() <= 2.0);
             (middle + sigma * drawn.unwrap_or(0.0)).clamp(low, high)
         } else {
             low + draws.unit(0) * (high - low)
         };
-        Fate::Delayed(SimTime::from_seconds(delay))
+        Action::Delayed(SimTime::from_seconds(delay))
     }
 }

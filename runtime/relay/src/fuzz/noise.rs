@@ -1,21 +1,21 @@
-//! Noise: adds a fresh normal draw of mean zero per message and number.
+//! Noise: adds a new normally distributed number with mean zero per message and number.
 
 use crate::fuzz::change::add;
-use crate::fuzz::{Draws, Fate, Places};
+use crate::fuzz::{Action, KeyedRng, Places};
 use crate::value::Value;
 
 /// A noise operation.
 #[derive(Debug, Clone)]
 pub struct Noise {
-    /// What is changed.
+    /// The values to change.
     pub places: Places,
     /// The standard deviation, in the field's unit; not negative.
     pub sigma: f64,
 }
 
 impl Noise {
-    /// Adds noise to the values; to each coordinate of a point a draw of its own.
-    pub fn apply(&self, draws: Draws, message: &mut Value) -> Fate {
+    /// Adds noise to the values, independently for each coordinate of a point.
+    pub fn apply(&self, draws: KeyedRng, message: &mut Value) -> Action {
         self.places
             .change(message, |value, first| add(value, |axis| self.sigma * draws.normal(first + 2 * axis as u64)))
     }

@@ -1,23 +1,23 @@
-//! NaN and infinity: what a sensor or a division by zero makes of a number.
+//! NaN and infinity, such as a sensor or a division by zero may produce.
 
 use sesame_plan::NotFinite;
 
 use crate::fuzz::change::map;
-use crate::fuzz::{Fate, Places};
+use crate::fuzz::{Action, Places};
 use crate::value::Value;
 
-/// An operation that replaces reals by what is no finite number.
+/// An operation that replaces reals by NaN or infinity.
 #[derive(Debug, Clone)]
 pub struct MakeNotFinite {
-    /// What is replaced.
+    /// The values to replace.
     pub places: Places,
-    /// By what.
+    /// The replacement.
     pub number: NotFinite,
 }
 
 impl MakeNotFinite {
-    /// Replaces reals and all coordinates of points; whole numbers have no such values and stay.
-    pub fn apply(&self, message: &mut Value) -> Fate {
+    /// Replaces reals and all coordinates of points; whole numbers have no such values and are left unchanged.
+    pub fn apply(&self, message: &mut Value) -> Action {
         let new = match self.number {
             NotFinite::Nan => f64::NAN,
             NotFinite::Infinity => f64::INFINITY,

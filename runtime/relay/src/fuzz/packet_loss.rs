@@ -1,6 +1,6 @@
-//! Packet loss: drops each message independently (paper §3.8, `PacketLossNetworkOperation`).
+//! Packet loss: drops each message independently ([SESAME 2023, §3.8], `PacketLossNetworkOperation`).
 
-use crate::fuzz::{Draws, Fate};
+use crate::fuzz::{Action, KeyedRng};
 
 /// A packet loss operation.
 #[derive(Debug, Clone, Copy)]
@@ -11,7 +11,7 @@ pub struct PacketLoss {
 
 impl PacketLoss {
     /// Drops the message or lets it pass.
-    pub fn apply(self, draws: Draws) -> Fate {
-        if draws.unit(0) < self.loss { Fate::Dropped } else { Fate::Unchanged }
+    pub fn apply(self, draws: KeyedRng) -> Action {
+        if draws.unit(0) < self.loss { Action::Dropped } else { Action::Unchanged }
     }
 }

@@ -2,10 +2,10 @@
 
 use sesame_plan::{Place, Step};
 
-use crate::fuzz::Fate;
+use crate::fuzz::Action;
 use crate::value::Value;
 
-/// How many draws each value of a message may make.
+/// How many random numbers each value of a message may use.
 const DRAWS_PER_VALUE: u64 = 8;
 
 /// The places of an operation in messages of its topic.
@@ -13,27 +13,27 @@ const DRAWS_PER_VALUE: u64 = 8;
 pub struct Places(Vec<Place>);
 
 impl Places {
-    /// These places, or the whole message if there are none.
+    /// These places, or the whole message if the list is empty.
     pub fn new(places: &[Place]) -> Self {
         Places(if places.is_empty() { vec![Vec::new()] } else { places.to_vec() })
     }
 
-    /// Visits the values at these places, in order, and says what became of the message. `change` says whether it changed
-    /// the value; it also gets the number of the value's first draw. That depends on the place and on the position in its
-    /// list alone, so that other places and longer lists shift nobody's draws.
+    /// Visits the values at these places in order, and returns what was done with the message. `change` returns whether
+    /// it changed the value; it also gets the number of the value's first random number. This number only depends on
+    /// the place and on the position in its list, so other places and longer lists do not shift it.
     ///
-    /// What a message does not have is left out: elements behind the end of a list, and whatever is not of its declared
-    /// type.
-    pub fn change(&self, message: &mut Value, mut change: impl FnMut(&mut Value, u64) -> bool) -> Fate {
+    /// Parts that a message does not have are skipped: elements beyond the end of a list, and values that are not of
+    /// their declared type.
+    pub fn change(&self, message: &mut Value, mut change: impl FnMut(&mut Value, u64) -> bool) -> Action {
         let mut changed = false;
         for (at, place) in (0u64..).zip(&self.0) {
             let mut next = (at << 32) * DRAWS_PER_VALUE;
             changed |= visit(message, place, &mut next, &mut change);
         }
-        if changed { Fate::Changed } else { Fate::Unchanged }
+        if changed { Action::Changed } else { Action::Unchanged }
     }
 
-    /// Remembers the values at these places, in the place of what was remembered.
+    /// Stores the values at these places and discards those stored before.
     pub fn remember(&self, message: &Value, memory: &mut Memory) {
         memory.0.clear();
         for (at, place) in (0u64..).zip(&self.0) {
@@ -42,8 +42,8 @@ impl Places {
         }
     }
 
-    /// Puts remembered values back into their places; elements that the list had not then stay as they are.
-    pub fn recall(&self, message: &mut Value, memory: &Memory) -> Fate {
+    /// Restores stored values to their places; elements that the list did not have before are left unchanged.
+    pub fn recall(&self, message: &mut Value, memory: &Memory) -> Action {
         let mut remembered = memory.0.iter().peekable();
         self.change(message, |value, at| {
             while remembered.next_if(|(before, _)| *before < at).is_some() {}
@@ -58,7 +58,7 @@ impl Places {
     }
 }
 
-/// The values that were at the places of an operation in one message, by the numbers of their draws.
+/// The values at an operation's places in one message, by the numbers of their random numbers.
 #[derive(Debug, Clone, Default)]
 pub struct Memory(Vec<(u64, Value)>);
 

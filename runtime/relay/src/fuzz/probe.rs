@@ -1,18 +1,18 @@
-//! Finds operation hooks that are not filled in yet, before anything is simulated.
+//! Finds operation hooks that are not implemented yet, before anything is simulated.
 
 use std::panic::{self, AssertUnwindSafe};
 
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Choice, Domain, Moment, OperationId};
 
-use crate::fuzz::{Draws, MessageCall, OperationEntry, RunContext, custom_operations};
+use crate::fuzz::{KeyedRng, MessageCall, OperationEntry, RunContext, custom_operations};
 use crate::metric::sample;
 
-/// The custom operations of the plan whose hook says, when called with a made-up message, that it is not filled in. A
-/// hook that panics on one is filled in.
+/// The custom operations of the plan whose hook, called with an artificial message, says that it is not implemented. A
+/// hook that panics counts as implemented.
 ///
-/// A hook before the start or after the end is called too, with a context that changes nothing: whatever it asks of it
-/// shows that it is filled in, and ends the call.
+/// A hook before the start or after the end is called too, with a context that changes nothing: if it uses the context,
+/// it is implemented, and the call ends there.
 pub fn unimplemented_operations(plan: &CampaignPlan, hooks: &[OperationEntry]) -> Vec<OperationId> {
     let quiet = panic::take_hook();
     panic::set_hook(Box::new(|_| {}));
@@ -22,16 +22,16 @@ pub fn unimplemented_operations(plan: &CampaignPlan, hooks: &[OperationEntry]) -
             let choices: Vec<Choice> = operation.parameters.iter().map(|it| first(&it.domain)).collect();
             let topic = operation.topic.map(|topic| plan.topic(topic));
             let path = topic.and_then(|topic| topic.paths.first()).map_or("", String::as_str);
-            let mut call = MessageCall::new(SimTime::ZERO, path, Draws::new(0, 0, 0));
+            let mut call = MessageCall::new(SimTime::ZERO, path, KeyedRng::new(0, 0, 0));
             let mut ctx = RunContext::probing();
             let called = panic::catch_unwind(AssertUnwindSafe(|| {
                 let mut hook = (entry.build)(&choices);
                 match (moment, topic) {
                     (Moment::OnMessage, Some(topic)) => hook.on_message(&mut sample(plan, &topic.ty), &mut call),
-                    _ => hook.beside_run(&mut ctx),
+                    _ => hook.before_or_after_run(&mut ctx),
                 }
             }));
-            // What it said before a panic counts.
+            // A hook may say it before a panic.
             drop(called);
             call.unimplemented || ctx.unimplemented
         })

@@ -1,30 +1,30 @@
-//! Random value: replaces or shifts numbers, points and texts by a fresh uniform draw per message (paper §3.8,
-//! `RandomValueFromSetOperation`).
+//! Random value: replaces or shifts numbers, points and texts by a new uniform random number per message ([SESAME 2023,
+//! §3.8], `RandomValueFromSetOperation`).
 
 use sesame_plan::ValueMode;
 
 use crate::fuzz::change::{add, map, put};
-use crate::fuzz::{Draws, Fate, Places};
+use crate::fuzz::{Action, KeyedRng, Places};
 use crate::value::{Text, Value};
 
 /// A random value operation on numbers or points, with its sub-ranges.
 #[derive(Debug, Clone)]
 pub struct RandomValue {
-    /// What is changed.
+    /// The values to change.
     pub places: Places,
-    /// Whether the draw replaces the number or is added to it.
+    /// Whether the random number replaces the value or is added to it.
     pub mode: ValueMode,
-    /// Whether draws are whole numbers.
+    /// Whether the random numbers are whole.
     pub integer: bool,
-    /// What is drawn from on each axis of a point, in the field's unit; of numbers the first. Both ends are included for
-    /// whole numbers.
+    /// The range on each axis of a point, in the field's unit; numbers use the first. For whole numbers both bounds are
+    /// included.
     pub ranges: [(f64, f64); 3],
 }
 
 impl RandomValue {
-    /// Changes the numbers, where the message has them as the space says; whole numbers stay whole. A message that comes
-    /// out as it went in counts as unchanged.
-    pub fn apply(&self, draws: Draws, message: &mut Value) -> Fate {
+    /// Changes the numbers that the message has as declared; whole numbers stay whole. A message with the same value as
+    /// before counts as unchanged.
+    pub fn apply(&self, draws: KeyedRng, message: &mut Value) -> Action {
         self.places.change(message, |value, first| {
             let draw = |axis: usize| self.draw(axis, draws.unit(first + axis as u64));
             match self.mode {
@@ -43,15 +43,15 @@ impl RandomValue {
 /// A random value operation on texts.
 #[derive(Debug, Clone)]
 pub struct RandomText {
-    /// What is changed.
+    /// The values to change.
     pub places: Places,
-    /// What is drawn from, each alike; at least one.
+    /// The texts, all equally likely; at least one.
     pub texts: Vec<Text>,
 }
 
 impl RandomText {
     /// Replaces the texts.
-    pub fn apply(&self, draws: Draws, message: &mut Value) -> Fate {
+    pub fn apply(&self, draws: KeyedRng, message: &mut Value) -> Action {
         self.places.change(message, |value, first| {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is below their number")]
             let at = (draws.unit(first) * self.texts.len() as f64) as usize;

@@ -1,24 +1,24 @@
-//! Scale: multiplies.
+//! Scale: multiplies by a constant.
 
 use crate::fuzz::change::map;
-use crate::fuzz::{Fate, Places};
+use crate::fuzz::{Action, Places};
 use crate::value::Value;
 
 /// A scale operation.
 #[derive(Debug, Clone)]
 pub struct Scale {
-    /// What is changed.
+    /// The values to change.
     pub places: Places,
-    /// What values are multiplied with.
+    /// The constant.
     pub factor: f64,
 }
 
 impl Scale {
-    /// Multiplies the values; points coordinate by coordinate.
+    /// Multiplies the values; of points, each coordinate.
     #[expect(clippy::float_cmp, reason = "exactly one changes nothing, not even whole numbers beyond 2^53")]
-    pub fn apply(&self, message: &mut Value) -> Fate {
+    pub fn apply(&self, message: &mut Value) -> Action {
         if self.factor == 1.0 {
-            return Fate::Unchanged;
+            return Action::Unchanged;
         }
         self.places.change(message, |value, _| map(value, |_, x| x * self.factor))
     }

@@ -1,11 +1,11 @@
-//! Stale: replaces values by those that were there some time ago, as a cache does that is behind.
+//! Stale: replaces values by older ones, as a cache that lags behind does.
 
 use std::collections::VecDeque;
 
 use sesame_base::time::SimTime;
 
 use crate::fuzz::places::Memory;
-use crate::fuzz::{Fate, PerWire, Places};
+use crate::fuzz::{Action, PerWire, Places};
 use crate::relay::HELD_LIMIT;
 use crate::value::Value;
 
@@ -18,16 +18,16 @@ pub struct Stale {
 }
 
 impl Stale {
-    /// An operation that gives messages the values of this age.
+    /// An operation that replaces values by those of this age.
     pub fn new(places: Places, age: SimTime) -> Self {
         Stale { places, age, past: PerWire::default() }
     }
 
-    /// A message passes, whether the operation is on or off.
+    /// A message passes, whether the operation is active or not.
     ///
-    /// What is remembered: the last values that are old enough, and all after them.
-    pub fn overhear(&mut self, now: SimTime, member: u64, message: &Value) {
-        let past = self.past.of(member);
+    /// Stores the latest values that are old enough, and all newer ones.
+    pub fn observe(&mut self, now: SimTime, member: u64, message: &Value) {
+        let past = self.past.entry(member);
         let mut spare = None;
         while past.get(1).is_some_and(|(time, _)| *time + self.age <= now) || past.len() >= HELD_LIMIT {
             spare = past.pop_front();
@@ -35,19 +35,19 @@ impl Stale {
         let mut memory = spare.map_or_else(Memory::default, |(_, memory)| memory);
         self.places.remember(message, &mut memory);
         past.push_back((now, memory));
-        // The new one may be old enough itself, when no age is asked for.
+        // If the age is zero, the new message is old enough itself.
         while past.get(1).is_some_and(|(time, _)| *time + self.age <= now) {
             past.pop_front();
         }
     }
 
-    /// Gives the message the values of the last one before it that is old enough; while there is none, those of the first
-    /// one that passed.
-    pub fn apply(&mut self, now: SimTime, member: u64, message: &mut Value) -> Fate {
-        self.overhear(now, member, message);
-        match self.past.of(member).front() {
+    /// Replaces the values by those of the latest earlier message that is old enough; before there is one, by those of
+    /// the first message.
+    pub fn apply(&mut self, now: SimTime, member: u64, message: &mut Value) -> Action {
+        self.observe(now, member, message);
+        match self.past.entry(member).front() {
             Some((_, memory)) => self.places.recall(message, memory),
-            None => Fate::Unchanged,
+            None => Action::Unchanged,
         }
     }
 }

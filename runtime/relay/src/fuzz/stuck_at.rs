@@ -1,19 +1,19 @@
-//! Stuck-at: a value is one and the same, whatever it was.
+//! Stuck-at: replaces a value by a constant.
 
 use crate::fuzz::change::{Amount, map, put};
-use crate::fuzz::{Fate, Places};
+use crate::fuzz::{Action, Places};
 use crate::value::{Text, Value};
 
 /// A stuck-at operation.
 #[derive(Debug, Clone)]
 pub struct StuckAt {
-    /// What is replaced.
+    /// The values to replace.
     pub places: Places,
-    /// By what.
+    /// The constant.
     pub at: Stuck,
 }
 
-/// What values are stuck at.
+/// The constant of a stuck-at operation.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Stuck {
     /// A number, or a point.
@@ -25,8 +25,8 @@ pub enum Stuck {
 }
 
 impl StuckAt {
-    /// Replaces the values, where the message has them as the space says.
-    pub fn apply(&self, message: &mut Value) -> Fate {
+    /// Replaces the values that the message has as declared.
+    pub fn apply(&self, message: &mut Value) -> Action {
         self.places.change(message, |value, _| match (&self.at, value) {
             (Stuck::Amount(amount), value) => map(value, |axis, _| amount.on(axis)),
             (Stuck::Text(at), Value::Text(text)) => put(text, at.clone()),

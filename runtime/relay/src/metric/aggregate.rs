@@ -1,10 +1,10 @@
-//! Declarative metrics during a run: the last value of each input is held, and what the formula says becomes of the values
-//! over time is kept up.
+//! Declarative metrics during a run: they hold the last value of each input, and aggregate the values of the formula
+//! over time.
 //!
-//! A formula over one topic is evaluated at each of its messages. One over several is evaluated once per instant of simulation
-//! time at which one of them had a message, when all messages of that instant are known: so it never sees the new value of one
-//! topic beside the old value of another that changes in the same instant. While the last value of an input is not finite, no
-//! formula is evaluated.
+//! A formula over one topic is evaluated at each of its messages. A formula over several topics is evaluated once per
+//! instant of simulation time at which one of them had a message, when all messages of that instant are known: so it
+//! never combines the new value of one topic with the old value of another that changes in the same instant. While the
+//! last value of an input is not finite, the formula is not evaluated.
 
 use std::collections::BTreeMap;
 
@@ -16,22 +16,22 @@ use crate::metric::expression::{Held, greatest, holds, least, number};
 use crate::metric::held::{HeldInputs, hear};
 use crate::value::{Text, Value};
 
-/// The most keys of one metric; messages of further ones are not heard, and the run is warned.
+/// The most keys of one metric; messages with further keys are ignored, with a warning of the run.
 const KEY_LIMIT: usize = 1_000;
 
 /// A formula in one run.
 pub(super) struct FormulaState<'p> {
     formula: &'p Formula,
-    /// Whether its inputs are of several topics.
+    /// Whether its inputs are on several topics.
     several: bool,
-    /// All there is without keys; with them, what a new key begins with.
+    /// The whole state without keys; with keys, the initial state of a new one.
     common: Stream,
     keys: BTreeMap<Key, Stream>,
-    /// What the message at hand holds, per input.
+    /// The values of the current message, per input.
     heard: Vec<(usize, Held)>,
 }
 
-/// A value that tells the messages of a topic apart.
+/// The value that distinguishes the messages of a topic.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 enum Key {
     Int(i64),
@@ -48,8 +48,8 @@ impl<'p> FormulaState<'p> {
         FormulaState { formula, several, common, keys: BTreeMap::new(), heard: Vec::new() }
     }
 
-    /// A message on the `member`th path of a topic, at the context's time. Whether the formula waits for the end of the
-    /// instant, of which [`FormulaState::settle`] tells it.
+    /// A message on the `member`th path of a topic, at the context's time. Returns whether the formula waits for the
+    /// end of the instant, for which [`FormulaState::settle`] is called.
     pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) -> bool {
         match hear(&self.formula.inputs, topic, value, &mut self.heard) {
             Ok(true) => {}
@@ -88,7 +88,7 @@ impl<'p> FormulaState<'p> {
             Some(_) => {
                 self.common.held.hold(&self.formula.inputs, &self.heard, member);
                 if self.several {
-                    // A key that begins in this instant counts what came before it in the same.
+                    // A key that begins in this instant includes earlier messages of the same instant.
                     self.common.take(self.formula, wire, true, context);
                 }
                 for stream in self.keys.values_mut() {
@@ -115,8 +115,8 @@ impl<'p> FormulaState<'p> {
         self.set(context);
     }
 
-    /// The value that is certain to count in a run in which every number had been finite: what came after the first that was
-    /// not counts too, unless a rate limit might have left it out.
+    /// The value that would have been reached if every number had been finite: messages after the first number that was
+    /// not finite count too, unless a rate limit might have excluded them.
     pub(super) fn certain(&self, context: &Context) -> Option<f64> {
         match (self.formula.every, context.not_finite) {
             (Some(_), Some((_, before))) => before,
@@ -124,7 +124,7 @@ impl<'p> FormulaState<'p> {
         }
     }
 
-    /// The run has come to its end, at the context's time: what holds has held until now.
+    /// The run has ended, at the context's time: what holds has held until now.
     pub(super) fn end(&mut self, context: &mut Context) {
         if !matches!(self.formula.aggregate, Aggregate::Duration { .. }) {
             return;
@@ -137,12 +137,12 @@ impl<'p> FormulaState<'p> {
         self.set(context);
     }
 
-    /// The value over all keys: what is counted adds up, the greatest is the greatest, and of all others it is the least.
+    /// The value over all keys: counts are added, of maxima it is the greatest, of all others the least.
     fn set(&self, context: &mut Context) {
         let tallies = || std::iter::once(&self.common).chain(self.keys.values()).map(|stream| &stream.tally);
         let values = tallies().filter_map(|tally| tally.value);
         let value = match self.formula.aggregate {
-            // In whole nanoseconds, so that what held equally long is equal.
+            // In whole nanoseconds, so that equal durations have equal values.
             Aggregate::Duration { .. } => tallies()
                 .filter(|tally| tally.value.is_some())
                 .map(|tally| tally.held)
@@ -158,19 +158,19 @@ impl<'p> FormulaState<'p> {
     }
 }
 
-/// What is held of the inputs, and what has become of the values so far; one for each key.
+/// The held inputs and the aggregated values; one for each key.
 #[derive(Clone)]
 struct Stream {
     held: HeldInputs,
     tally: Tally,
-    /// Whether a message came in the instant at hand that is still to be taken into account.
+    /// Whether a message of the current instant has not been aggregated yet.
     heard: bool,
-    /// The members of groups it came from, where the formula is that of each: each once, the latest last.
+    /// The members of groups from which it came, if each member has a formula: each once, the latest last.
     members: Vec<(TopicId, usize)>,
 }
 
 impl Stream {
-    /// Takes a message into account whose values are held: now, or when its instant is over.
+    /// Aggregates a message whose values are held: now, or when its instant is over.
     fn take(&mut self, formula: &Formula, wire: (TopicId, usize), wait: bool, context: &mut Context) {
         if !wait {
             return self.step(formula, context);
@@ -183,13 +183,13 @@ impl Stream {
         }
     }
 
-    /// The instant is over, and nothing of it is to be taken into account any more.
+    /// The instant is over, and nothing in it is left to aggregate.
     fn forget(&mut self) {
         self.heard = false;
         self.members.clear();
     }
 
-    /// The instant is over: each member of a group that had a message counts, or what is held, where none had.
+    /// The instant is over: aggregates each member of a group that had a message, or the held values if none had one.
     fn settle(&mut self, formula: &Formula, context: &mut Context) {
         if !std::mem::take(&mut self.heard) {
             return;
@@ -205,11 +205,11 @@ impl Stream {
         self.members = members;
     }
 
-    /// Takes the values into account as they are now, once all are known.
+    /// Aggregates the values as they are now, once all are known.
     fn step(&mut self, formula: &Formula, context: &mut Context) {
         let now = context.now;
         let Some(inputs) = self.held.values() else {
-            // Of what holds while a value is not finite nothing is known.
+            // While a value is not finite, it is not known what holds.
             if self.tally.holds_since.is_some() {
                 self.tally.hold(now, false);
             }
@@ -253,7 +253,7 @@ impl Stream {
     }
 }
 
-/// What has become of a formula's values.
+/// The aggregate of a formula's values.
 #[derive(Debug, Clone, Default)]
 struct Tally {
     value: Option<f64>,
@@ -262,13 +262,13 @@ struct Tally {
     sum: f64,
     /// When the last message counted.
     counted: Option<SimTime>,
-    /// For a duration: how long it has held, and since when it does.
+    /// For a duration: how long it has held, and since when it holds.
     held: SimTime,
     holds_since: Option<SimTime>,
 }
 
 impl Tally {
-    /// Whether a message counts that comes now.
+    /// Whether a message at this time counts.
     fn due(&mut self, now: SimTime, period: SimTime) -> bool {
         let due = self.counted.is_none_or(|counted| now - counted >= period);
         if due {
@@ -277,7 +277,7 @@ impl Tally {
         due
     }
 
-    /// What held before has held until now; whether it does from now on.
+    /// What held before has held until now; sets whether it holds from now on.
     fn hold(&mut self, now: SimTime, holds: bool) {
         if let Some(since) = self.holds_since {
             self.held = self.held + (now - since);

@@ -1,4 +1,4 @@
-//! All metrics of one run: which message goes to which, and what comes out.
+//! All metrics of one run: which messages they read, and their results.
 
 use sesame_base::observation::{MetricObservation, Reach};
 use sesame_base::time::SimTime;
@@ -16,33 +16,33 @@ use crate::wire::{Wire, WireTable};
 pub struct MetricTable<'p> {
     plan: &'p CampaignPlan,
     hooks: Vec<Option<HookEntry>>,
-    /// Per wire: the metrics that want its messages as they were published, with the position of its topic among their
+    /// Per wire: the metrics that read its messages as they were published, with the position of its topic among their
     /// inputs.
     taps: Vec<Vec<(usize, usize)>>,
-    /// Per wire: the metrics that want its messages as they are delivered.
+    /// Per wire: the metrics that read its messages as they are delivered.
     delivered: Vec<Vec<usize>>,
     /// Per wire: its path, its topic, and the position among the topic's paths.
     wires: Vec<(Text, TopicId, usize)>,
 }
 
-/// Why a runner cannot measure what its plan wants.
+/// Why a runner cannot compute the metrics of its plan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MetricError {
     /// A hook that the runner does not have.
     #[error("metric `{0}` has no hook in this runner: run `sesamec generate` again")]
     MissingHook(String),
-    /// A temporal formula that is none.
+    /// A temporal formula that is not valid.
     #[error("metric `{metric}`: {error}; the plan was not written by sesamec: run `sesamec generate` again")]
     Formula {
         /// The metric.
         metric: String,
-        /// What is wrong with it.
+        /// The problem.
         error: FormulaError,
     },
 }
 
 impl<'p> MetricTable<'p> {
-    /// Wires the metrics of a plan to its topics and to the runner's hooks, and checks its temporal formulas.
+    /// Connects the metrics of a plan to its topics and to the runner's hooks, and checks its temporal formulas.
     pub fn new(plan: &'p CampaignPlan, wires: &WireTable, hooks: &[HookEntry]) -> Result<Self, MetricError> {
         let mut found = Vec::with_capacity(plan.metrics.len());
         let mut taps = vec![Vec::new(); wires.len()];
@@ -124,9 +124,9 @@ impl<'p> MetricTable<'p> {
 pub struct Metrics<'p> {
     table: &'p MetricTable<'p>,
     states: Vec<State<'p>>,
-    /// The time that was last told.
+    /// The latest time.
     now: SimTime,
-    /// The metrics whose formulas wait for the end of the instant at hand.
+    /// The metrics whose formulas wait for the end of the current instant.
     waiting: Vec<usize>,
 }
 
@@ -137,7 +137,7 @@ struct State<'p> {
     context: Context,
     /// Whether it is among those that wait.
     waits: bool,
-    /// Whether it was told of the end of the run.
+    /// Whether it knows the end of the run.
     ended: bool,
 }
 
@@ -151,17 +151,22 @@ impl Metrics<'_> {
         }
     }
 
-    /// Time has come to `now`: all messages of the instants before are known. Formulas over several topics have their values of
-    /// those instants from here on, for conditions too. Messages tell their time themselves; whoever weighs conditions, or
-    /// knows that time has passed without a message, calls this first.
-    pub fn follow_time(&mut self, now: SimTime) {
+    /// Simulation time is `now` from here on: all messages of earlier instants are known, and formulas over several
+    /// topics have their values of those instants, also for conditions. A message includes this call; call it before
+    /// conditions are evaluated, and when time passes without a message.
+    pub fn advance_to(&mut self, now: SimTime) {
         if now > self.now {
             self.settle();
             self.now = now;
         }
     }
 
-    /// The instant at hand is over: all its messages are known. Whether a formula waited for that.
+    /// Whether a formula waits for the end of the current instant.
+    pub(crate) fn is_waiting(&self) -> bool {
+        !self.waiting.is_empty()
+    }
+
+    /// The current instant is over: all its messages are known. Returns whether a formula waited for that.
     pub fn settle(&mut self) -> bool {
         let waited = !self.waiting.is_empty();
         for at in self.waiting.drain(..) {
@@ -175,9 +180,9 @@ impl Metrics<'_> {
         waited
     }
 
-    /// Tells hooks and formulas that the run has come to its end. After a failure nobody does.
+    /// Tells hooks and formulas that the run has ended. This is not called after a failure.
     pub fn end(&mut self, now: SimTime) {
-        self.follow_time(now);
+        self.advance_to(now);
         self.settle();
         for State { hook, formula, robustness, context, ended, .. } in &mut self.states {
             context.now = now;
@@ -196,7 +201,7 @@ impl Metrics<'_> {
 
     /// A message, as the simulator sent it.
     pub fn message(&mut self, now: SimTime, wire: Wire, value: &Value) {
-        self.follow_time(now);
+        self.advance_to(now);
         for &(at, input) in &self.table.taps[wire.index()] {
             let State { hook, formula, robustness, context, waits, .. } = &mut self.states[at];
             if let Some(robustness) = robustness {
@@ -237,8 +242,8 @@ impl Metrics<'_> {
         }
     }
 
-    /// The value that a metric has for conditions at this moment: its last one, or its initial one before that. The fuzzing
-    /// time so far, in seconds, is what the relay knows and a metric of it shows.
+    /// The value of a metric for conditions at this moment: its last one, or its initial one before that. The relay
+    /// knows the fuzzing time so far, in seconds.
     pub fn value(&self, metric: MetricId, fuzzing_time: f64) -> Option<f64> {
         let declared = self.table.plan.metric(metric);
         match declared.source {
@@ -256,14 +261,14 @@ impl Metrics<'_> {
         }
     }
 
-    /// Whether a metric hears this wire's messages as they are delivered.
+    /// Whether a metric reads this wire's messages as they are delivered.
     pub(crate) fn delivers(&self, wire: Wire) -> bool {
         !self.table.delivered[wire.index()].is_empty()
     }
 
-    /// A message, as it is delivered.
-    pub fn delivered(&mut self, now: SimTime, wire: Wire, value: &Value) {
-        self.follow_time(now);
+    /// A message as it is delivered.
+    pub fn delivery(&mut self, now: SimTime, wire: Wire, value: &Value) {
+        self.advance_to(now);
         for &at in &self.table.delivered[wire.index()] {
             let State { formula, robustness, context, waits, .. } = &mut self.states[at];
             let (path, topic, member) = &self.table.wires[wire.index()];
@@ -281,10 +286,11 @@ impl Metrics<'_> {
         }
     }
 
-    /// What the run showed, as far as it went: a metric never set takes its default, one whose hook is not filled in has
-    /// no value. Also what the user should know, one line per metric. No hook is called any more.
+    /// The result of the run, as far as it went, and warnings for the user, one line per metric. A metric that was
+    /// never set takes its default; one whose hook is not implemented has no value. No hook is called any more.
     ///
-    /// `busy` has the intervals in which each operation that counts in `fuzzing_time()` was active or held messages back.
+    /// `busy` has the intervals in which each operation that counts in `fuzzing_time()` was active or held messages
+    /// back.
     pub fn finish(mut self, busy: &[Span]) -> (Vec<MetricObservation>, Vec<String>) {
         let mut warnings = Vec::new();
         let mut observations = Vec::with_capacity(self.states.len());
@@ -322,8 +328,8 @@ impl Metrics<'_> {
     }
 }
 
-/// The fuzzing time so far, at the end of each interval. It is summed in whole nanoseconds, so that tests which disturbed
-/// equally long are equal, however their intervals lie.
+/// The fuzzing time so far, at the end of each interval. It is summed in whole nanoseconds, so tests with equal fuzzing
+/// times have equal values, wherever their intervals are.
 fn fuzzing_time(busy: &[Span]) -> Vec<(SimTime, SimTime)> {
     let mut intervals: Vec<(SimTime, SimTime)> =
         busy.iter().map(|span| (SimTime::from_seconds(span.start), SimTime::from_seconds(span.end))).collect();

@@ -5,7 +5,7 @@ use sesame_plan::{Condition, Expression};
 /// The values of a formula's inputs: a point, or a number (true is 1, false 0) followed by zeros.
 pub(super) type Held = [f64; 3];
 
-/// The number an expression is; not finite where arithmetic is not.
+/// The value of an expression; not finite if the arithmetic is not.
 pub(super) fn number(of: &Expression, inputs: &[Held]) -> f64 {
     match of {
         Expression::Constant(value) => *value,

@@ -1,15 +1,15 @@
-//! What formulas hold of the messages they hear: the last value of each input, of each member of a group.
+//! The values that formulas hold: the last value of each input, and of each member of a group.
 
 use sesame_plan::{CampaignPlan, Input, Members, TopicId};
 
 use crate::metric::expression::{Held, greatest, least};
 use crate::value::Value;
 
-/// What is held of an input whose last value was not finite.
+/// The held value of an input whose last value was not finite.
 const NOT_FINITE: Held = [f64::NAN; 3];
 
-/// Reads the values of the inputs that a message on a topic has, with their positions, and says whether all of them are
-/// finite. On failure, the field it lacks.
+/// Reads the values of the inputs that a message on a topic has, with their positions, and returns whether all of them
+/// are finite. The error is a missing field.
 pub(super) fn hear(
     inputs: &[Input],
     topic: TopicId,
@@ -38,7 +38,7 @@ pub(super) fn hear(
 pub(super) struct HeldInputs {
     /// Per input: the last value of each member.
     members: Vec<Vec<Option<Held>>>,
-    /// Per input: what is made of them.
+    /// Per input: the value computed from them.
     inputs: Vec<Held>,
     /// Per input: whether there was a message at all.
     known: Vec<bool>,
@@ -54,7 +54,7 @@ impl HeldInputs {
         }
     }
 
-    /// Takes what [`hear`] found in a message on the `member`th path of its topic.
+    /// Takes the values that [`hear`] found in a message on the `member`th path of its topic.
     pub(super) fn hold(&mut self, inputs: &[Input], heard: &[(usize, Held)], member: usize) {
         for &(at, value) in heard {
             self.known[at] = true;
@@ -69,13 +69,13 @@ impl HeldInputs {
                 Members::Max => greatest,
                 Members::Sum => |a, b| a + b,
             };
-            // A point is never joined: it is that of a single topic.
+            // Points are never combined: they come from a single topic.
             let joined = members.iter().flatten().copied().reduce(|a, b| [join(a[0], b[0]), a[1], a[2]]);
             self.inputs[at] = joined.unwrap_or(value);
         }
     }
 
-    /// Makes one member of a group the latest, where the inputs are those of each.
+    /// Makes one member of a group the latest, if each member has a formula.
     pub(super) fn turn_to(&mut self, inputs: &[Input], topic: TopicId, member: usize) {
         for (at, input) in inputs.iter().enumerate() {
             if input.field.topic == topic && input.members == Members::Each {
@@ -84,7 +84,7 @@ impl HeldInputs {
         }
     }
 
-    /// What is held of each input, once all had a message and while the last one of each was finite.
+    /// The held values of all inputs, once all had a message and while the last ones are finite.
     pub(super) fn values(&self) -> Option<&[Held]> {
         let usable = !self.known.contains(&false) && self.inputs.iter().all(|held| !held[0].is_nan());
         usable.then_some(&self.inputs)

@@ -1,4 +1,4 @@
-//! Finds hooks that are not filled in yet, before anything is simulated.
+//! Finds hooks that are not implemented yet, before anything is simulated.
 
 use std::panic::{self, AssertUnwindSafe};
 
@@ -7,8 +7,8 @@ use sesame_plan::{CampaignPlan, MetricId, MetricSource, Type};
 use crate::metric::{Context, HookEntry};
 use crate::value::{Fields, Record, Text, Value};
 
-/// The metrics of the plan whose hook says, when called with made-up messages, that it is not filled in. A hook that
-/// panics on such messages is filled in.
+/// The metrics of the plan whose hook, called with artificial messages, says that it is not implemented. A hook that
+/// panics counts as implemented.
 pub fn unimplemented_hooks(plan: &CampaignPlan, hooks: &[HookEntry]) -> Vec<MetricId> {
     let quiet = panic::take_hook();
     panic::set_hook(Box::new(|_| {}));
@@ -29,7 +29,7 @@ pub fn unimplemented_hooks(plan: &CampaignPlan, hooks: &[HookEntry]) -> Vec<Metr
                 }
                 hook.on_end(&mut ctx);
             }));
-            // What it said before a panic counts.
+            // A hook may say it before a panic.
             drop(called);
             ctx.unimplemented
         })

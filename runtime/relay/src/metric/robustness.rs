@@ -1,5 +1,5 @@
-//! Metrics that are the robustness of a temporal formula: the values of its signals, held, go to a monitor, and the run's
-//! end tells what comes of them.
+//! Metrics that are the robustness of a temporal formula: a monitor gets the held values of its signals, and gives its
+//! result at the end of the run.
 
 use sesame_base::observation::Reach;
 use sesame_base::time::SimTime;
@@ -26,23 +26,23 @@ pub(super) struct RobustnessState<'p> {
 
 struct Instance {
     held: HeldInputs,
-    /// None once the run is over, or a number was not finite: then there is what came out.
+    /// `None` once the run is over, or a number was not finite: then there is an outcome.
     monitor: Option<Monitor>,
-    /// None as long as there is a monitor, and where the formula said nothing.
+    /// `None` as long as there is a monitor, and if the formula was never evaluated.
     said: Option<Said>,
 }
 
-/// What came of one monitor.
+/// The outcome of one monitor.
 #[derive(Clone, Copy)]
 struct Said {
-    /// The robustness of what was heard; none where the trace had not begun.
+    /// The robustness of the trace so far; `None` if the trace had not begun.
     robustness: Option<f64>,
     /// The least and the greatest robustness that the whole run may have.
     reach: (f64, f64),
 }
 
 impl Instance {
-    /// Nothing more is known from `now` on: what was heard is judged up to the `last` message before.
+    /// Nothing is known from `now` on: the trace is evaluated up to the `last` message before.
     fn break_off(&mut self, now: SimTime, last: SimTime) {
         if let Some(monitor) = self.monitor.take() {
             let reach = monitor.reach(now);
@@ -52,7 +52,7 @@ impl Instance {
 }
 
 impl<'p> RobustnessState<'p> {
-    /// Before the first message. Fails for a formula that the generator would not write.
+    /// Before the first message. Fails for a formula that the generator never writes.
     pub(super) fn new(robustness: &'p Robustness, plan: &CampaignPlan) -> Result<Self, FormulaError> {
         let monitor = Monitor::new(&robustness.formula, robustness.signals.len())?;
         let monitor = if robustness.whole_windows { monitor.over_whole_windows() } else { monitor };
@@ -78,7 +78,8 @@ impl<'p> RobustnessState<'p> {
         let before = std::mem::replace(&mut self.last, context.now);
         for (at, instance) in self.instances.iter_mut().enumerate() {
             let Instance { held, monitor, .. } = instance;
-            // Where each member has a formula, what is said of all of them goes to all, and what is said of one to its own.
+            // If each member has a formula, values of all members go to all formulas, and those of one member to its
+            // own.
             let own = self.each != Some(topic) || at == member;
             let mut finite = true;
             for &(input, value) in &self.heard {
@@ -94,7 +95,7 @@ impl<'p> RobustnessState<'p> {
             let (Some(values), Some(monitor)) = (held.values(), monitor) else { continue };
             for (at, signal) in signals.iter().enumerate() {
                 let value = number(signal, values);
-                // As with other formulas: arithmetic that comes to no number says nothing, and what was known goes on.
+                // As with other formulas: if arithmetic gives no number, the last value stays.
                 if value.is_finite() {
                     monitor.push(context.now, at, value);
                 } else {
@@ -104,12 +105,12 @@ impl<'p> RobustnessState<'p> {
         }
     }
 
-    /// The run is over, at the context's time: by how much the formula was kept.
+    /// The run is over, at the context's time: sets the robustness.
     pub(super) fn end(&mut self, context: &mut Context) {
         let end = context.now.max(self.last);
         for instance in &mut self.instances {
             if let Some(monitor) = instance.monitor.take() {
-                // One without a trace says nothing of the run, as far as it is known.
+                // A formula without a trace says nothing about the run.
                 let robustness = monitor.finish(end);
                 instance.said = robustness.map(|it| Said { robustness, reach: (it, it) });
             }
@@ -126,7 +127,7 @@ impl<'p> RobustnessState<'p> {
         }
     }
 
-    /// The run broke off at `now`, and the end was not told: it is judged up to its last message.
+    /// The run broke off at `now`, without its end: it is evaluated up to its last message.
     pub(super) fn break_off(&mut self, now: SimTime, context: &mut Context) {
         if self.instances.iter().any(|instance| instance.monitor.is_some()) {
             for instance in &mut self.instances {
@@ -137,8 +138,8 @@ impl<'p> RobustnessState<'p> {
         }
     }
 
-    /// The values that it may have at the end of the run, once that is over: of all instances the least counts. Where
-    /// nothing may be left to judge, its default is one of them.
+    /// The values that it may have at the end of the run, once the run is over: the least of all instances counts. If
+    /// nothing may be left to evaluate, its default is one of them.
     pub(super) fn reach(&self, default: Option<f64>) -> Reach {
         let unset = default.filter(|_| looks_ahead(&self.robustness.formula, self.robustness.whole_windows));
         let ends = |end: fn((f64, f64)) -> f64| {
@@ -152,8 +153,8 @@ impl<'p> RobustnessState<'p> {
     }
 }
 
-/// Whether a formula has an interval that may lie behind the end of a run altogether, or where only whole windows count, may be
-/// cut by it, so that nothing is left to judge.
+/// Whether a formula has an interval that may be completely beyond the end of a run, or, if only whole windows count,
+/// may be cut by it, so that nothing is left to evaluate.
 fn looks_ahead(formula: &Formula, whole: bool) -> bool {
     let ahead = |interval: &Interval| interval.from > 0.0 || (whole && interval.to.is_some());
     match formula {

@@ -65,7 +65,7 @@ fn measured_by(plan: &CampaignPlan, stream: &[Sent], end: Option<i64>) -> (Metri
         metrics.message(SimTime::from_nanos(time * 1_000_000), wire, &payload(path, number));
     }
     let last = stream.last().map_or(0, |sent| sent.0);
-    metrics.follow_time(SimTime::from_nanos(last * 1_000_000 + 1));
+    metrics.advance_to(SimTime::from_nanos(last * 1_000_000 + 1));
     if let Some(end) = end {
         metrics.end(SimTime::from_nanos(end * 1_000_000));
     }
@@ -125,9 +125,9 @@ fn conditions_see_the_values_of_an_instant_as_soon_as_time_moves_on() {
     for (path, number) in [(0, 1.0), (1, 10.0)] {
         metrics.message(at(5), wires.find(PATHS[path]).unwrap(), &payload(path, number));
     }
-    metrics.follow_time(at(5));
+    metrics.advance_to(at(5));
     assert_eq!(shown(&metrics), None);
-    metrics.follow_time(at(6));
+    metrics.advance_to(at(6));
     assert_eq!(shown(&metrics), Some(11.0));
     metrics.message(at(7), wires.find(PATHS[0]).unwrap(), &payload(0, 2.0));
     assert_eq!(shown(&metrics), Some(11.0));
@@ -145,7 +145,7 @@ fn an_instant_in_which_the_run_broke_off_is_not_judged() {
     for (path, number) in [(0, 1.0), (1, 10.0)] {
         metrics.message(SimTime::from_nanos(5), wires.find(PATHS[path]).unwrap(), &payload(path, number));
     }
-    metrics.follow_time(SimTime::from_nanos(5));
+    metrics.advance_to(SimTime::from_nanos(5));
     assert_eq!(metrics.finish(&[]).0[0].value, None);
 }
 

@@ -1,6 +1,7 @@
-//! When conditions switch operations, beside a model that looks at every nanosecond; what depends on it and what does not:
-//! copies of an operation, the tail of a delay, and who hears a message.
+//! When conditions switch operations, beside a model that looks at every nanosecond; what depends on it and what does
+//! not: copies of an operation, the tail of a delay, and who hears a message.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use proptest::prelude::*;
@@ -16,9 +17,9 @@ use sesame_plan::{
 };
 
 use crate::metric::MetricTable;
-use crate::relay::{Delivery, Exchange as _, Finished, Relay};
+use crate::relay::{Delivery, Exchange as _, Finished, Listener, OperationEvent, Relay};
 use crate::value::{Fields, Record, Value};
-use crate::wire::WireTable;
+use crate::wire::{Wire, WireTable};
 
 const COMMAND: &str = "arm/command";
 const ZONE: &str = "zones/Z1";
@@ -65,7 +66,7 @@ impl Event {
 fn run(plan: &CampaignPlan, test: Vec<TestOperation>, events: &[Event], end: i64) -> (Vec<(i64, f64)>, Finished) {
     let wires = WireTable::new(plan);
     let metrics = MetricTable::new(plan, &wires, &[]).unwrap();
-    let mut relay = Relay::new(plan, &wires, &test_of(test), metrics.start(), &[]).unwrap().heard_everywhere();
+    let mut relay = Relay::new(plan, &wires, &test_of(test), metrics.start(), &[]).unwrap().received_everywhere();
     let (command, level) = (wires.find(COMMAND).unwrap(), wires.find(ZONE).unwrap());
     let mut commands = Vec::new();
     for &event in events.iter().chain([&Event::Step(end)]) {
@@ -79,6 +80,66 @@ fn run(plan: &CampaignPlan, test: Vec<TestOperation>, events: &[Event], end: i64
         commands.extend(sent.map(|Delivery { value, .. }| (event.time(), value.number_at::<&str>(&[]).unwrap())));
     }
     (commands, relay.finish(SimTime::from_nanos(end)))
+}
+
+/// What happens in a run, with its time in nanoseconds.
+type Log = RefCell<Vec<(i64, String)>>;
+
+/// A listener that writes a log.
+struct Logger<'a>(&'a Log);
+
+impl Logger<'_> {
+    fn log(&self, now: SimTime, what: String) {
+        self.0.borrow_mut().push((now.nanos(), what));
+    }
+}
+
+impl Listener for Logger<'_> {
+    fn published(&mut self, now: SimTime, wire: Wire, index: u64, value: &Value) {
+        self.log(now, format!("published {index} on {}: {value:?}", wire.index()));
+    }
+    fn delivered(&mut self, now: SimTime, wire: Wire, index: u64, value: &Value) {
+        self.log(now, format!("delivered {index} on {}: {value:?}", wire.index()));
+    }
+    fn operated(&mut self, now: SimTime, operation: usize, event: OperationEvent) {
+        self.log(now, format!("{operation}: {event:?}"));
+    }
+}
+
+/// The log of a run until `END`. Time advances to each moment that is due, or to every nanosecond; in that case `None`
+/// if anything happened at a nanosecond that was not due.
+fn logged(plan: &CampaignPlan, test: Vec<TestOperation>, events: &[Event], every: bool) -> Option<Vec<(i64, String)>> {
+    let wires = WireTable::new(plan);
+    let metrics = MetricTable::new(plan, &wires, &[]).unwrap();
+    let log = Log::default();
+    let mut logger = Logger(&log);
+    let relay = Relay::new(plan, &wires, &test_of(test), metrics.start(), &[]).unwrap();
+    let mut relay = relay.received_everywhere().tapped(&mut logger);
+    let (command, level) = (wires.find(COMMAND).unwrap(), wires.find(ZONE).unwrap());
+    let mut now = -1;
+    for &event in events.iter().chain([&Event::Step(END)]) {
+        while now < event.time() {
+            let due = relay.next_due().map(SimTime::nanos);
+            now = if every { now + 1 } else { due.map_or(event.time(), |due| due.min(event.time())) };
+            let before = log.borrow().len();
+            relay.advance(SimTime::from_nanos(now), &mut Vec::new());
+            let happened = log.borrow().len() > before;
+            if happened && due != Some(now) || relay.next_due().is_some_and(|due| due.nanos() <= now) {
+                return None;
+            }
+        }
+        match event {
+            Event::Command(_, value) => {
+                relay.message(SimTime::from_nanos(now), command, Value::Real(nanos(value)), &mut Vec::new());
+            }
+            Event::Zone(_, value) => {
+                relay.message(SimTime::from_nanos(now), level, zone(nanos(value)), &mut Vec::new());
+            }
+            Event::Step(_) => {}
+        }
+    }
+    drop(relay);
+    Some(log.into_inner())
 }
 
 fn events(numbers: &[(i64, i64, u8)]) -> Vec<Event> {
@@ -227,6 +288,24 @@ proptest! {
             prop_assert!(effect.intervals.iter().all(|span| span.start < span.end));
             prop_assert_eq!(in_nanos(&effect.intervals), expected);
         }
+    }
+
+    #[test]
+    fn between_messages_something_happens_exactly_when_it_is_due(
+        events in any_events(),
+        activations in prop::collection::vec((0u32..3, any_activation(vec![0, 1, 2])), 1..4),
+        delay in 0i64..20,
+    ) {
+        let lag = |drain| Operation { within: Span { start: 0.0, end: nanos(80) }, ..operation(0, latency(Distribution::Fixed, drain)) };
+        let plan = watched(vec![hole((0, 80)), lag(Drain::Finish), lag(Drain::Flush)]);
+        let test: Vec<TestOperation> = activations.into_iter().map(|(operation, activation)| {
+            let parameters = if operation == 0 { vec![] } else { vec![Choice::Value { value: nanos(delay) }] };
+            used(operation, activation, parameters)
+        }).collect();
+        let events: Vec<Event> = events.into_iter().filter(|event| event.time() < END).collect();
+        let always = logged(&plan, test.clone(), &events, true);
+        prop_assert!(always.is_some(), "something happened at a nanosecond that was not due");
+        prop_assert_eq!(logged(&plan, test, &events, false), always);
     }
 
     #[test]

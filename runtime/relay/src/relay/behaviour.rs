@@ -1,5 +1,5 @@
-//! What single operations do beyond the table of `matrix`: on groups, in lists, in several activations, together, and in
-//! the long run.
+//! What single operations do beyond the table of `matrix`: on groups, in lists, in several activations, together, and
+//! in the long run.
 
 use proptest::prelude::*;
 
@@ -8,7 +8,7 @@ use sesame_plan::condition::{Comparison, Condition, Operand};
 use sesame_plan::testing::{at, latency, operation, plan, test_of, use_of};
 use sesame_plan::{Activation, Choice, Distribution, Drain, MetricId, Operation, OperationKind, Step, TestOperation};
 
-use crate::fuzz::{Disturbance, Draws, Encounter, Fate};
+use crate::fuzz::{Action, Disturbance, KeyedRng, MessageContext};
 use crate::metric::MetricTable;
 use crate::relay::{COPIES_LIMIT, Exchange as _, Finished, Relay};
 use crate::value::{Fields, Record, Value};
@@ -33,7 +33,7 @@ fn relayed(
     let plan = plan(operations);
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-    let mut relay = Relay::new(&plan, &wires, &test_of(test), metrics.start(), &[]).unwrap().heard_everywhere();
+    let mut relay = Relay::new(&plan, &wires, &test_of(test), metrics.start(), &[]).unwrap().received_everywhere();
     let mut delivered = Vec::new();
     for tenth in 0..=100 {
         let now = SimTime::from_nanos(i64::from(tenth) * 100_000_000);
@@ -55,16 +55,16 @@ fn numbers(delivered: &[(u32, String, Value)]) -> Vec<f64> {
     delivered.iter().map(|(_, _, value)| value.number_at::<&str>(&[]).unwrap()).collect()
 }
 
-/// The fates and results of an operation on real numbers, message by message, a tenth of a second apart.
-fn run(operation: &Operation, choices: Vec<Choice>, seed: u64, messages: u64) -> Vec<(Fate, f64)> {
+/// The actions and results of an operation on real numbers, message by message, a tenth of a second apart.
+fn run(operation: &Operation, choices: Vec<Choice>, seed: u64, messages: u64) -> Vec<(Action, f64)> {
     let mut disturbance = Disturbance::new(operation, &use_of(0, 0.0, 10.0, choices, seed), &[]).unwrap();
     disturbance.begin();
     let one = |n: u64| {
         let now = SimTime::from_nanos(i64::try_from(n).unwrap() * 100_000_000);
         let mut message = Value::Real(0.0);
-        let encounter = Encounter { now, active: now, member: 0, draws: Draws::new(seed, 0, n) };
-        let fate = disturbance.apply(encounter, &mut message);
-        (fate, message.number_at::<&str>(&[]).unwrap())
+        let context = MessageContext { now, active: now, member: 0, draws: KeyedRng::new(seed, 0, n) };
+        let action = disturbance.apply(context, &mut message);
+        (action, message.number_at::<&str>(&[]).unwrap())
     };
     (0..messages).map(one).collect()
 }
@@ -79,7 +79,7 @@ fn moments(values: &[f64]) -> (f64, f64) {
 fn burst_loss_drops_its_share_in_bursts_of_its_length() {
     for (enter, leave, loss) in [(0.1, 0.3, 1.0), (0.02, 0.5, 1.0), (0.3, 0.2, 0.6)] {
         let fates = run(&operation(0, OperationKind::BurstLoss), choices(&[enter, leave, loss]), 5, 200_000);
-        let lost: Vec<bool> = fates.iter().map(|(fate, _)| *fate == Fate::Dropped).collect();
+        let lost: Vec<bool> = fates.iter().map(|(action, _)| *action == Action::Dropped).collect();
         let share = lost.iter().filter(|&&lost| lost).count() as f64 / lost.len() as f64;
         let expected = loss * enter / (enter + leave);
         assert!((share - expected).abs() < 0.01, "{share}, not {expected}");
@@ -95,7 +95,7 @@ fn burst_loss_drops_its_share_in_bursts_of_its_length() {
 fn burst_loss_at_its_ends_is_no_loss_and_a_blackhole() {
     let lost = |enter, leave| {
         let fates = run(&operation(0, OperationKind::BurstLoss), choices(&[enter, leave, 1.0]), 5, 1_000);
-        fates.iter().filter(|(fate, _)| *fate == Fate::Dropped).count()
+        fates.iter().filter(|(action, _)| *action == Action::Dropped).count()
     };
     assert_eq!((lost(0.0, 0.5), lost(1.0, 0.0), lost(1.0, 1.0)), (0, 1_000, 500));
 }
@@ -119,8 +119,8 @@ fn a_normal_latency_stays_in_its_range_around_the_middle() {
     let delays = run(&lag, range(0.1, 0.5), 4, 50_000);
     let delays: Vec<f64> = delays
         .iter()
-        .map(|(fate, _)| match fate {
-            Fate::Delayed(by) => by.seconds(),
+        .map(|(action, _)| match action {
+            Action::Delayed(by) => by.seconds(),
             other => panic!("{other:?}"),
         })
         .collect();
@@ -156,8 +156,8 @@ proptest! {
         let drawn = |length: usize| {
             let disturbance = Disturbance::new(&noise, &use_of(0, 0.0, 1.0, choices(&[1.0]), seed), &[]);
             let mut message = Value::List(vec![Value::Real(0.0); length]);
-            let draws = Draws::new(seed, 0, 0);
-            let at = Encounter { now: SimTime::ZERO, active: SimTime::ZERO, member: 0, draws };
+            let draws = KeyedRng::new(seed, 0, 0);
+            let at = MessageContext { now: SimTime::ZERO, active: SimTime::ZERO, member: 0, draws };
             disturbance.unwrap().apply(at, &mut message);
             let Value::List(items) = message else { panic!("a list stays one") };
             items
@@ -303,6 +303,6 @@ fn a_disturbance_that_lacks_a_parameter_is_refused() {
     let refused = Disturbance::new(&stripped, &use_of(0, 0.0, 1.0, choices(&[0.5, 0.5]), 1), &[]).unwrap_err();
     assert_eq!(
         refused.to_string(),
-        "operation `burst_loss` has no parameter `enter`, or of another kind: run `sesamec generate` again"
+        "operation `burst_loss` has no parameter `enter` of the expected kind: run `sesamec generate` again"
     );
 }

@@ -1,7 +1,7 @@
-//! The time in which operations disturb: how much of it has passed, and when it comes to what conditions compare it with.
+//! The fuzzing time: how much of it has passed, and when it reaches the numbers with which conditions compare it.
 //!
-//! It grows while an operation is active and while it still holds messages back. A condition over it changes between two
-//! events, so the relay computes when, to the nanosecond, instead of looking at every event.
+//! It grows while an operation is active and while it still holds messages back. A condition over it changes between
+//! events, so the relay computes the moment, to the nanosecond, instead of checking at every event.
 
 use sesame_base::time::SimTime;
 use sesame_plan::condition::{Condition, Operand};
@@ -10,7 +10,7 @@ use sesame_plan::{Activation, CampaignPlan, MetricId, MetricSource, Span, Test};
 use crate::relay::{Relay, Stage};
 
 impl Stage {
-    /// How long it has disturbed until now.
+    /// How long it has been active or held messages back until now.
     fn busy_time(&self, now: SimTime) -> SimTime {
         let tails = self.tails.iter().copied().chain(self.tail_since.map(|since| (since, now)));
         tails.fold(self.activity.active_time(now), |sum, (from, to)| sum + (to - from))
@@ -20,14 +20,15 @@ impl Stage {
         self.activity.is_active() || self.tail_since.is_some()
     }
 
-    /// It holds nothing back any more, or is active again.
+    /// Ends the tail: the operation holds no messages any more, or is active again.
     pub(super) fn end_tail(&mut self, now: SimTime) {
         if let Some(since) = self.tail_since.take().filter(|&since| since < now) {
             self.tails.push((since, now));
         }
     }
 
-    /// When it held messages back without being active, in seconds, clipped to a run that ended at `end`.
+    /// The intervals in which it held messages back without being active, in seconds, clipped to a run that ended at
+    /// `end`.
     pub(super) fn tails(&self, end: SimTime) -> Vec<Span> {
         let all = self.tails.iter().copied().chain(self.tail_since.map(|since| (since, end)));
         let clipped = all.map(|(from, to)| (from, to.min(end))).filter(|(from, to)| from < to);
@@ -36,13 +37,13 @@ impl Stage {
 }
 
 impl Relay<'_> {
-    /// The time in which operations that count in `fuzzing_time()` have disturbed until now, added up.
+    /// The sum over all operations that count in `fuzzing_time()` until now.
     pub(super) fn fuzzing_time(&self) -> SimTime {
         let timed = self.operations.iter().filter(|stage| stage.timed);
         timed.fold(SimTime::ZERO, |sum, stage| sum + stage.busy_time(self.now))
     }
 
-    /// When the fuzzing time next comes to a number that a condition compares it with, or goes beyond it, if nothing else
+    /// When the fuzzing time next reaches or exceeds a number with which a condition compares it, if nothing else
     /// happens before.
     pub(super) fn next_comparison(&self) -> Option<SimTime> {
         if self.conditions.compared.is_empty() {
@@ -56,7 +57,7 @@ impl Relay<'_> {
             Operand::Variable(metric) => self.metrics.value(metric, 0.0),
         });
         let marks = numbers.flat_map(|number| [reaching(number), beyond(number)]).filter(|&mark| mark > total);
-        // The least number of nanoseconds after which so many operations have added up enough.
+        // The least number of nanoseconds after which this many operations have added up enough.
         marks.min().map(|mark| self.now + SimTime::from_nanos((mark - total - 1) / pace + 1))
     }
 }
@@ -71,9 +72,9 @@ fn beyond(number: f64) -> i64 {
     first(number, |seconds| seconds > number)
 }
 
-/// The first nanosecond near a number of seconds for which something holds that goes on to hold.
+/// The first nanosecond near a number of seconds from which on something holds.
 fn first(number: f64, holds: impl Fn(f64) -> bool) -> i64 {
-    // Even the largest times lie closer together than this when they are rounded to seconds.
+    // Even the largest times have smaller gaps than this after rounding to seconds.
     const NEAR: i64 = 1 << 12;
     let near = SimTime::from_seconds(number).nanos();
     let (mut low, mut high) = (near.saturating_sub(NEAR), near.saturating_add(NEAR));
@@ -88,7 +89,7 @@ fn first(number: f64, holds: impl Fn(f64) -> bool) -> i64 {
     low
 }
 
-/// The metrics that conditions of a test read, and what they compare the fuzzing time with.
+/// The metrics that the conditions of a test read, and the operands with which they compare the fuzzing time.
 pub(super) fn read_by(plan: &CampaignPlan, test: &Test) -> (Vec<MetricId>, Vec<Operand>) {
     let (mut variables, mut compared) = (Vec::new(), Vec::new());
     for operation in &test.operations {

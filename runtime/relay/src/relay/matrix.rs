@@ -13,7 +13,7 @@ use sesame_plan::{
     Type, ValueMode,
 };
 
-use crate::fuzz::Draws;
+use crate::fuzz::KeyedRng;
 use crate::metric::MetricTable;
 use crate::relay::{Exchange as _, Finished, Relay};
 use crate::value::{Fields, Record, Value};
@@ -21,7 +21,7 @@ use crate::wire::WireTable;
 
 const MESSAGES: u32 = 81;
 const SEED: u64 = 77;
-/// Draws per value of a message, as `Places` documents.
+/// Random numbers per value of a message, as `Places` documents.
 const PER_VALUE: u64 = 8;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -279,7 +279,7 @@ fn relayed(payload: Payload, case: &Case, switch: Switch) -> (Vec<(u32, Value)>,
     let used =
         TestOperation { operation: OperationId(0), activation: switch.activation(), parameters, draw_seed: SEED };
     let test = Test { operations: vec![used] };
-    let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).unwrap().heard_everywhere();
+    let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).unwrap().received_everywhere();
     let [payload_wire, switch_wire] = ["payload", "switch"].map(|name| wires.find(name).unwrap());
     let mut delivered = Vec::new();
     for tenth in 0..=100 {
@@ -310,12 +310,12 @@ fn active(n: u32) -> bool {
 }
 
 fn draw(n: u32, at: u64) -> f64 {
-    Draws::new(SEED, 0, u64::from(n)).unit(at)
+    KeyedRng::new(SEED, 0, u64::from(n)).unit(at)
 }
 
-/// Box and Muller's, written once more.
+/// The Box-Muller transform, a second time.
 fn normal(n: u32, at: u64) -> f64 {
-    (-2.0 * (1.0 - draw(n, at)).ln()).sqrt() * (std::f64::consts::TAU * draw(n, at + 1)).cos()
+    libm::sqrt(-2.0 * libm::log(1.0 - draw(n, at))) * libm::cos(std::f64::consts::TAU * draw(n, at + 1))
 }
 
 fn chosen(case: &Case, name: &str) -> f64 {
@@ -453,8 +453,8 @@ fn expected(payload: Payload, case: &Case, switch: Switch) -> Expected {
                     release = release.max(tail);
                     tail = release;
                 }
-                // At the moment of an edge, what is due then is still held; an end condition is weighed in the event of its
-                // message, after what is due.
+                // At the moment of an edge, what is due then is still held; an end condition is weighed in the event of
+                // its message, after what is due.
                 let late = if matches!(switch, Switch::Condition) { release > nanos(50) } else { release >= nanos(50) };
                 if late && *drain == Drain::Drop {
                     *dropped += 1;
@@ -473,8 +473,8 @@ fn expected(payload: Payload, case: &Case, switch: Switch) -> Expected {
             }
         }
     }
-    // Flushed messages go at the end of the window, in the order in which they would have gone, and before what is published
-    // then.
+    // Flushed messages go at the end of the window, in the order in which they would have gone, and before what is
+    // published then.
     let flushes = |n: u32| {
         let (OperationKind::Latency { drain, .. } | OperationKind::Reorder { drain }) = case.kind else { return false };
         active(n) && drain == Drain::Flush

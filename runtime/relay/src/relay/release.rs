@@ -1,4 +1,5 @@
-//! The release queue: messages that latency holds back, let go by time, then in the order they were held.
+//! The release queue: messages that operations hold back, released in order of time, then in the order in which they
+//! were held.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -6,7 +7,7 @@ use std::collections::BinaryHeap;
 use sesame_base::time::SimTime;
 use sesame_rng::derive_seed;
 
-use crate::relay::Touched;
+use crate::relay::MessageRef;
 use crate::value::Value;
 use crate::wire::Wire;
 
@@ -14,37 +15,37 @@ use crate::wire::Wire;
 #[derive(Debug)]
 pub(super) struct Held {
     pub(super) wire: Wire,
-    /// Its index among the messages published on its wire; of an injected one, that of the message it came with.
+    /// Its index among the messages published on its wire; for an injected message, the index of the original one.
     pub(super) published: u64,
-    /// What its draws are keyed by: its index, or of an injected one a number of its own.
+    /// The key of its random numbers: its index, or for an injected message a number of its own.
     pub(super) index: u64,
     pub(super) value: Value,
-    /// The position in its wire's pipeline at which it goes on.
+    /// The position in its wire's pipeline at which it continues.
     pub(super) next_stage: usize,
 }
 
 impl Held {
-    /// Which message it is, for a tap.
-    pub(super) fn touched(&self) -> Touched {
-        Touched { wire: self.wire, index: self.published }
+    /// Identifies the message for listeners.
+    pub(super) fn message_ref(&self) -> MessageRef {
+        MessageRef { wire: self.wire, index: self.published }
     }
 
-    /// A message that an operation makes up beside this one, its `number`th. It goes on where this one does, with an index
-    /// of its own, so that later operations draw for it apart from this one.
+    /// The `number`th message that an operation injects with this one. It continues at the same position, with a key of
+    /// its own, so later operations draw other random numbers for it.
     pub(super) fn beside(&self, operation: usize, number: u64, value: Value) -> Held {
         let index = derive_seed(self.index, "injected", &[operation as u64, number]);
         Held { wire: self.wire, published: self.published, index, value, next_stage: self.next_stage }
     }
 }
 
-/// Why a message is held back, as far as it is counted.
+/// Why a message is held back, for the counters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Why {
     /// The operation delays it.
     Delayed,
-    /// The operation is off, and it waits behind messages that are held.
+    /// The operation is inactive, and the message waits behind held ones.
     Queued,
-    /// Either, on a wire that nobody hears.
+    /// Either, on a wire without a receiver.
     Unheard,
 }
 
@@ -83,7 +84,7 @@ impl Ord for Entry {
 pub(super) struct ReleaseQueue {
     heap: BinaryHeap<Reverse<Entry>>,
     sequence: u64,
-    /// Per operation and wire: how many are held, and when the last of them goes.
+    /// Per operation and wire: how many messages are held, and when the last one is released.
     tails: Vec<Vec<Tail>>,
     /// Per operation: how many are held on all wires.
     held: Vec<usize>,
@@ -113,7 +114,7 @@ impl ReleaseQueue {
         self.held[operation]
     }
 
-    /// When the last message that an operation holds on a wire goes; `None` when it holds none.
+    /// When the last message that an operation holds on a wire is released; `None` if it holds none.
     pub(super) fn last_release(&self, operation: usize, wire: Wire) -> Option<SimTime> {
         let tail = self.tails[operation][wire.index()];
         (tail.held > 0).then_some(tail.last)
@@ -141,14 +142,14 @@ impl ReleaseQueue {
         Some((entry.operation, entry.message))
     }
 
-    /// Makes everything that an operation holds due now, in the order in which it would have gone.
+    /// Makes all messages that an operation holds due now, in the order in which they would have been released.
     pub(super) fn release_all(&mut self, operation: usize, now: SimTime) {
         for (why, message) in self.take_all(operation) {
             self.push(now, operation, why, message);
         }
     }
 
-    /// Everything an operation holds, in the order it would have gone.
+    /// All messages that an operation holds, in the order in which they would have been released.
     pub(super) fn take_all(&mut self, operation: usize) -> Vec<(Why, Held)> {
         let (mut taken, kept): (Vec<_>, Vec<_>) =
             std::mem::take(&mut self.heap).into_vec().into_iter().partition(|entry| entry.0.operation == operation);

@@ -47,7 +47,7 @@ fn relayed_with(
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     let mut relay =
-        Relay::new(&plan, &wires, &test_of(test.to_vec()), metrics.start(), hooks).unwrap().heard_everywhere();
+        Relay::new(&plan, &wires, &test_of(test.to_vec()), metrics.start(), hooks).unwrap().received_everywhere();
     let mut delivered = Vec::new();
     let mut messages = messages.iter().peekable();
     for tick in 0..=100 {
@@ -263,7 +263,7 @@ proptest! {
         let lag = vec![operation(0, latency(Distribution::Uniform, Drain::Finish))];
         let (delivered, _) = relayed(lag, &[use_of(0, 0.0, 10.0, range(low, low + width), seed)], &commands(40));
         let delays: Vec<f64> =
-            (0..40).map(|n| low + super::Draws::new(seed, 0, n).unit(0) * ((low + width) - low)).collect();
+            (0..40).map(|n| low + super::KeyedRng::new(seed, 0, n).unit(0) * ((low + width) - low)).collect();
         let sent: Vec<f64> = (0..40).map(|n| f64::from(n) * 0.1).collect();
         let tick = 100_000_000;
         let expected: Vec<(f64, f64)> = naive_releases(&sent, &delays)
@@ -303,7 +303,7 @@ fn an_outbound_metric_hears_what_operations_made_of_a_message_and_an_inbound_one
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     // From 1 s to 2 s all is lost; what is sent from 3 s on is delayed by 5 s, and the run ends at 8 s.
     let test = test_of(vec![use_of(0, 1.0, 2.0, vec![], 1), use_of(1, 3.0, 10.0, one(5.0), 1)]);
-    let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).unwrap().heard_everywhere();
+    let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).unwrap().received_everywhere();
     let command = wires.find(COMMAND).unwrap();
     for tenth in 0..80 {
         relay.message(SimTime::from_nanos(tenth * 100_000_000), command, Value::Real(0.0), &mut Vec::new());
@@ -403,7 +403,7 @@ fn only_an_offline_operation_is_offline_in_a_test() {
         Relay::new(&plan, &wires, &test, metrics.start(), &raising()).err().expect("it does not fit").to_string()
     };
     let window = refused(Moment::AfterEnd, Activation::Time { start: 1.0, end: 2.0 });
-    assert!(window.contains("has no activation: it acts beside the run"), "{window}");
+    assert!(window.contains("has no activation: it acts before or after the run"), "{window}");
     let offline = refused(Moment::OnMessage, Activation::Offline);
     assert!(offline.contains("lacks an activation: it acts during the run"), "{offline}");
 }
@@ -463,7 +463,7 @@ fn a_variable_has_its_initial_value_before_its_first_and_without_one_its_compari
         let until = Activation::Condition { start: below(1, 1.0), end: above(1, 1.0), times: 1 };
         let mut relay = Relay::new(&plan, &wires, &test_of(vec![by_condition(0, until, vec![])]), metrics.start(), &[])
             .unwrap()
-            .heard_everywhere();
+            .received_everywhere();
         relay.advance(SimTime::from_seconds(1.0), &mut Vec::new());
         relay.message(SimTime::from_seconds(2.0), wires.find(COMMAND).unwrap(), Value::Real(0.0), &mut Vec::new());
         relay.message(SimTime::from_seconds(3.0), wires.find(COMMAND).unwrap(), Value::Real(2.0), &mut Vec::new());
@@ -492,7 +492,7 @@ fn what_an_outbound_metric_shows_counts_once_its_message_is_through() {
     let until = Activation::Condition { start: above(1, 2.5), end: above(1, 100.0), times: 1 };
     let mut relay = Relay::new(&plan, &wires, &test_of(vec![by_condition(0, until, vec![])]), metrics.start(), &[])
         .unwrap()
-        .heard_everywhere();
+        .received_everywhere();
     for second in 1..=5 {
         let now = SimTime::from_seconds(f64::from(second));
         relay.message(now, wires.find(COMMAND).unwrap(), Value::Real(0.0), &mut Vec::new());

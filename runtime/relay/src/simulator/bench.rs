@@ -1,4 +1,4 @@
-//! A test bench for simulators: runs one with no relay at all and keeps what it published.
+//! A test bench for simulators: runs one without a relay and keeps its published messages.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -7,12 +7,12 @@ use sesame_base::time::SimTime;
 use crate::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError, Wires};
 use crate::value::Value;
 
-/// A message on the bench: when it was published and what it held.
+/// A message on the bench.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Published {
-    /// When.
+    /// When it was published.
     pub time: SimTime,
-    /// What.
+    /// Its value.
     pub value: Value,
 }
 
@@ -24,7 +24,7 @@ pub struct Bench<S> {
     step: SimTime,
 }
 
-/// Changes a message on its way: gets its time, topic and value; `None` drops it.
+/// Changes a message on its way, given its time, topic and value; `None` drops it.
 pub type Tamper = Box<dyn FnMut(SimTime, &str, Value) -> Option<Value>>;
 
 #[derive(Default)]
@@ -49,7 +49,7 @@ impl<S: Simulator> Bench<S> {
         Ok(Bench { simulator, wires, now: SimTime::ZERO, step: setup.step })
     }
 
-    /// Advances to at least this time, or to the simulator's own end.
+    /// Advances to at least this time, or to the end of the scenario.
     pub fn run_until(&mut self, end: SimTime) -> Result<Progress, SimulatorError> {
         while self.now < end {
             self.now = self.now + self.step;

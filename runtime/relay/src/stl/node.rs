@@ -13,7 +13,7 @@ use crate::stl::minimum::SlidingMinimum;
 use crate::stl::piece::{Pair, Piece, Span, Window, put};
 use crate::stl::until::SlidingUntil;
 
-/// The next part of the trace, on which no signal changes.
+/// The next part of the trace, in which no signal changes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stretch {
     /// Where it ends, excluded.
@@ -23,7 +23,7 @@ pub(super) struct Stretch {
     /// Where nothing is known of the signals: what stands for the robustness of their predicates, negative or positive
     /// infinity.
     pub(super) unknown: Option<f64>,
-    /// Whether only windows count that lie in the trace as a whole.
+    /// Whether only windows count that are completely within the trace.
     pub(super) whole: bool,
 }
 
@@ -38,18 +38,18 @@ impl Stretch {
         self.last && !self.whole && self.unknown.is_none()
     }
 
-    /// What stands for all that depends on where the trace will end, where only whole windows count and nothing is known: the
-    /// end decides what belongs to the formula at all.
+    /// What stands for all that depends on where the trace will end, where only whole windows count and nothing is
+    /// known: the end decides what belongs to the formula at all.
     fn undecided(self) -> Option<f64> {
         self.unknown.filter(|_| self.whole)
     }
 }
 
-/// An operator, and what of it is asked.
+/// An operator, and the span for which its robustness is needed.
 #[derive(Debug, Clone)]
 pub(super) struct Node {
     asked: Span,
-    /// Up to where its robustness has been told.
+    /// The time up to which its robustness is known.
     told: i64,
     operator: Operator,
 }
@@ -100,11 +100,11 @@ impl Node {
             Formula::And { left, right } => and(Node::new(left, asked, used)?, Node::new(right, asked, used)?),
             Formula::Or { left, right } => {
                 let (left, right) = (Node::new(left, asked, used)?, Node::new(right, asked, used)?);
-                return Ok(Node::of(asked, and(left.negated(), right.negated())).negated());
+                return Ok(Node::from_operator(asked, and(left.negated(), right.negated())).negated());
             }
             Formula::Implies { left, right } => {
                 let (left, right) = (Node::new(left, asked, used)?, Node::new(right, asked, used)?);
-                return Ok(Node::of(asked, and(left, right.negated())).negated());
+                return Ok(Node::from_operator(asked, and(left, right.negated())).negated());
             }
             Formula::Always { interval, of } => {
                 let window = window(*interval)?;
@@ -113,7 +113,7 @@ impl Node {
             Formula::Eventually { interval, of } => {
                 let window = window(*interval)?;
                 let of = Node::new(of, asked.seen_through(window), used)?;
-                return Ok(Node::of(asked, always(window, asked, of.negated())).negated());
+                return Ok(Node::from_operator(asked, always(window, asked, of.negated())).negated());
             }
             Formula::Until { interval, left, right } => {
                 let window = window(*interval)?;
@@ -132,10 +132,10 @@ impl Node {
                 }))
             }
         };
-        Ok(Node::of(asked, operator))
+        Ok(Node::from_operator(asked, operator))
     }
 
-    fn of(asked: Span, operator: Operator) -> Self {
+    fn from_operator(asked: Span, operator: Operator) -> Self {
         Node { asked, told: asked.start, operator }
     }
 
@@ -143,7 +143,7 @@ impl Node {
     fn negated(self) -> Self {
         match self.operator {
             Operator::Not { of, .. } => *of,
-            _ => Node::of(self.asked, Operator::Not { of: Box::new(self), input: VecDeque::new() }),
+            _ => Node::from_operator(self.asked, Operator::Not { of: Box::new(self), input: VecDeque::new() }),
         }
     }
 
@@ -263,7 +263,7 @@ fn window(interval: Interval) -> Result<Window, FormulaError> {
     Ok(Window { from: nanos(from), to: to.map(nanos) })
 }
 
-/// By how much a value keeps a comparison; never NaN.
+/// By how much a value satisfies a comparison; never NaN.
 fn margin(value: f64, comparison: Comparison, constant: f64) -> f64 {
     if value.is_nan() {
         return f64::NEG_INFINITY;

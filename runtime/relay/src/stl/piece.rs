@@ -1,7 +1,7 @@
-//! Signals as pieces: what operators hand to one another.
+//! Signals as pieces, which operators pass to each other.
 //!
-//! Times are whole nanoseconds since the beginning of the trace. Pieces of a signal follow one another without a gap, so
-//! that each needs only its end. A consumer asks for a span; what a producer says of earlier times is meaningless.
+//! Times are whole nanoseconds since the beginning of the trace. Pieces of a signal follow one another without a gap,
+//! so that each needs only its end. A consumer asks for a span; what a producer says of earlier times is meaningless.
 
 use std::collections::VecDeque;
 
@@ -14,7 +14,7 @@ pub(super) struct Piece {
     pub(super) value: f64,
 }
 
-/// Adds a piece, as part of the last one where the value stays.
+/// Adds a piece, or extends the last one if the value is the same.
 pub(super) fn put(pieces: &mut VecDeque<Piece>, end: i64, value: f64) {
     match pieces.back_mut() {
         Some(last) if last.value == value => last.end = end,

@@ -21,7 +21,7 @@ impl Passage {
     /// Of no time at all.
     const EMPTY: Passage = Passage { hold: f64::INFINITY, arrive: f64::NEG_INFINITY };
 
-    fn of(left: f64, right: f64) -> Self {
+    fn new(left: f64, right: f64) -> Self {
         Passage { hold: left, arrive: left.min(right) }
     }
 
@@ -73,7 +73,7 @@ impl SlidingUntil {
         if !self.asks(end) {
             return;
         }
-        let passage = Passage::of(left, right);
+        let passage = Passage::new(left, right);
         match self.entering.last_mut() {
             // It begins no window still asked for, so it need not be told apart from the one before it.
             Some(last) if last.end >= self.asked.end => last.passage = last.passage.then(passage),

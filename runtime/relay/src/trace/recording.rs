@@ -1,4 +1,4 @@
-//! Feeding metrics from a recording instead of a simulator.
+//! Replays a recording: feeds metrics from it instead of a simulator.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -30,14 +30,14 @@ const LIMIT: usize = 1 << 26;
 /// How much is read at once, in bytes.
 const BLOCK: usize = 1 << 16;
 
-/// What came of feeding a recording to a campaign's metrics.
+/// The result of feeding a recording to a campaign's metrics.
 #[derive(Debug)]
 pub struct Fed {
-    /// The run that was recorded, where a runner recorded it.
+    /// The recorded run, if a runner recorded it.
     pub run: Option<RecordedRun>,
-    /// Per metric of the plan. Without a run, what operations did is unknown, and so is `fuzzing_time()`.
+    /// Per metric of the plan. Without a run, the actions of operations are unknown, and so is `fuzzing_time()`.
     pub metrics: Vec<MetricObservation>,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
     /// Messages fed, as published.
     pub messages: u64,
@@ -54,7 +54,7 @@ pub struct RecordedRun {
     pub test: String,
     /// `completed`, `no_effect` (`void` in traces of earlier releases), `crash` or `timeout`.
     pub outcome: String,
-    /// What the run showed; empty when its worker died.
+    /// The metrics of the run; empty if its worker died.
     pub metrics: Vec<RecordedMetric>,
 }
 
@@ -74,27 +74,27 @@ pub enum RecordingError {
     /// The file cannot be read.
     #[error("cannot read the recording: {reason}: {}", path.display())]
     Unreadable {
-        /// Why not.
+        /// The reason.
         reason: String,
         /// The file.
         path: PathBuf,
     },
-    /// It is no MCAP file.
+    /// It is not an MCAP file.
     #[error("this is not an MCAP file: {}", path.display())]
     Foreign {
         /// The file.
         path: PathBuf,
     },
-    /// It ends before its end.
+    /// It is truncated.
     #[error("this recording is cut off; `mcap recover` saves what is in it: {}", path.display())]
     CutOff {
         /// The file.
         path: PathBuf,
     },
-    /// Its content contradicts itself, or the format.
+    /// Its content contradicts itself, or violates the format.
     #[error("this recording is damaged ({problem}); restore the file from a copy, or record it again: {}", path.display())]
     Damaged {
-        /// What was found.
+        /// The problem.
         problem: String,
         /// The file.
         path: PathBuf,
@@ -105,7 +105,7 @@ pub enum RecordingError {
          `mcap compress --compression none IN.mcap -o OUT.mcap`: {}", path.display()
     )]
     Compressed {
-        /// How.
+        /// The method.
         method: String,
         /// The file.
         path: PathBuf,
@@ -133,9 +133,9 @@ pub enum RecordingError {
     WrongType {
         /// The topic.
         topic: String,
-        /// When.
+        /// The time.
         time: SimTime,
-        /// What does not fit.
+        /// The mismatch.
         reason: String,
         /// The file.
         path: PathBuf,
@@ -162,9 +162,9 @@ fn listed(found: &[String]) -> String {
 
 /// Feeds the messages of a recording to the metrics of a plan, in order of time and without a simulator.
 ///
-/// A trace of a runner is fed as its run was. Of any other recording, messages count that are JSON on a topic of the
-/// space, from the time of the first one on, as published and delivered alike. The file is read once from start to
-/// end; memory holds one record at a time.
+/// The trace of a runner is fed in the same order as in its run. In any other recording, the JSON messages on topics of
+/// the space count, with times since the first of them, both as published and as delivered. The file is read once from
+/// start to end; memory holds one record at a time.
 pub fn feed(
     path: &Path,
     plan: &CampaignPlan,
@@ -210,7 +210,7 @@ fn read(
     while let Some(event) = reader.next_event() {
         match event.map_err(|error| sorted(error, path))? {
             LinearReadEvent::ReadRequest(wanted) => {
-                // What a damaged length asks for is not made room for all at once.
+                // Memory for a length that may be damaged is not allocated in advance.
                 let block = reader.insert(wanted.min(BLOCK));
                 let read = file
                     .read(block)
@@ -227,7 +227,7 @@ fn read(
     Ok(())
 }
 
-/// Sorts what is wrong with a file into what a user can do about it.
+/// Converts a problem with a file into an error with a remedy.
 fn sorted(error: McapError, path: &Path) -> RecordingError {
     let path = path.to_owned();
     match error {
@@ -331,13 +331,13 @@ impl Feeder<'_> {
             path: self.path.to_owned(),
         })?;
         if delivered {
-            self.metrics.delivered(time, wire, &value);
+            self.metrics.delivery(time, wire, &value);
             return Ok(());
         }
         self.messages += 1;
         self.metrics.message(time, wire, &value);
         if !self.delivered_apart[wire.index()] {
-            self.metrics.delivered(time, wire, &value);
+            self.metrics.delivery(time, wire, &value);
         }
         Ok(())
     }
@@ -372,11 +372,11 @@ impl Feeder<'_> {
                     let seconds = end.parse().map_err(|_| damaged("its end is no number"))?;
                     Some(SimTime::from_seconds(seconds).max(self.now))
                 }
-                // Hooks are not told of an end that a failure made.
+                // Hooks are not told of the end of a run that failed.
                 _ => None,
             };
             if let (None, Some(broken_off)) = (end, ending.get("end_s").and_then(|end| end.parse().ok())) {
-                self.metrics.follow_time(SimTime::from_seconds(broken_off));
+                self.metrics.advance_to(SimTime::from_seconds(broken_off));
             }
             run = Some(RecordedRun {
                 space: text(subject, "space"),
@@ -403,8 +403,7 @@ impl Feeder<'_> {
     }
 }
 
-/// When operations were active or held messages back that count in `fuzzing_time()`, of what a trace says of its test and
-/// of its operations.
+/// When operations that count in `fuzzing_time()` were active or held messages back, according to a trace.
 fn timed(subject: &BTreeMap<String, String>, effects: &str) -> serde_json::Result<Vec<Span>> {
     #[derive(Deserialize)]
     struct Recorded<T> {
@@ -412,7 +411,7 @@ fn timed(subject: &BTreeMap<String, String>, effects: &str) -> serde_json::Resul
     }
     #[derive(Deserialize)]
     struct Declared {
-        /// As in a plan: not written where it is true.
+        /// As in a plan: omitted if it is true.
         timed: Option<bool>,
     }
     #[derive(Deserialize)]
@@ -428,7 +427,7 @@ fn timed(subject: &BTreeMap<String, String>, effects: &str) -> serde_json::Resul
     Ok(counted.flat_map(|(_, effect)| effect.busy().collect::<Vec<_>>()).collect())
 }
 
-/// Reads a payload. One that is no object by itself may also stand alone, without the object around it.
+/// Reads a payload. If it is not an object, it may also stand alone, without the object around it.
 fn payload(plan: &CampaignPlan, shapes: &mut Shapes, ty: &Type, data: &[u8]) -> Result<Value, String> {
     #[derive(Deserialize)]
     struct Alone<'a> {

@@ -1,13 +1,13 @@
-//! Records of a file, with chunks taken apart here: the library's reader trusts the lengths inside a chunk, and a damaged
-//! one would bring it out of step, or to a panic.
+//! Records of a file. Chunks are split here, since the library's reader trusts the lengths inside of a chunk: a damaged
+//! one would make it lose its position, or panic.
 
 use mcap::records::{Record, op};
 use mcap::{McapError, McapResult, parse_record};
 
-/// What a record as it was read holds: all records of a chunk, in order, or itself. Kinds that no trace is made of are
-/// left out.
+/// The contents of a record: all records of a chunk in order, or the record itself. Kinds that do not occur in traces
+/// are left out.
 ///
-/// A chunk is whole, in length and in checksum where it has one, or it is an error. Compressed chunks are one too.
+/// A chunk that is not complete in length, or has a wrong checksum, is an error; so is a compressed one.
 pub(super) fn records(opcode: u8, data: &[u8]) -> McapResult<Vec<Record<'_>>> {
     if opcode != op::CHUNK {
         return Ok(known(opcode, data)?.into_iter().collect());

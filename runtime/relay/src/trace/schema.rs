@@ -4,8 +4,8 @@ use serde_json::{Value as Json, json};
 
 use sesame_plan::{CampaignPlan, Type};
 
-/// The schema's name and text for messages of a declared type. What is no object by itself is one with the field
-/// `value`, since readers expect objects.
+/// The name and text of the schema for messages of a declared type. A type that is not an object becomes one with the
+/// field `value`, since readers expect objects.
 pub(super) fn of_messages(plan: &CampaignPlan, ty: &Type) -> (String, Vec<u8>) {
     let name = name(plan, ty);
     let mut schema = match ty {
@@ -16,7 +16,7 @@ pub(super) fn of_messages(plan: &CampaignPlan, ty: &Type) -> (String, Vec<u8>) {
     (name, text(&schema))
 }
 
-/// The schema of operations' activity.
+/// The schema of the actions of operations.
 pub(super) fn of_operations() -> (String, Vec<u8>) {
     let described = |ty: &str, words: &str| json!({ "type": ty, "description": words });
     let schema = json!({
@@ -47,7 +47,7 @@ fn text(schema: &Json) -> Vec<u8> {
     schema.to_string().into_bytes()
 }
 
-/// An object with nothing but a value of this schema.
+/// An object with only a value of this schema.
 fn value_alone(schema: Json) -> Json {
     let mut object = json!({ "type": "object", "required": ["value"] });
     object["properties"]["value"] = schema;
@@ -55,7 +55,7 @@ fn value_alone(schema: Json) -> Json {
 }
 
 fn number(unit: Option<&str>) -> Json {
-    // NaN and the infinities are texts, since JSON has no numbers for them.
+    // NaN and infinity are strings, since JSON has no numbers for them.
     let mut schema = json!({ "type": "number" });
     if let Some(unit) = unit {
         schema["description"] = format!("in {unit}").into();
@@ -67,7 +67,7 @@ fn in_unit(name: &str, unit: Option<&str>) -> String {
     unit.map_or_else(|| name.to_owned(), |unit| format!("{name}[{unit}]"))
 }
 
-/// A type in the words of the language.
+/// A type as the language names it.
 fn name(plan: &CampaignPlan, ty: &Type) -> String {
     match ty {
         Type::Bool => "bool".to_owned(),

@@ -14,8 +14,8 @@ use sesame_plan::{Choice, Distribution, Drain, OperationKind, Test, ValueMode};
 use sesame_rng::Stream;
 
 use super::*;
-use crate::changed_files::ChangedFiles;
 use crate::evaluate::{Custom, Run, evaluate_tapped};
+use crate::files::NoFiles;
 use crate::metric::MetricTable;
 use crate::relay::Exchange;
 use crate::simulator::Progress;
@@ -82,7 +82,7 @@ fn traced(folder: &Path, plan: &CampaignPlan, test: &Test) -> Observation {
     let mut writer = TraceWriter::create(&folder.join("unfinished"), subject, &wires).unwrap();
     let mut transport = Awkward(SimTime::ZERO);
     let run = Run { test, simulator_seed: 1 };
-    let mut custom = Custom { hooks: &[], files: ChangedFiles::unlocked(folder) };
+    let mut custom = Custom { hooks: &[], files: Box::new(NoFiles) };
     let observed = evaluate_tapped(plan, &wires, &table, &mut transport, &run, &mut custom, Some(&mut writer)).unwrap();
     assert!(!folder.join("T1.mcap").exists(), "it has its name only when it is complete");
     writer.keep(&observed, &folder.join("T1.mcap")).unwrap();
@@ -125,7 +125,8 @@ fn a_trace_holds_every_message_and_what_each_operation_did_to_it() {
     // The numbers of deeds are those that the operations counted.
     let deeds: Vec<serde_json::Value> =
         topics["sesame/operations"].iter().map(|(_, _, json)| serde_json::from_str(json).unwrap()).collect();
-    let count = |did: &str, at: usize| deeds.iter().filter(|deed| deed["did"] == did && deed["position"] == at).count();
+    let count =
+        |did: &str, at: usize| deeds.iter().filter(|event| event["did"] == did && event["position"] == at).count();
     for (at, operation) in observed.operations.iter().enumerate() {
         let counters = operation.counters;
         assert_eq!((count("started", at), count("ended", at)), (1, 1));
@@ -138,9 +139,9 @@ fn a_trace_holds_every_message_and_what_each_operation_did_to_it() {
 
     // What arrived is what was published, less what was dropped, and what was changed differs.
     let arrived = &topics["zones/Z1/delivered"];
-    let lost = deeds.iter().filter(|deed| deed["did"] == "dropped" && deed["topic"] == "zones/Z1").count();
+    let lost = deeds.iter().filter(|event| event["did"] == "dropped" && event["topic"] == "zones/Z1").count();
     assert_eq!(arrived.len() + lost, topics["zones/Z1"].len());
-    let changed = &deeds.iter().find(|deed| deed["did"] == "changed").unwrap()["message"];
+    let changed = &deeds.iter().find(|event| event["did"] == "changed").unwrap()["message"];
     let number = changed.as_u64().unwrap();
     let find = |topic: &str| topics[topic].iter().find(|(_, sequence, _)| u64::from(*sequence) == number).unwrap();
     assert_ne!(find("arm/command").2, find("arm/command/delivered").2);
@@ -190,7 +191,7 @@ fn what_a_dead_process_had_written_is_saved() {
     let mut kept = Vec::new();
     for share in 0..=20 {
         fs::write(&unfinished, &whole[..whole.len() * share / 20]).unwrap();
-        salvage(&unfinished, &limit, &saved).unwrap();
+        recover(&unfinished, &limit, &saved).unwrap();
         let found = content(&saved);
         assert!(found.iter().all(|(topic, messages)| all[topic].starts_with(messages)), "{share}");
         kept.push(found.values().map(Vec::len).sum::<usize>());
@@ -201,7 +202,7 @@ fn what_a_dead_process_had_written_is_saved() {
     let run = fed(&saved, &plan).unwrap().run.unwrap();
     assert_eq!(run.outcome, "timeout");
     // Where nothing was begun there is nothing to save.
-    salvage(&folder.path().join("nothing"), &limit, &folder.path().join("T3.mcap")).unwrap();
+    recover(&folder.path().join("nothing"), &limit, &folder.path().join("T3.mcap")).unwrap();
     assert!(!folder.path().join("T3.mcap").exists());
 }
 
@@ -305,8 +306,8 @@ fn a_compressed_recording_is_refused_with_a_remedy() {
     assert!(said.contains("compressed (`lz4`)") && said.contains("mcap compress --compression none"), "{said}");
 }
 
-/// The same recording without its checksums, which are then not looked at: what is changed in it is not refused for being
-/// changed.
+/// The same recording without its checksums, which are then not looked at: what is changed in it is not refused for
+/// being changed.
 fn without_checksums(whole: &[u8]) -> Vec<u8> {
     use mcap::records::op;
     let mut bytes = whole.to_vec();
@@ -350,8 +351,8 @@ fn changed(whole: &[u8], stream: &mut Stream) -> Vec<u8> {
     bytes
 }
 
-/// Feeds changed recordings, and insists on an answer in time: neither a panic nor memory for a length that a damaged file
-/// claims.
+/// Feeds changed recordings, and insists on an answer in time: neither a panic nor memory for a length that a damaged
+/// file claims.
 fn all_are_fed_or_refused(numbers: std::ops::Range<u64>) {
     let folder = tempfile::tempdir().unwrap();
     let (plan, test) = awkward_plan();

@@ -1,4 +1,4 @@
-//! Writing a trace while its test runs.
+//! Writes a trace while its test runs.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -16,7 +16,7 @@ use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Test, TopicId, Type};
 
 use crate::json::{encode, number, quoted};
-use crate::relay::{Deed, Tap, Touched};
+use crate::relay::{Listener, MessageRef, OperationEvent};
 use crate::trace::{
     ROLE, ROLE_DELIVERED, ROLE_METRIC, ROLE_OPERATIONS, ROLE_PUBLISHED, Subject, TraceError, ending, owned, publish,
     schema,
@@ -24,10 +24,10 @@ use crate::trace::{
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
-/// How long what was written may wait until it is on its way to the disk: what a hanging test did last is in its trace.
+/// How long written data may stay in memory: the trace of a test that hangs must contain its last messages.
 const LATEST: Duration = Duration::from_millis(250);
 
-/// What is kept in memory at most before it is written, in bytes.
+/// The most bytes that are kept in memory before they are written.
 const CHUNK: u64 = 1 << 20;
 
 /// Options of all traces: no compression, which would need C libraries.
@@ -64,7 +64,7 @@ struct Channels {
     objects: Vec<bool>,
 }
 
-/// What the run's thread shares with the one that writes out what lies about.
+/// The state shared between the run's thread and the one that flushes.
 struct Shared {
     sink: Mutex<Sink>,
     wake: Condvar,
@@ -73,17 +73,17 @@ struct Shared {
 struct Sink {
     /// `None` once the file is complete.
     writer: Option<Writer<BufWriter<File>>>,
-    /// Something was written since it was last written out.
+    /// Something was written since the last flush.
     waiting: bool,
     over: bool,
-    /// The first thing that went wrong; nothing is written after it.
+    /// The first error; nothing is written after it.
     error: Option<McapError>,
     activities: u64,
 }
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, Sink> {
-        // A panic elsewhere leaves a sink that is as good as it was.
+        // A panic in another thread leaves the sink consistent.
         self.sink.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -118,7 +118,7 @@ impl<'a> TraceWriter<'a> {
             .write_metadata(&subject.metadata())
             .and_then(|()| Channels::declare(&mut writer, subject.plan, wires))
             .map_err(failed)?;
-        // So that even a process that dies at once leaves a trace that says of which run it is.
+        // So that a process that dies at once leaves a trace that identifies its run.
         writer.flush().map_err(failed)?;
         let sink = Sink { writer: Some(writer), waiting: false, over: false, error: None, activities: 0 };
         let shared = Arc::new(Shared { sink: Mutex::new(sink), wake: Condvar::new() });
@@ -139,7 +139,7 @@ impl<'a> TraceWriter<'a> {
         })
     }
 
-    /// Completes the trace with what the run showed and gives it this name, in a folder that exists.
+    /// Completes the trace with the result of the run and gives it this name, in a folder that exists.
     pub fn keep(mut self, observation: &Observation, file: &Path) -> Result<(), TraceError> {
         self.stop_flusher();
         let written = self.complete(observation);
@@ -172,7 +172,7 @@ impl<'a> TraceWriter<'a> {
         self.shared.lock().over = true;
         self.shared.wake.notify_all();
         if let Some(flusher) = self.flusher.take() {
-            // It does not panic; if it did, nothing would be left to do for it.
+            // The thread does not panic; if it did, there would be nothing left to do.
             flusher.join().ok();
         }
     }
@@ -183,20 +183,20 @@ impl Drop for TraceWriter<'_> {
         self.stop_flusher();
         self.shared.lock().writer = None;
         if !self.kept {
-            // What cannot be removed is overwritten by the next trace.
+            // If it cannot be removed, the next trace overwrites it.
             fs::remove_file(&self.path).ok();
         }
     }
 }
 
-/// Ends a file, so that whatever its buffer still holds is written where a failure is seen.
+/// Ends a file and flushes its buffer, so that an error is reported.
 pub(super) fn finish(mut writer: Writer<BufWriter<File>>) -> McapResult<()> {
     writer.finish()?;
     writer.into_inner().into_inner().map_err(std::io::IntoInnerError::into_error)?;
     Ok(())
 }
 
-/// Writes out what lies about for too long, until the trace is over.
+/// Flushes data that was in memory for too long, until the trace is over.
 fn write_out(shared: &Shared) {
     let mut sink = shared.lock();
     while !sink.over {
@@ -258,7 +258,7 @@ impl TraceWriter<'_> {
     }
 }
 
-impl Tap for TraceWriter<'_> {
+impl Listener for TraceWriter<'_> {
     fn published(&mut self, now: SimTime, wire: Wire, index: u64, value: &Value) {
         self.payload(wire, value);
         self.shared.lock().message(self.channels.published[wire.index()], index, now, &self.payload);
@@ -270,21 +270,21 @@ impl Tap for TraceWriter<'_> {
         self.shared.lock().message(channel, index, now, &self.payload);
     }
 
-    fn operated(&mut self, now: SimTime, operation: usize, deed: Deed) {
-        let (did, touched, until) = match deed {
-            Deed::Started => ("started", None, None),
-            Deed::Ended => ("ended", None, None),
-            Deed::Changed(touched) => ("changed", Some(touched), None),
-            Deed::Dropped(touched) => ("dropped", Some(touched), None),
-            Deed::Injected(touched) => ("injected", Some(touched), None),
-            Deed::Delayed(touched, until) => ("delayed", Some(touched), Some(until)),
+    fn operated(&mut self, now: SimTime, operation: usize, event: OperationEvent) {
+        let (did, touched, until) = match event {
+            OperationEvent::Started => ("started", None, None),
+            OperationEvent::Ended => ("ended", None, None),
+            OperationEvent::Changed(touched) => ("changed", Some(touched), None),
+            OperationEvent::Dropped(touched) => ("dropped", Some(touched), None),
+            OperationEvent::Injected(touched) => ("injected", Some(touched), None),
+            OperationEvent::Delayed(touched, until) => ("delayed", Some(touched), Some(until)),
         };
         let payload = &mut self.payload;
         payload.clear();
         payload.extend_from_slice(b"{\"operation\":");
         quoted(&self.plan.operation(self.test.operations[operation].operation).name, payload);
         payload.extend_from_slice(format!(",\"position\":{operation},\"did\":\"{did}\"").as_bytes());
-        if let Some(Touched { wire, index }) = touched {
+        if let Some(MessageRef { wire, index }) = touched {
             payload.extend_from_slice(b",\"topic\":");
             quoted(self.wires.path(wire), payload);
             payload.extend_from_slice(format!(",\"message\":{index}").as_bytes());

@@ -12,7 +12,7 @@ use crate::transport::{Capabilities, Connect, Place, Transport, TransportError, 
 use crate::value::Value;
 use crate::wire::Wire;
 
-/// Reaches a simulator that is a Rust type inside the runner.
+/// Connects to a simulator that is a Rust type inside the runner.
 pub const fn in_process<S: Simulator + 'static>() -> Connect {
     Connect { make: connect::<S>, place: Place { runner: "", space: "" } }
 }
@@ -23,19 +23,19 @@ fn connect<S: Simulator + 'static>(plan: &CampaignPlan, _: Place) -> Box<dyn Tra
     };
     Box::new(InProcess::<S> {
         simulator: None,
-        bus: Switchboard::default(),
+        bus: InProcessBus::default(),
         plan: plan.clone(),
         now: SimTime::ZERO,
         step: SimTime::from_nanos(i64::try_from(step_ns).unwrap_or(i64::MAX)),
     })
 }
 
-/// Messages in one step beyond which a simulator is taken to have lost its mind; what is more is not kept.
+/// The most messages that a simulator may publish in one step; further ones are not kept, and the test is a crash.
 const STEP_LIMIT: u64 = 100_000;
 
 struct InProcess<S> {
     simulator: Option<S>,
-    bus: Switchboard,
+    bus: InProcessBus,
     plan: CampaignPlan,
     now: SimTime,
     step: SimTime,
@@ -49,8 +49,8 @@ impl<S: Simulator> Transport for InProcess<S> {
     fn reset(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<(), TransportError> {
         self.simulator = None;
         self.now = SimTime::ZERO;
-        self.bus = Switchboard::new(relay.wires().len());
-        let mut linked = Linked { board: &mut self.bus, plan: &self.plan, relay };
+        self.bus = InProcessBus::new(relay.wires().len());
+        let mut linked = RelayedBus { board: &mut self.bus, plan: &self.plan, relay };
         let setup = Setup { seed, step: self.step };
         let started = S::start(&setup, &mut Bus { now: SimTime::ZERO, wires: &mut linked });
         self.simulator = Some(started.map_err(failed)?);
@@ -69,7 +69,7 @@ impl<S: Simulator> Transport for InProcess<S> {
         self.bus.published = 0;
         relay.advance(self.now, &mut self.bus.deliveries);
         self.bus.deliver();
-        let mut linked = Linked { board: &mut self.bus, plan: &self.plan, relay };
+        let mut linked = RelayedBus { board: &mut self.bus, plan: &self.plan, relay };
         let progress = simulator.step(&mut Bus { now: self.now, wires: &mut linked });
         self.bus.every_message_fits()?;
         progress.map_err(failed)
@@ -88,15 +88,16 @@ fn failed(error: SimulatorError) -> TransportError {
     TransportError::Simulator(error.0)
 }
 
-/// The bus of one run: the simulator's topics, which of them the relay knows, and what has arrived on them.
+/// The bus of one run: the simulator's topics, which of them the relay knows, and the messages that have arrived on
+/// them.
 #[derive(Default)]
-struct Switchboard {
+struct InProcessBus {
     by_path: BTreeMap<String, usize>,
     lines: Vec<Line>,
     /// The line of each of the relay's wires.
     by_wire: Vec<Option<usize>>,
     deliveries: Vec<Delivery>,
-    misfit: Option<TransportError>,
+    mismatch: Option<TransportError>,
     /// Messages since the last step began.
     published: u64,
 }
@@ -105,15 +106,15 @@ struct Switchboard {
 struct Line {
     path: String,
     wire: Option<Wire>,
-    /// What has arrived for the subscribers; `None` when there are none.
+    /// The messages that have arrived for the subscribers; `None` without subscribers.
     inbox: Option<VecDeque<Value>>,
     /// Whether a message has been compared with the declared type.
     checked: bool,
 }
 
-impl Switchboard {
+impl InProcessBus {
     fn new(wires: usize) -> Self {
-        Switchboard { by_wire: vec![None; wires], ..Switchboard::default() }
+        InProcessBus { by_wire: vec![None; wires], ..InProcessBus::default() }
     }
 
     /// Puts the relay's deliveries into the inboxes of their subscribers.
@@ -133,18 +134,18 @@ impl Switchboard {
     }
 
     fn every_message_fits(&mut self) -> Result<(), TransportError> {
-        self.misfit.take().map_or(Ok(()), Err)
+        self.mismatch.take().map_or(Ok(()), Err)
     }
 }
 
-/// The bus with the relay inside it, as the simulator sees it during one call.
-struct Linked<'a> {
-    board: &'a mut Switchboard,
+/// The bus with the relay, as the simulator sees it during one call.
+struct RelayedBus<'a> {
+    board: &'a mut InProcessBus,
     plan: &'a CampaignPlan,
     relay: &'a mut dyn Exchange,
 }
 
-impl Wires for Linked<'_> {
+impl Wires for RelayedBus<'_> {
     fn open(&mut self, path: &str) -> Port {
         if let Some(&line) = self.board.by_path.get(path) {
             return Port(line);
@@ -171,7 +172,7 @@ impl Wires for Linked<'_> {
         self.board.published += 1;
         if self.board.published > STEP_LIMIT {
             let flood = format!("it publishes more than {STEP_LIMIT} messages in the step to {now}");
-            self.board.misfit.get_or_insert(TransportError::Simulator(flood));
+            self.board.mismatch.get_or_insert(TransportError::Simulator(flood));
             return;
         }
         let line = &mut self.board.lines[port.0];
@@ -186,7 +187,7 @@ impl Wires for Linked<'_> {
             let declared = &self.plan.topic(self.relay.wires().topic(wire)).ty;
             if let Err(mismatch) = message::fits(self.plan, declared, &value) {
                 let wrong = TransportError::WrongType { path: line.path.clone(), reason: mismatch.to_string() };
-                self.board.misfit.get_or_insert(wrong);
+                self.board.mismatch.get_or_insert(wrong);
                 return;
             }
         }

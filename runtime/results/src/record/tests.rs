@@ -1,5 +1,7 @@
 //! The repository as its users see it: what is written is read, by functions and by views.
 
+#![expect(clippy::disallowed_methods, reason = "tests of a record of wall time, and of how long reading takes")]
+
 use std::path::Path;
 
 use proptest::prelude::*;

@@ -75,11 +75,11 @@ impl Course {
         for (moment, values) in (0u32..).zip(&self.values) {
             let now = SimTime::from_seconds(time_of(plan, moment));
             while let Some(edge) = activity.next_edge().filter(|&edge| edge <= now) {
-                activity.follow(edge);
-                activity.weigh(edge, &|metric| value_in(before.unwrap_or(values), metric));
+                activity.advance_to(edge);
+                activity.evaluate(edge, &|metric| value_in(before.unwrap_or(values), metric));
             }
             if before.replace(values) != Some(values) {
-                activity.weigh(now, &|metric| value_in(values, metric));
+                activity.evaluate(now, &|metric| value_in(values, metric));
             }
         }
         activity.intervals(SimTime::from_seconds(end))

@@ -1,6 +1,8 @@
 //! The reduction and coverage on the original platform's own data, where it is at hand: `SESAME_LEGACY_DIR` names the
 //! folder of its files. Without it these tests say so and check nothing; the numbers of our own beside them always run.
 
+#![expect(clippy::disallowed_methods, reason = "reads data of the original platform")]
+
 use std::path::PathBuf;
 
 use roxmltree::{Document, Node};

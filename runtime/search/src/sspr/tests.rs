@@ -1,3 +1,8 @@
+#![expect(
+    clippy::disallowed_methods,
+    reason = "independent of the code that is tested, and compared within tolerances"
+)]
+
 use proptest::prelude::*;
 
 use sesame_plan::{

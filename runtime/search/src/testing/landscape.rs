@@ -197,10 +197,10 @@ impl Landscape {
         for slot in 0u32..350 {
             let now = SimTime::from_seconds(f64::from(slot) * 0.2);
             while let Some(edge) = activity.next_edge().filter(|&edge| edge <= now) {
-                activity.follow(edge);
-                activity.weigh(edge, &|metric| Some(Self::signal(metric, edge.seconds())));
+                activity.advance_to(edge);
+                activity.evaluate(edge, &|metric| Some(Self::signal(metric, edge.seconds())));
             }
-            activity.weigh(now, &|metric| Some(Self::signal(metric, now.seconds())));
+            activity.evaluate(now, &|metric| Some(Self::signal(metric, now.seconds())));
         }
         activity.intervals(SimTime::from_seconds(65.0)).into_iter().map(|span| (span.start, span.end)).collect()
     }

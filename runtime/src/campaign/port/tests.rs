@@ -17,9 +17,9 @@ fn attacked(attack: impl Fn(SocketAddr, &AtomicBool) + Sync) -> (io::Result<TcpS
         scope.spawn(|| attack(address, &done));
         // The strangers are first.
         thread::sleep(Duration::from_millis(200));
-        let worker = scope.spawn(move || connect(address, token));
+        let worker = scope.spawn(move || connect(address, &Hello { lock_stepped: true, token: Some(token) }));
         let started = Instant::now();
-        let accepted = port.accept(LIMIT, &mut || Ok(()));
+        let accepted = port.accept(LIMIT, &mut || Ok(())).map(|(stream, _)| stream);
         let took = started.elapsed();
         done.store(true, Ordering::Relaxed);
         worker.join().unwrap().unwrap();
@@ -106,8 +106,8 @@ fn a_frame_of_a_gibibyte_is_refused_by_its_length() {
 #[test]
 fn what_is_no_greeting_or_has_another_token_is_turned_away() {
     survives(|address, _| {
-        let wrong = serde_json::to_vec(&Hello { token: Some("0".repeat(32)) }).unwrap();
-        let none = serde_json::to_vec(&Hello { token: None }).unwrap();
+        let wrong = serde_json::to_vec(&Hello { lock_stepped: true, token: Some("0".repeat(32)) }).unwrap();
+        let none = serde_json::to_vec(&Hello { lock_stepped: true, token: None }).unwrap();
         for body in [wrong.as_slice(), &none, b"{}", b"GET / HTTP/1.1\r\n\r\n", &[0; 1024], b""] {
             let mut stream = TcpStream::connect(address).unwrap();
             stream.write_all(&u32::try_from(body.len()).unwrap().to_le_bytes()).unwrap();
@@ -133,7 +133,7 @@ fn a_worker_that_speaks_slowly_is_understood() {
     let (address, token) = (port.address().unwrap(), port.token().to_owned());
     let worker = thread::spawn(move || {
         let mut whole = Vec::new();
-        protocol::send(&mut whole, &Hello { token: Some(token) }).unwrap();
+        protocol::send(&mut whole, &Hello { lock_stepped: true, token: Some(token) }).unwrap();
         // What follows the greeting is not taken with it.
         protocol::send(&mut whole, &"what follows").unwrap();
         let mut stream = TcpStream::connect(address).unwrap();
@@ -142,7 +142,7 @@ fn a_worker_that_speaks_slowly_is_understood() {
             thread::sleep(Duration::from_millis(5));
         }
     });
-    let mut stream = port.accept(LIMIT, &mut || Ok(())).unwrap();
+    let (mut stream, _) = port.accept(LIMIT, &mut || Ok(())).unwrap();
     let follows: String = protocol::receive(&mut stream).unwrap();
     assert_eq!(follows, "what follows");
     worker.join().unwrap();

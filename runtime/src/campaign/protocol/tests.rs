@@ -38,7 +38,7 @@ fn heard(stream: &mut InParts) -> Result<Option<String>, ()> {
     loop {
         match greeting.hear(stream) {
             Ok(None) => {}
-            Ok(Some(Hello { token })) => return Ok(token),
+            Ok(Some(Hello { token, .. })) => return Ok(token),
             Err(_) => return Err(()),
         }
     }
@@ -54,7 +54,7 @@ proptest! {
         parts in proptest::collection::vec(1usize..40, 0..60),
     ) {
         let mut bytes = Vec::new();
-        send(&mut bytes, &Hello { token: token.clone() }).unwrap();
+        send(&mut bytes, &Hello { lock_stepped: true, token: token.clone() }).unwrap();
         let whole = bytes.len();
         prop_assume!(whole <= 4 + GREETING_LIMIT);
         bytes.extend(follows);

@@ -39,10 +39,21 @@ impl Executor for InThread<'_> {
             self.interrupted.store(true, Ordering::Relaxed);
         }
         let observation = sample::observe(self.plan, &test, simulator_seed);
-        Ok(Some(JobResult { number, observation, notes: Vec::new(), trace_failure: None, killed: false }))
+        Ok(Some(JobResult {
+            number,
+            observation,
+            notes: Vec::new(),
+            trace_failure: None,
+            killed: false,
+            lock_stepped: true,
+        }))
     }
 
     fn set_timeout(&mut self, _: Duration) {}
+
+    fn lock_stepped(&self) -> bool {
+        true
+    }
 }
 
 /// The sample campaign, with all that a campaign can do on the way.
@@ -194,6 +205,10 @@ impl Executor for Deaf<'_> {
             result.observation.unheard = self.0.plan.topics.iter().flat_map(|topic| topic.paths.clone()).collect();
         }
         Ok(next)
+    }
+
+    fn lock_stepped(&self) -> bool {
+        self.0.lock_stepped()
     }
 
     fn set_timeout(&mut self, timeout: Duration) {

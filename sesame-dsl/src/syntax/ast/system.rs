@@ -44,6 +44,8 @@ pub(crate) struct Process {
     pub(crate) program: Text,
     pub(crate) arguments: Vec<Text>,
     pub(crate) steps: Vec<(Span, Quantity)>,
+    /// Where it says `free running`.
+    pub(crate) free_running: Vec<(Span, ())>,
     pub(crate) has_errors: bool,
 }
 

@@ -70,11 +70,15 @@ impl Reader<'_> {
     fn process(&mut self, pair: &Pair<'_>) -> Process {
         let mut texts = children(pair, Rule::text).map(|text| self.text_of(&text)).collect::<Vec<_>>().into_iter();
         let program = texts.next().expect("a process has a program");
-        let mut transport = Process { program, arguments: texts.collect(), steps: vec![], has_errors: false };
+        let mut transport =
+            Process { program, arguments: texts.collect(), steps: vec![], free_running: vec![], has_errors: false };
         let settings = expect_child(pair, Rule::process_settings);
         transport.has_errors = self.members(&settings, |reader, setting| {
             let span = reader.keyword_span(&setting);
-            transport.steps.push((span, reader.signed(&expect_child(&setting, Rule::signed))));
+            match setting.as_rule() {
+                Rule::free_running => transport.free_running.push((reader.span(&setting), ())),
+                _ => transport.steps.push((span, reader.signed(&expect_child(&setting, Rule::signed)))),
+            }
         });
         transport
     }

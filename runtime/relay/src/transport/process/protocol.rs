@@ -1,5 +1,5 @@
-//! What runner and simulator say to each other: JSON, one message of the protocol a line. `docs/process.md` tells it to
-//! those who write simulators.
+//! The messages between runner and simulator: one JSON object per line. `docs/process.md` describes the protocol for
+//! authors of simulators.
 
 use std::borrow::Cow;
 use std::io::{self, BufRead};
@@ -16,31 +16,34 @@ use crate::transport::TransportError;
 /// The longest line either side may write, in bytes.
 pub(super) const LINE_LIMIT: usize = 16 << 20;
 
-/// What a simulator says.
+/// A line of the simulator.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub(super) enum Said<'a> {
+pub(super) enum SimulatorMessage<'a> {
     /// It is at time zero: the answer to `reset`.
     #[serde(borrow)]
     Ready(Ready<'a>),
-    /// Messages of the present whose deliveries it waits for.
+    /// Messages of the current step, whose deliveries it waits for.
     #[serde(borrow)]
     Publish(Vec<Message<'a>>),
-    /// The step is over.
+    /// The step is over; of a free-running simulator, the scenario.
     #[serde(borrow)]
     Done(Done<'a>),
-    /// It cannot go on, in its own words.
+    /// The simulation time of a free-running simulator with a clock of its own, in seconds.
+    Time(f64),
+    /// It cannot continue, with its reason.
     Failed(String),
 }
 
-impl Said<'_> {
-    /// The word it is said with.
-    pub(super) fn word(&self) -> &'static str {
+impl SimulatorMessage<'_> {
+    /// The keyword of the line.
+    pub(super) fn keyword(&self) -> &'static str {
         match self {
-            Said::Ready(_) => "ready",
-            Said::Publish(_) => "publish",
-            Said::Done(_) => "done",
-            Said::Failed(_) => "failed",
+            SimulatorMessage::Ready(_) => "ready",
+            SimulatorMessage::Publish(_) => "publish",
+            SimulatorMessage::Done(_) => "done",
+            SimulatorMessage::Time(_) => "time",
+            SimulatorMessage::Failed(_) => "failed",
         }
     }
 }
@@ -52,12 +55,15 @@ pub(super) struct Ready<'a> {
     /// Topics it publishes.
     #[serde(default)]
     pub(super) publishes: Vec<String>,
-    /// Topics whose messages it wants delivered.
+    /// Topics to which it subscribes.
     #[serde(default)]
     pub(super) subscribes: Vec<String>,
-    /// Whether it can be reset again; if not, it is started anew for each test.
+    /// Whether it can be reset again; if not, it is restarted for each test.
     #[serde(default)]
     pub(super) resets: bool,
+    /// Of a free-running simulator: whether it sends its simulation time; otherwise simulation time is wall time.
+    #[serde(default)]
+    pub(super) clock: bool,
     /// Messages of time zero.
     #[serde(default, borrow)]
     pub(super) messages: Vec<Message<'a>>,
@@ -67,10 +73,10 @@ pub(super) struct Ready<'a> {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Done<'a> {
-    /// Messages of the step for which no answer is needed.
+    /// Messages of the step that need no answer.
     #[serde(default, borrow)]
     pub(super) messages: Vec<Message<'a>>,
-    /// Whether the scenario has come to its own end.
+    /// Whether the scenario has ended.
     #[serde(default)]
     pub(super) ended: bool,
 }
@@ -90,65 +96,101 @@ pub(super) struct Message<'a> {
 /// The simulator's lines, counted from its last reset.
 pub(super) struct Lines<R> {
     reader: R,
-    line: Vec<u8>,
-    count: u64,
+    line: Line,
     limit: usize,
 }
 
 impl<R: BufRead> Lines<R> {
     pub(super) fn new(reader: R, limit: usize) -> Self {
-        Lines { reader, line: Vec::new(), count: 0, limit }
+        Lines { reader, line: Line::default(), limit }
     }
 
-    /// Where the lines come from.
+    /// The stream of the lines.
     pub(super) fn reader(&self) -> &R {
         &self.reader
     }
 
-    /// The beginning of the line that was read last, for a message.
-    pub(super) fn shown(&self) -> String {
-        shown(&String::from_utf8_lossy(&self.line))
+    /// The last line that was read.
+    pub(super) fn line(&self) -> &Line {
+        &self.line
     }
 
     /// Counts from one again.
     pub(super) fn recount(&mut self) {
-        self.count = 0;
+        self.line.number = 0;
     }
 
-    /// Reads the next line; `false` when there is none: the output was closed, be it in the middle of a line.
+    /// Reads the next line; `false` at the end of the output, even in the middle of a line.
     pub(super) fn read(&mut self) -> Result<bool, TransportError> {
-        self.line.clear();
-        self.count += 1;
-        loop {
-            let available = match self.reader.fill_buf() {
-                Ok(available) => available,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                // The other end is gone, whatever the system says of the way it went.
-                Err(_) => return Ok(false),
-            };
-            if available.is_empty() {
-                return Ok(false);
-            }
-            let end = available.iter().position(|&byte| byte == b'\n');
-            let taken = end.unwrap_or(available.len());
-            if self.line.len() + taken > self.limit {
-                let problem = format!("is longer than {} bytes", self.limit);
-                return Err(self.wrong(problem, "send less in one line, or several lines"));
-            }
-            self.line.extend_from_slice(&available[..taken]);
-            self.reader.consume(taken + usize::from(end.is_some()));
-            if end.is_some() {
-                return Ok(true);
-            }
+        self.line.number += 1;
+        match read_line(&mut self.reader, self.limit, &mut self.line.bytes) {
+            Read::Line => Ok(true),
+            Read::End => Ok(false),
+            Read::TooLong => Err(self.line.too_long(self.limit)),
         }
     }
+}
 
-    /// What the line says that was read last.
-    pub(super) fn said(&self) -> Result<Said<'_>, TransportError> {
-        let Ok(text) = std::str::from_utf8(&self.line) else {
+/// What was read of a stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Read {
+    Line,
+    /// The stream has ended, perhaps in the middle of a line.
+    End,
+    /// The line is longer than permitted, and was not read completely.
+    TooLong,
+}
+
+/// Reads a line of at most `limit` bytes, without its line feed.
+pub(super) fn read_line(reader: &mut impl BufRead, limit: usize, line: &mut Vec<u8>) -> Read {
+    line.clear();
+    loop {
+        let available = match reader.fill_buf() {
+            Ok(available) => available,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+            // The other end is closed, whatever error the system reports.
+            Err(_) => return Read::End,
+        };
+        if available.is_empty() {
+            return Read::End;
+        }
+        let end = available.iter().position(|&byte| byte == b'\n');
+        let taken = end.unwrap_or(available.len());
+        if line.len() + taken > limit {
+            return Read::TooLong;
+        }
+        line.extend_from_slice(&available[..taken]);
+        reader.consume(taken + usize::from(end.is_some()));
+        if end.is_some() {
+            return Read::Line;
+        }
+    }
+}
+
+/// A line of the simulator, with its number since the last reset.
+#[derive(Debug, Default)]
+pub(super) struct Line {
+    pub(super) bytes: Vec<u8>,
+    pub(super) number: u64,
+}
+
+impl Line {
+    /// The beginning of the line, for an error message.
+    pub(super) fn shown(&self) -> String {
+        shown(&String::from_utf8_lossy(&self.bytes))
+    }
+
+    /// Parses the line.
+    pub(super) fn parse(&self) -> Result<SimulatorMessage<'_>, TransportError> {
+        let Ok(text) = std::str::from_utf8(&self.bytes) else {
             return Err(self.wrong("is not UTF-8".to_owned(), "the protocol is JSON in UTF-8"));
         };
         serde_json::from_str(text).map_err(|error| self.not_understood(text, &error))
+    }
+
+    /// The error about a line that is longer than permitted.
+    pub(super) fn too_long(&self, limit: usize) -> TransportError {
+        self.wrong(format!("is longer than {limit} bytes"), "send less in one line, or several lines")
     }
 
     fn not_understood(&self, text: &str, error: &serde_json::Error) -> TransportError {
@@ -156,30 +198,35 @@ impl<R: BufRead> Lines<R> {
         if serde_json::from_str::<IgnoredAny>(text).is_ok() {
             let why = error.to_string();
             let why = why.split(" at line ").next().unwrap_or_default();
-            let remedy = "a simulator says `ready`, `publish`, `done` or `failed`, as docs/process.md has them";
+            let remedy = "a simulator sends `ready`, `publish`, `done` or `failed`, as docs/process.md describes";
             return self.wrong(format!("is not of the protocol ({why}): {shown}"), remedy);
         }
-        // What Python and JavaScript make of numbers that JSON does not have.
+        // As Python and JavaScript write numbers that JSON does not have.
         if ["NaN", "Infinity"].iter().any(|name| has_bare_word(text, name)) {
-            let remedy = "write such a number as the text \"NaN\", \"Infinity\" or \"-Infinity\"";
+            let remedy = "write such a number as the string \"NaN\", \"Infinity\" or \"-Infinity\"";
             return self.wrong(format!("holds a number that JSON does not have: {shown}"), remedy);
         }
-        let remedy = "standard output carries the protocol alone, print everything else to standard error";
+        let remedy = "standard output is reserved for the protocol, print everything else to standard error";
         self.wrong(format!("is not JSON: {shown}"), remedy)
     }
 
-    /// An error about the line that was read last.
+    /// An error about this line.
     pub(super) fn wrong(&self, problem: String, remedy: impl Into<String>) -> TransportError {
-        TransportError::Protocol { line: self.count, problem, remedy: remedy.into() }
+        TransportError::Protocol { line: self.number, problem, remedy: remedy.into() }
+    }
+
+    /// The error about a message that was not expected now.
+    pub(super) fn out_of_turn(&self, message: &SimulatorMessage<'_>, awaited: &str, remedy: &str) -> TransportError {
+        self.wrong(format!("says `{}` while {awaited} was awaited", message.keyword()), remedy)
     }
 }
 
-/// Whether a word stands in JSON outside of quotes, as far as an error message needs to know.
+/// Whether a word occurs in JSON outside of strings; an approximation that is good enough for an error message.
 fn has_bare_word(text: &str, word: &str) -> bool {
     text.split('"').step_by(2).any(|outside| outside.contains(word))
 }
 
-/// The beginning of a line, for a message.
+/// The beginning of a line, for an error message.
 fn shown(text: &str) -> String {
     const LENGTH: usize = 100;
     let start: String = text.chars().take(LENGTH).collect();
@@ -188,20 +235,24 @@ fn shown(text: &str) -> String {
     format!("`{plain}`{rest}")
 }
 
-/// What the runner says, written to a line.
-pub(super) mod order {
+/// The runner's requests, written to a line.
+pub(super) mod request {
     use super::{SimTime, number, quoted};
 
-    /// `{"reset":{"seed":1,"step":0.02,"topics":["a"]}}`
+    /// `{"reset":{"seed":1,"step":0.02,"topics":["a"]}}`, without `step` for a free-running simulator.
     pub(in super::super) fn reset<'a>(
         line: &mut Vec<u8>,
         seed: u64,
-        step: SimTime,
+        step: Option<SimTime>,
         topics: impl Iterator<Item = &'a str>,
     ) {
-        line.extend_from_slice(format!("{{\"reset\":{{\"seed\":{seed},\"step\":").as_bytes());
-        number(step.seconds(), line);
-        line.extend_from_slice(b",\"topics\":[");
+        line.extend_from_slice(format!("{{\"reset\":{{\"seed\":{seed},").as_bytes());
+        if let Some(step) = step {
+            line.extend_from_slice(b"\"step\":");
+            number(step.seconds(), line);
+            line.push(b',');
+        }
+        line.extend_from_slice(b"\"topics\":[");
         for (at, topic) in topics.enumerate() {
             if at > 0 {
                 line.push(b',');

@@ -1,4 +1,5 @@
-//! The protocol's runner side, over any pair of streams: what is said when, and how messages pass the relay.
+//! The runner's side of the protocol, over any pair of streams: the order of requests and answers, and the way of
+//! messages through the relay.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, Write};
@@ -13,22 +14,22 @@ use crate::json::{self, Shapes};
 use crate::message::Mismatch;
 use crate::relay::{Delivery, Exchange};
 use crate::simulator::Progress;
-use crate::transport::process::protocol::{LINE_LIMIT, Lines, Message, Ready, Said, order};
+use crate::transport::process::protocol::{LINE_LIMIT, Line, Lines, Message, Ready, SimulatorMessage, request};
 use crate::transport::{TransportError, unknown_topic};
 use crate::wire::Wire;
 
 /// The most messages a simulator may publish in one step.
 const STEP_LIMIT: u64 = 100_000;
 
-/// What to do about an answer too many.
+/// The remedy for a surplus answer.
 const TURNS: &str = "give one answer to each line; in this test there is one too many";
 
-/// Why a session came to its end.
+/// Why a session ended.
 #[derive(Debug)]
 pub(super) enum Fault {
-    /// The simulator closed its output before it said what it was to say, given as a phrase.
-    Gone(String),
-    /// The simulator is there, but it cannot go on, or not with it.
+    /// The simulator closed its output before it sent what was expected, given as a phrase.
+    Disconnected(String),
+    /// The simulator is running, but the session cannot continue.
     Wrong(TransportError),
 }
 
@@ -38,27 +39,28 @@ impl From<TransportError> for Fault {
     }
 }
 
-/// A conversation with a simulator.
+/// A session with a simulator.
 pub(super) struct Session<R, W> {
     lines: Lines<R>,
     output: W,
     line: Vec<u8>,
-    board: Board,
+    topics: Topics,
     resets: bool,
     ready: bool,
 }
 
-/// The topics of one run, and what waits to be delivered.
+/// The topics of one run, and the messages that wait for delivery.
 #[derive(Default)]
-struct Board {
-    topics: BTreeMap<String, Topic>,
+pub(super) struct Topics {
+    by_path: BTreeMap<String, Topic>,
     /// Per wire of the relay: whether the simulator subscribes to it.
     subscribed: Vec<bool>,
     shapes: Shapes,
-    deliveries: Vec<Delivery>,
-    /// Messages to be delivered, as the next line to the simulator will have them.
-    outbox: Vec<u8>,
-    published: u64,
+    pub(super) deliveries: Vec<Delivery>,
+    /// Messages to be delivered, as JSON for the next line to the simulator.
+    pub(super) outbox: Vec<u8>,
+    /// Messages since the last step began.
+    pub(super) published: u64,
 }
 
 /// One topic of the simulator.
@@ -75,10 +77,10 @@ impl<R: BufRead, W: Write> Session<R, W> {
 
     fn with_limit(input: R, output: W, limit: usize) -> Self {
         let lines = Lines::new(input, limit);
-        Session { lines, output, line: Vec::new(), board: Board::default(), resets: false, ready: false }
+        Session { lines, output, line: Vec::new(), topics: Topics::default(), resets: false, ready: false }
     }
 
-    /// Where the simulator's lines come from.
+    /// The stream of the simulator's lines.
     pub(super) fn input(&self) -> &R {
         self.lines.reader()
     }
@@ -88,14 +90,14 @@ impl<R: BufRead, W: Write> Session<R, W> {
         self.ready
     }
 
-    /// What is to be said of a simulator that says more after it has answered everything. Reads what it says.
-    pub(super) fn answer_too_many(&mut self) -> TransportError {
+    /// The error about a simulator that sends more after it has answered everything. Reads what it sends.
+    pub(super) fn surplus_answer(&mut self) -> TransportError {
         match self.lines.read() {
             Ok(true) => {
-                let problem = format!("comes after everything was answered: {}", self.lines.shown());
-                self.lines.wrong(problem, TURNS)
+                let problem = format!("comes after everything was answered: {}", self.lines.line().shown());
+                self.lines.line().wrong(problem, TURNS)
             }
-            Ok(false) => self.lines.wrong("begins after everything was answered".to_owned(), TURNS),
+            Ok(false) => self.lines.line().wrong("begins after everything was answered".to_owned(), TURNS),
             Err(error) => error,
         }
     }
@@ -105,7 +107,7 @@ impl<R: BufRead, W: Write> Session<R, W> {
         self.resets
     }
 
-    /// Brings the simulator to time zero.
+    /// Sets the simulator to time zero.
     pub(super) fn reset(
         &mut self,
         plan: &CampaignPlan,
@@ -115,94 +117,107 @@ impl<R: BufRead, W: Write> Session<R, W> {
     ) -> Result<(), Fault> {
         self.lines.recount();
         self.ready = false;
-        self.board = Board { shapes: mem::take(&mut self.board.shapes), ..Board::default() };
+        self.topics.clear();
         let wires = relay.wires();
-        order::reset(&mut self.line, seed, step, wires.iter().map(|wire| wires.path(wire)));
+        request::reset(&mut self.line, seed, Some(step), wires.iter().map(|wire| wires.path(wire)));
         self.send();
         let awaited = || "its answer to `reset`".to_owned();
         if !self.lines.read()? {
-            return Err(Fault::Gone(awaited()));
+            return Err(Fault::Disconnected(awaited()));
         }
-        let ready = match self.lines.said()? {
-            Said::Ready(ready) => ready,
-            Said::Failed(words) => return Err(TransportError::Simulator(words).into()),
-            other => return Err(self.out_of_turn(&other, &awaited(), "answer `reset` with `ready`").into()),
+        let ready = match self.lines.line().parse()? {
+            SimulatorMessage::Ready(ready) => ready,
+            SimulatorMessage::Failed(reason) => return Err(TransportError::Simulator(reason).into()),
+            other => {
+                return Err(self.lines.line().out_of_turn(&other, &awaited(), "answer `reset` with `ready`").into());
+            }
         };
+        if ready.clock {
+            let problem = "says `clock`, but the space steps this simulator".to_owned();
+            return Err(self
+                .lines
+                .line()
+                .wrong(problem, "leave `clock` out, or declare the simulator `free running`")
+                .into());
+        }
         self.resets = ready.resets;
         self.ready = true;
-        self.board.open(&ready, relay)?;
-        self.board.publish(plan, SimTime::ZERO, &ready.messages, relay, &self.lines)?;
+        self.topics.open(&ready, relay)?;
+        self.topics.publish(plan, SimTime::ZERO, &ready.messages, relay, self.lines.line())?;
         Ok(())
     }
 
-    /// Lets the simulator take its step to `now`.
+    /// Makes the simulator take its step to `now`.
     pub(super) fn step(
         &mut self,
         plan: &CampaignPlan,
         now: SimTime,
         relay: &mut dyn Exchange,
     ) -> Result<Progress, Fault> {
-        self.board.published = 0;
-        relay.advance(now, &mut self.board.deliveries);
-        self.board.deliver(relay, None);
-        order::step(&mut self.line, now, &self.board.outbox);
-        self.board.outbox.clear();
+        self.topics.published = 0;
+        relay.advance(now, &mut self.topics.deliveries);
+        self.topics.deliver(relay, None);
+        request::step(&mut self.line, now, &self.topics.outbox);
+        self.topics.outbox.clear();
         self.send();
         let awaited = || format!("the end of its step to {now}");
         loop {
             if !self.lines.read()? {
-                return Err(Fault::Gone(awaited()));
+                return Err(Fault::Disconnected(awaited()));
             }
-            match self.lines.said()? {
-                Said::Publish(messages) => {
-                    self.board.publish(plan, now, &messages, relay, &self.lines)?;
-                    order::deliver(&mut self.line, &self.board.outbox);
-                    self.board.outbox.clear();
+            match self.lines.line().parse()? {
+                SimulatorMessage::Publish(messages) => {
+                    self.topics.publish(plan, now, &messages, relay, self.lines.line())?;
+                    request::deliver(&mut self.line, &self.topics.outbox);
+                    self.topics.outbox.clear();
                     self.send();
                 }
-                Said::Done(done) => {
-                    self.board.publish(plan, now, &done.messages, relay, &self.lines)?;
+                SimulatorMessage::Done(done) => {
+                    self.topics.publish(plan, now, &done.messages, relay, self.lines.line())?;
                     return Ok(if done.ended { Progress::Ended } else { Progress::Running });
                 }
-                Said::Failed(words) => return Err(TransportError::Simulator(words).into()),
-                ready @ Said::Ready(_) => {
-                    return Err(self.out_of_turn(&ready, &awaited(), "end a step with `done`").into());
+                SimulatorMessage::Failed(reason) => return Err(TransportError::Simulator(reason).into()),
+                other @ (SimulatorMessage::Ready(_) | SimulatorMessage::Time(_)) => {
+                    return Err(self.lines.line().out_of_turn(&other, &awaited(), "end a step with `done`").into());
                 }
             }
         }
     }
 
-    /// Sends the line. A simulator that does not listen any more may still have said why; reading tells.
+    /// Sends the line. An error is ignored: a simulator that has closed its input may still have sent the reason, and
+    /// the next read returns it.
     fn send(&mut self) {
         self.output.write_all(&self.line).and_then(|()| self.output.flush()).ok();
         self.line.clear();
     }
-
-    fn out_of_turn(&self, said: &Said<'_>, awaited: &str, remedy: &str) -> TransportError {
-        self.lines.wrong(format!("says `{}` while {awaited} was awaited", said.word()), remedy)
-    }
 }
 
-impl Board {
-    /// Takes up the simulator's topics; all of the space's must be among them. The relay learns which are subscribed to.
-    fn open(&mut self, ready: &Ready<'_>, relay: &mut dyn Exchange) -> Result<(), TransportError> {
+impl Topics {
+    /// Forgets the topics of the last run.
+    pub(super) fn clear(&mut self) {
+        *self = Topics { shapes: mem::take(&mut self.shapes), ..Topics::default() };
+    }
+
+    /// Takes the simulator's topics; all topics of the space must be among them. Tells the relay which have
+    /// subscribers.
+    pub(super) fn open(&mut self, ready: &Ready<'_>, relay: &mut dyn Exchange) -> Result<(), TransportError> {
         let wires = relay.wires();
         for path in ready.publishes.iter().chain(&ready.subscribes) {
             let topic = Topic { wire: wires.find(path), publishes: false, subscribes: false };
-            self.topics.entry(path.clone()).or_insert(topic);
+            self.by_path.entry(path.clone()).or_insert(topic);
         }
         self.subscribed = vec![false; wires.len()];
         for path in &ready.publishes {
-            self.topics.entry(path.clone()).and_modify(|topic| topic.publishes = true);
+            self.by_path.entry(path.clone()).and_modify(|topic| topic.publishes = true);
         }
         for path in &ready.subscribes {
-            self.topics.entry(path.clone()).and_modify(|topic| topic.subscribes = true);
+            self.by_path.entry(path.clone()).and_modify(|topic| topic.subscribes = true);
             if let Some(wire) = wires.find(path) {
                 self.subscribed[wire.index()] = true;
             }
         }
-        if let Some(missing) = wires.iter().find(|&wire| !self.topics.contains_key(wires.path(wire))) {
-            return Err(unknown_topic(wires.path(missing), self.topics.keys()));
+        if let Some(missing) = wires.iter().find(|&wire| !self.by_path.contains_key(wires.path(wire))) {
+            return Err(unknown_topic(wires.path(missing), self.by_path.keys()));
         }
         for wire in wires.iter().filter(|wire| self.subscribed[wire.index()]) {
             relay.subscribed(wire);
@@ -210,35 +225,34 @@ impl Board {
         Ok(())
     }
 
-    /// Takes messages through the relay; what reaches subscribers is put into the outbox.
-    fn publish<R: BufRead>(
+    /// Passes messages through the relay; deliveries to subscribers go to the outbox.
+    pub(super) fn publish(
         &mut self,
         plan: &CampaignPlan,
         now: SimTime,
         messages: &[Message<'_>],
         relay: &mut dyn Exchange,
-        lines: &Lines<R>,
+        line: &Line,
     ) -> Result<(), TransportError> {
         self.published += messages.len() as u64;
         if self.published > STEP_LIMIT {
-            let problem = format!("makes more than {STEP_LIMIT} messages in the step to {now}");
-            return Err(lines.wrong(problem, "end a step with `done`"));
+            let problem = format!("has more than {STEP_LIMIT} messages in the step to {now}");
+            return Err(line.wrong(problem, "end a step with `done`"));
         }
         for Message { topic: path, value } in messages {
-            let Some(topic) = self.topics.get(path.as_ref()).filter(|topic| topic.publishes) else {
+            let Some(topic) = self.by_path.get(path.as_ref()).filter(|topic| topic.publishes) else {
                 let problem = format!("has a message on `{path}`, which the simulator did not say it publishes");
-                return Err(lines.wrong(problem, "list it in `publishes` of `ready`"));
+                return Err(line.wrong(problem, "list it in `publishes` of `ready`"));
             };
             let Some(wire) = topic.wire else {
                 if topic.subscribes {
-                    order::message(&mut self.outbox, path, |out| out.extend_from_slice(value.get().as_bytes()));
+                    request::message(&mut self.outbox, path, |out| out.extend_from_slice(value.get().as_bytes()));
                 }
                 continue;
             };
             let declared = &plan.topic(relay.wires().topic(wire)).ty;
-            let decoded = json::decode(plan, &mut self.shapes, declared, value).map_err(|misfit| {
-                let misfit: Mismatch = misfit;
-                TransportError::WrongType { path: path.as_ref().to_owned(), reason: misfit.to_string() }
+            let decoded = json::decode(plan, &mut self.shapes, declared, value).map_err(|mismatch: Mismatch| {
+                TransportError::WrongType { path: path.as_ref().to_owned(), reason: mismatch.to_string() }
             })?;
             relay.message(now, wire, decoded, &mut self.deliveries);
             self.deliver(relay, Some((wire, value)));
@@ -246,15 +260,15 @@ impl Board {
         Ok(())
     }
 
-    /// Puts the relay's deliveries to subscribers into the outbox. A message that nothing could have touched goes out as
-    /// it came in.
-    fn deliver(&mut self, relay: &dyn Exchange, published: Option<(Wire, &RawValue)>) {
+    /// Puts the relay's deliveries to subscribers into the outbox. A message that no operation intercepts is passed on
+    /// byte for byte.
+    pub(super) fn deliver(&mut self, relay: &dyn Exchange, published: Option<(Wire, &RawValue)>) {
         for Delivery { wire, value } in self.deliveries.drain(..) {
             if !self.subscribed.get(wire.index()).copied().unwrap_or(false) {
                 continue;
             }
             let untouched = published.filter(|&(from, _)| from == wire && !relay.intercepts(wire));
-            order::message(&mut self.outbox, relay.wires().path(wire), |out| match untouched {
+            request::message(&mut self.outbox, relay.wires().path(wire), |out| match untouched {
                 Some((_, raw)) => out.extend_from_slice(raw.get().as_bytes()),
                 None => json::encode(&value, out),
             });

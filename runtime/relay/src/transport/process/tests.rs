@@ -1,4 +1,6 @@
-//! Simulators that are real processes, good and bad ones. They are written in Python.
+//! Simulators that are real processes, correct and faulty ones. They are written in Python.
+
+#![expect(clippy::disallowed_types, reason = "a test that looks for Python starts it")]
 
 use std::path::Path;
 use std::process::Command;
@@ -6,8 +8,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use sesame_base::observation::{Observation, Outcome};
-use sesame_plan::testing::{plan, test_of};
-use sesame_plan::{CampaignPlan, Transport as Declared};
+use sesame_plan::testing::{latency, operation, plan, test_of, use_of};
+use sesame_plan::{CampaignPlan, Choice, Distribution, Drain, Span, Transport as Declared};
 
 use super::*;
 use crate::evaluate::{Custom, evaluate};
@@ -52,9 +54,19 @@ fn plan_of(program: &str, arguments: &[&str]) -> CampaignPlan {
     plan.simulator.transport = Declared::Process {
         program: program.to_owned(),
         arguments: arguments.iter().map(|&argument| argument.to_owned()).collect(),
-        step_ns: 100_000_000,
+        step_ns: Some(100_000_000),
     };
     plan
+}
+
+/// The transport of a plan whose program is stepped.
+fn stepped(plan: &CampaignPlan, folder: PathBuf) -> Process {
+    Process::new(plan, program_of(plan, folder), SimTime::from_nanos(100_000_000))
+}
+
+fn program_of(plan: &CampaignPlan, folder: PathBuf) -> Program {
+    let Declared::Process { program, arguments, .. } = plan.simulator.transport.clone() else { unreachable!() };
+    Program { name: program, arguments, folder, in_runner: false }
 }
 
 fn run(transport: &mut Process, seed: u64) -> Observation {
@@ -76,7 +88,7 @@ fn python_of(program: &str) -> Option<Python> {
     }
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("sim.py"), program.replace("RESETS", "True")).unwrap();
-    let transport = Process::new(&plan_of("python3", &["sim.py"]), folder.path().to_owned(), false);
+    let transport = stepped(&plan_of("python3", &["sim.py"]), folder.path().to_owned());
     Some(Python { folder, transport })
 }
 
@@ -98,13 +110,9 @@ fn a_run_goes_to_its_end_with_every_message_delivered_in_its_step() {
     assert_eq!(observation.metrics[1].value, Some(20.0));
 }
 
-#[test]
-fn the_example_of_the_documentation_is_a_simulator() {
-    if !python() {
-        return;
-    }
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/transport/process");
-    let mut plan = plan_of("python3", &["minimal.py"]);
+/// The plan of the examples of the documentation.
+fn cart(program: &str) -> CampaignPlan {
+    let mut plan = plan_of("python3", &[program]);
     plan.topics.truncate(1);
     plan.topics[0].paths = vec!["cart/target".to_owned()];
     plan.topics.push(plan.topics[0].clone());
@@ -112,12 +120,39 @@ fn the_example_of_the_documentation_is_a_simulator() {
     plan.metrics[1].source = sesame_plan::MetricSource::Last {
         input: sesame_plan::FieldRef { topic: sesame_plan::TopicId(1), path: vec![] },
     };
-    let mut transport = Process::new(&plan, folder, false);
+    plan
+}
+
+#[test]
+fn the_example_of_the_documentation_is_a_simulator() {
+    if !python() {
+        return;
+    }
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/transport/process");
+    let plan = cart("minimal.py");
+    let mut transport = stepped(&plan, folder);
     let first = run(&mut transport, 1);
     assert_eq!(first.outcome, Outcome::Completed);
     let position = (0..10).fold(0.0, |position: f64, _| position + (1.0 - position) * 0.1);
     assert_eq!(first.metrics[1].value, Some(position));
     assert_eq!(run(&mut transport, 1).metrics, first.metrics, "it begins anew");
+}
+
+#[test]
+fn the_free_running_example_of_the_documentation_is_a_simulator() {
+    if !python() {
+        return;
+    }
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/transport/process");
+    let plan = cart("free_running.py");
+    let mut transport = FreeRunning::new(&plan, program_of(&plan, folder));
+    let wires = WireTable::new(&plan);
+    let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+    let observed =
+        evaluate(&plan, &wires, &metrics, &mut transport, &test_of(Vec::new()), 1, &mut Custom::none()).unwrap();
+    assert_eq!((observed.outcome, observed.end), (Outcome::Completed, 1.0));
+    let position = observed.metrics[1].value.unwrap();
+    assert!(0.0 < position && position < 0.8, "{position}");
 }
 
 #[test]
@@ -157,7 +192,7 @@ fn a_simulator_that_closes_its_output_and_stays_is_ended() {
     let step = "    import os, time\n    os.close(1)\n    time.sleep(1000)";
     let Some(crash) = crash(step) else { return };
     assert!(
-        crash.contains("closed its standard output, but did not end, while the end of its step to 0.100 s"),
+        crash.contains("closed its standard output, but did not exit, while the end of its step to 0.100 s"),
         "{crash}"
     );
 }
@@ -179,8 +214,8 @@ fn a_simulator_that_ends_has_ended_even_if_a_child_holds_its_output() {
     let Some(crash) = crash(step) else { return };
     assert_eq!(
         crash,
-        "the simulator `python3 sim.py` ended (exit status: 3) while the end of its step to 0.100 s was awaited; its last \
-         words:\nthe last words"
+        "the simulator `python3 sim.py` ended (exit status: 3) while the end of its step to 0.100 s was awaited; the last \
+         lines of its standard error:\nthe last words"
     );
     assert!(started.elapsed() < Duration::from_secs(60), "and not only when the child ends");
 }
@@ -192,12 +227,13 @@ fn that_a_simulator_was_killed_is_told_apart_from_other_ends() {
         let step = format!("    import os, signal\n    os.kill(os.getpid(), signal.{signal})");
         let Some(mut python) = python_of(&format!("{FRAME}{step}")) else { return };
         assert!(matches!(run(&mut python.transport, 1).outcome, Outcome::Crash { .. }));
-        assert_eq!(python.transport.aside(), Aside { killed, notes: Vec::new() });
-        assert_eq!(python.transport.aside(), Aside::default(), "it is said once");
+        assert_eq!(python.transport.incidents(), Incidents { killed, notes: Vec::new() });
+        assert_eq!(python.transport.incidents(), Incidents::default(), "it is reported once");
     }
 }
 
-/// Runs a simulator three times that does this at the end of its first run; the crashes, and what is noted of the others.
+/// Runs a simulator three times that does this at the end of its first run; the crashes, and what is noted of the
+/// others.
 fn after_the_last_answer(what: &str) -> Option<(Vec<Option<String>>, Vec<String>)> {
     let program = format!(
         "from time import sleep\n{}",
@@ -212,7 +248,7 @@ fn after_the_last_answer(what: &str) -> Option<(Vec<Option<String>>, Vec<String>
         let outcome = run(&mut python.transport, seed).outcome;
         // What it says late has come by then.
         std::thread::sleep(Duration::from_millis(500));
-        notes.extend(python.transport.aside().notes);
+        notes.extend(python.transport.incidents().notes);
         match outcome {
             Outcome::Crash { message } => Some(message),
             Outcome::Completed => None,
@@ -234,7 +270,7 @@ fn an_answer_too_many_is_the_crash_of_its_own_run_and_no_fault_of_the_next() {
 
 #[test]
 fn what_a_simulator_does_between_two_runs_is_noted_and_the_next_begins_with_a_new_process() {
-    let before = "the simulator was started anew before this test, for what it did after the one before: ";
+    let before = "the simulator was restarted before this test, because of a fault after the previous one: ";
     for (what, noted) in [
         ("sleep(0.3); say({'done': {}})", "comes after everything was answered"),
         (
@@ -255,7 +291,7 @@ fn what_a_simulator_does_between_two_runs_is_noted_and_the_next_begins_with_a_ne
 fn a_program_that_is_not_there_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let start = |program: &str, folder: &Path| {
-        let mut transport = Process::new(&plan_of(program, &["a b", "c"]), folder.to_owned(), false);
+        let mut transport = stepped(&plan_of(program, &["a b", "c"]), folder.to_owned());
         match run(&mut transport, 1).outcome {
             Outcome::Crash { message } => message.replace(&*folder.to_string_lossy(), "FOLDER"),
             other => panic!("{other:?} is no crash"),
@@ -317,4 +353,132 @@ fn connections_of_several_threads_do_not_meet() {
         .collect();
     let values: Vec<_> = threads.into_iter().map(|thread| thread.join().unwrap()).collect();
     assert_eq!(values, [Some(10.0), Some(11.0), Some(12.0)]);
+}
+
+/// A simulator that runs freely and does this after its answer to `reset`, in a run of at most an hour in which `lag`
+/// holds commands back for 0.3 s; what its run showed.
+fn free_running(ready: &str, after: &str) -> Option<(Observation, f64)> {
+    if !python() {
+        return None;
+    }
+    let program = format!(
+        r#"
+import json, sys
+def say(what): print(json.dumps(what), flush=True)
+def command(value): say({{"publish": [{{"topic": "arm/command", "value": value}}]}})
+def hear(): return json.loads(sys.stdin.readline())
+TOPICS = ["arm/command", "zones/Z1", "zones/Z2"]
+reset = hear()["reset"]
+assert "step" not in reset, reset
+say({{"ready": {{"publishes": TOPICS, "subscribes": TOPICS {ready}}}}})
+{after}
+"#
+    );
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("sim.py"), program).unwrap();
+    let mut plan = plan_of("python3", &["sim.py"]);
+    plan.campaign.end_after = 3600.0;
+    plan.operations = vec![operation(0, latency(Distribution::Fixed, Drain::Finish))];
+    plan.operations[0].within = Span { start: 0.0, end: 3600.0 };
+    let Declared::Process { step_ns, .. } = &mut plan.simulator.transport else { unreachable!() };
+    *step_ns = None;
+    let mut transport = transport(&plan, folder.path().to_owned(), false);
+    assert!(!transport.capabilities().lock_stepped);
+    let wires = WireTable::new(&plan);
+    let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+    let test = test_of(vec![use_of(0, 0.0, 3600.0, vec![Choice::Value { value: 0.3 }], 1)]);
+    let started = Instant::now();
+    let observed = evaluate(&plan, &wires, &metrics, transport.as_mut(), &test, 1, &mut Custom::none()).unwrap();
+    Some((observed, started.elapsed().as_secs_f64()))
+}
+
+#[test]
+fn a_held_message_reaches_a_silent_free_running_simulator_when_it_is_due() {
+    let after = r#"
+command(1.5)
+assert hear() == {"deliver": [{"topic": "arm/command", "value": 1.5}]}
+say({"done": {"ended": True}})
+sys.stdin.readline()
+"#;
+    let Some((observed, took)) = free_running("", after) else { return };
+    assert_eq!(observed.outcome, Outcome::Completed);
+    assert!((0.3..60.0).contains(&observed.end) && took < 60.0, "it ended at {} s, after {took} s", observed.end);
+    assert_eq!(observed.operations[0].counters.delayed, 1);
+}
+
+#[test]
+fn a_free_running_simulator_may_have_a_clock_of_its_own() {
+    // An hour of simulation in a moment: held messages come when the simulator's clock has come so far.
+    let after = r#"
+heard = []
+for step in range(1, 36001):
+    say({"time": step / 10})
+    if step == 1: command(7.0)
+    if step == 3 or step == 4: say({"publish": [{"topic": "zones/Z1", "value": {"level": 1.0, "count": step}}]})
+    if step == 3: heard += hear()["deliver"]
+    if step == 4: heard += hear()["deliver"] + hear()["deliver"]
+topics = [message["topic"] for message in heard]
+assert topics == ["zones/Z1", "arm/command", "zones/Z1"], topics
+command(8.0)
+sys.stdin.readline()
+"#;
+    let Some((observed, took)) = free_running(r#", "clock": True"#, after) else { return };
+    assert_eq!(observed.outcome, Outcome::Completed);
+    assert!(took < 120.0, "{took} s");
+    assert_eq!(observed.end, 3600.0);
+    assert_eq!(observed.metrics[1].series, [(0.1, 7.0)]);
+}
+
+#[test]
+fn what_a_free_running_simulator_does_wrong_is_reported_with_a_remedy() {
+    let mut reported = Vec::new();
+    for (ready, after) in [
+        ("", "say({'time': 1.0})"),
+        (", 'clock': True", "say({'time': 1.0})\nsay({'time': 0.5})"),
+        ("", "say({'done': {}})"),
+        ("", "say({'ready': {}})"),
+        ("", "say({'failed': 'the map is missing'})"),
+        ("", "print('Loading map', flush=True)"),
+        ("", "sys.exit(3)"),
+    ] {
+        let Some((observed, _)) = free_running(ready, after) else { return };
+        match observed.outcome {
+            Outcome::Crash { message } => reported.push(message),
+            other => panic!("{after}: {other:?}"),
+        }
+    }
+    insta::assert_snapshot!(reported.join("\n"));
+}
+
+#[test]
+fn a_free_running_simulator_that_resets_is_started_once_and_its_late_messages_are_discarded() {
+    if !python() {
+        return;
+    }
+    let program = r#"
+import json, sys
+def say(what): print(json.dumps(what), flush=True)
+open("starts", "a").write("x")
+TOPICS = ["arm/command", "zones/Z1", "zones/Z2"]
+for line in sys.stdin:
+    request = json.loads(line)
+    if "reset" in request:
+        say({"ready": {"publishes": TOPICS, "subscribes": TOPICS, "resets": True, "clock": True}})
+        say({"publish": [{"topic": "arm/command", "value": request["reset"]["seed"]}]})
+        say({"time": 2.0})
+        say({"publish": [{"topic": "arm/command", "value": 99}]})
+"#;
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("sim.py"), program).unwrap();
+    let plan = plan_of("python3", &["sim.py"]);
+    let mut transport = FreeRunning::new(&plan, program_of(&plan, folder.path().to_owned()));
+    let wires = WireTable::new(&plan);
+    let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+    for seed in [3, 4] {
+        let observed =
+            evaluate(&plan, &wires, &metrics, &mut transport, &test_of(Vec::new()), seed, &mut Custom::none()).unwrap();
+        assert_eq!((observed.outcome, observed.end), (Outcome::Completed, 1.0));
+        assert_eq!(observed.metrics[1].series, [(0.0, seed as f64)]);
+    }
+    assert_eq!(std::fs::read(folder.path().join("starts")).unwrap(), b"x");
 }

@@ -1,5 +1,7 @@
 //! The page, as a browser and any XML parser see it.
 
+#![expect(clippy::disallowed_types, reason = "starts a browser")]
+
 use sha2::Digest as _;
 
 use super::*;

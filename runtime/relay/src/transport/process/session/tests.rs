@@ -208,7 +208,7 @@ fn text_that_is_not_utf8_is_named() {
 fn a_simulator_that_is_gone_is_told_from_one_that_is_wrong() {
     for said in ["", &READY[..20], &format!("{READY}\n"), &format!("{READY}\n{{\"done\":")] {
         let talk = talk_about(Vec::new(), &test_of(Vec::new()), 1, said);
-        assert!(matches!(talk.end, Err(Fault::Gone(_))), "{said}: {:?}", talk.end);
+        assert!(matches!(talk.end, Err(Fault::Disconnected(_))), "{said}: {:?}", talk.end);
     }
 }
 

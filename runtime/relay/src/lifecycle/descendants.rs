@@ -1,15 +1,15 @@
-//! Processes that a process started, with all that these started in turn, and how they are ended.
+//! Processes that a process started, directly and indirectly, and how they are ended.
 //!
-//! A group of processes holds only those that stay in it: whoever calls `setsid` leaves it, and a process whose parent ends
-//! is no longer below those who started it. On Linux this process can ask to become the parent of such orphans, so
-//! that it finds everything: by walking `/proc`. On other systems nothing is found here, and groups have to do.
+//! A process group contains only the processes that stay in it: one that calls `setsid` leaves it, and a process whose
+//! parent ends is no longer below its grandparent. On Linux this process can become the parent of such orphans, so that
+//! it finds all of them by walking `/proc`. On other systems nothing is found here, and only groups can be ended.
 
 use std::time::{Duration, Instant};
 
-/// How long processes that were sent `SIGKILL` may take to be gone. Only one that the system itself holds takes longer.
+/// How long processes may take to end after `SIGKILL`. It takes longer only if the system itself blocks the process.
 const GONE_LIMIT: Duration = Duration::from_secs(5);
 
-/// A process: its id, and when it started, since ids are used again.
+/// A process: its id and its start time, since ids are reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Process {
     id: u32,
@@ -24,7 +24,8 @@ impl Process {
     }
 }
 
-/// Makes this process the parent of all processes below it whose own parent ends. Says whether the system can do that.
+/// Makes this process the parent of all processes below it whose own parent ends. Returns whether the system supports
+/// this.
 pub fn adopt_orphans() -> bool {
     #[cfg(target_os = "linux")]
     {
@@ -36,7 +37,8 @@ pub fn adopt_orphans() -> bool {
     }
 }
 
-/// The children of this process that are not its own, which is to say that it adopted, with all below them.
+/// The children that this process adopted, with all processes below them. Children for which `is_own` holds are those
+/// that it started itself.
 pub fn adopted(is_own: impl Fn(u32) -> bool) -> Vec<Process> {
     #[cfg(target_os = "linux")]
     {
@@ -49,10 +51,9 @@ pub fn adopted(is_own: impl Fn(u32) -> bool) -> Vec<Process> {
     }
 }
 
-/// Waits until all these processes have ended, at most for this long; then ends those that live, all below them, and all
-/// in groups and sessions that they lead. Comes back when none is left, and says how many are: those that the system
-/// does not let go, or does not let us end. Those of them whose parent is this process are reaped, so none of them may be
-/// one that is waited for elsewhere.
+/// Waits up to `patience` until all these processes have ended; then ends the remaining ones, all processes below them,
+/// and all in groups and sessions that they lead. Returns how many remain: processes that the system blocks, or does
+/// not permit us to end. Children of this process among them are reaped, so no other code may wait for them.
 fn end(processes: Vec<Process>, patience: Duration) -> usize {
     #[cfg(target_os = "linux")]
     {
@@ -65,7 +66,7 @@ fn end(processes: Vec<Process>, patience: Duration) -> usize {
     }
 }
 
-/// Ends what [`adopted`] finds until there is nothing to be found, as [`end`] does; says how many are left.
+/// Ends the processes that [`adopted`] finds, as [`end`] does, until there are none; returns how many remain.
 pub fn end_adopted(is_own: impl Fn(u32) -> bool, patience: Duration) -> usize {
     let started = Instant::now();
     loop {
@@ -90,13 +91,13 @@ mod linux {
 
     use super::{GONE_LIMIT, Process};
 
-    /// What `/proc` says of a process.
+    /// A process as `/proc` describes it.
     pub(super) struct Entry {
         process: Process,
         parent: u32,
         group: u32,
         session: u32,
-        lives: bool,
+        is_alive: bool,
     }
 
     /// All processes that can be seen.
@@ -107,7 +108,7 @@ mod linux {
     }
 
     fn entry(id: u32) -> Option<Entry> {
-        // A process may have any name, with blanks and brackets and what is not UTF-8 in it.
+        // The name of a process may contain spaces, parentheses, and bytes that are not UTF-8.
         let stat = fs::read(format!("/proc/{id}/stat")).ok()?;
         let after_name = stat.iter().rposition(|&byte| byte == b')')? + 1;
         let fields = String::from_utf8_lossy(&stat[after_name..]).into_owned();
@@ -118,11 +119,11 @@ mod linux {
             parent: number(1)?,
             group: number(2)?,
             session: number(3)?,
-            lives: !matches!(*fields.first()?, "Z" | "X" | "x"),
+            is_alive: !matches!(*fields.first()?, "Z" | "X" | "x"),
         })
     }
 
-    /// Those alive below these.
+    /// The living processes below these.
     pub(super) fn below(all: &[Entry], mut known: Vec<u32>) -> Vec<Process> {
         let mut found = Vec::new();
         let mut at = 0;
@@ -133,7 +134,7 @@ mod linux {
                     continue;
                 }
                 known.push(entry.process.id);
-                if entry.lives {
+                if entry.is_alive {
                     found.push(entry.process);
                 }
             }
@@ -144,7 +145,7 @@ mod linux {
     pub(super) fn adopted(is_own: impl Fn(u32) -> bool) -> Vec<Process> {
         let this = std::process::id();
         let all = all();
-        // Also what has ended is to be reaped.
+        // Ended ones are included, since they have to be reaped.
         let children = all.iter().filter(|entry| entry.parent == this && !is_own(entry.process.id));
         let mut found: Vec<Process> = children.map(|entry| entry.process).collect();
         let deeper = below(&all, found.iter().map(|process| process.id).collect());
@@ -166,16 +167,16 @@ mod linux {
             let mut left = 0;
             for entry in all.iter().filter(|entry| wanted.contains(&entry.process)) {
                 let Some(id) = Pid::from_raw(entry.process.id.cast_signed()) else { continue };
-                if kill && entry.lives {
-                    // It may have ended just now, which is what is wanted.
+                if kill && entry.is_alive {
+                    // An error means that it has just ended.
                     kill_process(id, Signal::KILL).ok();
                 }
                 if entry.parent == this {
-                    // One that lives yet is reaped in another round.
+                    // One that is still alive is reaped in a later round.
                     let reaped = waitpid(Some(id), WaitOptions::NOHANG);
                     left += usize::from(!matches!(reaped, Ok(Some(_)) | Err(rustix::io::Errno::CHILD)));
                 } else {
-                    left += usize::from(entry.lives);
+                    left += usize::from(entry.is_alive);
                 }
             }
             if left == 0 || started.elapsed() >= patience + GONE_LIMIT {
@@ -186,7 +187,7 @@ mod linux {
         }
     }
 
-    /// Adds what is below the wanted ones, and in groups and sessions that one of them leads.
+    /// Adds the processes below the wanted ones, and those in groups and sessions that one of them leads.
     fn widen(wanted: &mut BTreeSet<Process>, all: &[Entry], this: u32) {
         let leaders: BTreeSet<u32> = wanted.iter().map(|process| process.id).collect();
         let led = |entry: &&Entry| leaders.contains(&entry.group) || leaders.contains(&entry.session);
@@ -212,7 +213,7 @@ mod tests {
     struct Shell(Child);
 
     impl Shell {
-        fn of(starts: &str) -> Shell {
+        fn new(starts: &str) -> Shell {
             let script = format!("{starts}\necho ready\nread _");
             let mut command = Command::new("sh");
             let command = command.args(["-c", &script]).stdin(Stdio::piped()).stdout(Stdio::piped());
@@ -237,27 +238,27 @@ mod tests {
     }
 
     #[test]
-    fn all_below_a_process_are_found_and_ended_also_in_sessions_of_their_own() {
-        let shell = Shell::of("sleep 1001 &\nsetsid sleep 1002 &\nsh -c 'sleep 1003 & sleep 1004' &\nsleep 0.3");
+    fn all_descendants_are_found_and_ended_even_in_sessions_of_their_own() {
+        let shell = Shell::new("sleep 1001 &\nsetsid sleep 1002 &\nsh -c 'sleep 1003 & sleep 1004' &\nsleep 0.3");
         let found = shell.below();
-        assert_eq!(found.len(), 5, "four sleep, and there is the inner shell: {found:?}");
+        assert_eq!(found.len(), 5, "four sleeping processes and the inner shell: {found:?}");
         assert!(!found.iter().any(|process| process.id == shell.0.id()));
         assert_eq!(end(found, Duration::ZERO), 0);
         assert_eq!(shell.below(), []);
     }
 
     #[test]
-    fn what_ends_in_its_time_is_not_killed() {
+    fn a_process_that_ends_in_time_is_not_killed() {
         let folder = tempfile::tempdir().unwrap();
         let ended = folder.path().join("ended");
-        let shell = Shell::of(&format!("(sleep 0.2; echo yes > '{}') &", ended.display()));
+        let shell = Shell::new(&format!("(sleep 0.2; echo yes > '{}') &", ended.display()));
         assert_eq!(end(shell.below(), Duration::from_secs(20)), 0);
         assert_eq!(std::fs::read_to_string(ended).unwrap(), "yes\n");
     }
 
     #[test]
-    fn a_process_that_has_the_id_of_one_that_ended_is_another() {
-        let shell = Shell::of("sleep 1000 &");
+    fn a_process_with_the_reused_id_of_an_ended_one_is_not_ended() {
+        let shell = Shell::new("sleep 1000 &");
         let found = shell.below();
         assert_eq!(found.len(), 1);
         let stale = found.iter().map(|process| Process { started: process.started - 1, ..*process }).collect();

@@ -1,8 +1,8 @@
-//! The simulator's process: started without a shell in a group of its own, and ended with all it started.
+//! A program: started without a shell in a process group of its own, and ended with everything it started.
 //!
-//! However it comes to its end, its input is closed first, and it has [`END_LIMIT`] to end by itself. What it leaves behind
-//! when it ends is ended at once: so nobody is left who holds its output open, and the end of the output tells the end of
-//! the process. On Linux its [keeper](super::keeper) sees to all that, also when the worker is gone.
+//! In every case its input is closed first, and it has [`END_LIMIT`] to exit by itself. Everything that it leaves
+//! behind when it exits is ended at once, so no process holds its output open, and the end of the output means the end
+//! of the program. On Linux its [keeper](super::keeper) does this, even after the worker has ended.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -12,39 +12,38 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
 use std::thread;
 use std::time::Duration;
 
-use crate::process_group;
-use crate::transport::TransportError;
 #[cfg(target_os = "linux")]
-use crate::transport::process::keeper::Report;
-use crate::transport::process::words::LastWords;
+use crate::lifecycle::keeper::Report;
+use crate::lifecycle::process_group;
+use crate::lifecycle::stderr::StderrTail;
 
-/// How long a simulator whose input is closed may take to end by itself.
+/// How long a program whose input is closed may take to exit by itself.
 pub(super) const END_LIMIT: Duration = Duration::from_secs(1);
 
-/// How long a keeper may take beyond that to end what the simulator started, and then itself.
+/// How much longer a keeper may take to end everything that the program started, and then itself.
 #[cfg(target_os = "linux")]
 const KEEPER_LIMIT: Duration = Duration::from_secs(7);
 
-/// The simulators of this process that may be alive.
-static RUNNING: Mutex<Vec<Weak<Held>>> = Mutex::new(Vec::new());
+/// The programs started by this process that may be alive.
+static RUNNING: Mutex<Vec<Weak<Handle>>> = Mutex::new(Vec::new());
 
-/// A program that is a simulator.
+/// A program that can be started.
 #[derive(Debug, Clone)]
-pub(super) struct Program {
+pub(crate) struct Program {
     /// A name on `PATH`, or a path relative to the folder.
-    pub(super) name: String,
+    pub(crate) name: String,
     /// Its arguments.
-    pub(super) arguments: Vec<String>,
+    pub(crate) arguments: Vec<String>,
     /// The folder it runs in.
-    pub(super) folder: PathBuf,
-    /// Whether the program of this process is a runner, which can keep watch over the simulator.
-    #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux ends a process with another"))]
-    pub(super) in_runner: bool,
+    pub(crate) folder: PathBuf,
+    /// Whether this process is a runner, whose executable can be the keeper.
+    #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux has keepers"))]
+    pub(crate) in_runner: bool,
 }
 
 impl Program {
     /// The program with its arguments, for messages.
-    pub(super) fn shown(&self) -> String {
+    pub(crate) fn shown(&self) -> String {
         self.arguments.iter().fold(self.name.clone(), |mut shown, argument| {
             let plain = !argument.is_empty() && !argument.contains(|c: char| c.is_whitespace() || c.is_control());
             let written =
@@ -55,20 +54,14 @@ impl Program {
     }
 
     /// Starts it.
-    pub(super) fn start(&self) -> Result<(Running, Input, ChildStdout), TransportError> {
-        let failed = |error: &io::Error| TransportError::NotStarted {
-            command: self.shown(),
-            folder: self.folder.clone(),
-            reason: reason(error),
-        };
+    pub(crate) fn start(&self) -> Result<(Running, Input, ChildStdout), StartError> {
+        let refused = |reason| StartError { command: self.shown(), folder: self.folder.clone(), reason };
+        let failed = |error: &io::Error| refused(reason(error));
         if !self.folder.is_dir() {
-            return Err(TransportError::NotStarted {
-                command: self.shown(),
-                folder: self.folder.clone(),
-                reason: "there is no such folder; if the space has moved, run `sesamec generate` again".to_owned(),
-            });
+            let reason = "there is no such folder; if the space has moved, run `sesamec generate` again";
+            return Err(refused(reason.to_owned()));
         }
-        // The folder that a worker has for itself is where it runs; the simulator runs beside its space.
+        // A worker runs in its own folder; the program runs beside the space.
         let own_folder = std::env::current_dir().map_err(|error| failed(&error))?;
         let (mut command, keeper) = self.command().map_err(|error| failed(&error))?;
         process_group::own(&mut command);
@@ -83,12 +76,12 @@ impl Program {
             .map_err(|error| failed(&error))?;
         let input = child.stdin.take().expect("it is piped");
         let output = child.stdout.take().expect("it is piped");
-        let words = LastWords::listen(child.stderr.take().expect("it is piped"));
-        let held = Held::new(child, input, keeper.is_some());
-        Ok((Running { held: Arc::clone(&held), words, keeper }, Input(held), output))
+        let stderr = StderrTail::capture(child.stderr.take().expect("it is piped"));
+        let handle = Handle::new(child, input, keeper.is_some());
+        Ok((Running { handle: Arc::clone(&handle), stderr, keeper }, Input(handle), output))
     }
 
-    /// The program's path: what has a folder in it is relative to ours, everything else is looked up.
+    /// The program's path: a path with a folder is relative to the program's folder, a name is looked up on `PATH`.
     fn path(&self) -> PathBuf {
         if self.name.contains(std::path::is_separator) {
             self.folder.join(&self.name)
@@ -97,14 +90,14 @@ impl Program {
         }
     }
 
-    /// The command that starts it, and where its keeper will report if it has one.
+    /// The command that starts it, and where its keeper reports, if it has one.
     #[cfg(target_os = "linux")]
     fn command(&self) -> io::Result<(Command, Option<Report>)> {
         if !self.in_runner {
             return Ok((plain(self), None));
         }
-        // If the keeper is killed, what it kept becomes ours.
-        crate::descendants::adopt_orphans();
+        // If the keeper is killed, this process becomes the parent of its children.
+        crate::lifecycle::descendants::adopt_orphans();
         let report = Report::new()?;
         let mut command = super::keeper::command(&report);
         command.arg(self.path()).args(&self.arguments);
@@ -117,7 +110,7 @@ impl Program {
     }
 }
 
-/// Nobody keeps a simulator here, so nobody reports.
+/// There are no keepers here.
 #[cfg(not(target_os = "linux"))]
 enum Report {}
 
@@ -127,7 +120,18 @@ fn plain(program: &Program) -> Command {
     command
 }
 
-/// Why a program does not start, in words.
+/// Why a program cannot be started.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct StartError {
+    /// The program with its arguments.
+    pub(crate) command: String,
+    /// The folder it was to run in.
+    pub(crate) folder: PathBuf,
+    /// The reason, in words for the user.
+    pub(crate) reason: String,
+}
+
+/// Why a program does not start, in words for the user.
 pub(super) fn reason(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "there is no such program; install it, or give its path".to_owned(),
@@ -136,22 +140,22 @@ pub(super) fn reason(error: &io::Error) -> String {
     }
 }
 
-/// Ends all simulators of this process with all that they started, whatever they do: as when each is closed, but from
-/// any thread, and also while another talks to them.
-pub fn end_simulators() {
-    let running: Vec<Arc<Held>> = lock(&RUNNING).iter().filter_map(Weak::upgrade).collect();
-    // First of all, so that they end side by side.
-    let closed: Vec<bool> = running.iter().map(|held| held.try_close_input()).collect();
-    for (held, closed) in running.iter().zip(closed) {
+/// Ends all programs that this process started, with everything they started. It does the same as closing each of them,
+/// but may be called from any thread, even while another one communicates with them.
+pub(crate) fn end_programs() {
+    let running: Vec<Arc<Handle>> = lock(&RUNNING).iter().filter_map(Weak::upgrade).collect();
+    // All inputs are closed first, so that the programs exit at the same time.
+    let closed: Vec<bool> = running.iter().map(|handle| handle.try_close_input()).collect();
+    for (handle, closed) in running.iter().zip(closed) {
         if closed {
-            held.wait();
+            handle.wait();
         }
-        held.end();
+        handle.end();
     }
 }
 
-/// The way to a simulator's standard input. Dropping it closes the input.
-pub(super) struct Input(Arc<Held>);
+/// A program's standard input. Dropping it closes the input.
+pub(crate) struct Input(Arc<Handle>);
 
 impl Write for Input {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
@@ -172,43 +176,43 @@ impl Drop for Input {
     }
 }
 
-/// What became of a simulator.
-pub(super) struct PostMortem {
-    /// How it ended, as a phrase.
-    pub(super) how: String,
+/// How a program ended.
+pub(crate) struct PostMortem {
+    /// The way it ended, as a phrase.
+    pub(crate) how: String,
     /// The last lines of its standard error.
-    pub(super) last_words: String,
-    /// Whether it was killed, and not by us.
-    pub(super) killed: bool,
+    pub(crate) last_lines: String,
+    /// Whether it was killed by another process or the system.
+    pub(crate) killed: bool,
 }
 
-/// A simulator's process. Dropping it ends the process and all that it started; its input must be closed by then, or it
-/// is not given the time to end by itself.
-pub(super) struct Running {
-    held: Arc<Held>,
-    words: LastWords,
+/// A program that was started. Dropping it ends the program and everything it started. Close its input first; otherwise
+/// the program has no time to exit by itself.
+pub(crate) struct Running {
+    handle: Arc<Handle>,
+    stderr: StderrTail,
     #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux has keepers"))]
     keeper: Option<Report>,
 }
 
 impl Running {
-    /// What became of a process that closed its output. Its input must be closed.
-    pub(super) fn post_mortem(mut self) -> PostMortem {
-        let in_time = self.held.wait();
-        let status = self.held.end();
+    /// How a program ended that has closed its output. Its input must be closed.
+    pub(crate) fn post_mortem(mut self) -> PostMortem {
+        let in_time = self.handle.wait();
+        let status = self.handle.end();
         let (how, killed) = match self.ended_by_itself(status.filter(|_| in_time)) {
             Some(status) => (format!("ended ({status})"), process_group::was_killed(status)),
-            None => ("closed its standard output, but did not end,".to_owned(), false),
+            None => ("closed its standard output, but did not exit,".to_owned(), false),
         };
-        PostMortem { how, last_words: self.words.take(), killed }
+        PostMortem { how, last_lines: self.stderr.last_lines(), killed }
     }
 
-    /// A new test begins: forgets what was said on standard error so far.
-    pub(super) fn forget_words(&mut self) {
-        self.words.forget();
+    /// A new test begins: forgets everything written to standard error so far.
+    pub(crate) fn clear_stderr(&mut self) {
+        self.stderr.clear();
     }
 
-    /// The status of a simulator that ended by itself. The keeper knows more than its own status says.
+    /// The status of a program that exited by itself, as its keeper reports it, if there is one.
     fn ended_by_itself(&mut self, status: Option<ExitStatus>) -> Option<ExitStatus> {
         #[cfg(target_os = "linux")]
         if let Some(report) = self.keeper.take() {
@@ -220,19 +224,19 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        if lock(&self.held.input).is_none() {
-            self.held.wait();
+        if lock(&self.handle.input).is_none() {
+            self.handle.wait();
         }
-        self.held.end();
+        self.handle.end();
     }
 }
 
-/// A process, or its keeper, that several threads hold.
-struct Held {
+/// A process, or its keeper, shared between threads.
+struct Handle {
     id: u32,
     #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux has keepers"))]
     kept: bool,
-    /// Locked while a line is written, which may take as long as nobody reads it.
+    /// Locked while a line is written, which blocks until the program reads it.
     input: Mutex<Option<ChildStdin>>,
     process: Mutex<Process>,
     ended: Condvar,
@@ -240,15 +244,15 @@ struct Held {
 
 struct Process {
     child: Child,
-    /// It has ended, and nothing of it is left.
+    /// It has ended, and so has everything it left behind.
     ended: bool,
-    /// It is reaped: from then on its id may be another's.
+    /// Its status, once it is reaped: from then on its id may be reused.
     status: Option<ExitStatus>,
 }
 
-impl Held {
-    fn new(child: Child, input: ChildStdin, kept: bool) -> Arc<Held> {
-        let held = Arc::new(Held {
+impl Handle {
+    fn new(child: Child, input: ChildStdin, kept: bool) -> Arc<Handle> {
+        let handle = Arc::new(Handle {
             id: child.id(),
             kept,
             input: Mutex::new(Some(input)),
@@ -256,19 +260,19 @@ impl Held {
             ended: Condvar::new(),
         });
         let mut running = lock(&RUNNING);
-        running.retain(|held| held.strong_count() > 0);
-        running.push(Arc::downgrade(&held));
+        running.retain(|handle| handle.strong_count() > 0);
+        running.push(Arc::downgrade(&handle));
         drop(running);
-        let watched = Arc::clone(&held);
+        let watched = Arc::clone(&handle);
         thread::spawn(move || watched.watch());
-        held
+        handle
     }
 
-    /// Waits for the process to end, and ends what it leaves behind.
+    /// Waits for the process to end, and ends everything it leaves behind.
     fn watch(&self) {
-        let killed = end::wait_for_end(self);
+        let killed = self.wait_for_end();
         let mut process = lock(&self.process);
-        // Whoever reaped it has ended the rest too.
+        // The thread that reaped it has ended the rest too.
         let reaped = process.status.is_some();
         if !reaped {
             process_group::kill(&mut process.child);
@@ -281,7 +285,7 @@ impl Held {
         self.ended.notify_all();
     }
 
-    /// Waits for the process, whose input is closed, to end by itself; says whether it did within the time it has.
+    /// Waits for the process, whose input is closed, to exit by itself; returns whether it did so in time.
     fn wait(&self) -> bool {
         let process = lock(&self.process);
         let running = |process: &mut Process| !process.ended && process.status.is_none();
@@ -298,7 +302,7 @@ impl Held {
         END_LIMIT
     }
 
-    /// Ends the process and all that it started, at once.
+    /// Ends the process and everything it started, at once.
     fn end(&self) -> Option<ExitStatus> {
         let mut process = lock(&self.process);
         if process.status.is_none() {
@@ -315,17 +319,20 @@ impl Held {
         process.status
     }
 
-    /// What a keeper leaves behind that is killed itself has become ours. Other children of a worker, which hooks start,
-    /// are in its own group.
+    /// Ends the processes that a killed keeper left behind: this process is now their parent. Other children of a
+    /// worker, started by hooks, are in the worker's own group.
     fn end_orphans(&self) {
         #[cfg(target_os = "linux")]
         if self.kept {
-            let own: Vec<u32> = lock(&RUNNING).iter().filter_map(Weak::upgrade).map(|held| held.id).collect();
-            crate::descendants::end_adopted(|id| own.contains(&id) || process_group::is_ours(id), Duration::ZERO);
+            let own: Vec<u32> = lock(&RUNNING).iter().filter_map(Weak::upgrade).map(|handle| handle.id).collect();
+            crate::lifecycle::descendants::end_adopted(
+                |id| own.contains(&id) || process_group::is_ours(id),
+                Duration::ZERO,
+            );
         }
     }
 
-    /// Closes the input unless a line is just being written.
+    /// Closes the input, unless a line is being written at the moment.
     fn try_close_input(&self) -> bool {
         match self.input.try_lock() {
             Ok(mut input) => {
@@ -335,25 +342,15 @@ impl Held {
             Err(_) => false,
         }
     }
-}
 
-/// Nothing that is locked here is left half done by a panic.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
+    /// Waits until the process has ended, and returns whether a signal ended it. The process is not reaped, so its id
+    /// is not reused.
+    #[cfg(unix)]
+    fn wait_for_end(&self) -> bool {
+        use rustix::io::Errno;
+        use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
 
-/// How the end of a process is awaited without reaping it.
-#[cfg(unix)]
-mod end {
-    use rustix::io::Errno;
-    use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
-
-    use super::Held;
-
-    /// Waits until the process has ended, and says whether a signal ended it. It is not reaped, so that its id is given to
-    /// no other.
-    pub(super) fn wait_for_end(held: &Held) -> bool {
-        let Some(id) = Pid::from_raw(held.id.cast_signed()) else { return true };
+        let Some(id) = Pid::from_raw(self.id.cast_signed()) else { return true };
         loop {
             match waitid(WaitId::Pid(id), WaitIdOptions::EXITED | WaitIdOptions::NOWAIT) {
                 Err(Errno::INTR) => {}
@@ -363,19 +360,12 @@ mod end {
             }
         }
     }
-}
 
-/// The same where the standard library offers nothing better than to ask again and again.
-#[cfg(not(unix))]
-mod end {
-    use std::thread;
-    use std::time::Duration;
-
-    use super::{Held, lock};
-
-    pub(super) fn wait_for_end(held: &Held) -> bool {
+    /// The same by polling: the standard library has nothing better.
+    #[cfg(not(unix))]
+    fn wait_for_end(&self) -> bool {
         loop {
-            let mut process = lock(&held.process);
+            let mut process = lock(&self.process);
             if process.status.is_some() || !matches!(process.child.try_wait(), Ok(None)) {
                 return false;
             }
@@ -383,4 +373,9 @@ mod end {
             thread::sleep(Duration::from_millis(20));
         }
     }
+}
+
+/// A panic leaves no partial change in anything that is locked here.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

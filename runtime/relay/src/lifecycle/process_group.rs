@@ -1,4 +1,4 @@
-//! Groups of processes: a process that was started with its own can be ended together with those that stayed in it.
+//! Process groups: a process that was started in a group of its own can be ended together with all processes in it.
 
 pub use self::system::has_ended;
 #[cfg(target_os = "linux")]
@@ -12,12 +12,12 @@ mod system {
 
     use rustix::process::{Pid, Signal, kill_process_group};
 
-    /// Lets the process begin a group of its own.
+    /// Makes the command start its process in a group of its own.
     pub fn own(command: &mut Command) {
         command.process_group(0);
     }
 
-    /// Whether the process has ended. It is not reaped, so that its id is given to no other.
+    /// Whether the process has ended. It is not reaped, so its id is not reused.
     pub fn has_ended(child: &mut Child) -> bool {
         use rustix::process::{WaitId, WaitIdOptions, waitid};
 
@@ -27,11 +27,11 @@ mod system {
 
     /// Ends the process and its group. It must not have been reaped.
     pub fn kill(child: &mut Child) {
-        // A group that has ended already is what was asked for.
+        // An error means that the group has already ended.
         kill_process_group(Pid::from_child(child), Signal::KILL).ok();
     }
 
-    /// Whether a process is in the group of this one.
+    /// Whether a process is in the group of this process.
     #[cfg(target_os = "linux")]
     pub fn is_ours(id: u32) -> bool {
         use rustix::process::{getpgid, getpgrp};
@@ -39,13 +39,13 @@ mod system {
         getpgid(Pid::from_raw(id.cast_signed())).is_ok_and(|group| group == getpgrp())
     }
 
-    /// Whether a process was killed. Only another process, or the system, can have done that.
+    /// Whether a process was killed with `SIGKILL`, by another process or by the system.
     pub fn was_killed(status: ExitStatus) -> bool {
         status.signal() == Some(Signal::KILL.as_raw())
     }
 }
 
-/// Processes alone: the standard library knows no more.
+/// Single processes: the standard library has no groups.
 #[cfg(not(unix))]
 mod system {
     use std::process::{Child, Command, ExitStatus};
@@ -60,7 +60,7 @@ mod system {
         child.kill().ok();
     }
 
-    /// The status does not tell here.
+    /// The status does not show it here.
     pub fn was_killed(_: ExitStatus) -> bool {
         false
     }

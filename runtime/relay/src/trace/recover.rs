@@ -1,4 +1,4 @@
-//! Saving what was written of a trace whose process died.
+//! Recovers the part of a trace that was written before its process died.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Read as _};
@@ -17,9 +17,9 @@ use crate::trace::{RUN, TraceError, how_it_ended, publish};
 /// The largest record and chunk that is read; ours are far smaller.
 const LIMIT: usize = 1 << 28;
 
-/// Makes a trace of what was written into an unfinished one, up to its last whole chunk, and gives it this name, in a
-/// folder that exists. Without an unfinished one there is none. The unfinished one is gone then.
-pub fn salvage(unfinished: &Path, outcome: &Outcome, file: &Path) -> Result<(), TraceError> {
+/// Makes a trace of the contents of an unfinished one, up to its last complete chunk, and gives it this name, in a
+/// folder that exists. Without an unfinished trace it does nothing. The unfinished trace is removed.
+pub fn recover(unfinished: &Path, outcome: &Outcome, file: &Path) -> Result<(), TraceError> {
     if !unfinished.exists() {
         return Ok(());
     }
@@ -32,7 +32,7 @@ pub fn salvage(unfinished: &Path, outcome: &Outcome, file: &Path) -> Result<(), 
 fn copy(unfinished: &Path, outcome: &Outcome, saved: &Path) -> McapResult<()> {
     let mut writer = options().create(BufWriter::new(File::create(saved)?))?;
     let mut file = File::open(unfinished)?;
-    // A chunk is looked at only when it is whole.
+    // Only complete chunks are read.
     let reading =
         LinearReaderOptions::default().with_skip_end_magic(true).with_emit_chunks(true).with_record_length_limit(LIMIT);
     let mut reader = LinearReader::new_with_options(reading);
@@ -42,7 +42,7 @@ fn copy(unfinished: &Path, outcome: &Outcome, saved: &Path) -> McapResult<()> {
                 let read = file.read(reader.insert(wanted))?;
                 reader.notify_read(read);
             }
-            // What cannot be understood is where the process died.
+            // The first error is where the process died.
             Ok(LinearReadEvent::Record { opcode, data }) => match records(opcode, data) {
                 Ok(records) => records.iter().try_for_each(|record| copy_record(&mut writer, record))?,
                 Err(_) => break,

@@ -1,10 +1,11 @@
-//! A simulator's keeper: a process between worker and simulator that sees to it that nothing of the simulator is left,
-//! whoever ends first, and however. Linux only.
+//! A program's keeper: a process between worker and program which ensures that no process of the program remains,
+//! whichever of them ends first. Linux only.
 //!
-//! It becomes the parent of all that is below the simulator once its own parents end, sessions or not. It waits until the
-//! simulator has ended, or until the simulator's input is closed, be it that the worker closed it or that the worker is
-//! gone; then the simulator has its time to end by itself. What is left after that is ended, the keeper reports how the
-//! simulator ended, and ends too. If the keeper is killed, the simulator is, and what it started becomes the worker's.
+//! It becomes the parent of every process below the program whose own parent ends, whatever its session. It waits until
+//! the program has exited, or until the program's input is closed: by the worker, or because the worker has ended. In
+//! that case the program has its time to exit by itself. Then the keeper ends all remaining processes, reports how the
+//! program ended, and exits. If the keeper is killed, the system ends the program, and the program's children become
+//! the worker's.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
@@ -24,19 +25,19 @@ use rustix::process::{
     wait, waitid,
 };
 
-use crate::descendants;
-use crate::transport::process::child::{END_LIMIT, reason};
+use crate::lifecycle::descendants;
+use crate::lifecycle::program::{END_LIMIT, reason};
 
-/// How often a keeper looks whether its worker is there: who holds the simulator's input open may be the simulator itself.
-const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000_000 };
+/// How often a keeper checks that its worker is alive: the program itself may hold its input open.
+const CHECK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000_000 };
 
-/// What the keeper says instead of a status when it ended the simulator itself.
+/// What the keeper reports instead of a status if it ended the program itself.
 const STOPPED: &str = "stopped";
 
-/// The way on which a keeper tells its worker how the simulator ended.
+/// The pipe on which a keeper reports to its worker how the program ended.
 pub(super) struct Report {
     reader: PipeReader,
-    /// Lent to the keeper, which opens it by its name.
+    /// The keeper opens it by its name.
     writer: PipeWriter,
 }
 
@@ -50,11 +51,11 @@ impl Report {
         format!("/proc/{}/fd/{}", std::process::id(), self.writer.as_raw_fd())
     }
 
-    /// The status of a simulator that ended by itself, as its keeper reported it, which has ended. Without a report, since
-    /// the keeper was killed or had no way to report, its own status has to do.
+    /// The status of a program that exited by itself, as its keeper reported it; the keeper has ended. Without a
+    /// report, because the keeper was killed or could not open the pipe, the keeper's own status is used.
     pub(super) fn read(mut self, of_keeper: Option<ExitStatus>) -> Option<ExitStatus> {
         drop(self.writer);
-        // Somebody else may have opened the way, and hold it.
+        // Another process may have opened the pipe and hold it open.
         if rustix::io::ioctl_fionread(&self.reader).is_ok_and(|waiting| waiting == 0) {
             return of_keeper;
         }
@@ -65,9 +66,9 @@ impl Report {
     }
 }
 
-/// The command of a keeper, short of the simulator's program and its arguments.
+/// The command of a keeper, without the program and its arguments.
 pub(super) fn command(report: &Report) -> Command {
-    // This is the runner's own file even if another was put into its place meanwhile.
+    // This is the running executable even if its file was replaced.
     let mut command = Command::new("/proc/self/exe");
     if let Some(name) = std::env::args_os().next() {
         command.arg0(name);
@@ -76,76 +77,80 @@ pub(super) fn command(report: &Report) -> Command {
     command
 }
 
-/// How far a simulator is.
+/// The state of a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
-    Runs,
+    Running,
     Stopped,
     Ended,
 }
 
-/// Starts a simulator, keeps it until it has ended, and ends what it leaves behind.
-pub fn keep_simulator(worker: u32, report: &Path, program: &OsStr, arguments: &[OsString]) -> ExitCode {
+/// Starts a program, waits until it has ended, and ends everything it leaves behind. If it cannot be started, `failed`
+/// is called with the reason, with the program's standard output.
+pub(crate) fn keep(worker: u32, report: &Path, program: &OsStr, arguments: &[OsString], failed: fn(&str)) -> ExitCode {
     descendants::adopt_orphans();
-    // Without it the keeper's own status has to do.
+    // Without it the keeper's own status is used.
     let report = File::options().write(true).open(report).ok();
     let mut command = Command::new("/proc/self/exe");
     if let Some(name) = std::env::args_os().next() {
         command.arg0(name);
     }
     command.arg("simulated").arg(std::process::id().to_string()).arg("--").arg(program).args(arguments);
-    let simulator = match command.process_group(0).spawn() {
+    let child = match command.process_group(0).spawn() {
         Ok(child) => Pid::from_child(&child),
-        Err(error) => return failed(&format!("cannot start its keeper: {error}")),
+        Err(error) => {
+            failed(&format!("cannot start its keeper: {error}"));
+            return ExitCode::FAILURE;
+        }
     };
-    // The worker is to see when the simulator closes them. This end of the input can be written by nobody.
+    // The worker must see when the program closes its output, so the keeper must not hold it open. It writes nothing.
     rustix::stdio::dup2_stdout(io::stdin()).ok();
     rustix::stdio::dup2_stderr(io::stdin()).ok();
 
-    let shared = Arc::new((Mutex::new(Stage::Runs), Condvar::new()));
+    let shared = Arc::new((Mutex::new(Stage::Running), Condvar::new()));
     let watched = Arc::clone(&shared);
-    thread::spawn(move || end_after_input(worker, simulator, &watched));
-    let Some(status) = reap_until_ended(simulator, &shared) else { return ExitCode::FAILURE };
+    thread::spawn(move || end_after_input(worker, child, &watched));
+    let Some(status) = reap_until_ended(child, &shared) else { return ExitCode::FAILURE };
     let (status, stopped) = status;
     descendants::end_adopted(|_| false, Duration::ZERO);
     if let Some(mut report) = report {
         let text = if stopped { STOPPED.to_owned() } else { status.into_raw().to_string() };
         report.write_all(text.as_bytes()).ok();
     }
-    // As shells have it.
+    // As in shells.
     let code = status.code().or_else(|| Some(128 + status.signal()?)).and_then(|code| u8::try_from(code).ok());
     code.map_or(ExitCode::FAILURE, ExitCode::from)
 }
 
-/// Ends the simulator if it does not end by itself in time after its input was closed.
-fn end_after_input(worker: u32, simulator: Pid, shared: &(Mutex<Stage>, Condvar)) {
+/// Ends the program if it does not exit by itself in time after its input was closed.
+fn end_after_input(worker: u32, child: Pid, shared: &(Mutex<Stage>, Condvar)) {
     wait_for_end_of_input(worker);
     let (stage, changed) = shared;
     let running = stage.lock().unwrap_or_else(PoisonError::into_inner);
-    let waited = changed.wait_timeout_while(running, END_LIMIT, |stage| *stage == Stage::Runs);
+    let waited = changed.wait_timeout_while(running, END_LIMIT, |stage| *stage == Stage::Running);
     let (mut stage, _) = waited.unwrap_or_else(PoisonError::into_inner);
-    if *stage == Stage::Runs {
+    if *stage == Stage::Running {
         *stage = Stage::Stopped;
-        // It is reaped by who holds this lock only, so the id is its own.
-        kill_process_group(simulator, Signal::KILL).ok();
+        // It is only reaped while this lock is held, so the id is still its own.
+        kill_process_group(child, Signal::KILL).ok();
     }
 }
 
-/// Waits until nobody can write to standard input any more, or the worker is gone.
+/// Waits until no process can write to standard input any more, or the worker has ended.
 fn wait_for_end_of_input(worker: u32) {
     let input = io::stdin();
-    let worker_lives = || getppid().is_some_and(|parent| parent.as_raw_pid().cast_unsigned() == worker);
-    while worker_lives() {
+    let worker_is_alive = || getppid().is_some_and(|parent| parent.as_raw_pid().cast_unsigned() == worker);
+    while worker_is_alive() {
         let mut input = [PollFd::new(&input, PollFlags::empty())];
-        match poll(&mut input, Some(&LOOK)) {
+        match poll(&mut input, Some(&CHECK)) {
             Ok(0) | Err(Errno::INTR) => {}
             _ => return,
         }
     }
 }
 
-/// Reaps whatever ends until the simulator has; gives its status, and whether it was stopped before.
-fn reap_until_ended(simulator: Pid, (stage, changed): &(Mutex<Stage>, Condvar)) -> Option<(ExitStatus, bool)> {
+/// Reaps all processes until the program has ended; returns its status, and whether the keeper ended it.
+fn reap_until_ended(child: Pid, (stage, changed): &(Mutex<Stage>, Condvar)) -> Option<(ExitStatus, bool)> {
     loop {
         match waitid(WaitId::All, WaitIdOptions::EXITED | WaitIdOptions::NOWAIT) {
             Ok(_) => {}
@@ -154,7 +159,7 @@ fn reap_until_ended(simulator: Pid, (stage, changed): &(Mutex<Stage>, Condvar)) 
         }
         let mut stage = stage.lock().unwrap_or_else(PoisonError::into_inner);
         if let Ok(Some((ended, status))) = wait(WaitOptions::NOHANG)
-            && ended == simulator
+            && ended == child
         {
             let stopped = *stage == Stage::Stopped;
             *stage = Stage::Ended;
@@ -164,26 +169,18 @@ fn reap_until_ended(simulator: Pid, (stage, changed): &(Mutex<Stage>, Condvar)) 
     }
 }
 
-/// Becomes a simulator that ends when its keeper does, even if the keeper is killed while the simulator hangs. Only
-/// returns if that fails; it is then said in the words of the protocol.
-pub fn become_simulator(keeper: u32, program: &OsStr, arguments: &[OsString]) -> ExitCode {
+/// Replaces this process by a program that ends when its keeper does, even if the keeper is killed while the program
+/// hangs. Only returns if that fails, after it has called `failed` with the reason.
+pub(crate) fn become_program(keeper: u32, program: &OsStr, arguments: &[OsString], failed: fn(&str)) -> ExitCode {
     if let Err(error) = set_parent_process_death_signal(Some(Signal::KILL)) {
-        return failed(&format!("it cannot be made to end with its keeper: {error}"));
+        failed(&format!("it cannot be made to end with its keeper: {error}"));
+        return ExitCode::FAILURE;
     }
-    // The keeper may have gone before the system was asked.
+    // The keeper may have ended before the system was asked.
     if getppid().is_none_or(|parent| parent.as_raw_pid().cast_unsigned() != keeper) {
         return ExitCode::FAILURE;
     }
     let error = Command::new(program).args(arguments).exec();
-    failed(&format!("cannot start `{}`: {}", program.display(), reason(&error)))
-}
-
-/// Says in the words of the protocol that there will be no simulator.
-fn failed(what: &str) -> ExitCode {
-    let mut line = b"{\"failed\":".to_vec();
-    crate::json::quoted(what, &mut line);
-    line.extend_from_slice(b"}\n");
-    // Nobody is left to be told if this fails.
-    io::stdout().write_all(&line).and_then(|()| io::stdout().flush()).ok();
+    failed(&format!("cannot start `{}`: {}", program.display(), reason(&error)));
     ExitCode::FAILURE
 }

@@ -1,0 +1,317 @@
+//! A simulator that is a program and runs freely: nobody steps it, and it receives messages as they are delivered.
+//!
+//! Simulation time is the simulator's own clock, if it sends its time, and wall time since its answer to `reset`
+//! otherwise. The transport sleeps until the next line of the simulator or until the relay has something to do,
+//! whichever is first: a message that an operation holds back is delivered when it is due, even if the simulator is
+//! silent.
+
+use std::io::{BufReader, Write};
+use std::mem;
+use std::process::ChildStdout;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use sesame_base::time::SimTime;
+use sesame_plan::CampaignPlan;
+
+use crate::lifecycle::{Input, Program, Running};
+use crate::relay::Exchange;
+use crate::simulator::Progress;
+use crate::transport::process::protocol::{LINE_LIMIT, Line, Read, SimulatorMessage, read_line, request};
+use crate::transport::process::session::{Fault, Topics};
+use crate::transport::process::{disconnected, restarted};
+use crate::transport::{Capabilities, Incidents, Transport, TransportError};
+
+/// How many lines are read ahead. The simulator's output is read while a line to it is written, so a simulator that
+/// writes before it reads does not block the runner.
+const READ_AHEAD: usize = 1 << 16;
+
+pub(super) struct FreeRunning {
+    program: Program,
+    connection: Option<Connection>,
+    plan: CampaignPlan,
+    now: SimTime,
+    incidents: Incidents,
+}
+
+struct Connection {
+    // Dropped first: the end of its input tells the simulator to exit.
+    input: Input,
+    lines: Receiver<Received>,
+    line: Line,
+    topics: Topics,
+    clock: Clock,
+    resets: bool,
+    running: Running,
+}
+
+/// What was read of the simulator's output.
+enum Received {
+    Line(Vec<u8>),
+    TooLong,
+}
+
+/// What simulation time is.
+#[derive(Debug, Clone, Copy)]
+enum Clock {
+    /// Wall time since this moment.
+    Wall(Instant),
+    /// The time that the simulator sends.
+    Simulator,
+}
+
+impl FreeRunning {
+    pub(super) fn new(plan: &CampaignPlan, program: Program) -> Self {
+        FreeRunning {
+            program,
+            connection: None,
+            plan: plan.clone(),
+            now: SimTime::ZERO,
+            incidents: Incidents::default(),
+        }
+    }
+
+    /// The error for a fault. The connection is closed: a simulator is never used after a fault.
+    fn explain(&mut self, fault: Fault) -> TransportError {
+        let running = self.connection.take().map(|connection| {
+            // The simulator may be waiting for the end of its input.
+            drop(connection.input);
+            connection.running
+        });
+        match fault {
+            Fault::Disconnected(awaited) => disconnected(&self.program, running, awaited, &mut self.incidents),
+            Fault::Wrong(error) => error,
+        }
+    }
+
+    /// Begins a run with the existing process, or with a new one.
+    fn begin(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<(), Fault> {
+        let (connection, was_used) = match &mut self.connection {
+            Some(connection) => (connection, true),
+            empty => (empty.insert(Connection::start(&self.program)?), false),
+        };
+        connection.running.clear_stderr();
+        connection.reset(&self.plan, seed, was_used, relay)
+    }
+}
+
+impl Connection {
+    fn start(program: &Program) -> Result<Self, TransportError> {
+        let (running, input, output) = program.start()?;
+        let (lines, topics) = (read_lines(output), Topics::default());
+        Ok(Connection { input, lines, line: Line::default(), topics, clock: Clock::Simulator, resets: false, running })
+    }
+
+    /// Waits for the next line, at most for this long; false if there was none.
+    fn receive(&mut self, wait: Option<Duration>, awaited: &str) -> Result<bool, Fault> {
+        let received = match wait {
+            Some(wait) => self.lines.recv_timeout(wait),
+            None => self.lines.recv().map_err(|_| RecvTimeoutError::Disconnected),
+        };
+        self.line.number += u64::from(received.is_ok());
+        match received {
+            Ok(Received::Line(bytes)) => {
+                self.line.bytes = bytes;
+                Ok(true)
+            }
+            Ok(Received::TooLong) => Err(self.line.too_long(LINE_LIMIT).into()),
+            Err(RecvTimeoutError::Timeout) => Ok(false),
+            Err(RecvTimeoutError::Disconnected) => Err(Fault::Disconnected(awaited.to_owned())),
+        }
+    }
+
+    /// Sets the simulator to time zero. One that was used before may still send messages of its last run; they are
+    /// discarded.
+    fn reset(&mut self, plan: &CampaignPlan, seed: u64, was_used: bool, relay: &mut dyn Exchange) -> Result<(), Fault> {
+        const AWAITED: &str = "its answer to `reset`";
+        self.topics.clear();
+        let (mut line, wires) = (Vec::new(), relay.wires());
+        request::reset(&mut line, seed, None, wires.iter().map(|wire| wires.path(wire)));
+        send(&mut self.input, &line);
+        self.line.number = 0;
+        loop {
+            self.receive(None, AWAITED)?;
+            let ready = match self.line.parse()? {
+                SimulatorMessage::Ready(ready) => ready,
+                SimulatorMessage::Failed(reason) => return Err(TransportError::Simulator(reason).into()),
+                _ if was_used => continue,
+                other => return Err(self.line.out_of_turn(&other, AWAITED, "answer `reset` with `ready`").into()),
+            };
+            self.resets = ready.resets;
+            self.clock = if ready.clock { Clock::Simulator } else { Clock::Wall(Instant::now()) };
+            self.topics.open(&ready, relay)?;
+            self.topics.publish(plan, SimTime::ZERO, &ready.messages, relay, &self.line)?;
+            break;
+        }
+        self.deliver();
+        Ok(())
+    }
+
+    /// Sends what was delivered.
+    fn deliver(&mut self) {
+        if !self.topics.outbox.is_empty() {
+            let mut line = Vec::new();
+            request::deliver(&mut line, &self.topics.outbox);
+            self.topics.outbox.clear();
+            send(&mut self.input, &line);
+        }
+    }
+
+    /// Simulation time by the wall clock, or the latest time that the simulator sent.
+    fn time(&self, latest: SimTime) -> SimTime {
+        match self.clock {
+            Clock::Wall(start) => SimTime::from_nanos(i64::try_from(start.elapsed().as_nanos()).unwrap_or(i64::MAX)),
+            Clock::Simulator => latest,
+        }
+    }
+
+    /// Advances the relay, and sends what is due.
+    fn advance_to(&mut self, now: SimTime, relay: &mut dyn Exchange) {
+        relay.advance(now, &mut self.topics.deliveries);
+        self.topics.deliver(relay, None);
+        self.deliver();
+    }
+
+    /// How long nothing happens without a line of the simulator; `None` for as long as there is none.
+    fn pause(&self, now: SimTime, until: SimTime, relay: &dyn Exchange) -> Option<Duration> {
+        match self.clock {
+            Clock::Wall(_) => {
+                let due = relay.next_due().map_or(until, |due| due.min(until));
+                Some(Duration::from_nanos(u64::try_from((due - now).nanos()).unwrap_or(0)))
+            }
+            Clock::Simulator => None,
+        }
+    }
+
+    /// Carries out the line that was received at `now`, and returns the time after it.
+    fn carry_out(
+        &mut self,
+        plan: &CampaignPlan,
+        now: SimTime,
+        relay: &mut dyn Exchange,
+    ) -> Result<(SimTime, Progress), TransportError> {
+        let (time, progress) = match self.line.parse()? {
+            SimulatorMessage::Publish(messages) => {
+                self.topics.publish(plan, now, &messages, relay, &self.line)?;
+                (now, Progress::Running)
+            }
+            SimulatorMessage::Done(done) => {
+                self.topics.publish(plan, now, &done.messages, relay, &self.line)?;
+                if !done.ended {
+                    let problem = "says `done`, but this simulator takes no steps".to_owned();
+                    let remedy = "send messages with `publish`, and `\"ended\": true` at the end of the scenario";
+                    return Err(self.line.wrong(problem, remedy));
+                }
+                (now, Progress::Ended)
+            }
+            SimulatorMessage::Time(seconds) => {
+                let time = SimTime::from_seconds(seconds);
+                if matches!(self.clock, Clock::Wall(_)) {
+                    let remedy = "say `\"clock\": true` in `ready` if the simulator has a clock of its own";
+                    return Err(self.line.wrong("says `time` without a clock".to_owned(), remedy));
+                }
+                if !seconds.is_finite() || time < now {
+                    let problem = format!("sets the time to {seconds} s, which is before {now}");
+                    return Err(self.line.wrong(problem, "send times that never decrease"));
+                }
+                (time, Progress::Running)
+            }
+            SimulatorMessage::Failed(reason) => return Err(TransportError::Simulator(reason)),
+            other @ SimulatorMessage::Ready(_) => {
+                return Err(self.line.out_of_turn(&other, "a message", "answer each `reset` once"));
+            }
+        };
+        self.topics.published = 0;
+        self.deliver();
+        Ok((time, progress))
+    }
+}
+
+impl Transport for FreeRunning {
+    fn capabilities(&self) -> Capabilities {
+        let resets = self.connection.as_ref().is_some_and(|connection| connection.resets);
+        Capabilities { lock_stepped: false, resets }
+    }
+
+    fn reset(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<(), TransportError> {
+        self.now = SimTime::ZERO;
+        if !self.capabilities().resets {
+            self.close();
+        }
+        if self.connection.is_some() {
+            // A fault of a process that was used before may belong to the previous run.
+            let Err(fault) = self.begin(seed, relay) else { return Ok(()) };
+            let killed = self.incidents.killed;
+            let reason = self.explain(fault);
+            self.incidents.killed = killed;
+            self.incidents.notes.push(restarted(&reason));
+        }
+        self.begin(seed, relay).map_err(|fault| self.explain(fault))
+    }
+
+    fn advance(&mut self, until: SimTime, relay: &mut dyn Exchange) -> Result<Progress, TransportError> {
+        let Some(connection) = &mut self.connection else {
+            return Err(TransportError::Simulator("it was advanced before it was started".to_owned()));
+        };
+        self.now = connection.time(self.now).min(until);
+        connection.advance_to(self.now, relay);
+        if self.now >= until {
+            return Ok(Progress::Ended);
+        }
+        let pause = connection.pause(self.now, until, relay);
+        let received = match connection.receive(pause, "a message or the end of the scenario") {
+            Ok(received) => received,
+            Err(fault) => return Err(self.explain(fault)),
+        };
+        self.now = connection.time(self.now).min(until);
+        if !received || self.now >= until {
+            return Ok(Progress::Running);
+        }
+        match connection.carry_out(&self.plan, self.now, relay) {
+            Ok((time, progress)) => {
+                self.now = time.min(until);
+                Ok(progress)
+            }
+            Err(error) => Err(self.explain(error.into())),
+        }
+    }
+
+    fn now(&self) -> SimTime {
+        self.now
+    }
+
+    fn close(&mut self) {
+        self.connection = None;
+    }
+
+    fn incidents(&mut self) -> Incidents {
+        mem::take(&mut self.incidents)
+    }
+}
+
+/// Sends a line. An error is ignored: a simulator that has closed its input may still have sent the reason.
+fn send(input: &mut Input, line: &[u8]) {
+    input.write_all(line).and_then(|()| input.flush()).ok();
+}
+
+/// Reads lines in a thread of its own until the output ends or the receiver is dropped.
+fn read_lines(output: ChildStdout) -> Receiver<Received> {
+    let (sender, lines) = mpsc::sync_channel(READ_AHEAD);
+    thread::spawn(move || {
+        let mut output = BufReader::with_capacity(1 << 16, output);
+        loop {
+            let mut line = Vec::new();
+            let received = match read_line(&mut output, LINE_LIMIT, &mut line) {
+                Read::Line => Received::Line(line),
+                Read::TooLong => Received::TooLong,
+                Read::End => return,
+            };
+            let is_last = matches!(received, Received::TooLong);
+            if sender.send(received).is_err() || is_last {
+                return;
+            }
+        }
+    });
+    lines
+}

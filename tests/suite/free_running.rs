@@ -1,0 +1,46 @@
+//! A campaign on a simulator that nobody steps: nothing is concluded from the result of an equal test.
+
+use std::fs;
+
+use sesame_base::observation::Outcome;
+use sesame_results::record::{EventKind, Origin, Repository};
+use sesame_tests::{Project, workspace};
+
+#[test]
+fn equal_tests_of_a_free_running_simulator_are_simulated_again_and_a_replay_may_differ() {
+    let found = std::process::Command::new("python3").arg("--version").output().is_ok_and(|it| it.status.success());
+    assert!(found || std::env::var_os("CI").is_none(), "python3 is needed");
+    if !found {
+        eprintln!("skipped: there is no python3 here");
+        return;
+    }
+    let space = fs::read_to_string(workspace().join("tests/simulators/free_running/space.sesame")).unwrap();
+    let runner = Project::new("free_running", &space.replace("NAME", "free_running"), "free_running").build("freely");
+
+    let ran = runner.run(&["known", "--workers", "1", "--results", "known"]).expect(0);
+    let repository = Repository::open(&runner.folder.join("known/known")).unwrap();
+    let tests = repository.tests().unwrap();
+    assert!(tests.iter().all(|test| test.outcome == Outcome::Completed), "{tests:?}\n{}", ran.err);
+    let known: Vec<u32> =
+        tests.iter().filter(|test| test.origin != Origin::Reference).map(|test| test.number).collect();
+    let [one, two] = known[..] else { panic!("{tests:?}") };
+    let (one, two) = (repository.test(one).unwrap(), repository.test(two).unwrap());
+    assert_eq!(one.test, two.test, "they are equal");
+    assert_eq!((one.duplicate_of, two.duplicate_of), (None, None));
+    let values = [&one, &two].map(|test| test.observation.metrics[0].value.unwrap());
+    assert_eq!(values, [2.5, 3.5], "the second and the third run of the simulator, pushed by 0.5 m more");
+
+    let warnings: Vec<String> = repository
+        .events()
+        .unwrap()
+        .into_iter()
+        .filter(|event| event.kind == EventKind::Warning)
+        .map(|event| event.text)
+        .collect();
+    let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+    assert!(warning.starts_with("the simulator runs freely"), "{warning}");
+
+    let replayed = runner.run(&["replay", "T2", "--results", "known/known"]).expect(0);
+    assert!(replayed.err.contains("the simulator runs freely"), "{}", replayed.err);
+    assert!(replayed.out.contains("1.5"), "the difference is shown: {}", replayed.out);
+}
