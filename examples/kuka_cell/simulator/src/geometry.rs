@@ -6,7 +6,7 @@ use parry3d_f64::bounding_volume::Aabb;
 pub use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQuery as _;
 use parry3d_f64::query::details::closest_points_segment_segment_with_locations_nD as closest_on_segments;
-use parry3d_f64::shape::SegmentPointLocation;
+pub use parry3d_f64::shape::Capsule;
 
 /// The distance from the surface of a sphere to a cuboid whose faces are parallel to the axes of the cell.
 ///
@@ -17,37 +17,11 @@ pub fn sphere_to_cuboid(centre: Vector, radius: f64, cuboid: &Aabb) -> f64 {
     cuboid.distance_to_local_point(centre, false) - radius
 }
 
-/// A segment with a thickness: the points within `radius` of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Capsule {
-    /// One end of the axis.
-    pub start: Vector,
-    /// The other end of the axis.
-    pub end: Vector,
-    /// Half the thickness.
-    pub radius: f64,
-}
-
-impl Capsule {
-    /// The distance between two capsules' surfaces. Where their axes meet it is minus the sum of the radii.
-    pub fn distance(&self, other: &Capsule) -> f64 {
-        let (here, there) = closest_on_segments((&self.start, &self.end), (&other.start, &other.end));
-        let gap = self.point_at(&here) - other.point_at(&there);
-        gap.length() - self.radius - other.radius
-    }
-
-    fn point_at(&self, location: &SegmentPointLocation) -> Vector {
-        match location {
-            SegmentPointLocation::OnVertex(0) => self.start,
-            SegmentPointLocation::OnVertex(_) => self.end,
-            SegmentPointLocation::OnEdge([start, end]) => self.start * *start + self.end * *end,
-        }
-    }
-
-    /// Centre and radius of the smallest sphere around the capsule.
-    fn bounding_sphere(&self) -> (Vector, f64) {
-        ((self.start + self.end) * 0.5, (self.end - self.start).length() * 0.5 + self.radius)
-    }
+/// The distance between two capsules' surfaces. Where their axes meet it is minus the sum of the radii.
+pub fn capsule_to_capsule(one: &Capsule, other: &Capsule) -> f64 {
+    let (here, there) = closest_on_segments((&one.segment.a, &one.segment.b), (&other.segment.a, &other.segment.b));
+    let gap = one.segment.point_at(&here) - other.segment.point_at(&there);
+    gap.length() - one.radius - other.radius
 }
 
 /// The smallest distance between any capsule of one chain and any of another.
@@ -55,18 +29,18 @@ impl Capsule {
 /// Pairs whose bounding spheres are already further apart than the best pair are not measured; the result is the same
 /// as measuring them all.
 pub fn distance_between_chains<const N: usize>(chain: &[Capsule; N], other: &[Capsule; N]) -> f64 {
-    let spheres = chain.each_ref().map(Capsule::bounding_sphere);
-    let other_spheres = other.each_ref().map(Capsule::bounding_sphere);
+    let spheres = chain.each_ref().map(Capsule::local_bounding_sphere);
+    let other_spheres = other.each_ref().map(Capsule::local_bounding_sphere);
     let mut nearest = f64::INFINITY;
     // The outer links meet first, so starting with them leaves little to measure.
-    for (capsule, (centre, radius)) in chain.iter().zip(spheres).rev() {
-        for (other_capsule, (other_centre, other_radius)) in other.iter().zip(other_spheres).rev() {
-            let reach = nearest + radius + other_radius;
+    for (capsule, sphere) in chain.iter().zip(&spheres).rev() {
+        for (other_capsule, other_sphere) in other.iter().zip(&other_spheres).rev() {
+            let reach = nearest + sphere.radius + other_sphere.radius;
             // A reach below zero cannot be squared; so deep in each other, the pair is measured.
-            if reach > 0.0 && (centre - other_centre).length_squared() >= reach * reach {
+            if reach > 0.0 && (sphere.center - other_sphere.center).length_squared() >= reach * reach {
                 continue;
             }
-            nearest = nearest.min(capsule.distance(other_capsule));
+            nearest = nearest.min(capsule_to_capsule(capsule, other_capsule));
         }
     }
     nearest
@@ -101,13 +75,13 @@ mod tests {
 
     #[test]
     fn capsules_crossed_in_line_and_touching() {
-        let along_x = Capsule { start: Vector::ZERO, end: Vector::new(2.0, 0.0, 0.0), radius: 0.25 };
-        let across = Capsule { start: Vector::new(1.0, -1.0, 1.0), end: Vector::new(1.0, 1.0, 1.0), radius: 0.25 };
-        let ahead = Capsule { start: Vector::new(5.0, 0.0, 0.0), end: Vector::new(9.0, 0.0, 0.0), radius: 0.5 };
-        let through = Capsule { start: Vector::new(1.0, -1.0, 0.0), end: Vector::new(1.0, 1.0, 0.0), radius: 0.5 };
-        assert_eq!(along_x.distance(&across), 0.5);
-        assert_eq!(along_x.distance(&ahead), 2.25);
-        assert_eq!(along_x.distance(&through), -0.75);
+        let along_x = Capsule::new(Vector::ZERO, Vector::new(2.0, 0.0, 0.0), 0.25);
+        let across = Capsule::new(Vector::new(1.0, -1.0, 1.0), Vector::new(1.0, 1.0, 1.0), 0.25);
+        let ahead = Capsule::new(Vector::new(5.0, 0.0, 0.0), Vector::new(9.0, 0.0, 0.0), 0.5);
+        let through = Capsule::new(Vector::new(1.0, -1.0, 0.0), Vector::new(1.0, 1.0, 0.0), 0.5);
+        assert_eq!(capsule_to_capsule(&along_x, &across), 0.5);
+        assert_eq!(capsule_to_capsule(&along_x, &ahead), 2.25);
+        assert_eq!(capsule_to_capsule(&along_x, &through), -0.75);
     }
 
     fn points() -> impl Strategy<Value = Vector> {
@@ -115,14 +89,15 @@ mod tests {
     }
 
     fn capsules() -> impl Strategy<Value = Capsule> {
-        (points(), points(), 0.05..0.4f64).prop_map(|(start, end, radius)| Capsule { start, end, radius })
+        (points(), points(), 0.05..0.4f64).prop_map(|(start, end, radius)| Capsule::new(start, end, radius))
     }
 
     /// The least distance over a fine grid of points of the two axes: never below the true one, and above it by at
     /// most half a grid cell of each axis.
     fn sampled(a: &Capsule, b: &Capsule) -> f64 {
-        let points =
-            |capsule: &Capsule| (0..=80).map(|i| capsule.start.lerp(capsule.end, f64::from(i) / 80.0)).collect();
+        let points = |capsule: &Capsule| {
+            (0..=80).map(|i| capsule.segment.a.lerp(capsule.segment.b, f64::from(i) / 80.0)).collect()
+        };
         let (on_a, on_b): (Vec<Vector>, Vec<Vector>) = (points(a), points(b));
         let gap = on_a.iter().flat_map(|p| on_b.iter().map(move |q| (*p - *q).length())).fold(f64::INFINITY, f64::min);
         gap - a.radius - b.radius
@@ -133,14 +108,15 @@ mod tests {
 
         #[test]
         fn capsule_distance_agrees_with_sampling(a in capsules(), b in capsules()) {
-            let cell = ((a.end - a.start).length() + (b.end - b.start).length()) / 160.0;
-            let (exact, sampled) = (a.distance(&b), sampled(&a, &b));
+            let cell = (a.height() + b.height()) / 160.0;
+            let (exact, sampled) = (capsule_to_capsule(&a, &b), sampled(&a, &b));
             prop_assert!(exact <= sampled + 1e-9 && sampled <= exact + cell + 1e-9, "{exact} {sampled}");
         }
 
         #[test]
         fn pruning_changes_nothing(a in prop::array::uniform4(capsules()), b in prop::array::uniform4(capsules())) {
-            let all = a.iter().flat_map(|x| b.iter().map(move |y| x.distance(y))).fold(f64::INFINITY, f64::min);
+            let pairs = a.iter().flat_map(|x| b.iter().map(move |y| capsule_to_capsule(x, y)));
+            let all = pairs.fold(f64::INFINITY, f64::min);
             prop_assert_eq!(distance_between_chains(&a, &b), all);
         }
 

@@ -64,7 +64,7 @@ impl Posture {
     /// The solids of the arm: base with turntable, upper arm, forearm, gripper with what it holds.
     pub fn capsules(&self) -> [Capsule; 4] {
         let points = [self.base, self.shoulder, self.elbow, self.wrist, self.gripper];
-        std::array::from_fn(|i| Capsule { start: points[i], end: points[i + 1], radius: RADII[i] })
+        std::array::from_fn(|i| Capsule::new(points[i], points[i + 1], RADII[i]))
     }
 }
 
