@@ -13,6 +13,8 @@
 pub mod descendants;
 #[cfg(all(feature = "process", target_os = "linux"))]
 mod keeper;
+#[cfg(feature = "process")]
+mod limits;
 pub mod process_group;
 #[cfg(feature = "process")]
 mod program;

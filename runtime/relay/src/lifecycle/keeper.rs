@@ -26,7 +26,7 @@ use rustix::process::{
 };
 
 use crate::lifecycle::descendants;
-use crate::lifecycle::program::{END_LIMIT, reason};
+use crate::lifecycle::limits::{END_LIMIT, reason};
 
 /// How often a keeper checks that its worker is alive: the program itself may hold its input open.
 const CHECK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000_000 };

@@ -14,11 +14,9 @@ use std::time::Duration;
 
 #[cfg(target_os = "linux")]
 use crate::lifecycle::keeper::Report;
+use crate::lifecycle::limits::{END_LIMIT, reason};
 use crate::lifecycle::process_group;
 use crate::lifecycle::stderr::StderrTail;
-
-/// How long a program whose input is closed may take to exit by itself.
-pub(super) const END_LIMIT: Duration = Duration::from_secs(1);
 
 /// How much longer a keeper may take to end everything that the program started, and then itself.
 #[cfg(target_os = "linux")]
@@ -129,15 +127,6 @@ pub(crate) struct StartError {
     pub(crate) folder: PathBuf,
     /// The reason, in words for the user.
     pub(crate) reason: String,
-}
-
-/// Why a program does not start, in words for the user.
-pub(super) fn reason(error: &io::Error) -> String {
-    match error.kind() {
-        io::ErrorKind::NotFound => "there is no such program; install it, or give its path".to_owned(),
-        io::ErrorKind::PermissionDenied => format!("{error}; is it marked as executable?"),
-        _ => error.to_string(),
-    }
 }
 
 /// Ends all programs that this process started, with everything they started. It does the same as closing each of them,

@@ -6,7 +6,7 @@ use std::process::ChildStderr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
 use std::thread;
 
-use crate::lifecycle::program::END_LIMIT;
+use crate::lifecycle::limits::END_LIMIT;
 
 /// How many bytes of a test are logged.
 const LOGGED_BYTES: u64 = 1 << 20;

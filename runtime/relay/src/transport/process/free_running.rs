@@ -5,6 +5,8 @@
 //! whichever is first: a message that an operation holds back is delivered when it is due, even if the simulator is
 //! silent.
 
+#![expect(clippy::disallowed_methods, reason = "an adapter: it waits for a program, in a thread of its own")]
+
 use std::io::{BufReader, Write};
 use std::mem;
 use std::process::ChildStdout;
@@ -18,9 +20,9 @@ use sesame_plan::CampaignPlan;
 use crate::lifecycle::{Input, Program, Running};
 use crate::relay::Exchange;
 use crate::simulator::Progress;
+use crate::transport::process::fault::{disconnected, restarted};
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Read, SimulatorMessage, read_line, request};
 use crate::transport::process::session::{Fault, Topics};
-use crate::transport::process::{disconnected, restarted};
 use crate::transport::{Capabilities, Incidents, Transport, TransportError};
 
 /// How many lines are read ahead. The simulator's output is read while a line to it is written, so a simulator that

@@ -14,6 +14,7 @@ use sesame_plan::{CampaignPlan, Choice, Distribution, Drain, Span, Transport as 
 use super::*;
 use crate::evaluate::{Custom, evaluate};
 use crate::metric::MetricTable;
+use crate::transport::Incidents;
 use crate::wire::WireTable;
 
 /// Says what a simulator of the fixture's plan says first, and then does something else with each order.
@@ -60,8 +61,8 @@ fn plan_of(program: &str, arguments: &[&str]) -> CampaignPlan {
 }
 
 /// The transport of a plan whose program is stepped.
-fn stepped(plan: &CampaignPlan, folder: PathBuf) -> Process {
-    Process::new(plan, program_of(plan, folder), SimTime::from_nanos(100_000_000))
+fn stepped(plan: &CampaignPlan, folder: PathBuf) -> LockStepped {
+    LockStepped::new(plan, program_of(plan, folder), SimTime::from_nanos(100_000_000))
 }
 
 fn program_of(plan: &CampaignPlan, folder: PathBuf) -> Program {
@@ -69,7 +70,7 @@ fn program_of(plan: &CampaignPlan, folder: PathBuf) -> Program {
     Program { name: program, arguments, folder, in_runner: false }
 }
 
-fn run(transport: &mut Process, seed: u64) -> Observation {
+fn run(transport: &mut LockStepped, seed: u64) -> Observation {
     let plan = transport.plan.clone();
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
@@ -79,7 +80,7 @@ fn run(transport: &mut Process, seed: u64) -> Observation {
 /// A Python program as the simulator, in a folder of its own.
 struct Python {
     folder: tempfile::TempDir,
-    transport: Process,
+    transport: LockStepped,
 }
 
 fn python_of(program: &str) -> Option<Python> {

@@ -1,0 +1,16 @@
+//! What starting and ending a program have in common, whether a keeper or a worker does it.
+
+use std::io;
+use std::time::Duration;
+
+/// How long a program whose input is closed may take to exit by itself.
+pub(super) const END_LIMIT: Duration = Duration::from_secs(1);
+
+/// Why a program does not start, in words for the user.
+pub(super) fn reason(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "there is no such program; install it, or give its path".to_owned(),
+        io::ErrorKind::PermissionDenied => format!("{error}; is it marked as executable?"),
+        _ => error.to_string(),
+    }
+}
