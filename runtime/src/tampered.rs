@@ -20,7 +20,7 @@ use sesame_plan::condition::{ConditionEnd, ConditionSpace};
 use sesame_plan::{
     Activation, ActivationMode, BoostedChildren, Bound, CampaignPlan, Confirmation, CoverageGoal, Dimension, Domain,
     Expectation, Exploration, Failing, Field, GridAxis, KnownTestId, MessageId, MessageType, MetricId, MetricSource,
-    OperationId, RequirementId, Search, StopRule, TopicId, Type, Typical,
+    OperationId, RequirementId, Search, Statistic, StopRule, TopicId, Type,
 };
 use sesame_results::analysis::{
     self, Run, Selection, compare, coverage, front, indicators, regions, sspr, tests as tests_of,
@@ -67,7 +67,7 @@ fn rich() -> CampaignPlan {
     plan.campaign.coverage = Some(CoverageGoal { axes, hits: 1, stop_at: Some(0.9) });
     let children = BoostedChildren::Falling { first: 9, last: 2, drop: 1 };
     plan.campaign.exploration = Some(Exploration::Boost { every_generations: 2, children, tries: 5 });
-    plan.campaign.confirm = Some(Confirmation { times: 3, by: Typical::Quantile { share: 0.5 }, violations: true });
+    plan.campaign.confirm = Some(Confirmation { times: 3, by: Statistic::Quantile { share: 0.5 }, violations: true });
     plan.campaign.stop =
         vec![StopRule::Stagnation { generations: 3, below: 0.01 }, StopRule::Completeness { share: 0.9 }];
     let bound = plan.requirements[0].bound;
@@ -148,7 +148,7 @@ fn wholes() -> Vec<Whole> {
                     test: candidate.test,
                     fitness: search::fitness(&plan, &record.observation),
                     point: None,
-                    course: None,
+                    trajectories: None,
                     margins: Vec::new(),
                     failing: record.observation.value(MetricId(0)).value > Some(0.0),
                 });

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
     ActivationMode, BoostedChildren, CampaignPlan, Confirmation, Copies, CoverageGoal, Distribution, Domain, Drain,
-    Exploration, MetricSource, Operation, OperationKind, Parameter, Recorded, Search, StopRule, Typical,
+    Exploration, MetricSource, Operation, OperationKind, Parameter, Recorded, Search, Statistic, StopRule,
     place_in_words,
 };
 
@@ -101,9 +101,9 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
     }
     if let Some(Confirmation { times, by, violations }) = campaign.confirm {
         let by = match by {
-            Typical::Mean => "mean".to_owned(),
-            Typical::Median => "median".to_owned(),
-            Typical::Quantile { share } => format!("quantile {}%", percent(share)),
+            Statistic::Mean => "mean".to_owned(),
+            Statistic::Median => "median".to_owned(),
+            Statistic::Quantile { share } => format!("quantile {}%", percent(share)),
         };
         let violations = if violations { "  violations" } else { "" };
         clauses.push(("confirm", format!("{times} times {{ by {by}{violations} }}")));

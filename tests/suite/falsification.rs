@@ -5,16 +5,16 @@ use std::fmt::Write as _;
 use sesame_dsl::analyse;
 use sesame_dsl::source::SourceMap;
 use sesame_optimise::dominance::Fitness;
-use sesame_optimise::falsify::{Falsifier, Settings as FalsifierSettings, UnitBox};
+use sesame_optimise::falsify::{Falsifier, Margin, Settings as FalsifierSettings, UnitBox};
 use sesame_optimise::nsga2::{Nsga2, Settings, Survival, Told};
-use sesame_optimise::published::FalsificationProblem;
-use sesame_optimise::real::RealVariation;
+use sesame_optimise::problems::FalsificationProblem;
+use sesame_optimise::problems::RealVariation;
 use sesame_optimise::sobol::SobolPoints;
 use sesame_plan::{Activation, CampaignPlan, Choice, Test, TestOperation};
 use sesame_results::record::Repository;
 use sesame_rng::{Stream, keyed_unit};
-use sesame_search::margin::margin_to;
-use sesame_search::{Evaluated, Margin};
+use sesame_search::Evaluated;
+use sesame_search::margin_to;
 use sesame_tests::Project;
 
 const BUDGET: u32 = 80;
@@ -316,7 +316,7 @@ fn tests_until_violated(problem: FalsificationProblem, plan: &CampaignPlan, seed
                 test: candidate.test,
                 fitness: Fitness::Measured(objectives),
                 point: None,
-                course: None,
+                trajectories: None,
                 margins,
                 failing: false,
             });

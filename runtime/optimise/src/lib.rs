@@ -5,7 +5,7 @@
 //! - [`hypervolume`] and [`igd`]: how good a front is.
 //! - [`sobol`]: low-discrepancy points.
 //! - [`falsify`]: looking for a violation where evaluations are expensive, by a Gaussian process.
-//! - [`problems`] and [`published`]: functions with known answers, for tests and benchmarks.
+//! - [`problems`]: functions with known answers, for tests and benchmarks.
 //!
 //! All objectives are minimised. Everything is a function of its arguments and a seed; equal seeds give equal results
 //! on every machine.
@@ -18,8 +18,6 @@ pub mod hypervolume;
 pub mod igd;
 pub mod nsga2;
 pub mod problems;
-pub mod published;
-pub mod real;
 pub mod selection;
 pub mod sobol;
 pub mod sorting;

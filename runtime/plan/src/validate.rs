@@ -19,7 +19,7 @@ use crate::{
     Activation, ActivationMode, Aggregate, BoostedChildren, Bound, Campaign, CampaignPlan, Choice, Confirmation,
     CoverageGoal, Domain, Exploration, Expression, Failing, FieldRef, Formula, KnownTest, KnownTestId, MessageId,
     Metric, MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA, Search, Span,
-    StopRule, Test, TopicId, Transport, Type, Typical,
+    Statistic, StopRule, Test, TopicId, Transport, Type,
 };
 
 /// What is wrong with a plan, and where in it.
@@ -571,8 +571,8 @@ fn exploration(exploration: &Exploration) -> Checked {
 fn confirmation(confirmation: &Confirmation) -> Checked {
     at("times", at_least_one(confirmation.times))?;
     match confirmation.by {
-        Typical::Mean | Typical::Median => Ok(()),
-        Typical::Quantile { share } => at("by.share", positive_share(share)),
+        Statistic::Mean | Statistic::Median => Ok(()),
+        Statistic::Quantile { share } => at("by.share", positive_share(share)),
     }
 }
 

@@ -167,7 +167,7 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, 
     if objectives.is_empty() {
         return Ok(dataset);
     }
-    let front = Front::of(judged.iter().map(|(number, fitness)| (*number, fitness)));
+    let front = Front::from_tests(judged.iter().map(|(number, fitness)| (*number, fitness)));
     let mut members: Vec<&FrontMember> = front.members().iter().collect();
     members.sort_by(|a, b| lexicographic(&a.objectives, &b.objectives));
     for (number, fitness) in &judged {
@@ -234,7 +234,7 @@ pub fn coverage(
     convention: Convention,
 ) -> Result<CoverageAnalysis, RecordError> {
     let plan = repository.plan();
-    let feasible = Feasible::of(plan, &grid);
+    let feasible = Feasible::from_plan(plan, &grid);
     let mut coverage = Coverage::new(grid, hits);
     let mut points = Vec::new();
     repository.scan(&mut |test| {

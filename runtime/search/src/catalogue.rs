@@ -5,25 +5,32 @@ use sesame_optimise::nsga2::{self, Nsga2, Survival};
 use sesame_plan::{ActivationMode, CampaignPlan, Exploration, Search};
 
 use crate::coverage::Grid;
-use crate::evolve::boost::{Boosted, Boosting};
+use crate::evolve::boost::{Boosting, BoostingVariation};
 use crate::evolve::cells::Cells;
-use crate::evolve::construct::Constructor;
-use crate::evolve::constructing::{Constructing, Construction};
+use crate::evolve::construct::placement::CellPlacer;
+use crate::evolve::construct::{ConstructingVariation, Construction};
+use crate::evolve::map_elites::MapElites;
 use crate::evolve::novelty::{Measure, Novel};
-use crate::evolve::predict::Predicting;
+use crate::evolve::predict::PredictingVariation;
 use crate::evolve::variation::{self, TestVariation};
-use crate::{
-    Falsification, InTurn, Known, LatinHypercube, MapElites, Permitted, Random, Repeat, SearchError, Shrink, Sobol,
-    Strategy,
-};
+use crate::falsification::Falsification;
+use crate::known::Known;
+use crate::repeat::Repeat;
+use crate::sample::latin_hypercube::LatinHypercube;
+use crate::sample::random::Random;
+use crate::sample::sampled_search::SampledSearch;
+use crate::sample::sobol::Sobol;
+use crate::shrink::Shrink;
+use crate::space::test_space::TestSpace;
+use crate::{SearchError, Strategy};
 
 /// Whether the strategy of a plan asks for the margins of requirements.
 pub fn needs_margins(plan: &CampaignPlan) -> bool {
     matches!(plan.campaign.search, Search::Falsification { .. })
 }
 
-/// Whether the strategy of a plan asks for the courses of runs.
-pub fn needs_courses(plan: &CampaignPlan) -> bool {
+/// Whether the strategy of a plan asks for the trajectories of runs.
+pub fn needs_trajectories(plan: &CampaignPlan) -> bool {
     matches!(plan.campaign.exploration, Some(Exploration::Predict { .. }))
 }
 
@@ -36,8 +43,8 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
             return Err(SearchError::NoPopulation { campaign: plan.campaign.name.clone() });
         }
         &Search::Nsga2 { population, evaluations } => {
-            let permitted = Permitted::of(plan)?;
-            let tests = variation(plan, permitted.clone(), seed);
+            let test_space = TestSpace::from_plan(plan)?;
+            let tests = variation(plan, test_space.clone(), seed);
             let settings = nsga2::Settings { population, evaluations, seed, survival: survival(plan) };
             let by_time = plan.campaign.activation == ActivationMode::Time;
             match &plan.campaign.exploration {
@@ -48,7 +55,7 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
                     return Err(SearchError::NotByTime { campaign: plan.campaign.name.clone() });
                 }
                 &Some(Exploration::Predict { candidates }) => {
-                    let predicting = Predicting::new(tests, permitted, cells(plan)?, candidates, seed);
+                    let predicting = PredictingVariation::new(tests, test_space, cells(plan)?, candidates, seed);
                     Box::new(Nsga2::new(settings, predicting))
                 }
                 None => Box::new(Nsga2::new(settings, tests)),
@@ -56,20 +63,20 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
                     let measure = Measure {
                         neighbours: *neighbours as usize,
                         over: over.clone(),
-                        largest_count: permitted.most() as f64,
+                        largest_count: test_space.most() as f64,
                     };
                     Box::new(Novel::new(Nsga2::new(settings, tests), measure))
                 }
                 &Some(Exploration::Boost { every_generations, children, tries }) => {
                     let boosting = Boosting { every_generations, children, tries };
-                    Box::new(Nsga2::new(settings, Boosted::new(tests, cells(plan)?, boosting, seed)))
+                    Box::new(Nsga2::new(settings, BoostingVariation::new(tests, cells(plan)?, boosting, seed)))
                 }
                 &Some(Exploration::Construct { share, until }) => {
                     let cells = cells(plan)?;
                     let (grid, feasible) = (cells.grid().clone(), cells.feasible().clone());
-                    let constructor = Constructor::new(permitted, grid, feasible, plan.campaign.copies);
+                    let placer = CellPlacer::new(test_space, grid, feasible, plan.campaign.copies);
                     let construction = Construction { share, until: until.unwrap_or(1.0) };
-                    Box::new(Nsga2::new(settings, Constructing::new(tests, cells, constructor, construction, seed)))
+                    Box::new(Nsga2::new(settings, ConstructingVariation::new(tests, cells, placer, construction, seed)))
                 }
             }
         }
@@ -80,15 +87,18 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
             let grid =
                 Grid::new(goal.axes.clone()).map_err(|reason| SearchError::Grid { campaign: campaign(), reason })?;
             let settings = nsga2::Settings { population, evaluations, seed, survival: Survival::Crowded };
-            Box::new(MapElites::new(settings, variation(plan, Permitted::of(plan)?, seed), grid))
+            Box::new(MapElites::new(settings, variation(plan, TestSpace::from_plan(plan)?, seed), grid))
         }
         &Search::LatinHypercube { evaluations } => {
             by_time(plan)?;
-            Box::new(InTurn::new(LatinHypercube::new(Permitted::of(plan)?, evaluations, seed), evaluations))
+            Box::new(SampledSearch::new(
+                LatinHypercube::new(TestSpace::from_plan(plan)?, evaluations, seed),
+                evaluations,
+            ))
         }
         &Search::Sobol { evaluations } => {
             by_time(plan)?;
-            Box::new(InTurn::new(Sobol::new(Permitted::of(plan)?, seed), evaluations))
+            Box::new(SampledSearch::new(Sobol::new(TestSpace::from_plan(plan)?, seed), evaluations))
         }
         &Search::Falsification { population, evaluations } => {
             by_time(plan)?;
@@ -97,9 +107,11 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
                 return Err(SearchError::NoRequirement { campaign: plan.campaign.name.clone() });
             }
             let settings = falsify::Settings { requirements, evaluations, batch: population, seed };
-            Box::new(Falsification::new(Permitted::of(plan)?, settings))
+            Box::new(Falsification::new(TestSpace::from_plan(plan)?, settings))
         }
-        &Search::Random { evaluations } => Box::new(InTurn::new(Random::new(Permitted::of(plan)?, seed), evaluations)),
+        &Search::Random { evaluations } => {
+            Box::new(SampledSearch::new(Random::new(TestSpace::from_plan(plan)?, seed), evaluations))
+        }
         &Search::Repeat { test, times } => Box::new(Repeat::new(plan.test(test).test.clone(), times, seed)),
         Search::Known { tests } => {
             Box::new(Known::new(tests.iter().map(|&id| (id, plan.test(id).test.clone())).collect()))
@@ -118,12 +130,12 @@ fn by_time(plan: &CampaignPlan) -> Result<(), SearchError> {
     }
 }
 
-fn variation(plan: &CampaignPlan, permitted: Permitted, seed: u64) -> TestVariation {
+fn variation(plan: &CampaignPlan, test_space: TestSpace, seed: u64) -> TestVariation {
     let rates = match plan.campaign.activation {
         ActivationMode::Time => variation::Rates::default(),
         ActivationMode::Condition { .. } => variation::Rates::by_condition(),
     };
-    TestVariation::new(permitted, rates, seed)
+    TestVariation::new(test_space, rates, seed)
 }
 
 /// Conditions hold or not: many tests are active equally long, and change nothing that is measured.
@@ -138,5 +150,5 @@ fn survival(plan: &CampaignPlan) -> Survival {
 fn cells(plan: &CampaignPlan) -> Result<Cells, SearchError> {
     let campaign = || plan.campaign.name.clone();
     let goal = plan.campaign.coverage.as_ref().ok_or_else(|| SearchError::NoCoverage { campaign: campaign() })?;
-    Cells::of(plan, goal).map_err(|reason| SearchError::Grid { campaign: campaign(), reason })
+    Cells::from_plan(plan, goal).map_err(|reason| SearchError::Grid { campaign: campaign(), reason })
 }

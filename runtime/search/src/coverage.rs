@@ -114,7 +114,7 @@ mod tests {
             intervals: vec![Span { start: t1 - t2 / 2.0, end: t1 + t2 / 2.0 }],
             parameters: vec![Intensity { permitted: (0.0, 1.0), chosen: (p1, p1), shape: Shape::Value }],
         };
-        Point::of(&[disturbance], Convention::Ours).unwrap()
+        Point::from_disturbances(&[disturbance], Convention::Ours).unwrap()
     }
 
     fn grid(cells: [u32; 3]) -> Grid {

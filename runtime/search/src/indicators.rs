@@ -142,7 +142,7 @@ mod tests {
         let mut indicators = Indicators::new(Some(&measured([0.0, 0.0])));
         let crash = Outcome::Crash { message: "gone".to_owned() };
         let mut front = Front::default();
-        indicators.add(&crash, false, &Fitness::Unfit(crate::Unfit::Crash));
+        indicators.add(&crash, false, &Fitness::Unfit(sesame_optimise::dominance::Unfit::Crash));
         let nothing = indicators.after(0, &front);
         assert_eq!((nothing.crashes, nothing.evaluations, nothing.hypervolume), (1, 1, None));
         for (number, values) in [(2, [10.0, -3.0]), (3, [4.0, f64::NEG_INFINITY]), (4, [20.0, -5.0])] {
@@ -171,7 +171,7 @@ mod tests {
         assert_eq!(indicators.after(0, &front).hypervolume, None);
         assert!(indicators.reference().is_some());
         let mut indicators = Indicators::new(None);
-        let front = Front::of([(1, &Fitness::Measured(Vec::new()))]);
+        let front = Front::from_tests([(1, &Fitness::Measured(Vec::new()))]);
         indicators.add(&Outcome::Completed, false, &Fitness::Measured(Vec::new()));
         assert_eq!(indicators.after(0, &front).hypervolume, None);
     }
@@ -185,7 +185,7 @@ mod tests {
         for point in &points {
             indicators.add(&Outcome::Completed, false, point);
         }
-        let front = Front::of((0u32..).zip(&points));
+        let front = Front::from_tests((0u32..).zip(&points));
         let after = indicators.after(0, &front);
         let (volume, error) = (after.hypervolume.unwrap(), after.standard_error.unwrap());
         assert!(error > 0.0 && error < 0.05 * volume, "{volume} and {error}");

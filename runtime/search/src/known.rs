@@ -6,14 +6,14 @@ use crate::{Candidate, Evaluated, Strategy};
 
 /// Each of these tests once, in one generation.
 #[derive(Debug, Clone)]
-pub struct Known {
+pub(crate) struct Known {
     tests: Vec<(KnownTestId, Test)>,
     awaited: Option<usize>,
 }
 
 impl Known {
     /// These tests, in this order.
-    pub fn new(tests: Vec<(KnownTestId, Test)>) -> Self {
+    pub(crate) fn new(tests: Vec<(KnownTestId, Test)>) -> Self {
         Known { tests, awaited: None }
     }
 }

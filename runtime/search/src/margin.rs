@@ -4,7 +4,7 @@ use sesame_base::observation::Observation;
 use sesame_base::verdict::{Verdict, verdict};
 use sesame_plan::{Bound, CampaignPlan, Requirement};
 
-pub use sesame_optimise::falsify::Margin;
+pub(crate) use sesame_optimise::falsify::Margin;
 
 /// The margin to a bound of which a metric has this value, which is not NaN.
 pub fn margin_to(bound: Bound, value: f64) -> Margin {
@@ -53,10 +53,10 @@ mod tests {
     use sesame_plan::{MetricId, Search};
 
     use super::*;
-    use crate::testing::landscape::LANDSCAPES;
+    use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     fn margin(outcome: Outcome, shown: MetricObservation) -> Margin {
-        let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+        let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
         plan.requirements = vec![Requirement {
             name: "in_time".to_owned(),
             text: String::new(),

@@ -7,7 +7,7 @@ use crate::{Candidate, Evaluated, Strategy};
 
 /// The same test so many times, draw seeds included, in one generation; each run has a seed of the simulator of its own.
 #[derive(Debug, Clone)]
-pub struct Repeat {
+pub(crate) struct Repeat {
     test: Test,
     times: u32,
     seed: u64,
@@ -16,7 +16,7 @@ pub struct Repeat {
 
 impl Repeat {
     /// So many repetitions of a test; `seed` is the campaign's.
-    pub fn new(test: Test, times: u32, seed: u64) -> Self {
+    pub(crate) fn new(test: Test, times: u32, seed: u64) -> Self {
         Repeat { test, times, seed, awaited: None }
     }
 }

@@ -8,16 +8,16 @@
 //!
 //! Like every [`Strategy`] it is a function of what it was told, so a run that was stopped is taken up again.
 
-mod dial;
+mod axis;
+mod reduce;
 mod space;
 #[cfg(test)]
 mod tests;
-mod walk;
 
 use std::collections::BTreeMap;
 
-use space::Space;
-use walk::{Answers, Arrived, Asked, walk};
+use reduce::{Oracle, Pending, Reduced, reduce};
+use space::ShrinkSpace;
 
 use sesame_plan::{CampaignPlan, Search, Test};
 use sesame_rng::derive_seed;
@@ -40,7 +40,7 @@ pub enum Phase {
     /// Parameters are milder.
     Parameters,
     /// Whatever can be made smaller is, by one step.
-    LastSteps,
+    LocalMinimality,
 }
 
 impl Phase {
@@ -52,7 +52,7 @@ impl Phase {
             Phase::Windows => "windows",
             Phase::Conditions => "conditions",
             Phase::Parameters => "parameters",
-            Phase::LastSteps => "last steps",
+            Phase::LocalMinimality => "last steps",
         }
     }
 }
@@ -75,7 +75,7 @@ pub struct Tried {
 /// Makes a test smaller, by ask and tell of which candidates [fail](Evaluated::failing).
 #[derive(Debug, Clone)]
 pub struct Shrink {
-    space: Space,
+    space: ShrinkSpace,
     test: Test,
     simulator_seed: u64,
     runs: u32,
@@ -89,7 +89,7 @@ pub struct Shrink {
     generation: u32,
     /// How many runs of that generation are to be told.
     awaited: usize,
-    arrived: Option<Arrived>,
+    reduced: Option<Reduced>,
 }
 
 impl Shrink {
@@ -115,7 +115,7 @@ impl Shrink {
     ) -> Shrink {
         let runs = runs.max(1);
         Shrink {
-            space: Space::of(plan, resolution),
+            space: ShrinkSpace::from_plan(plan, resolution),
             test,
             simulator_seed,
             runs,
@@ -125,7 +125,7 @@ impl Shrink {
             asked: 0,
             generation: 0,
             awaited: 0,
-            arrived: None,
+            reduced: None,
         }
     }
 
@@ -136,16 +136,16 @@ impl Shrink {
 
     /// Positions among those tried of the tests that were gone to so far, the smallest last. Empty where the test that was
     /// given does not fail, and as long as that is not known.
-    pub fn kept(&self) -> Vec<usize> {
-        let arrived = self.arrived.clone();
-        // With nothing more to be run the walk goes as far as what is known leads.
-        let arrived = arrived.or_else(|| walk(&self.space, &self.test, self, true).ok());
-        arrived.map_or_else(Vec::new, |arrived| arrived.kept)
+    pub fn accepted(&self) -> Vec<usize> {
+        let reduced = self.reduced.clone();
+        // With nothing more to be run the reduce goes as far as what is known leads.
+        let reduced = reduced.or_else(|| reduce(&self.space, &self.test, self, true).ok());
+        reduced.map_or_else(Vec::new, |reduced| reduced.accepted)
     }
 
     /// Whether nothing of the smallest test can be made smaller by one step alone: all of that was run.
     pub fn is_minimal(&self) -> bool {
-        self.arrived.as_ref().is_some_and(|arrived| arrived.minimal)
+        self.reduced.as_ref().is_some_and(|reduced| reduced.minimal)
     }
 
     /// In how many runs each test is run.
@@ -154,7 +154,7 @@ impl Shrink {
     }
 }
 
-impl Answers for Shrink {
+impl Oracle for Shrink {
     fn find(&self, test: &Test) -> Option<(usize, bool)> {
         let &at = self.known.get(&content(test))?;
         Some((at, self.tried[at].failed? == self.runs))
@@ -169,12 +169,12 @@ fn content(test: &Test) -> String {
 impl Strategy for Shrink {
     fn ask(&mut self) -> Vec<Candidate> {
         assert!(self.awaited == 0, "a generation is told before the next is asked");
-        if self.arrived.is_some() {
+        if self.reduced.is_some() {
             return Vec::new();
         }
-        let Asked { phase, mut tests, base } = match walk(&self.space, &self.test, self, self.left == 0) {
-            Ok(arrived) => {
-                self.arrived = Some(arrived);
+        let Pending { phase, mut tests, base } = match reduce(&self.space, &self.test, self, self.left == 0) {
+            Ok(reduced) => {
+                self.reduced = Some(reduced);
                 return Vec::new();
             }
             Err(asked) => asked,
@@ -215,10 +215,10 @@ impl Strategy for Shrink {
     }
 
     fn ended(&self) -> Option<String> {
-        let arrived = self.arrived.as_ref()?;
-        Some(if arrived.kept.is_empty() {
+        let reduced = self.reduced.as_ref()?;
+        Some(if reduced.accepted.is_empty() {
             "the test did not fail again".to_owned()
-        } else if arrived.minimal {
+        } else if reduced.minimal {
             "no single step is left that still fails".to_owned()
         } else {
             "all evaluations were used up".to_owned()

@@ -89,7 +89,7 @@ impl Point {
     /// With the start `s` and end `e` of each interval as shares of its operation's window: T1 is the mean of
     /// `(s + e) / 2`, T2 the mean of `e - s`, T3 the population standard deviation of `(s + e) / 2`. With the normalised
     /// parameters of all operations that were active: P1 is their mean, P2 their population standard deviation.
-    pub fn of(disturbances: &[Disturbance], convention: Convention) -> Option<Point> {
+    pub fn from_disturbances(disturbances: &[Disturbance], convention: Convention) -> Option<Point> {
         let active: Vec<&Disturbance> =
             disturbances.iter().filter(|it| !it.intervals.is_empty() && it.window.length() > 0.0).collect();
         let share = |of: &Disturbance, time: f64| (time - of.window.start) / of.window.length();

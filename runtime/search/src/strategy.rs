@@ -4,7 +4,7 @@ use sesame_optimise::dominance::Fitness;
 use sesame_optimise::nsga2::{self, Nsga2, Variation};
 use sesame_plan::{KnownTestId, Test};
 
-use crate::evolve::predict::Course;
+use crate::evolve::predict::VariableTrajectories;
 use crate::evolve::variation::TestVariation;
 use crate::margin::Margin;
 use crate::sspr::Point;
@@ -21,7 +21,7 @@ pub trait Strategy: Send {
     fn tell(&mut self, results: &[Evaluated]);
 
     /// Takes how the condition variables went in the undisturbed run, before the first generation is asked.
-    fn reference(&mut self, _: Course) {}
+    fn reference(&mut self, _: VariableTrajectories) {}
 
     /// What the search gave up, for the record of the campaign.
     fn given_up(&self) -> Vec<String> {
@@ -60,8 +60,8 @@ pub struct Evaluated {
     pub fitness: Fitness,
     /// Where its run lies in the reduced parameter space, if it counts for coverage.
     pub point: Option<Point>,
-    /// How the condition variables went in its run, where the campaign [predicts](needs_courses).
-    pub course: Option<Course>,
+    /// How the condition variables went in its run, where the campaign [predicts](needs_trajectories).
+    pub trajectories: Option<VariableTrajectories>,
     /// How far each requirement of the plan is from its violation, from [`margins`], where the campaign
     /// [asks for them](needs_margins); else empty.
     pub margins: Vec<Margin>,
@@ -75,7 +75,7 @@ pub(crate) trait Learning: Variation<Genome = Test> {
     fn learn(&mut self, results: &[Evaluated]);
 
     /// Takes how the condition variables went in the undisturbed run.
-    fn reference(&mut self, _: Course) {}
+    fn reference(&mut self, _: VariableTrajectories) {}
 
     /// What it gave up, each in a sentence.
     fn given_up(&self) -> Vec<String> {
@@ -98,8 +98,8 @@ impl<V: Learning + Send> Strategy for Nsga2<V> {
             .collect()
     }
 
-    fn reference(&mut self, course: Course) {
-        self.variation_mut().reference(course);
+    fn reference(&mut self, trajectories: VariableTrajectories) {
+        self.variation_mut().reference(trajectories);
     }
 
     fn given_up(&self) -> Vec<String> {

@@ -1,7 +1,7 @@
 //! Synthetic robots: campaigns whose results are computed, for tests.
 
 #[cfg(test)]
-mod drawn;
+mod exploration;
 #[cfg(test)]
-mod explored;
-pub mod landscape;
+mod permitted_tests;
+pub mod synthetic_robots;

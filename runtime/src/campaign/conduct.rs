@@ -22,7 +22,9 @@ use sesame_search as search;
 use sesame_search::coverage::{self, Coverage, Feasible, Grid, GridError};
 use sesame_search::indicators::Indicators;
 use sesame_search::sspr::{self, Point};
-use sesame_search::{Candidate, Confirming, Course, Evaluated, Judged, Neighbours, SearchError, StopRules};
+use sesame_search::{
+    Candidate, ConfirmedFront, Evaluated, GenerationTest, Neighbours, SearchError, StopRules, VariableTrajectories,
+};
 
 use crate::campaign::confirmation::{Again, LIKE_BEFORE};
 use crate::campaign::pool::{Ended, Job, Pool, PoolError, PoolSettings};
@@ -205,20 +207,20 @@ pub fn conduct(
         desk.recorder.put_event(&Event { kind: EventKind::Warning, test: None, text })?;
     }
 
-    let (courses, margins) = (search::needs_courses(plan), search::needs_margins(plan));
-    if let Some(course) = Course::of(plan, &reference).filter(|_| courses) {
-        strategy.reference(course);
+    let (trajectories, margins) = (search::needs_trajectories(plan), search::needs_margins(plan));
+    if let Some(trajectories) = VariableTrajectories::from_observation(plan, &reference).filter(|_| trajectories) {
+        strategy.reference(trajectories);
     }
     let total = plan.campaign.search.evaluations();
     let failing = if let Search::Shrink { failing, .. } = &plan.campaign.search { Some(failing) } else { None };
     let mut front = Front::default();
-    let mut rules = StopRules::of(plan);
+    let mut rules = StopRules::from_plan(plan);
     let mut indicators = Indicators::new(Some(&search::fitness(plan, &reference)));
     let begun = Instant::now();
     let mut earlier = Earlier::default();
-    let mut confirming = plan.campaign.confirm.map(|confirmation| (confirmation, Confirming::default()));
+    let mut confirming = plan.campaign.confirm.map(|confirmation| (confirmation, ConfirmedFront::default()));
     let mut again = Again::default();
-    let mut neighbours = Neighbours::of(plan);
+    let mut neighbours = Neighbours::from_plan(plan);
     let mut originals = BTreeMap::new();
     let mut violating = BTreeSet::new();
     let mut numbered = 0;
@@ -269,14 +271,15 @@ pub fn conduct(
             if let (Some(tracking), Some(point)) = (&mut tracking, &point) {
                 tracking.coverage.add(point);
             }
-            let course = if courses { Course::of(plan, &record.observation) } else { None };
+            let trajectories =
+                if trajectories { VariableTrajectories::from_observation(plan, &record.observation) } else { None };
             let margins = if margins { search::margins(plan, &record.observation) } else { Vec::new() };
             told.push(Evaluated {
                 number: record.number,
                 test: record.test.clone(),
                 fitness,
                 point,
-                course,
+                trajectories,
                 margins,
                 failing,
             });
@@ -290,7 +293,7 @@ pub fn conduct(
         told.sort_by_key(|evaluated| evaluated.number);
         let stands_for = |number: u32| originals.get(&number).copied().unwrap_or(number);
         if let Some((confirmation, confirming)) = &mut confirming {
-            confirming.begin(told.iter().map(|it| Judged {
+            confirming.begin(told.iter().map(|it| GenerationTest {
                 number: it.number,
                 stands_for: stands_for(it.number),
                 first: it.fitness.clone(),
@@ -407,7 +410,7 @@ struct Tracking {
 impl Tracking {
     fn of(plan: &CampaignPlan, goal: &CoverageGoal) -> Result<Tracking, GridError> {
         let grid = Grid::new(goal.axes.clone())?;
-        let feasible = Feasible::of(plan, &grid);
+        let feasible = Feasible::from_plan(plan, &grid);
         Ok(Tracking { coverage: Coverage::new(grid, goal.hits), feasible, stop_at: goal.stop_at })
     }
 
@@ -609,7 +612,7 @@ impl Desk<'_> {
         }
         if known.is_empty() {
             let repository = self.recorder.repository();
-            let series = origin == Origin::Reference || search::needs_courses(repository.plan());
+            let series = origin == Origin::Reference || search::needs_trajectories(repository.plan());
             let together = if series { number } else { number.saturating_add(READ_TOGETHER).min(*numbers.end()) };
             known.extend(repository.records(number..=together, series)?);
         }

@@ -29,7 +29,7 @@ use std::collections::BTreeMap;
 pub use sesame_plan::stl::Interval;
 pub use sesame_plan::{
     BoostedChildren, Comparison, Confirmation, Copies, Dimension, Direction, Distribution, Drain, Exploration, Members,
-    Moment, NotFinite, OperationKind, Recorded, Shape, Step, StopRule, Typical, ValueMode,
+    Moment, NotFinite, OperationKind, Recorded, Shape, Statistic, Step, StopRule, ValueMode,
 };
 
 use crate::span::{FileId, Span};

@@ -2,7 +2,7 @@
 
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{Confirmation, Typical};
+use crate::model::{Confirmation, Statistic};
 use crate::syntax::ast::{self, Strategy};
 
 impl<'a> Resolver<'a> {
@@ -14,10 +14,10 @@ impl<'a> Resolver<'a> {
         let Some(written) = campaign.confirms.first() else { return Some(None) };
         let times = self.count(written.times, 1, "a test is confirmed by being repeated");
         let by = match self.single(&written.by, "by") {
-            None | Some(ast::Typical::Mean) => Some(Typical::Mean),
-            Some(ast::Typical::Median) => Some(Typical::Median),
+            None | Some(ast::Typical::Mean) => Some(Statistic::Mean),
+            Some(ast::Typical::Median) => Some(Statistic::Median),
             Some(ast::Typical::Quantile(share)) => {
-                self.share(share, "the share of a quantile").map(|share| Typical::Quantile { share })
+                self.share(share, "the share of a quantile").map(|share| Statistic::Quantile { share })
             }
         };
         let violations = self.single(&written.violations, "violations").is_some();

@@ -13,7 +13,7 @@ use sesame_plan::{
 use sesame_rng::Stream;
 use sesame_search as search;
 use sesame_search::coverage::{Coverage, Grid};
-use sesame_search::{Candidate, Course, Evaluated, StopRules, sspr};
+use sesame_search::{Candidate, Evaluated, StopRules, VariableTrajectories, sspr};
 
 const FIXED: Exploration =
     Exploration::Boost { every_generations: 2, children: BoostedChildren::Every { iterations: 2 }, tries: 10 };
@@ -97,14 +97,16 @@ fn spent(plan: &CampaignPlan) -> Duration {
     let mut spent = Duration::ZERO;
     let begun = Instant::now();
     let mut strategy = search::strategy(plan, 1).expect("the campaign can be searched");
-    let (courses, margins) = (search::needs_courses(plan), search::needs_margins(plan));
-    if let Some(course) = Course::of(plan, &observe(plan, 0, &[])).filter(|_| courses) {
-        strategy.reference(course);
+    let (trajectories, margins) = (search::needs_trajectories(plan), search::needs_margins(plan));
+    if let Some(trajectories) =
+        VariableTrajectories::from_observation(plan, &observe(plan, 0, &[])).filter(|_| trajectories)
+    {
+        strategy.reference(trajectories);
     }
     let goal = plan.campaign.coverage.as_ref().expect("the campaign counts cells");
     let mut coverage = Coverage::new(Grid::new(goal.axes.clone()).expect("it is a grid"), goal.hits);
     let mut front = Front::default();
-    let mut rules = StopRules::of(plan);
+    let mut rules = StopRules::from_plan(plan);
     let mut number = 0;
     spent += begun.elapsed();
     loop {
@@ -125,9 +127,10 @@ fn spent(plan: &CampaignPlan) -> Duration {
             if let Some(point) = &point {
                 coverage.add(point);
             }
-            let course = if courses { Course::of(plan, &observation) } else { None };
+            let trajectories =
+                if trajectories { VariableTrajectories::from_observation(plan, &observation) } else { None };
             let margins = if margins { search::margins(plan, &observation) } else { Vec::new() };
-            told.push(Evaluated { number, test, fitness, point, course, margins, failing: false });
+            told.push(Evaluated { number, test, fitness, point, trajectories, margins, failing: false });
             spent += begun.elapsed();
         }
         let begun = Instant::now();

@@ -6,10 +6,10 @@ use rusqlite::params;
 
 use sesame_base::observation::{MetricObservation, Observation, Outcome, WallTime};
 use sesame_optimise::dominance::Fitness;
+use sesame_optimise::falsify::Margin;
 use sesame_plan::{CampaignPlan, Requirement};
 use sesame_search as search;
-use sesame_search::Margin;
-use sesame_search::confirming::{typical, typical_margin};
+use sesame_search::{aggregate, aggregate_margin};
 
 use crate::record::recorder::write_event;
 use crate::record::schema::index;
@@ -25,7 +25,7 @@ pub fn confirmed_fitness(plan: &CampaignPlan, repetitions: &[Repetition]) -> Opt
         .iter()
         .map(|run| search::fitness_of(plan, &run.outcome, |metric| run.value(metric).value))
         .collect();
-    Some(typical(&runs, confirmation.by))
+    Some(aggregate(&runs, confirmation.by))
 }
 
 /// How far the repetitions of a test are from violating each requirement, by the campaign's way to sum them up; `None` as
@@ -36,7 +36,7 @@ pub fn confirmed_margins(plan: &CampaignPlan, repetitions: &[Repetition]) -> Opt
         own(plan, repetitions)?.iter().map(|run| search::margins(plan, &run.observation())).collect();
     let of = |requirement: usize| {
         let margins: Vec<Margin> = runs.iter().map(|run| run[requirement]).collect();
-        typical_margin(&margins, confirmation.by)
+        aggregate_margin(&margins, confirmation.by)
     };
     Some((0..plan.requirements.len()).map(of).collect())
 }
@@ -230,7 +230,7 @@ impl Repository {
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_plan::{Confirmation, Typical};
+    use sesame_plan::{Confirmation, Statistic};
 
     use super::*;
     use crate::record::{DATABASE, sample};
@@ -343,7 +343,7 @@ mod tests {
         let completed = |position, collisions| repetition(3, position, Outcome::Completed, Some(collisions));
         let runs = [completed(1, 2.0), completed(2, 4.0), completed(3, 90.0)];
         assert_eq!(confirmed_fitness(&plan, &runs), None, "it does not confirm");
-        plan.campaign.confirm = Some(Confirmation { times: 2, by: Typical::Mean, violations: false });
+        plan.campaign.confirm = Some(Confirmation { times: 2, by: Statistic::Mean, violations: false });
         // Fuzzing time is minimised, collisions are maximised.
         let Some(Fitness::Measured(values)) = confirmed_fitness(&plan, &runs) else { panic!("both have values") };
         assert_eq!(values, [f64::midpoint(1.1, 2.1), -3.0]);
@@ -355,7 +355,7 @@ mod tests {
         let completed = |position, collisions| repetition(3, position, Outcome::Completed, Some(collisions));
         let runs = [completed(1, 2.0), completed(2, 4.0), completed(3, 90.0)];
         assert_eq!(confirmed_margins(&plan, &runs), None, "it does not confirm");
-        plan.campaign.confirm = Some(Confirmation { times: 2, by: Typical::Mean, violations: false });
+        plan.campaign.confirm = Some(Confirmation { times: 2, by: Statistic::Mean, violations: false });
         // R1: at most 0 collisions. R4 bounds a metric without value here.
         let margins = confirmed_margins(&plan, &runs).unwrap();
         assert_eq!(margins[0], Margin { value: Some(-3.0), violated: true });

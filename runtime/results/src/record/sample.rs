@@ -445,7 +445,7 @@ fn recorded(folder: &Path, plan: &CampaignPlan, searched: u32, fronts: bool) -> 
         Recorder::create(folder, plan, plan.campaign.seed, 2).expect("what is made up here can be recorded");
     let records = records(plan, searched);
     let mut indicators = Indicators::new(Some(&search::fitness(plan, &records[0].observation)));
-    let mut front_so_far = search::Front::default();
+    let mut front_so_far = sesame_optimise::front::Front::default();
     recorder.commit(&records[0]).expect("what is made up here can be recorded");
     for (at, record) in records.iter().enumerate().skip(1) {
         recorder.commit(record).expect("what is made up here can be recorded");

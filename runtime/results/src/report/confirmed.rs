@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use sesame_base::observation::Outcome;
-use sesame_plan::{CampaignPlan, Confirmation, Direction, Typical};
+use sesame_plan::{CampaignPlan, Confirmation, Direction, Statistic};
 
 use crate::record::{Judge, RecordError, Repetition, Repository, Standing, Tally, TestRow, Verdict, confirmed_fitness};
 use crate::report::number::{self, fixed, join_words, plural};
@@ -238,9 +238,9 @@ pub(crate) fn once_sentence(once: usize, confirms: bool) -> Option<String> {
 pub(crate) fn values_sentence(confirmation: Confirmation) -> String {
     let runs = plural(confirmation.times as usize, "fresh run", "fresh runs");
     match confirmation.by {
-        Typical::Mean => format!("Values are means of {runs} of each test."),
-        Typical::Median => format!("Values are medians of {runs} of each test."),
-        Typical::Quantile { share } => {
+        Statistic::Mean => format!("Values are means of {runs} of each test."),
+        Statistic::Median => format!("Values are medians of {runs} of each test."),
+        Statistic::Quantile { share } => {
             format!("Values are what {} % of {runs} of each test reach or go beyond.", number::number(100.0 * share))
         }
     }

@@ -7,8 +7,9 @@ use serde::Serialize;
 use sesame_base::condition;
 use sesame_optimise::dominance::Fitness;
 use sesame_plan::{Activation, CampaignPlan, Dimension, Failing, MetricId, RequirementId, Search, Test, TestOperation};
+use sesame_search::shrink::Shrink;
 use sesame_search::shrink::strength;
-use sesame_search::{Evaluated, Shrink, Strategy as _, sspr};
+use sesame_search::{Evaluated, Strategy as _, sspr};
 
 use crate::record::{MetricValue, RecordError, Repository, TestRow, fails};
 use crate::report::export::shrunk_block;
@@ -138,7 +139,15 @@ pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Opt
             let Some(row) = rows.get(&number).filter(|row| row.test == candidate.test) else { break };
             let failing = fails(plan, failing, &row.outcome, |id| row.value(id));
             let (test, fitness) = (candidate.test.clone(), Fitness::Measured(Vec::new()));
-            told.push(Evaluated { number, test, fitness, point: None, course: None, margins: Vec::new(), failing });
+            told.push(Evaluated {
+                number,
+                test,
+                fitness,
+                point: None,
+                trajectories: None,
+                margins: Vec::new(),
+                failing,
+            });
         }
         // A run that is unfinished is told as far as its last whole generation.
         if asked.is_empty() || told.len() < asked.len() {
@@ -148,7 +157,7 @@ pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Opt
     }
     let name = plan.test(*test).name.clone();
     let metrics = metrics(plan, failing);
-    let kept = search.kept();
+    let kept = search.accepted();
     let steps = search.tried().iter().enumerate().filter_map(|(at, tried)| {
         let row = rows.get(&tried.number)?;
         Some(ShrinkStep {
@@ -463,7 +472,15 @@ mod tests {
                 let failing = fails(&plan, &failing, &record.observation.outcome, value);
                 recorder.commit(&record).unwrap();
                 let (test, fitness) = (candidate.test.clone(), Fitness::Measured(Vec::new()));
-                told.push(Evaluated { number, test, fitness, point: None, course: None, margins: Vec::new(), failing });
+                told.push(Evaluated {
+                    number,
+                    test,
+                    fitness,
+                    point: None,
+                    trajectories: None,
+                    margins: Vec::new(),
+                    failing,
+                });
                 if number as usize == most {
                     return (folder, recorder.finish("stopped").unwrap());
                 }

@@ -29,32 +29,32 @@ pub(crate) struct Boosting {
 
 /// Variation of tests with coverage boosting.
 #[derive(Debug, Clone)]
-pub(crate) struct Boosted {
+pub(crate) struct BoostingVariation {
     tests: TestVariation,
     cells: Cells,
     boosting: Boosting,
     seed: u64,
 }
 
-impl Boosted {
+impl BoostingVariation {
     pub(crate) fn new(tests: TestVariation, cells: Cells, boosting: Boosting, seed: u64) -> Self {
-        Boosted { tests, cells, boosting, seed }
+        BoostingVariation { tests, cells, boosting, seed }
     }
 
     fn boosts(&self, generation: u64, place: u64) -> bool {
         let every = u64::from(self.boosting.every_generations.max(1));
-        // Boosted generations are the multiples of `every` from `every` on.
+        // BoostingVariation generations are the multiples of `every` from `every` on.
         let [index, time] =
             [place, (generation / every).saturating_sub(1)].map(|it| u32::try_from(it).unwrap_or(u32::MAX));
         generation.is_multiple_of(every) && self.boosting.children.includes(index, time)
     }
 
-    fn wants(&self, test: &Test) -> bool {
-        self.cells.cell_of(test).is_some_and(|cell| self.cells.wants(cell))
+    fn needs_tests(&self, test: &Test) -> bool {
+        self.cells.cell_of(test).is_some_and(|cell| self.cells.needs_tests(cell))
     }
 }
 
-impl Variation for Boosted {
+impl Variation for BoostingVariation {
     type Genome = Test;
 
     fn initial(&mut self, index: u64) -> Test {
@@ -64,19 +64,19 @@ impl Variation for Boosted {
     fn offspring(&mut self, parents: [&Test; 2], generation: u64, pair: u64) -> [Child<Test>; 2] {
         let mut place = 2 * pair;
         self.tests.offspring(parents, generation, pair).map(|mut child| {
-            if self.boosts(generation, place) && !self.wants(&child.genome) {
+            if self.boosts(generation, place) && !self.needs_tests(&child.genome) {
                 let mut stream = Stream::derive(self.seed, "boost", &[generation, place]);
                 let mut test = child.genome.clone();
                 for _ in 0..self.boosting.tries {
                     self.tests.mutate_again(&mut test, &mut stream);
-                    if self.wants(&test) && self.tests.claim(&test) {
+                    if self.needs_tests(&test) && self.tests.claim(&test) {
                         child.genome = test;
                         break;
                     }
                 }
             }
             if let Some(cell) = self.cells.cell_of(&child.genome) {
-                self.cells.promise(cell);
+                self.cells.reserve(cell);
             }
             place += 1;
             child
@@ -84,7 +84,7 @@ impl Variation for Boosted {
     }
 }
 
-impl Learning for Boosted {
+impl Learning for BoostingVariation {
     fn learn(&mut self, results: &[Evaluated]) {
         self.cells.learn(results);
     }

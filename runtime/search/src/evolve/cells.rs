@@ -13,15 +13,15 @@ pub(crate) struct Cells {
     plan: CampaignPlan,
     coverage: Coverage,
     feasible: Feasible,
-    promised: Vec<u32>,
+    reserved: Vec<u32>,
 }
 
 impl Cells {
-    pub(crate) fn of(plan: &CampaignPlan, goal: &CoverageGoal) -> Result<Cells, GridError> {
+    pub(crate) fn from_plan(plan: &CampaignPlan, goal: &CoverageGoal) -> Result<Cells, GridError> {
         let grid = Grid::new(goal.axes.clone())?;
-        let feasible = Feasible::of(plan, &grid);
-        let promised = vec![0; grid.len()];
-        Ok(Cells { plan: plan.clone(), coverage: Coverage::new(grid, goal.hits), feasible, promised })
+        let feasible = Feasible::from_plan(plan, &grid);
+        let reserved = vec![0; grid.len()];
+        Ok(Cells { plan: plan.clone(), coverage: Coverage::new(grid, goal.hits), feasible, reserved })
     }
 
     pub(crate) fn plan(&self) -> &CampaignPlan {
@@ -34,7 +34,7 @@ impl Cells {
 
     /// Where a test is planned to lie; `None` where only a run can tell, or where it lies nowhere.
     pub(crate) fn point_of(&self, test: &Test) -> Option<Point> {
-        Point::of(&planned(&self.plan, test)?, Convention::Ours)
+        Point::from_disturbances(&planned(&self.plan, test)?, Convention::Ours)
     }
 
     /// The cell that a test is planned to fall into.
@@ -43,8 +43,8 @@ impl Cells {
     }
 
     /// Whether a cell is underserved: too few tests have hit it or promise to.
-    pub(crate) fn wants(&self, cell: usize) -> bool {
-        self.coverage.hits()[cell].saturating_add(self.promised[cell]) < self.coverage.needed()
+    pub(crate) fn needs_tests(&self, cell: usize) -> bool {
+        self.coverage.hits()[cell].saturating_add(self.reserved[cell]) < self.coverage.needed()
     }
 
     /// Whether a test of the campaign can fall into a cell.
@@ -59,18 +59,18 @@ impl Cells {
 
     /// The share of all cells that are covered if all promises are kept, in `0..=1`.
     pub(crate) fn expected_share(&self) -> f64 {
-        let served = (0..self.grid().len()).filter(|&cell| !self.wants(cell)).count();
+        let served = (0..self.grid().len()).filter(|&cell| !self.needs_tests(cell)).count();
         served as f64 / self.grid().len() as f64
     }
 
     /// Notes that a test asked for is planned to fall into a cell.
-    pub(crate) fn promise(&mut self, cell: usize) {
-        self.promised[cell] += 1;
+    pub(crate) fn reserve(&mut self, cell: usize) {
+        self.reserved[cell] += 1;
     }
 
     /// Takes the results of the tests asked since the last time.
     pub(crate) fn learn(&mut self, results: &[Evaluated]) {
-        self.promised.fill(0);
+        self.reserved.fill(0);
         for point in results.iter().filter_map(|result| result.point.as_ref()) {
             self.coverage.add(point);
         }

@@ -20,7 +20,7 @@ const ELITES: usize = 5;
 
 /// MAP-Elites over the tests of one campaign, in generations.
 #[derive(Debug, Clone)]
-pub struct MapElites {
+pub(crate) struct MapElites {
     settings: Settings,
     tests: TestVariation,
     grid: Grid,
@@ -33,7 +33,7 @@ pub struct MapElites {
 
 impl MapElites {
     /// A search before its first generation.
-    pub fn new(settings: Settings, tests: TestVariation, grid: Grid) -> Self {
+    pub(crate) fn new(settings: Settings, tests: TestVariation, grid: Grid) -> Self {
         assert!(settings.population > 0, "a generation has at least one test");
         MapElites { settings, tests, grid, elites: BTreeMap::new(), generation: 0, asked: 0, awaited: 0 }
     }
@@ -121,13 +121,14 @@ mod tests {
 
     use super::*;
     use crate::evolve::variation::Rates;
+    use crate::space::test_space::TestSpace;
     use crate::sspr::{Convention, Point, planned};
-    use crate::testing::landscape::LANDSCAPES;
-    use crate::{Permitted, strategy};
+    use crate::strategy;
+    use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     fn search() -> MapElites {
-        let plan = LANDSCAPES[0].plan(sesame_plan::Search::Random { evaluations: 1 });
-        let tests = TestVariation::new(Permitted::of(&plan).unwrap(), Rates::default(), 1);
+        let plan = SYNTHETIC_ROBOTS[0].plan(sesame_plan::Search::Random { evaluations: 1 });
+        let tests = TestVariation::new(TestSpace::from_plan(&plan).unwrap(), Rates::default(), 1);
         let grid = Grid::parse("T1:0:1:2").unwrap();
         MapElites::new(Settings { population: 10, evaluations: 100, seed: 1, survival: Survival::Crowded }, tests, grid)
     }
@@ -137,7 +138,7 @@ mod tests {
         fn a_cell_keeps_tests_that_no_other_of_it_dominates(
             results in prop::collection::vec((0u8..6, 0u8..6, any::<bool>()), 1..40),
         ) {
-            let plan = LANDSCAPES[0].plan(sesame_plan::Search::Random { evaluations: 1 });
+            let plan = SYNTHETIC_ROBOTS[0].plan(sesame_plan::Search::Random { evaluations: 1 });
             let mut search = search();
             let mut all = Vec::new();
             for (number, (a, b, early)) in (1..).zip(results) {
@@ -146,9 +147,9 @@ mod tests {
                     let (start, end) = if early { (5.0, 6.0) } else { (55.0, 56.0) };
                     operation.activation = sesame_plan::Activation::Time { start, end };
                 }
-                let point = Point::of(&planned(&plan, &test).unwrap(), Convention::Ours);
+                let point = Point::from_disturbances(&planned(&plan, &test).unwrap(), Convention::Ours);
                 let fitness = Fitness::Measured(vec![f64::from(a), f64::from(b)]);
-                let result = Evaluated { number, test, fitness, point, course: None, margins: Vec::new(), failing: false };
+                let result = Evaluated { number, test, fitness, point, trajectories: None, margins: Vec::new(), failing: false };
                 search.keep(&result);
                 all.push((early, result));
             }
@@ -172,7 +173,7 @@ mod tests {
 
     #[test]
     fn it_covers_more_than_an_evolution_for_the_objectives_alone() {
-        let landscape = &LANDSCAPES[0];
+        let landscape = &SYNTHETIC_ROBOTS[0];
         let grid = Grid::parse("T1:0:1:6,T2:0:0.5:6,P1:0:1:3").unwrap();
         let covered = |search, seed| {
             let mut plan = landscape.plan(search);

@@ -11,11 +11,11 @@ use sesame_rng::Stream;
 
 use super::*;
 use crate::Strategy as _;
-use crate::shrink::dial;
+use crate::shrink::axis;
 use crate::space::initial::fresh_test;
-use crate::space::permitted::Permitted;
-use crate::space::permitted::tests::{any_plan, broken_rule};
-use crate::testing::landscape::LANDSCAPES;
+use crate::space::test_space::TestSpace;
+use crate::space::test_space::tests::{any_plan, broken_rule};
+use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
 /// Makes a test smaller where a run of it fails as `fails` has it.
 fn shrunk(mut shrink: Shrink, mut fails: impl FnMut(&Test, u64) -> bool) -> Shrink {
@@ -34,7 +34,7 @@ fn shrunk(mut shrink: Shrink, mut fails: impl FnMut(&Test, u64) -> bool) -> Shri
                 test: candidate.test,
                 fitness: Fitness::Measured(Vec::new()),
                 point: None,
-                course: None,
+                trajectories: None,
                 margins: Vec::new(),
                 failing,
             });
@@ -44,7 +44,7 @@ fn shrunk(mut shrink: Shrink, mut fails: impl FnMut(&Test, u64) -> bool) -> Shri
 }
 
 fn smallest(shrink: &Shrink) -> Option<&Test> {
-    Some(&shrink.tried()[*shrink.kept().last()?].test)
+    Some(&shrink.tried()[*shrink.accepted().last()?].test)
 }
 
 /// A number that looks random and is the same for the same test.
@@ -87,7 +87,7 @@ fn grown(before: &Test, after: &Test) -> Option<String> {
 }
 
 /// Every test that is one step smaller, in whatever order.
-fn one_step_smaller(space: &Space, test: &Test) -> Vec<Test> {
+fn one_step_smaller(space: &ShrinkSpace, test: &Test) -> Vec<Test> {
     let mut found = Vec::new();
     if test.operations.len() > space.fewest {
         for place in 0..test.operations.len() {
@@ -103,9 +103,9 @@ fn one_step_smaller(space: &Space, test: &Test) -> Vec<Test> {
             found.push(simpler);
         }
     }
-    for dial in dial::times(test).into_iter().chain(dial::parameters(test)) {
+    for dial in axis::times(test).into_iter().chain(axis::parameters(test)) {
         if dial.steps(space, test) > 0 {
-            found.push(dial.turned(space, test, 1));
+            found.push(dial.shrink_along(space, test, 1));
         }
     }
     found
@@ -118,8 +118,8 @@ proptest! {
     fn whatever_fails_the_smallest_test_fails_is_permitted_and_loses_nothing_by_one_step(
         plan in any_plan(), seed: u64, share in 0.05..0.95f64,
     ) {
-        let permitted = Permitted::of(&plan).unwrap();
-        let mut original = fresh_test(&permitted, &mut Stream::derive(seed, "test", &[]));
+        let test_space = TestSpace::from_plan(&plan).unwrap();
+        let mut original = fresh_test(&test_space, &mut Stream::derive(seed, "test", &[]));
         for (at, used) in (0u64..).zip(&mut original.operations) {
             used.draw_seed = at;
         }
@@ -211,7 +211,7 @@ proptest! {
 
 /// Two operations that lose messages, one to five per test.
 fn losses() -> CampaignPlan {
-    let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
     for operation in &mut plan.operations {
         operation.kind = OperationKind::PacketLoss;
         operation.parameters[0].domain = Domain::Number { low: 0.0, high: 1.0, shape: Shape::Value, integer: false };
@@ -220,9 +220,9 @@ fn losses() -> CampaignPlan {
 }
 
 /// A test with one of its dials turned in every way, and as it is.
-fn turned_anyhow(space: &Space, test: &Test, dial: usize) -> Vec<Test> {
-    let dial = [dial::times(test), dial::parameters(test)].concat()[dial];
-    let turned = (1..=dial.steps(space, test)).map(|steps| dial.turned(space, test, steps));
+fn turned_anyhow(space: &ShrinkSpace, test: &Test, dial: usize) -> Vec<Test> {
+    let dial = [axis::times(test), axis::parameters(test)].concat()[dial];
+    let turned = (1..=dial.steps(space, test)).map(|steps| dial.shrink_along(space, test, steps));
     std::iter::once(test.clone()).chain(turned).collect()
 }
 
@@ -253,7 +253,7 @@ fn only(test: &Test) -> (f64, f64, f64, f64) {
 
 #[test]
 fn a_made_up_robot_shows_what_of_a_test_mattered() {
-    let robot = &LANDSCAPES[0];
+    let robot = &SYNTHETIC_ROBOTS[0];
     let plan = robot.plan(Search::Random { evaluations: 1 });
     // Only an offset above 0.2 on the second signal between 30 s and 33 s counts, on the average of its sub-range.
     let original = offsets(&[
@@ -271,7 +271,7 @@ fn a_made_up_robot_shows_what_of_a_test_mattered() {
 
 #[test]
 fn windows_close_in_from_both_ends_down_to_the_shortest_that_is_permitted() {
-    let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
     let original = offsets(&[(0, (2.0, 50.0), range(-0.2, 0.25))]);
     let shrink = shrunk(Shrink::new(&plan, original.clone(), 7, 1, 500), |_, _| true);
     let (start, end, low, high) = only(smallest(&shrink).unwrap());
@@ -288,7 +288,7 @@ fn windows_close_in_from_both_ends_down_to_the_shortest_that_is_permitted() {
 
 #[test]
 fn a_sub_range_that_lies_off_its_mild_end_goes_there_as_a_whole() {
-    let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
     for sign in [1.0, -1.0] {
         let ends = |a: f64, b: f64| range((a * sign).min(b * sign), (a * sign).max(b * sign));
         let original = offsets(&[(0, (2.0, 50.0), ends(0.2, 0.3))]);
@@ -337,7 +337,7 @@ fn a_value_goes_to_what_disturbs_least_of_its_kind() {
 #[test]
 fn a_condition_loses_what_does_not_matter_and_activations_get_fewer_and_shorter() {
     use sesame_base::condition::testing::{above, and, below, or};
-    let robot = &LANDSCAPES[0];
+    let robot = &SYNTHETIC_ROBOTS[0];
     let length = ConditionEnd::Length { low: 1.0, high: 15.0 };
     let mut plan = robot.plan_by_condition(Search::Random { evaluations: 1 }, length);
     if let ActivationMode::Condition { space } = &mut plan.campaign.activation {
@@ -361,7 +361,7 @@ fn a_condition_loses_what_does_not_matter_and_activations_get_fewer_and_shorter(
 
 #[test]
 fn with_several_runs_a_test_has_to_fail_in_each() {
-    let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
     let original = offsets(&[(0, (2.0, 50.0), range(-0.2, 0.25)), (1, (2.0, 50.0), range(-0.2, 0.25))]);
     let mut seeds = BTreeSet::new();
     // With the seed of the test everything fails, with the others only what has both operations.
@@ -379,7 +379,7 @@ fn with_several_runs_a_test_has_to_fail_in_each() {
 
 #[test]
 fn when_the_evaluations_are_used_up_the_smallest_so_far_is_told_as_such() {
-    let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
     let original = offsets(&[(0, (2.0, 50.0), range(-0.2, 0.25)), (1, (2.0, 50.0), range(-0.2, 0.25))]);
     let whole =
         shrunk(Shrink::new(&plan, original.clone(), 7, 1, 500), |test, _| test.operations.len() == 2).tried().len();
@@ -403,7 +403,7 @@ fn when_the_evaluations_are_used_up_the_smallest_so_far_is_told_as_such() {
 
 #[test]
 fn a_test_that_does_not_fail_again_is_left_as_it_is() {
-    let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
     let original = offsets(&[(0, (2.0, 50.0), range(-0.2, 0.25))]);
     let shrink = shrunk(Shrink::new(&plan, original, 7, 2, 500), |_, seed| seed == 7);
     assert_eq!((smallest(&shrink), shrink.tried().len(), shrink.tried()[0].failed), (None, 1, Some(1)));

@@ -19,7 +19,7 @@ use sesame_plan::{
 
 use crate::margin::margin_to;
 use crate::sspr::{self, Convention, Point};
-use crate::{Course, Evaluated, Strategy, needs_courses};
+use crate::{Evaluated, Strategy, VariableTrajectories, needs_trajectories};
 
 /// Where and to what the robot is vulnerable.
 pub struct Phase {
@@ -30,7 +30,7 @@ pub struct Phase {
 }
 
 /// One robot.
-pub struct Landscape {
+pub struct SyntheticRobot {
     /// What it is called in messages of tests.
     pub name: &'static str,
     /// How many signals it has, each with an operation of its own.
@@ -40,8 +40,8 @@ pub struct Landscape {
 }
 
 /// Four robots, from one vulnerable to one signal at a time to one with many signals that do nothing.
-pub const LANDSCAPES: [Landscape; 4] = [
-    Landscape {
+pub const SYNTHETIC_ROBOTS: [SyntheticRobot; 4] = [
+    SyntheticRobot {
         name: "three phases",
         signals: 2,
         phases: &[
@@ -50,7 +50,7 @@ pub const LANDSCAPES: [Landscape; 4] = [
             Phase { start: 50.0, end: 58.0, thresholds: &[(0, -0.1)] },
         ],
     },
-    Landscape {
+    SyntheticRobot {
         name: "joint bias",
         signals: 2,
         phases: &[
@@ -58,7 +58,7 @@ pub const LANDSCAPES: [Landscape; 4] = [
             Phase { start: 40.0, end: 46.0, thresholds: &[(0, -0.05), (1, 0.15)] },
         ],
     },
-    Landscape {
+    SyntheticRobot {
         name: "many signals",
         signals: 6,
         phases: &[
@@ -67,7 +67,7 @@ pub const LANDSCAPES: [Landscape; 4] = [
             Phase { start: 44.0, end: 52.0, thresholds: &[(1, -0.12)] },
         ],
     },
-    Landscape {
+    SyntheticRobot {
         name: "strong bias",
         signals: 2,
         phases: &[
@@ -80,7 +80,7 @@ pub const LANDSCAPES: [Landscape; 4] = [
 /// Active time beyond which a test is worth nothing, in seconds.
 const REFERENCE_TIME: f64 = 130.0;
 
-impl Landscape {
+impl SyntheticRobot {
     /// A campaign on this robot: `random offset [-0.3, 0.3] within [0s, 65s]` on each signal, 1 to 5 per test,
     /// which may overlap.
     pub fn plan(&self, search: Search) -> CampaignPlan {
@@ -237,7 +237,7 @@ impl Landscape {
             let intervals = Self::active(it).into_iter().map(|(start, end)| Span { start, end }).collect();
             sspr::disturbance(plan, it.operation, &it.parameters, intervals)
         });
-        Point::of(&disturbances.collect::<Vec<_>>(), Convention::Ours)
+        Point::from_disturbances(&disturbances.collect::<Vec<_>>(), Convention::Ours)
     }
 
     /// What is recorded of a run: nothing that a test does changes what conditions see.
@@ -262,11 +262,13 @@ impl Landscape {
         self.campaign_of(&self.plan(Search::Random { evaluations: 1 }), strategy)
     }
 
-    /// As [`Landscape::campaign`], of a plan that is by condition perhaps.
+    /// As [`SyntheticRobot::campaign`], of a plan that is by condition perhaps.
     pub fn campaign_of(&self, plan: &CampaignPlan, strategy: &mut dyn Strategy) -> Run {
-        let course = needs_courses(plan).then(|| Course::of(plan, &Self::undisturbed(plan))).flatten();
-        if let Some(course) = course.clone() {
-            strategy.reference(course);
+        let trajectories = needs_trajectories(plan)
+            .then(|| VariableTrajectories::from_observation(plan, &Self::undisturbed(plan)))
+            .flatten();
+        if let Some(trajectories) = trajectories.clone() {
+            strategy.reference(trajectories);
         }
         let mut front = Front::default();
         let mut tests = Vec::new();
@@ -293,7 +295,7 @@ impl Landscape {
                         test: candidate.test,
                         fitness,
                         point,
-                        course: course.clone(),
+                        trajectories: trajectories.clone(),
                         margins,
                         failing: false,
                     }
@@ -327,11 +329,11 @@ mod tests {
 
     const NSGA2: Search = Search::Nsga2 { population: 10, evaluations: 210 };
 
-    fn median_volume(landscape: &Landscape, search: &Search) -> f64 {
+    fn median_volume(landscape: &SyntheticRobot, search: &Search) -> f64 {
         median_volume_of(landscape, &landscape.plan(search.clone()))
     }
 
-    fn median_volume_of(landscape: &Landscape, plan: &CampaignPlan) -> f64 {
+    fn median_volume_of(landscape: &SyntheticRobot, plan: &CampaignPlan) -> f64 {
         let run = |seed| landscape.campaign(strategy(plan, seed).unwrap().as_mut()).volume;
         let mut volumes: Vec<f64> = (1..=10).map(run).collect();
         volumes.sort_by(f64::total_cmp);
@@ -340,7 +342,7 @@ mod tests {
 
     #[test]
     fn evolution_beats_chance_on_every_landscape() {
-        let ratios = LANDSCAPES.map(|landscape| {
+        let ratios = SYNTHETIC_ROBOTS.map(|landscape| {
             let random = median_volume(&landscape, &Search::Random { evaluations: 210 });
             (landscape.name, median_volume(&landscape, &NSGA2) / random)
         });
@@ -351,7 +353,7 @@ mod tests {
     /// has only the active time to go by.
     #[test]
     fn evolution_beats_chance_where_conditions_switch_and_one_signal_is_enough() {
-        for landscape in [&LANDSCAPES[0], &LANDSCAPES[2], &LANDSCAPES[3]] {
+        for landscape in [&SYNTHETIC_ROBOTS[0], &SYNTHETIC_ROBOTS[2], &SYNTHETIC_ROBOTS[3]] {
             let by_condition = |search| landscape.plan_by_condition(search, ConditionEnd::Condition);
             let random = median_volume_of(landscape, &by_condition(Search::Random { evaluations: 210 }));
             let evolved = median_volume_of(landscape, &by_condition(NSGA2));
@@ -364,7 +366,7 @@ mod tests {
     #[ignore = "long: 240 searches of 210 tests"]
     fn shares_of_the_ideal_where_conditions_switch() {
         println!("| robot | random | NSGA-II | seeds ahead |\n|---|---:|---:|---:|");
-        for landscape in &LANDSCAPES {
+        for landscape in &SYNTHETIC_ROBOTS {
             let volumes = |search: Search| -> Vec<f64> {
                 let plan = landscape.plan_by_condition(search, ConditionEnd::Condition);
                 (1..=30).map(|seed| landscape.campaign(strategy(&plan, seed).unwrap().as_mut()).volume).collect()
@@ -383,7 +385,7 @@ mod tests {
 
     #[test]
     fn no_test_is_asked_twice() {
-        for landscape in LANDSCAPES {
+        for landscape in SYNTHETIC_ROBOTS {
             let plan = landscape.plan(NSGA2);
             let run = landscape.campaign(strategy(&plan, 5).unwrap().as_mut());
             for (i, result) in run.tests.iter().enumerate() {
@@ -394,8 +396,10 @@ mod tests {
 
     #[test]
     fn the_seed_decides_everything() {
-        for plan in [LANDSCAPES[1].plan(NSGA2), LANDSCAPES[1].plan_by_condition(NSGA2, ConditionEnd::Condition)] {
-            let run = |seed| LANDSCAPES[1].campaign(strategy(&plan, seed).unwrap().as_mut()).tests;
+        for plan in
+            [SYNTHETIC_ROBOTS[1].plan(NSGA2), SYNTHETIC_ROBOTS[1].plan_by_condition(NSGA2, ConditionEnd::Condition)]
+        {
+            let run = |seed| SYNTHETIC_ROBOTS[1].campaign(strategy(&plan, seed).unwrap().as_mut()).tests;
             assert_eq!(run(3), run(3));
             assert_ne!(run(3), run(4));
         }
@@ -403,7 +407,7 @@ mod tests {
 
     #[test]
     fn a_resumed_search_goes_on_as_if_never_stopped() {
-        let landscape = &LANDSCAPES[0];
+        let landscape = &SYNTHETIC_ROBOTS[0];
         let plan = landscape.plan(NSGA2);
         let whole = landscape.campaign(strategy(&plan, 8).unwrap().as_mut()).tests;
         let mut resumed = strategy(&plan, 8).unwrap();
@@ -418,7 +422,7 @@ mod tests {
 
     /// All generations of a search in which nothing can be measured.
     fn generations(search: Search) -> Vec<Vec<Candidate>> {
-        let mut plan = LANDSCAPES[0].plan(search);
+        let mut plan = SYNTHETIC_ROBOTS[0].plan(search);
         plan.tests = vec![sesame_plan::KnownTest {
             name: "known".to_owned(),
             doc: String::new(),
@@ -441,7 +445,7 @@ mod tests {
                     test: candidate.test.clone(),
                     fitness: Fitness::Unfit(Unfit::Unmeasured),
                     point: None,
-                    course: None,
+                    trajectories: None,
                     margins: Vec::new(),
                     failing: false,
                 })
@@ -488,7 +492,7 @@ mod tests {
 
     #[test]
     fn a_population_of_nobody_is_refused() {
-        let plan = LANDSCAPES[0].plan(Search::Nsga2 { population: 0, evaluations: 10 });
+        let plan = SYNTHETIC_ROBOTS[0].plan(Search::Nsga2 { population: 0, evaluations: 10 });
         let Err(refusal) = strategy(&plan, 1) else { panic!("a population of 0 was accepted") };
         assert_eq!(refusal.to_string(), "campaign `three phases` has a population of 0; give it at least 1");
     }
