@@ -489,13 +489,13 @@ pub(crate) mod tests {
         let mut no_number = plan();
         let offset = &mut no_number.operations[1].parameters[0];
         offset.domain = Domain::Number { low: 0.2, high: 0.8, shape: Shape::Range, integer: true };
-        assert!(refusal(&no_number).contains("`jitter1` permits no whole number for `offset`"));
+        assert!(refusal(&no_number).contains("the range of `offset` in operation `jitter1` contains no whole number"));
 
         let mut unreachable =
             SYNTHETIC_ROBOTS[0].plan_by_condition(Search::Random { evaluations: 10 }, ConditionEnd::Condition);
         let bounds = Integers { lowest: 30, highest: 40 };
         unreachable.operations[1].constraints = vec![Constraint::Integer { bounds }];
-        assert!(refusal(&unreachable).contains("has no start condition for operation `jitter1`"));
+        assert!(refusal(&unreachable).contains("no start condition of operation `jitter1`"));
     }
 
     #[test]
