@@ -3,23 +3,39 @@
 //! The supervisor alone owns search and results. Tests run in workers, so that a simulator or hook that crashes or
 //! hangs takes nothing with it. Nothing here depends on how many workers there are: tests are numbered when they are
 //! asked for, and told in that order.
+//!
+//! [`run`] is the campaign, step by step; [`evaluator`] hands its tests to an [`executor`] and records the results;
+//! [`observers`] follow the search; [`events`] tell whoever shows a campaign what happens.
 
-mod conduct;
 mod confirmation;
+mod error;
+mod evaluator;
+mod events;
+mod executor;
 mod link;
+mod numbering;
+mod observer;
+mod observers;
 mod pool;
 #[cfg(any(not(unix), test))]
 mod port;
 mod protocol;
+mod reference;
+mod run;
+mod settings;
 mod single;
 mod traces;
 mod worker;
 mod worker_process;
 
-pub use conduct::{CampaignError, Conducted, Progress, Settings, Unheard, conduct, patience};
-pub use confirmation::{Further, confirm_further};
+pub use confirmation::{Confirmations, confirm_recorded};
+pub use error::CampaignError;
+pub use events::{CampaignEvent, Listener, Progress};
+pub use executor::{Executor, ExecutorError, Job, JobResult, TraceRequest};
 pub use link::Address;
-pub use pool::{Ended, Job, Pool, PoolError, PoolSettings};
-pub use single::{AloneSettings, run_alone};
-pub use traces::TraceOrder;
+pub use pool::{Pool, PoolSettings};
+pub use reference::Unheard;
+pub use run::{CampaignEnd, run_campaign};
+pub use settings::{Settings, default_timeout};
+pub use single::{SingleSettings, run_single};
 pub use worker::serve;

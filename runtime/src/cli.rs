@@ -6,6 +6,7 @@
 mod confirm;
 mod execution;
 mod export;
+mod failure;
 mod gate;
 mod known;
 mod progress;
@@ -17,26 +18,20 @@ mod results_folder;
 mod run;
 mod shrink;
 mod terminal;
+mod view;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
-use terminal::{print, print_json, say, text_options};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use sesame_base::visible::visible_lines;
 use sesame_plan::CampaignPlan;
-use sesame_results::report as reports;
 
 use crate::campaign;
+use crate::cli::failure::Failure;
+use crate::cli::terminal::say;
 use crate::runner::Runner;
-
-/// Exit code of a command that did its work and found that something is not as required: what `--fail-on` names was found, a
-/// campaign says too little, or a test came out different.
-const NOT_AS_REQUIRED: u8 = 3;
-
-/// Exit code of a run that the user stopped, as shells have it for an interrupted program.
-const STOPPED: u8 = 130;
 
 #[derive(Debug, Parser)]
 #[command(
@@ -77,16 +72,16 @@ enum Command {
     /// Write the page with pictures anew and print what was found, also of an unfinished run
     Report(report::Options),
     /// List all tests of a run
-    List(Which),
+    List(view::Which),
     /// Show one test whole: operations, effects, metrics, requirements
     Show {
         /// The test, for example `T158`
         test: String,
         #[command(flatten)]
-        which: Which,
+        which: view::Which,
     },
     /// Print the hash of a run's content: equal runs have equal digests
-    Digest(Which),
+    Digest(view::Which),
     /// Serve a supervisor; started by `run`
     #[command(hide = true)]
     Worker(campaign::Address),
@@ -114,38 +109,9 @@ enum Command {
     },
 }
 
-/// Which run, and how it is shown.
-#[derive(Debug, Args)]
-struct Which {
-    /// Folder of the run, for example `results/42`; by default the latest
-    #[arg(long, value_name = "DIR")]
-    results: Option<PathBuf>,
-    /// How to show it
-    #[arg(long, value_enum, default_value_t)]
-    format: Format,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-enum Format {
-    /// For people
-    #[default]
-    Text,
-    /// For programs
-    Json,
-}
-
-/// What went wrong, in words for the user; causes are in the words.
-#[derive(Debug)]
-struct Failure(String);
-
-impl<E: std::error::Error> From<E> for Failure {
-    fn from(error: E) -> Self {
-        Failure(error.to_string())
-    }
-}
-
-pub(crate) fn main(runner: &Runner) -> ExitCode {
-    match dispatch(runner) {
+/// The runner's command line. A generated `main` is nothing but this call.
+pub fn main(runner: Runner) -> ExitCode {
+    match dispatch(&runner) {
         Ok(code) => code,
         Err(Failure(words)) => {
             say(format_args!("error: {}", visible_lines(&words)));
@@ -176,10 +142,10 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
         Some(Command::Shrink(options)) => shrink::shrink(runner, &plan, &results, &options),
         Some(Command::ReplayRecording(options)) => replay_recording::replay_recording(runner, &plan, &options),
         Some(Command::Export(options)) => export::export(&results, &options),
-        Some(Command::Report(options)) => report::report_anew(&results, &options),
-        Some(Command::List(which)) => list(&results, &which),
-        Some(Command::Show { test, which }) => show(&results, &which, &test),
-        Some(Command::Digest(which)) => digest(&results, &which),
+        Some(Command::Report(options)) => report::report(&results, &options),
+        Some(Command::List(which)) => view::list(&results, &which),
+        Some(Command::Show { test, which }) => view::show(&results, &which, &test),
+        Some(Command::Digest(which)) => view::digest(&results, &which),
         Some(Command::Worker(supervisor)) => {
             campaign::serve(runner, &plan, &supervisor)?;
             Ok(ExitCode::SUCCESS)
@@ -197,37 +163,12 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
     }
 }
 
-fn list(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
-    let list = reports::list(&results_folder::open(results, which.results.as_deref())?)?;
-    match which.format {
-        Format::Text => print(&reports::list_text(&list, text_options())),
-        Format::Json => print_json(&list),
-    }
-}
-
-fn show(results: &Path, which: &Which, test: &str) -> Result<ExitCode, Failure> {
-    let shown = reports::show(&results_folder::open(results, which.results.as_deref())?, test)?;
-    match which.format {
-        Format::Text => print(&reports::test_text(&shown, text_options())),
-        Format::Json => print_json(&shown),
-    }
-}
-
-fn digest(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
-    let repository = results_folder::open(results, which.results.as_deref())?;
-    let digest = repository.digest()?;
-    match which.format {
-        Format::Text => print(&format!("{digest}\n")),
-        Format::Json => print_json(&serde_json::json!({ "digest": digest })),
-    }
-}
-
 /// What commands ask of recorded results beside what reports do: whether a gate closes, how a test is to be made smaller, and
 /// how long it may take when it is run again.
 #[cfg(test)]
 pub(crate) fn asked_beside_reports(repository: &sesame_results::record::Repository, test: &str) -> Result<(), String> {
     let words = |error: sesame_results::record::RecordError| error.to_string();
-    drop(gate::every_objection(&reports::summary(repository).map_err(words)?, repository.plan()));
+    drop(gate::every_objection(&sesame_results::report::summary(repository).map_err(words)?, repository.plan()));
     let record = repository.find(test).and_then(|number| repository.test(number)).map_err(words)?;
     replay::limit(&record);
     drop(shrink::failing(repository, &record, &[]).map_err(|Failure(words)| words)?);

@@ -18,7 +18,9 @@ mod runner;
 mod tampered;
 
 #[cfg(feature = "campaign")]
-pub use runner::{Runner, main};
+pub use cli::main;
+#[cfg(feature = "campaign")]
+pub use runner::Runner;
 pub use sesame_base::{activation, condition, observation, time, verdict};
 #[cfg(feature = "campaign")]
 pub use sesame_optimise as optimise;

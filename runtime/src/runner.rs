@@ -1,7 +1,5 @@
 //! What a generated crate hands to the runtime.
 
-use std::process::ExitCode;
-
 use sesame_relay::fuzz::OperationEntry;
 use sesame_relay::metric::HookEntry;
 use sesame_relay::transport::Connect;
@@ -21,9 +19,4 @@ pub struct Runner {
     pub operations: &'static [OperationEntry],
     /// How the simulator is reached.
     pub connect: Connect,
-}
-
-/// The runner's command line. A generated `main` is nothing but this call.
-pub fn main(runner: Runner) -> ExitCode {
-    crate::cli::main(&runner)
 }

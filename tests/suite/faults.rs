@@ -80,7 +80,7 @@ fn every_fault_is_the_outcome_of_its_test_and_the_campaign_goes_on() {
     }
     let (aborted, _) = by_fault["do_abort"][0];
     let shown = runner.run(&["show", &format!("T{aborted}"), "--results", "all/3"]).expect(0).out;
-    assert!(shown.contains("the worker's last words:\nabout to abort"), "{shown}");
+    assert!(shown.contains("the last lines that the worker printed:\nabout to abort"), "{shown}");
 
     // Nothing of this depends on workers, on what a worker had printed before, or on the clock.
     let one = runner.run(&["--results", "one", "--timeout", "1.5", "--workers", "1", "--fail-on", "nothing"]).expect(0);
@@ -102,7 +102,7 @@ fn a_system_that_does_not_work_undisturbed_is_not_fuzzed() {
         ("wrong type", "a message on `faulty/level` is not of its declared type: "),
     ] {
         let said = undisturbed(&runner, fault).expect(1);
-        assert!(said.err.contains("the undisturbed reference run failed: "), "{}", said.err);
+        assert!(said.err.contains("the reference run failed: "), "{}", said.err);
         assert!(said.err.contains(words), "{}", said.err);
         assert!(said.err.contains("nothing was fuzzed"), "{}", said.err);
         let repository = Repository::open(&runner.folder.join(fault).join("3")).unwrap();
@@ -137,7 +137,7 @@ fn a_simulator_or_hook_that_reads_standard_input_finds_it_empty() {
 fn a_requirement_broken_undisturbed_is_a_warning() {
     let runner = faulty("tilted", "harmless");
     let said = undisturbed(&runner, "broken requirement").expect(0);
-    let words = "requirement R1 is broken before anything is fuzzed: `highest` is 5";
+    let words = "requirement R1 is violated before anything is fuzzed: `highest` is 5";
     assert!(said.out.contains(words), "{}", said.out);
     let repository = Repository::open(&runner.folder.join("broken requirement/3")).unwrap();
     assert!(repository.events().unwrap().iter().any(|event| event.text == words));

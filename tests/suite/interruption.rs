@@ -121,7 +121,7 @@ fn ctrl_c_stops_in_good_order_and_resume_gives_what_an_unbroken_run_gives() {
         killpg(running.pid(), Signal::SIGINT).unwrap();
         let (_, said) = running.ended();
         let said = said.expect(130);
-        let advice = format!("`resume {}` goes on to the same results", Path::new(&results).join("3").display());
+        let advice = format!("`resume {}` continues to the same results", Path::new(&results).join("3").display());
         assert!(said.err.contains(&advice), "{}", said.err);
         assert_eq!(said.out, "");
         no_worker_is_left(&runner);
@@ -282,12 +282,12 @@ fn a_killed_worker_leaves_no_trace_in_results_but_a_note() {
     no_worker_is_left(&runner);
 }
 
-/// What kills itself, or is killed for want of memory each time, is not run for ever.
+/// A test that is killed each time is not run for ever.
 #[test]
 fn a_worker_that_is_killed_each_time_is_a_crash_of_its_test() {
     let runner = faulty("killed_each_time", "harmless");
     let mut command = runner.command(&["--results", "results"]);
     let said = Done::of(&command.env("FAULT", "kill").output().unwrap()).expect(1);
     assert!(said.err.contains("signal: 9 (SIGKILL)"), "{}", said.err);
-    assert!(said.err.contains("the undisturbed reference run failed"), "{}", said.err);
+    assert!(said.err.contains("the reference run failed"), "{}", said.err);
 }

@@ -269,7 +269,7 @@ fn a_simulator_that_is_killed_each_time_is_a_crash_that_says_so() {
     assert!(crashes.len() >= 3, "{rows:?}");
     for row in crashes {
         let detail = row.outcome.detail().unwrap();
-        assert!(detail.starts_with("killed twice, by somebody or by the system for want of memory: "), "{detail}");
+        assert!(detail.starts_with("killed twice, by a user or by the system because memory was short: "), "{detail}");
         let shown = runner.run(&["show", &format!("T{}", row.number), "--results", "results/3"]).expect(0).out;
         assert!(shown.contains("the simulator was killed while it ran this test"), "{shown}");
     }

@@ -49,5 +49,8 @@ fn a_campaign_that_nobody_hears_ends_before_it_fuzzes_and_names_its_operations()
     assert!(unheard > 0, "what they did is counted apart");
     let warnings = repository.events().unwrap().into_iter().filter(|event| event.kind == EventKind::Warning);
     let warnings: Vec<String> = warnings.map(|event| event.text).collect();
-    assert!(warnings.iter().any(|text| text.contains("nobody hears operation `hide_speed`")), "{warnings:?}");
+    assert!(
+        warnings.iter().any(|text| text.contains("nothing receives what operation `hide_speed` disturbs")),
+        "{warnings:?}"
+    );
 }

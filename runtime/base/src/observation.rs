@@ -236,6 +236,25 @@ impl From<&MetricObservation> for MetricValue {
 }
 
 impl Observation {
+    /// That of a run that left nothing but the cause of its crash.
+    pub fn crashed(message: String) -> Self {
+        Observation::without_run(Outcome::Crash { message })
+    }
+
+    /// That of a run of which nothing but the outcome is known.
+    pub fn without_run(outcome: Outcome) -> Self {
+        Observation {
+            outcome,
+            end: 0.0,
+            operations: Vec::new(),
+            unheard: Vec::new(),
+            metrics: Vec::new(),
+            messages: 0,
+            warnings: Vec::new(),
+            wall: WallTime::default(),
+        }
+    }
+
     /// The value of the plan's metric at this position; unmeasured when the run reported none.
     pub fn value(&self, metric: sesame_plan::MetricId) -> MetricValue {
         self.metrics.get(metric.index()).map(MetricValue::from).unwrap_or_default()

@@ -3,85 +3,165 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::sync::atomic::AtomicBool;
 
-use sesame_plan::Test;
-use sesame_results::record::{Event, EventKind, Recorder, Repetition, TestRecord};
+use sesame_optimise::front::Front;
+use sesame_plan::{CampaignPlan, Confirmation, Test};
+use sesame_results::record::{self, Event, EventKind, Recorder, Repetition, TestRecord};
 use sesame_rng::derive_seed;
+use sesame_search::{self as search, ConfirmedFront, Evaluated, GenerationTest};
 
-use crate::campaign::conduct::{CampaignError, Desk, Settings, patience};
-use crate::campaign::pool::{Ended, Job, Pool, PoolSettings};
+use crate::campaign::error::{CampaignError, Halt};
+use crate::campaign::evaluator::Evaluator;
+use crate::campaign::executor::{Job, JobResult};
+use crate::campaign::numbering::Numbering;
+use crate::campaign::pool::Pool;
+use crate::campaign::settings::{Settings, default_timeout};
 
-/// What is said when confirming showed that there was nothing to confirm.
-pub(super) const LIKE_BEFORE: &str = "every run to confirm a test came out just like the run it repeats: the simulator does not vary \
-     with its seed, so `confirm` costs simulations and shows nothing";
+/// What is said when no confirmation could have shown anything.
+const DETERMINISTIC_SIMULATOR: &str = "each run that confirms a test had exactly the results of the run it repeats: the simulator \
+     does not vary with its seed, so `confirm` costs simulations and shows nothing";
 
 /// The simulator's seed of a repetition. It depends on the test's number and the repetition only, so that a test has the
-/// same ones whenever it is confirmed.
+/// same seeds each time it is confirmed.
 pub(super) fn confirmation_seed(seed: u64, test: u32, repetition: u32) -> u64 {
     derive_seed(seed, "confirm", &[u64::from(test), u64::from(repetition)])
 }
 
+/// The part of a campaign that confirms tests while it searches.
+pub(super) struct ConfirmedSearch {
+    confirmation: Confirmation,
+    seed: u64,
+    front: ConfirmedFront,
+    repeated: RepeatedTests,
+}
+
+impl ConfirmedSearch {
+    /// For a campaign with this seed.
+    pub(super) fn new(confirmation: Confirmation, seed: u64) -> Self {
+        ConfirmedSearch { confirmation, seed, front: ConfirmedFront::default(), repeated: RepeatedTests::default() }
+    }
+
+    /// Takes a test that may be confirmed until the next generation comes.
+    pub(super) fn remember(&mut self, record: &TestRecord) {
+        self.repeated.remember(record);
+    }
+
+    /// Runs to confirm tests so far.
+    pub(super) fn runs(&self) -> u32 {
+        self.repeated.runs
+    }
+
+    /// The front of confirmed tests.
+    pub(super) fn front(&self) -> Front {
+        self.front.front()
+    }
+
+    /// What is to be said after the search.
+    pub(super) fn warning(&self) -> Option<String> {
+        self.repeated.all_identical().then(|| DETERMINISTIC_SIMULATOR.to_owned())
+    }
+
+    /// Confirms the tests of a generation that would be on the front, or violate a requirement, until all tests on the front
+    /// are confirmed; then gives tests their confirmed fitness and margins. `each` sees the number of runs and the front.
+    pub(super) fn confirm(
+        &mut self,
+        plan: &CampaignPlan,
+        evaluator: &mut Evaluator<'_>,
+        numbering: &Numbering,
+        tests: &mut [Evaluated],
+        violating: &BTreeSet<u32>,
+        each: &mut dyn FnMut(u32, &Front),
+    ) -> Result<(), Halt> {
+        self.front.begin(tests.iter().map(|test| GenerationTest {
+            number: test.number,
+            stands_for: numbering.stands_for(test.number),
+            first: test.fitness.clone(),
+            violates: self.confirmation.violations && violating.contains(&test.number),
+        }));
+        loop {
+            let unconfirmed = self.front.unconfirmed();
+            if unconfirmed.is_empty() {
+                break;
+            }
+            let before = self.front.front();
+            let runs: Vec<_> = unconfirmed.iter().map(|&number| (number, 1..=self.confirmation.times)).collect();
+            evaluator.repeat(&mut self.repeated, &runs, self.seed, &mut |runs| each(runs, &before))?;
+            for number in unconfirmed {
+                let fitness = record::confirmed_fitness(plan, evaluator.repetitions_of(number));
+                self.front.confirm(number, fitness.expect("all repetitions of the test have just been run"));
+            }
+        }
+        for (test, fitness) in tests.iter_mut().zip(self.front.fitness()) {
+            test.fitness = fitness.clone();
+            let runs = evaluator.repetitions_of(numbering.stands_for(test.number));
+            if let Some(confirmed) = record::confirmed_margins(plan, runs).filter(|_| search::needs_margins(plan)) {
+                test.margins = confirmed;
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Tests of finished results that are to be run again.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Further {
+pub struct Confirmations {
     /// Numbers of the tests; none of a duplicate.
     pub tests: Vec<u32>,
     /// How often each is run.
     pub times: u32,
 }
 
-/// Runs tests of finished results again, and records that beside what is recorded already: the repetitions that a campaign
-/// of its own accord confirms by are never among them, so that its front stays what it is. `each` is told how many runs
+/// Runs tests of finished results again, and records the runs beside those that are recorded already: the repetitions by
+/// which the campaign itself confirms are never among them, so its front stays what it is. `each` is told how many runs
 /// there are by now, and how many there will be. False if the user stopped it; what had ended by then is recorded.
-pub fn confirm_further(
+pub fn confirm_recorded(
     recorder: &mut Recorder,
-    further: &Further,
+    confirmations: &Confirmations,
     settings: &Settings,
     directory: &Path,
     interrupted: &AtomicBool,
     each: &mut dyn FnMut(u32, u32),
 ) -> Result<bool, CampaignError> {
     let repository = recorder.repository();
-    let repeated = repository.repetitions()?;
+    let recorded = repository.repetitions()?;
     let own = repository.plan().campaign.confirm.map_or(0, |confirmation| confirmation.times);
-    let mut again = Again::default();
+    let mut repeated = RepeatedTests::default();
     let mut longest: f64 = 0.0;
-    let mut wanted = Vec::with_capacity(further.tests.len());
-    for &number in &further.tests {
+    let mut runs = Vec::with_capacity(confirmations.tests.len());
+    for &number in &confirmations.tests {
         let record = repository.test(number)?;
         longest = longest.max(record.observation.wall.run);
         let shown = Repetition::of(number, 0, record.simulator_seed, &record.observation);
-        again.first.insert(number, (record.test, shown));
-        let last = repeated.get(&number).and_then(|runs| runs.last()).map_or(0, |run| run.position);
+        repeated.first.insert(number, (record.test, shown));
+        let last = recorded.get(&number).and_then(|runs| runs.last()).map_or(0, |run| run.position);
         let first = last.max(own) + 1;
-        wanted.push((number, first..=first.saturating_add(further.times - 1)));
+        runs.push((number, first..=first.saturating_add(confirmations.times - 1)));
     }
-    let total = further.times.saturating_mul(u32::try_from(further.tests.len()).unwrap_or(u32::MAX));
-    let pool = Pool::start(&PoolSettings {
-        workers: settings.workers_for(total),
-        program: settings.program.clone(),
-        directory: directory.to_path_buf(),
-        timeout: settings.timeout.unwrap_or_else(|| patience(longest)),
-    })?;
-    let mut desk = Desk { recorder, recorded: BTreeSet::new(), repeated, pool, traces: None, interrupted };
-    desk.repeat(&mut again, &wanted, settings.seed, &mut |runs| each(runs, total))
+    let total = confirmations.times.saturating_mul(u32::try_from(confirmations.tests.len()).unwrap_or(u32::MAX));
+    let mut pool = Pool::start(&settings.pool(total, directory, default_timeout(longest)))?;
+    let mut evaluator = Evaluator::for_repetitions(recorder, &mut pool, interrupted)?;
+    match evaluator.repeat(&mut repeated, &runs, settings.seed, &mut |runs| each(runs, total)) {
+        Ok(()) => Ok(true),
+        Err(Halt::Stopped) => Ok(false),
+        Err(Halt::Failed(error)) => Err(error),
+    }
 }
 
-/// What repeating needs to know of tests, and what it has seen.
+/// What is known of tests that are run again.
 #[derive(Default)]
-pub(super) struct Again {
-    /// The tests of the generation at hand, with what their first runs showed.
+pub(super) struct RepeatedTests {
+    /// The tests of the current generation, with what their first runs showed.
     first: BTreeMap<u32, (Test, Repetition)>,
     generation: Option<u32>,
+    /// Repetitions so far.
     runs: u32,
+    /// Those with other results than the run they repeat.
     differing: u32,
 }
 
-impl Again {
-    /// Takes a test that may be repeated until the next generation comes.
-    pub(super) fn remember(&mut self, record: &TestRecord) {
+impl RepeatedTests {
+    fn remember(&mut self, record: &TestRecord) {
         if record.generation != self.generation {
             self.first.clear();
             self.generation = record.generation;
@@ -90,70 +170,57 @@ impl Again {
         self.first.insert(record.number, (record.test.clone(), shown));
     }
 
-    /// Repetitions so far.
-    pub(super) fn runs(&self) -> u32 {
-        self.runs
-    }
-
-    /// Whether there were repetitions, and none of them differed from the run it repeated.
-    pub(super) fn all_like_before(&self) -> bool {
+    /// Whether there were repetitions, and all had the results of the run that they repeat.
+    fn all_identical(&self) -> bool {
         self.runs > 0 && self.differing == 0
     }
 
     fn count(&mut self, repetition: &Repetition) {
-        let alike = self.first.get(&repetition.test).is_some_and(|(_, first)| {
+        let identical = self.first.get(&repetition.test).is_some_and(|(_, first)| {
             first.values == repetition.values && first.outcome.word() == repetition.outcome.word()
         });
         self.runs += 1;
-        self.differing += u32::from(!alike);
+        self.differing += u32::from(!identical);
     }
 }
 
-impl Desk<'_> {
+impl Evaluator<'_> {
     /// What is recorded of a test's repetitions, in their order.
-    pub(super) fn repetitions(&self, test: u32) -> &[Repetition] {
-        self.repeated.get(&test).map_or(&[], Vec::as_slice)
+    pub(super) fn repetitions_of(&self, test: u32) -> &[Repetition] {
+        self.repetitions.get(&test).map_or(&[], Vec::as_slice)
     }
 
-    /// Runs these repetitions of each of these tests and records each as it ends; those recorded already are not run.
-    /// `each` is told how many there are by now. False if the user stopped it; what had ended by then is recorded.
-    pub(super) fn repeat(
+    /// Runs these repetitions of each of these tests and records each as it ends; those that are recorded are not run.
+    /// `each` is told how many there are by now.
+    fn repeat(
         &mut self,
-        again: &mut Again,
+        repeated: &mut RepeatedTests,
         tests: &[(u32, RangeInclusive<u32>)],
         seed: u64,
         each: &mut dyn FnMut(u32),
-    ) -> Result<bool, CampaignError> {
+    ) -> Result<(), Halt> {
         let mut waiting = BTreeMap::new();
         for (number, positions) in tests {
             let number = *number;
-            let Some((test, _)) = again.first.get(&number) else { unreachable!("tests are remembered before") };
+            let Some((test, _)) = repeated.first.get(&number) else { unreachable!("tests are remembered before") };
             let test = test.clone();
             for position in positions.clone() {
                 let simulator_seed = confirmation_seed(seed, number, position);
-                if let Some(known) = self.repetitions(number).iter().find(|it| it.position == position) {
-                    if known.simulator_seed != simulator_seed {
-                        return Err(CampaignError::OtherCampaign(number));
+                if let Some(recorded) = self.repetitions_of(number).iter().find(|run| run.position == position) {
+                    if recorded.simulator_seed != simulator_seed {
+                        return Err(CampaignError::OtherCampaign(number).into());
                     }
-                    again.count(known);
+                    repeated.count(recorded);
                     continue;
                 }
-                // The pool's numbers only tell jobs apart.
                 let job = u32::try_from(waiting.len()).unwrap_or(u32::MAX);
-                self.pool.submit(Job { number: job, test: test.clone(), simulator_seed, trace: None });
+                self.executor.submit(Job { number: job, test: test.clone(), simulator_seed, trace: None });
                 waiting.insert(job, (number, position, simulator_seed));
             }
         }
-        each(again.runs());
+        each(repeated.runs);
         while !waiting.is_empty() {
-            if self.interrupted.load(Ordering::Relaxed) {
-                return Ok(false);
-            }
-            let Some(Ended { number: job, observation, notes, trace_failure: _, killed: _ }) =
-                self.pool.next(Duration::from_millis(100))?
-            else {
-                continue;
-            };
+            let JobResult { number: job, observation, notes, trace_failure: _, killed: _ } = self.next()?;
             let Some((test, position, simulator_seed)) = waiting.remove(&job) else { continue };
             let repetition = Repetition::of(test, position, simulator_seed, &observation);
             self.recorder.put_repetition(&repetition, &observation.warnings)?;
@@ -161,12 +228,12 @@ impl Desk<'_> {
                 let text = format!("repetition {position}: {note}");
                 self.recorder.put_event(&Event { kind: EventKind::Session, test: Some(test), text })?;
             }
-            again.count(&repetition);
-            let known = self.repeated.entry(test).or_default();
-            let place = known.partition_point(|it| it.position < position);
-            known.insert(place, repetition);
-            each(again.runs());
+            repeated.count(&repetition);
+            let recorded = self.repetitions.entry(test).or_default();
+            let place = recorded.partition_point(|run| run.position < position);
+            recorded.insert(place, repetition);
+            each(repeated.runs);
         }
-        Ok(true)
+        Ok(())
     }
 }

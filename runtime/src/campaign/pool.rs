@@ -17,22 +17,17 @@ use std::time::{Duration, Instant};
 use sesame_base::observation::{Observation, Outcome};
 use sesame_relay::process_group::was_killed;
 
+use crate::campaign::executor::{Executor, ExecutorError, Job, JobResult};
 use crate::campaign::link::{self, Stream};
 use crate::campaign::protocol::{self, Reply};
 use crate::campaign::traces;
-use crate::campaign::worker::{crashed, empty};
-use crate::campaign::worker_process::WorkerProcess;
-
-pub use crate::campaign::protocol::Job;
+use crate::campaign::worker_process::{WORKER, WorkerProcess};
 
 /// How long a fresh worker may take to report.
 const START_LIMIT: Duration = Duration::from_secs(30);
 
 /// How long a worker that broke off the conversation may take to end.
 const DEATH_LIMIT: Duration = Duration::from_secs(2);
-
-/// The environment variable with a worker's number, which all that a worker starts inherits.
-pub(super) const WORKER: &str = "SESAME_WORKER";
 
 /// How a pool runs its workers.
 #[derive(Debug, Clone)]
@@ -47,38 +42,11 @@ pub struct PoolSettings {
     pub timeout: Duration,
 }
 
-/// A worker that cannot be started.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot start worker {worker}: {reason}")]
-pub struct PoolError {
-    /// Which one, from 1.
-    pub worker: usize,
-    /// Why.
-    pub reason: String,
-}
-
-/// A test that has ended.
-#[derive(Debug)]
-pub struct Ended {
-    /// Its number.
-    pub number: u32,
-    /// What its run showed.
-    pub observation: Observation,
-    /// What befell its worker: that it was killed and the test run again, what it printed last before it died. Of this
-    /// one session: it may hold process numbers.
-    pub notes: Vec<String>,
-    /// Why the trace that was asked for could not be written: the result must not be recorded without it.
-    pub trace_failure: Option<String>,
-    /// Whether its worker or its simulator was killed, and again when it was run once more. The observation says so; it
-    /// may say nothing of the test, but only of this machine today.
-    pub killed: bool,
-}
-
 /// Worker processes and the threads that talk to them.
 pub struct Pool {
     jobs: Option<mpsc::Sender<Job>>,
-    results: mpsc::Receiver<Result<Ended, PoolError>>,
-    lanes: Vec<JoinHandle<()>>,
+    results: mpsc::Receiver<Result<JobResult, ExecutorError>>,
+    slots: Vec<JoinHandle<()>>,
     stop: Arc<AtomicBool>,
     /// Wall time after which a test is stopped, in milliseconds.
     timeout: Arc<AtomicU64>,
@@ -86,38 +54,37 @@ pub struct Pool {
 
 impl Pool {
     /// Starts the workers.
-    pub fn start(settings: &PoolSettings) -> Result<Self, PoolError> {
+    pub fn start(settings: &PoolSettings) -> Result<Self, ExecutorError> {
         let (jobs, queue) = mpsc::channel();
         let queue = Arc::new(Mutex::new(queue));
         let (sender, results) = mpsc::channel();
         let stop = Arc::new(AtomicBool::new(false));
         let timeout = Arc::new(AtomicU64::new(millis(settings.timeout)));
         // Dropped if a worker cannot be started, which ends those that were.
-        let mut pool = Pool { jobs: Some(jobs), results, lanes: Vec::new(), stop, timeout };
+        let mut pool = Pool { jobs: Some(jobs), results, slots: Vec::new(), stop, timeout };
         for number in 1..=settings.workers.max(1) {
             let (stop, timeout) = (Arc::clone(&pool.stop), Arc::clone(&pool.timeout));
-            let mut lane = Lane { number, settings: settings.clone(), worker: None, stop, timeout };
-            lane.worker = Some(lane.start()?);
+            let mut slot = WorkerSlot { number, settings: settings.clone(), worker: None, stop, timeout };
+            slot.worker = Some(slot.start()?);
             let (queue, sender) = (Arc::clone(&queue), sender.clone());
-            pool.lanes.push(thread::spawn(move || lane.work(&queue, &sender)));
+            pool.slots.push(thread::spawn(move || slot.work(&queue, &sender)));
         }
         Ok(pool)
     }
+}
 
-    /// Changes the wall time after which a test is stopped, for tests not begun yet.
-    pub fn set_timeout(&self, timeout: Duration) {
-        self.timeout.store(millis(timeout), Ordering::Relaxed);
-    }
-
-    /// Hands out a test.
-    pub fn submit(&self, job: Job) {
+impl Executor for Pool {
+    fn submit(&mut self, job: Job) {
         let sent = self.jobs.as_ref().is_some_and(|jobs| jobs.send(job).is_ok());
-        assert!(sent, "lanes live as long as their pool");
+        assert!(sent, "slots live as long as their pool");
     }
 
-    /// The next test that ended; `None` after `wait` without one.
-    pub fn next(&self, wait: Duration) -> Result<Option<Ended>, PoolError> {
+    fn next(&mut self, wait: Duration) -> Result<Option<JobResult>, ExecutorError> {
         self.results.recv_timeout(wait).map_or(Ok(None), |result| result.map(Some))
+    }
+
+    fn set_timeout(&mut self, timeout: Duration) {
+        self.timeout.store(millis(timeout), Ordering::Relaxed);
     }
 }
 
@@ -126,15 +93,15 @@ impl Drop for Pool {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         self.jobs = None;
-        for lane in self.lanes.drain(..) {
-            // A lane that panicked has nothing left to stop: its worker was ended when it unwound.
-            lane.join().ok();
+        for slot in self.slots.drain(..) {
+            // A slot that panicked has nothing left to stop: its worker was ended when it unwound.
+            slot.join().ok();
         }
     }
 }
 
 /// One worker process after another, and the thread that feeds them.
-struct Lane {
+struct WorkerSlot {
     number: usize,
     settings: PoolSettings,
     worker: Option<Worker>,
@@ -142,8 +109,8 @@ struct Lane {
     timeout: Arc<AtomicU64>,
 }
 
-impl Lane {
-    fn work(mut self, queue: &Mutex<mpsc::Receiver<Job>>, results: &mpsc::Sender<Result<Ended, PoolError>>) {
+impl WorkerSlot {
+    fn work(mut self, queue: &Mutex<mpsc::Receiver<Job>>, results: &mpsc::Sender<Result<JobResult, ExecutorError>>) {
         loop {
             let job = match queue.lock() {
                 Ok(queue) => queue.recv(),
@@ -160,17 +127,17 @@ impl Lane {
     }
 
     /// Starts a worker. One that is killed meanwhile is started once more, as it would be while it runs a test.
-    fn start(&self) -> Result<Worker, PoolError> {
+    fn start(&self) -> Result<Worker, ExecutorError> {
         match Worker::start(self) {
             Err(NotStarted { killed: true, .. }) if !self.stop.load(Ordering::Relaxed) => Worker::start(self),
             started => started,
         }
-        .map_err(|NotStarted { reason, .. }| PoolError { worker: self.number, reason })
+        .map_err(|NotStarted { reason, .. }| ExecutorError { worker: self.number, reason })
     }
 
-    /// Runs a test. If its worker or its simulator is killed, the test is run once more: whoever kills processes, by hand
-    /// or for want of memory, is to leave no trace in results. Killed again, it is a crash that says so.
-    fn run(&mut self, job: &Job) -> Result<Ended, PoolError> {
+    /// Runs a test. If its worker or its simulator is killed, the test is run once more: a process killed by hand, or because
+    /// memory is short, must leave no trace in results. If it is killed again, the test is a crash that says so.
+    fn run(&mut self, job: &Job) -> Result<JobResult, ExecutorError> {
         let (ended, victim) = self.attempt(job)?;
         let Some(victim) = victim.filter(|_| !self.stop.load(Ordering::Relaxed)) else { return Ok(ended) };
         let (mut ended, again) = self.attempt(job)?;
@@ -178,14 +145,14 @@ impl Lane {
         if again.is_some() {
             ended.killed = true;
             if let Outcome::Crash { message } = &mut ended.observation.outcome {
-                *message = format!("killed twice, by somebody or by the system for want of memory: {message}");
+                *message = format!("killed twice, by a user or by the system because memory was short: {message}");
             }
         }
         Ok(ended)
     }
 
     /// Runs a test, and says which process was killed by someone else, if one was.
-    fn attempt(&mut self, job: &Job) -> Result<(Ended, Option<&'static str>), PoolError> {
+    fn attempt(&mut self, job: &Job) -> Result<(JobResult, Option<&'static str>), ExecutorError> {
         let mut worker = match self.worker.take() {
             Some(worker) => worker,
             None => self.start()?,
@@ -204,28 +171,28 @@ impl Lane {
                 // Only of a worker that is gone is it known that it writes no more.
                 drop(worker);
                 let lost = self.save_trace(job, &outcome);
-                (empty(outcome), Vec::new(), lost)
+                (Observation::without_run(outcome), Vec::new(), lost)
             }
             Err(error) => {
                 // Only what is the same in every session: the cause is part of the digest.
                 let status = worker.process.wait(DEATH_LIMIT);
                 killed = status.is_some_and(was_killed).then_some("worker");
                 let how = status.map_or_else(|| error.to_string(), |status| status.to_string());
-                let observation = crashed(format!("the worker process ended: {how}"));
+                let observation = Observation::crashed(format!("the worker process ended: {how}"));
                 drop(worker);
                 let lost = self.save_trace(job, &observation.outcome);
                 let words = last_lines(&output_file(&self.directory()), printed, 10);
-                let words = words.map(|words| format!("the worker's last words:\n{words}"));
+                let words = words.map(|words| format!("the last lines that the worker printed:\n{words}"));
                 (observation, words.into_iter().collect(), lost)
             }
         };
-        Ok((Ended { number: job.number, observation, notes, trace_failure, killed: false }, killed))
+        Ok((JobResult { number: job.number, observation, notes, trace_failure, killed: false }, killed))
     }
 
     /// Saves what a dead worker wrote of a trace that was asked for; why not, otherwise.
     fn save_trace(&self, job: &Job, outcome: &Outcome) -> Option<String> {
-        let order = job.trace.as_ref().filter(|_| !self.stop.load(Ordering::Relaxed))?;
-        traces::save(order, &self.directory(), outcome).err()
+        let request = job.trace.as_ref().filter(|_| !self.stop.load(Ordering::Relaxed))?;
+        traces::save(request, &self.directory(), outcome).err()
     }
 
     fn directory(&self) -> PathBuf {
@@ -254,17 +221,17 @@ impl From<io::Error> for NotStarted {
 }
 
 impl Worker {
-    fn start(lane: &Lane) -> Result<Self, NotStarted> {
-        let directory = lane.directory();
+    fn start(slot: &WorkerSlot) -> Result<Self, NotStarted> {
+        let directory = slot.directory();
         fs::create_dir_all(&directory)?;
         let output = File::options().create(true).append(true).open(output_file(&directory))?;
-        let mut command = Command::new(&lane.settings.program);
+        let mut command = Command::new(&slot.settings.program);
         let offer = link::offer(&mut command)?;
-        command.env(WORKER, lane.number.to_string()).current_dir(&directory).stdout(output.try_clone()?).stderr(output);
+        command.env(WORKER, slot.number.to_string()).current_dir(&directory).stdout(output.try_clone()?).stderr(output);
         let mut process = WorkerProcess::start(command)
-            .map_err(|error| io::Error::other(format!("{}: {error}", lane.settings.program.display())))?;
+            .map_err(|error| io::Error::other(format!("{}: {error}", slot.settings.program.display())))?;
         let taken = offer.taken(START_LIMIT, &mut || {
-            if lane.stop.load(Ordering::Relaxed) {
+            if slot.stop.load(Ordering::Relaxed) {
                 return Err(io::Error::new(io::ErrorKind::TimedOut, "the run was stopped"));
             }
             if process.ended().is_some() { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(()) }
@@ -277,7 +244,8 @@ impl Worker {
                 || error.into(),
                 |status| {
                     let output = last_lines(&output_file(&directory), 0, 10);
-                    let output = output.map_or_else(String::new, |lines| format!("; its last words:\n{lines}"));
+                    let output =
+                        output.map_or_else(String::new, |lines| format!("; the last lines that it printed:\n{lines}"));
                     NotStarted { reason: format!("it ended at once, {status}{output}"), killed: was_killed(status) }
                 },
             )),

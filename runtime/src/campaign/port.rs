@@ -2,7 +2,7 @@
 //!
 //! Any user of the machine can connect to it, so what comes before the token is not trusted: connections are listened to
 //! side by side, so that a silent one holds up none of the others; each may say a kilobyte; and there is one deadline for
-//! all of them together. Whoever does not know the token can delay a worker by no more than that.
+//! all of them together. A program that does not know the token can delay a worker by no more than that.
 
 use std::collections::VecDeque;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};

@@ -9,10 +9,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use sesame_base::observation::Observation;
-use sesame_plan::Test;
 use sesame_relay::transport::Aside;
-
-use crate::campaign::traces::TraceOrder;
 
 /// The largest frame either side accepts; time series of a long test are the largest thing sent.
 const FRAME_LIMIT: u32 = 1 << 30;
@@ -23,21 +20,8 @@ const GREETING_LIMIT: usize = 1 << 10;
 /// A worker's first words.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Hello {
-    /// Proves that the worker is the one the supervisor started, where anybody could have connected.
+    /// Proves that the worker is the one that the supervisor started, where other programs could connect.
     pub(super) token: Option<String>,
-}
-
-/// What the supervisor asks for.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Job {
-    /// The test's number, given back with the result.
-    pub number: u32,
-    /// The test.
-    pub test: Test,
-    /// Seed of the simulator's own randomness.
-    pub simulator_seed: u64,
-    /// The trace that is asked for, if any.
-    pub trace: Option<TraceOrder>,
 }
 
 /// What the worker answers.
@@ -47,7 +31,7 @@ pub(super) struct Reply {
     pub(super) observation: Observation,
     /// Why the trace that was asked for could not be written.
     pub(super) trace_failure: Option<String>,
-    /// What befell the simulator meanwhile.
+    /// What happened to the simulator meanwhile.
     pub(super) aside: Aside,
 }
 
@@ -83,7 +67,7 @@ pub(super) struct Greeting {
 
 impl Greeting {
     /// Takes what has come of it, and nothing that follows it; `None` while it is not whole and the stream has no more for
-    /// now. What is longer than a kilobyte, or is no greeting, is an error.
+    /// now. Anything longer than a kilobyte is an error, and so is anything that is not a greeting.
     pub(super) fn hear(&mut self, stream: &mut impl Read) -> io::Result<Option<Hello>> {
         loop {
             let whole = match self.heard.first_chunk() {
@@ -91,7 +75,7 @@ impl Greeting {
                 Some(length) => {
                     let length = usize::try_from(u32::from_le_bytes(*length)).unwrap_or(usize::MAX);
                     if length == 0 || length > GREETING_LIMIT {
-                        return Err(io::Error::other(format!("a greeting of {length} bytes is none")));
+                        return Err(io::Error::other(format!("{length} bytes are not a greeting")));
                     }
                     size_of::<u32>() + length
                 }

@@ -1,14 +1,15 @@
-//! Running one test alone, without recording it.
+//! Running one test by itself, without recording it.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::campaign::pool::{Ended, Job, Pool, PoolError, PoolSettings};
+use crate::campaign::executor::{Executor as _, ExecutorError, Job, JobResult};
+use crate::campaign::pool::{Pool, PoolSettings};
 
 /// Where and how long one test runs.
 #[derive(Debug, Clone)]
-pub struct AloneSettings {
+pub struct SingleSettings {
     /// The runner's program, started again as the worker.
     pub program: PathBuf,
     /// Folder in which the worker gets a folder of its own.
@@ -18,13 +19,17 @@ pub struct AloneSettings {
 }
 
 /// Runs a test in a worker of its own; `None` when the user stopped it.
-pub fn run_alone(job: Job, settings: &AloneSettings, interrupted: &AtomicBool) -> Result<Option<Ended>, PoolError> {
-    let AloneSettings { program, directory, timeout } = settings.clone();
-    let pool = Pool::start(&PoolSettings { workers: 1, program, directory, timeout })?;
+pub fn run_single(
+    job: Job,
+    settings: &SingleSettings,
+    interrupted: &AtomicBool,
+) -> Result<Option<JobResult>, ExecutorError> {
+    let SingleSettings { program, directory, timeout } = settings.clone();
+    let mut pool = Pool::start(&PoolSettings { workers: 1, program, directory, timeout })?;
     pool.submit(job);
     while !interrupted.load(Ordering::Relaxed) {
-        if let Some(ended) = pool.next(Duration::from_millis(100))? {
-            return Ok(Some(ended));
+        if let Some(result) = pool.next(Duration::from_millis(100))? {
+            return Ok(Some(result));
         }
     }
     Ok(None)

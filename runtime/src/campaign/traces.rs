@@ -4,9 +4,7 @@
 //! recorded, the trace gets its name or is discarded: so a recorded test has its trace, and a trace whose test was not
 //! recorded any more is replaced when `resume` runs that test again.
 
-use std::path::{Path, PathBuf};
-
-use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 use sesame_base::observation::{Observation, Outcome};
 use sesame_plan::{CampaignPlan, Recorded};
@@ -15,21 +13,11 @@ use sesame_relay::metric::MetricTable;
 use sesame_relay::transport::Transport;
 use sesame_relay::wire::WireTable;
 
-use crate::campaign::protocol::Job;
-use crate::campaign::worker::crashed;
+use crate::campaign::executor::{Job, TraceRequest};
 
 /// Name of a trace on its way, in its worker's folder.
 #[cfg(feature = "mcap")]
 const UNFINISHED: &str = "trace.unfinished";
-
-/// Asks for the trace of a test.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct TraceOrder {
-    /// The file it is to be, in a folder that exists.
-    pub file: PathBuf,
-    /// Whether to keep it whatever the outcome.
-    pub keep: Recorded,
-}
 
 /// Runs a test, and writes its trace if it is asked for. The second is why the trace could not be written.
 pub(super) fn run(
@@ -43,9 +31,9 @@ pub(super) fn run(
 ) -> (Observation, Option<String>) {
     let Job { test, simulator_seed, .. } = job;
     let what = Run { test, simulator_seed: *simulator_seed };
-    let Some(order) = &job.trace else {
+    let Some(request) = &job.trace else {
         let observed = evaluate_tapped(plan, wires, metrics, transport, &what, custom, None);
-        return (observed.unwrap_or_else(|misfit| crashed(misfit.to_string())), None);
+        return (observed.unwrap_or_else(|misfit| Observation::crashed(misfit.to_string())), None);
     };
     #[cfg(feature = "mcap")]
     {
@@ -54,35 +42,37 @@ pub(super) fn run(
         let subject = Subject { plan, number: job.number, test, simulator_seed: *simulator_seed };
         let mut writer = match TraceWriter::create(&directory.join(UNFINISHED), subject, wires) {
             Ok(writer) => writer,
-            Err(error) => return (crashed("there was no trace to write to".to_owned()), Some(error.to_string())),
+            Err(error) => {
+                return (Observation::crashed("there was no trace to write to".to_owned()), Some(error.to_string()));
+            }
         };
         let observed = evaluate_tapped(plan, wires, metrics, transport, &what, custom, Some(&mut writer));
-        let observation = observed.unwrap_or_else(|misfit| crashed(misfit.to_string()));
-        let settled = if is_kept(plan, order.keep, &observation) {
-            writer.keep(&observation, &order.file).map_err(|error| error.to_string())
+        let observation = observed.unwrap_or_else(|misfit| Observation::crashed(misfit.to_string()));
+        let settled = if is_kept(plan, request.keep, &observation) {
+            writer.keep(&observation, &request.file).map_err(|error| error.to_string())
         } else {
             drop(writer);
-            discard(&order.file)
+            discard(&request.file)
         };
         (observation, settled.err())
     }
     #[cfg(not(feature = "mcap"))]
     {
-        let _ = (order, directory);
-        (crashed("there was no trace to write to".to_owned()), Some(NOT_BUILT_IN.to_owned()))
+        let _ = (request, directory);
+        (Observation::crashed("there was no trace to write to".to_owned()), Some(NOT_BUILT_IN.to_owned()))
     }
 }
 
 /// Saves what a worker that died wrote of a trace. The error says why that is not possible.
-pub(super) fn save(order: &TraceOrder, directory: &Path, outcome: &Outcome) -> Result<(), String> {
+pub(super) fn save(request: &TraceRequest, directory: &Path, outcome: &Outcome) -> Result<(), String> {
     #[cfg(feature = "mcap")]
     {
-        sesame_relay::trace::salvage(&directory.join(UNFINISHED), outcome, &order.file)
+        sesame_relay::trace::salvage(&directory.join(UNFINISHED), outcome, &request.file)
             .map_err(|error| error.to_string())
     }
     #[cfg(not(feature = "mcap"))]
     {
-        let _ = (order, directory, outcome);
+        let _ = (request, directory, outcome);
         Err(NOT_BUILT_IN.to_owned())
     }
 }

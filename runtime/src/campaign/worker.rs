@@ -5,16 +5,17 @@ use std::sync::{Mutex, mpsc};
 use std::time::Duration;
 use std::{io, thread};
 
-use sesame_base::observation::{Observation, Outcome, WallTime};
+use sesame_base::observation::Outcome;
 use sesame_plan::CampaignPlan;
 use sesame_relay::changed_files::ChangedFiles;
 use sesame_relay::evaluate::Custom;
 use sesame_relay::metric::MetricTable;
 use sesame_relay::wire::WireTable;
-use sesame_relay::{descendants, panic_capture as last_panic};
+use sesame_relay::{descendants, panic_capture};
 
+use crate::campaign::executor::Job;
 use crate::campaign::link::{self, Address, Stream};
-use crate::campaign::protocol::{self, Job, Reply};
+use crate::campaign::protocol::{self, Reply};
 use crate::campaign::traces;
 use crate::runner::Runner;
 
@@ -24,7 +25,7 @@ use crate::runner::Runner;
 /// simulator.
 pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::Result<()> {
     let mut stream = link::connect(supervisor)?;
-    last_panic::listen();
+    panic_capture::listen();
     // So that what leaves its parents can be found when it is to end. Where the system cannot do that, groups have to do.
     descendants::adopt_orphans();
 
@@ -79,22 +80,4 @@ fn end_what_was_started() {
     #[cfg(feature = "process")]
     sesame_relay::transport::end_simulators();
     descendants::end_adopted(|_| false, Duration::ZERO);
-}
-
-/// The observation of a run that left nothing but its cause.
-pub(super) fn crashed(message: String) -> Observation {
-    empty(Outcome::Crash { message })
-}
-
-pub(super) fn empty(outcome: Outcome) -> Observation {
-    Observation {
-        outcome,
-        end: 0.0,
-        operations: Vec::new(),
-        unheard: Vec::new(),
-        metrics: Vec::new(),
-        messages: 0,
-        warnings: Vec::new(),
-        wall: WallTime::default(),
-    }
 }

@@ -14,7 +14,8 @@ use std::{io, thread};
 
 use sesame_relay::{descendants, process_group};
 
-use crate::campaign::pool::WORKER;
+/// The environment variable with a worker's number, which everything inherits that the worker starts.
+pub(super) const WORKER: &str = "SESAME_WORKER";
 
 /// How long a worker whose connection is closed may take to end what it started, and itself; and how long what outlives it
 /// may take after that.

@@ -11,12 +11,13 @@ use sesame_plan::CampaignPlan;
 use sesame_results::record::{Origin, Recorder, Repository, TestRow, Verdict};
 use sesame_results::report;
 
-use crate::campaign::{Further, confirm_further};
-use crate::cli::execution::{Work, claim_files, interruptible, refuse_unfilled, shown};
+use crate::campaign::{Confirmations, confirm_recorded};
+use crate::cli::execution::{ExecutionArgs, claim_files, interruptible, refuse_unfilled, shown};
+use crate::cli::failure::{Failure, STOPPED};
 use crate::cli::gate::Gate;
 use crate::cli::results_folder::{open, refuse_changed};
+use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json, say, text_options};
-use crate::cli::{Failure, Format, STOPPED};
 use crate::runner::Runner;
 
 /// How often a line is printed.
@@ -43,7 +44,7 @@ pub(super) struct Options {
     #[command(flatten)]
     gate: Gate,
     #[command(flatten)]
-    work: Work,
+    execution: ExecutionArgs,
 }
 
 pub(super) fn confirm(
@@ -59,8 +60,8 @@ pub(super) fn confirm(
         names => names.iter().map(|name| repository.find(name)).collect::<Result<_, _>>()?,
     };
     if tests.is_empty() && options.violations {
-        say(format_args!("there is no test that violates a requirement and was run once only"));
-        return conclude(&repository, &tests, options);
+        say(format_args!("no test that violates a requirement was run only once"));
+        return report_outcome(&repository, &tests, options);
     }
     if tests.is_empty() {
         return Err(Failure(format!(
@@ -80,16 +81,16 @@ pub(super) fn confirm(
     let folder = repository.folder().to_owned();
     drop(repository);
 
-    let mut recorder = Recorder::reopen(&folder, options.work.workers())?;
+    let mut recorder = Recorder::reopen(&folder, options.execution.workers())?;
     let files = claim_files(runner, plan)?;
     refuse_unfilled(runner, plan, true)?;
-    let settings = options.work.settings(seed, &files)?;
+    let settings = options.execution.settings(seed, &files)?;
     let interrupted = interruptible()?;
-    let further = Further { tests, times: options.times };
+    let confirmations = Confirmations { tests, times: options.times };
     let mut said = Instant::now();
-    let complete = confirm_further(
+    let complete = confirm_recorded(
         &mut recorder,
-        &further,
+        &confirmations,
         &settings,
         &folder.join("workers"),
         &interrupted,
@@ -108,7 +109,7 @@ pub(super) fn confirm(
         return Ok(ExitCode::from(STOPPED));
     }
     report::write_page(&repository, &folder.join("report.html"))?;
-    conclude(&repository, &further.tests, options)
+    report_outcome(&repository, &confirmations.tests, options)
 }
 
 /// The tests that violate a requirement and were run once only, by number; none of a duplicate.
@@ -122,7 +123,7 @@ fn run_once(repository: &Repository) -> Result<Vec<u32>, Failure> {
 }
 
 /// Prints what fresh runs say of these tests. The exit code is for all that is recorded.
-fn conclude(repository: &Repository, tests: &[u32], options: &Options) -> Result<ExitCode, Failure> {
+fn report_outcome(repository: &Repository, tests: &[u32], options: &Options) -> Result<ExitCode, Failure> {
     let summary = report::summary(repository)?;
     let code = options.gate.code(&summary, repository.plan());
     let confirmed: Vec<_> = summary.confirmed.into_iter().filter(|test| tests.contains(&test.number)).collect();

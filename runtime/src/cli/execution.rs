@@ -17,11 +17,12 @@ use sesame_relay::metric::unimplemented_hooks;
 use sesame_results::record::{self, Recorder, Repository};
 use sesame_results::report::{self, Summary};
 
-use crate::campaign::{Conducted, Settings, conduct};
+use crate::campaign::{CampaignEnd, Settings, run_campaign};
+use crate::cli::failure::{Failure, STOPPED};
 use crate::cli::gate::Gate;
 use crate::cli::progress::{Display, Waiting, wait};
+use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json, say, text_options};
-use crate::cli::{Failure, Format, STOPPED};
 use crate::runner::Runner;
 
 /// The most worker processes that may be asked for. Each is a process with a simulator of its own, and takes one of the
@@ -31,21 +32,21 @@ const MOST_WORKERS: usize = 512;
 
 /// How tests are run.
 #[derive(Debug, Default, Args)]
-pub(super) struct Work {
+pub(super) struct ExecutionArgs {
     /// How many worker processes, at most 512; by default one per processor, and never more than tests
     #[arg(long, value_name = "N", value_parser = workers)]
     workers: Option<NonZeroUsize>,
-    /// Seconds of wall time after which a test is stopped; by default 20 times the undisturbed run, at least 60
+    /// Seconds of wall time after which a test is stopped; by default 20 times the reference run, at least 60
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     timeout: Option<Duration>,
-    /// Go on although nobody hears what an operation disturbs: the simulator does not subscribe to its topic, and no outbound metric reads it
+    /// Go on although nothing receives what an operation disturbs: the simulator does not subscribe to its topic, and no outbound metric reads it
     #[arg(long)]
     allow_unheard: bool,
 }
 
 /// How a command says what was found.
 #[derive(Debug, Default, Args)]
-pub(super) struct Ending {
+pub(super) struct OutputArgs {
     /// How to show what was found; as JSON there is nothing else on standard output
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -77,7 +78,7 @@ pub(super) fn seconds(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| "must be above 0".to_owned())
 }
 
-impl Work {
+impl ExecutionArgs {
     /// The number of workers, for the record.
     pub(super) fn workers(&self) -> u32 {
         u32::try_from(self.processes()).unwrap_or(u32::MAX)
@@ -180,38 +181,38 @@ pub(super) fn begin(
     name: &str,
     plan: &CampaignPlan,
     seed: u64,
-    work: &Work,
+    execution: &ExecutionArgs,
 ) -> Result<(Recorder, PathBuf), Failure> {
     let claim = record::claim_folder(results, name)?;
     if let Some(unfinished) = &claim.unfinished {
         say(format_args!("note: an earlier run is unfinished: `resume {}` goes on with it", shown(unfinished)));
     }
     let folder = claim.folder.clone();
-    Ok((Recorder::create_in(claim, plan, seed, work.workers())?, folder))
+    Ok((Recorder::create_in(claim, plan, seed, execution.workers())?, folder))
 }
 
 /// Runs a campaign to its end and says what was found.
-pub(super) fn carry_out(
+pub(super) fn execute(
     plan: &CampaignPlan,
     recorder: Recorder,
     folder: &Path,
     seed: u64,
-    work: &Work,
-    ending: &Ending,
+    execution: &ExecutionArgs,
+    output: &OutputArgs,
     files: Files,
 ) -> Result<ExitCode, Failure> {
-    let settings = work.settings(seed, &files)?;
+    let settings = execution.settings(seed, &files)?;
     let interrupted = interruptible()?;
     let started = Instant::now();
     let mut display = Display::new(plan, seed);
-    let conducted = conduct(plan, recorder, &settings, &folder.join("workers"), &interrupted, &mut |progress| {
-        display.update(progress);
+    let end = run_campaign(plan, recorder, &settings, &folder.join("workers"), &interrupted, &mut |event, progress| {
+        display.update(event, progress);
     });
     display.finish();
     files.finish()?;
-    match conducted? {
-        Conducted::Finished(repository) => {
-            let code = conclude(&repository, folder, &folder.join("report.html"), ending)?;
+    match end? {
+        CampaignEnd::Finished(repository) => {
+            let code = report_outcome(&repository, folder, &folder.join("report.html"), output)?;
             let repetitions: usize = repository.repetitions()?.values().map(Vec::len).sum();
             let (took, tests) = (started.elapsed(), repository.numbers()?.len() + repetitions);
             let took =
@@ -219,9 +220,9 @@ pub(super) fn carry_out(
             say(format_args!("      Took {took} for {tests} runs"));
             Ok(code)
         }
-        Conducted::Interrupted => {
+        CampaignEnd::Interrupted => {
             say(format_args!(
-                "stopped; what was measured is kept. `resume {}` goes on to the same results",
+                "stopped; everything measured so far is kept. `resume {}` continues to the same results",
                 shown(folder)
             ));
             Ok(ExitCode::from(STOPPED))
@@ -229,7 +230,7 @@ pub(super) fn carry_out(
     }
 }
 
-/// A flag that Ctrl-C sets. The first stops in good order; who insists is obeyed.
+/// A flag that Ctrl-C sets: the first one stops in good order, a second one exits at once.
 pub(super) fn interruptible() -> Result<Arc<AtomicBool>, Failure> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
@@ -254,21 +255,21 @@ struct Concluded<'a> {
 }
 
 /// Writes the page and the JUnit file and prints what was found.
-pub(super) fn conclude(
+pub(super) fn report_outcome(
     repository: &Repository,
     folder: &Path,
     page: &Path,
-    ending: &Ending,
+    output: &OutputArgs,
 ) -> Result<ExitCode, Failure> {
     let waiting = Waiting::on(repository.evaluated()?, "making the page");
     let digest = repository.digest()?;
     report::write_page_with(repository, page, &digest)?;
-    if let Some(junit) = &ending.junit {
+    if let Some(junit) = &output.junit {
         report::write_junit(repository, junit)?;
     }
     let summary = report::summary(repository)?;
     drop(waiting);
-    match ending.format {
+    match output.format {
         Format::Text => {
             print(&report::summary_text(&summary, text_options()))?;
             print(&format!("\n    Report {}\n    Digest {digest}\n", shown(page)))?;
@@ -277,7 +278,7 @@ pub(super) fn conclude(
             print_json(&Concluded { results: folder, report: page, digest, summary: &summary })?;
         }
     }
-    Ok(ending.gate.code(&summary, repository.plan()))
+    Ok(output.gate.code(&summary, repository.plan()))
 }
 
 /// A path as the user would type it: relative to where they are, if it is below.

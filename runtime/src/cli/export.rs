@@ -8,9 +8,11 @@ use clap::Args;
 use sesame_base::visible::visible_lines;
 use sesame_results::report;
 
+use crate::cli::failure::Failure;
 use crate::cli::results_folder::open;
+use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json};
-use crate::cli::{Failure, Format, Which};
+use crate::cli::view::Which;
 
 /// Which test is written, and under which name.
 #[derive(Debug, Args)]

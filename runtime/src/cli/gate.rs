@@ -12,7 +12,7 @@ use sesame_plan::{CampaignPlan, Search};
 use sesame_results::record::Verdict;
 use sesame_results::report::Summary;
 
-use crate::cli::NOT_AS_REQUIRED;
+use crate::cli::failure::NOT_AS_REQUIRED;
 use crate::cli::terminal::say;
 
 /// Which findings make a command end with exit code 3.

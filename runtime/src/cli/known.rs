@@ -7,8 +7,8 @@ use clap::Args;
 
 use sesame_plan::{CampaignPlan, KnownTestId, Search};
 
-use crate::cli::Failure;
-use crate::cli::execution::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled};
+use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
+use crate::cli::failure::Failure;
 use crate::runner::Runner;
 
 /// Which known tests are run, and how.
@@ -24,9 +24,9 @@ pub(super) struct Options {
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
     #[command(flatten)]
-    work: Work,
+    execution: ExecutionArgs,
     #[command(flatten)]
-    ending: Ending,
+    output: OutputArgs,
 }
 
 pub(super) fn known(
@@ -46,8 +46,8 @@ pub(super) fn known(
     refuse_unfilled(runner, &plan, true)?;
     let seed = options.seed.unwrap_or(plan.campaign.seed);
     let results = options.results.as_deref().unwrap_or(results);
-    let (recorder, folder) = begin(results, "known", &plan, seed, &options.work)?;
-    carry_out(&plan, recorder, &folder, seed, &options.work, &options.ending, files)
+    let (recorder, folder) = begin(results, "known", &plan, seed, &options.execution)?;
+    execute(&plan, recorder, &folder, seed, &options.execution, &options.output, files)
 }
 
 /// The known tests of these names, each once and in the space's order; all of them when no name is given.

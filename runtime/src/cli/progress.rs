@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use sesame_plan::{CampaignPlan, Direction, MetricSource};
+use sesame_results::record::TestRecord;
 
-use crate::campaign::Progress;
+use crate::campaign::{CampaignEvent, Progress};
 use crate::cli::terminal::say;
 
 /// How often a line is printed where there is no terminal.
@@ -36,8 +37,10 @@ impl<'a> Display<'a> {
         Display { plan, bar, started: now, last_line: now, worst: vec![None; plan.campaign.objectives.len()] }
     }
 
-    pub(super) fn update(&mut self, progress: Progress<'_>) {
-        self.remember(progress);
+    pub(super) fn update(&mut self, event: CampaignEvent<'_>, progress: Progress<'_>) {
+        if let CampaignEvent::TestEnded(record) = event {
+            self.remember(record);
+        }
         let rest = self.rest(progress);
         match &self.bar {
             Some(bar) => {
@@ -60,10 +63,9 @@ impl<'a> Display<'a> {
     }
 
     /// The worst value of each objective so far.
-    fn remember(&mut self, progress: Progress<'_>) {
-        let Some(latest) = progress.latest else { return };
+    fn remember(&mut self, record: &TestRecord) {
         for (worst, &id) in self.worst.iter_mut().zip(&self.plan.campaign.objectives) {
-            let value = latest.observation.metrics.get(id.index()).and_then(|metric| metric.value);
+            let value = record.observation.metrics.get(id.index()).and_then(|metric| metric.value);
             *worst = match (*worst, value, self.plan.metric(id).direction) {
                 (Some(old), Some(new), Some(Direction::Maximise)) => Some(old.max(new)),
                 (Some(old), Some(new), _) => Some(old.min(new)),
@@ -77,8 +79,8 @@ impl<'a> Display<'a> {
         if !self.plan.campaign.objectives.is_empty() {
             parts.push(format!("front of {}", progress.front.numbers().len()));
         }
-        if progress.repetitions > 0 {
-            parts.push(format!("{} runs to confirm", progress.repetitions));
+        if progress.confirmation_runs > 0 {
+            parts.push(format!("{} runs to confirm", progress.confirmation_runs));
         }
         if let Some(coverage) = progress.coverage {
             parts.push(format!("coverage {:.0} %", 100.0 * coverage.share()));

@@ -8,8 +8,8 @@ use clap::Args;
 use sesame_plan::{CampaignPlan, KnownTest, KnownTestId, Search, Test};
 use sesame_rng::derive_seed;
 
-use crate::cli::Failure;
-use crate::cli::execution::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled};
+use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
+use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_changed};
 use crate::runner::Runner;
 
@@ -31,9 +31,9 @@ pub(super) struct Options {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     #[command(flatten)]
-    work: Work,
+    execution: ExecutionArgs,
     #[command(flatten)]
-    ending: Ending,
+    output: OutputArgs,
 }
 
 /// A test to be repeated.
@@ -69,8 +69,8 @@ pub(super) fn repeat(
     let files = claim_files(runner, &plan)?;
     refuse_unfilled(runner, &plan, true)?;
     let results = options.into.as_deref().unwrap_or(&results);
-    let (recorder, folder) = begin(results, &format!("repeat-{name}"), &plan, seed, &options.work)?;
-    carry_out(&plan, recorder, &folder, seed, &options.work, &options.ending, files)
+    let (recorder, folder) = begin(results, &format!("repeat-{name}"), &plan, seed, &options.execution)?;
+    execute(&plan, recorder, &folder, seed, &options.execution, &options.output, files)
 }
 
 fn recorded(plan: &CampaignPlan, results: &Path, options: &Options) -> Result<Repeated, Failure> {

@@ -11,11 +11,13 @@ use sesame_plan::CampaignPlan;
 use sesame_results::record::{TestRecord, differences};
 use sesame_results::report::{Replay, replay_text};
 
-use crate::campaign::{AloneSettings, Ended, Job, patience, run_alone};
+use crate::campaign::{Job, JobResult, SingleSettings, default_timeout, run_single};
 use crate::cli::execution::{claim_files, interruptible, refuse_unfilled, seconds};
+use crate::cli::failure::{Failure, NOT_AS_REQUIRED, STOPPED};
 use crate::cli::results_folder::{open, refuse_changed};
+use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json, say, text_options};
-use crate::cli::{Failure, Format, NOT_AS_REQUIRED, STOPPED, Which};
+use crate::cli::view::Which;
 use crate::runner::Runner;
 
 /// Which test is run once more.
@@ -43,16 +45,16 @@ pub(super) fn replay(
     refuse_unfilled(runner, plan, true)?;
     let interrupted = interruptible()?;
     let folder = Scratch::new()?;
-    let settings = AloneSettings {
+    let settings = SingleSettings {
         program: std::env::current_exe()?,
         directory: folder.0.clone(),
         timeout: options.timeout.unwrap_or_else(|| limit(&record)),
     };
     let job =
         Job { number: record.number, test: record.test.clone(), simulator_seed: record.simulator_seed, trace: None };
-    let ended = run_alone(job, &settings, &interrupted);
+    let ended = run_single(job, &settings, &interrupted);
     files.finish()?;
-    let Some(Ended { observation: again, notes, .. }) = ended? else {
+    let Some(JobResult { observation: again, notes, .. }) = ended? else {
         say(format_args!("stopped; a replay leaves nothing behind"));
         return Ok(ExitCode::from(STOPPED));
     };
@@ -77,7 +79,7 @@ pub(super) fn replay(
 pub(super) fn limit(record: &TestRecord) -> Duration {
     match record.observation.outcome {
         Outcome::Timeout { limit } => Duration::from_secs_f64(limit),
-        _ => patience(record.observation.wall.run),
+        _ => default_timeout(record.observation.wall.run),
     }
 }
 

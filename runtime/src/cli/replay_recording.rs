@@ -7,7 +7,8 @@ use clap::Args;
 
 use sesame_plan::CampaignPlan;
 
-use crate::cli::{Failure, Format};
+use crate::cli::failure::Failure;
+use crate::cli::terminal::Format;
 use crate::runner::Runner;
 
 /// Which recording is fed.
@@ -38,20 +39,20 @@ pub(super) fn replay_recording(runner: &Runner, plan: &CampaignPlan, options: &O
 
     use sesame_relay::metric::MetricTable;
     use sesame_relay::wire::WireTable;
-    use sesame_relay::{panic_capture as last_panic, trace};
+    use sesame_relay::{panic_capture, trace};
     use sesame_results::report::recording_text;
 
-    use super::NOT_AS_REQUIRED;
     use super::execution::refuse_unfilled;
+    use super::failure::NOT_AS_REQUIRED;
     use super::terminal::{print, print_json, say, text_options};
 
     refuse_unfilled(runner, plan, true)?;
     let wires = WireTable::new(plan);
     let table = MetricTable::new(plan, &wires, runner.hooks)?;
-    last_panic::listen();
+    panic_capture::listen();
     let fed = AssertUnwindSafe(|| trace::feed(&options.recording, plan, &wires, &table));
     let fed = panic::catch_unwind(fed)
-        .map_err(|_| Failure(format!("a hook cannot take this recording: {}", last_panic::take())))??;
+        .map_err(|_| Failure(format!("a hook cannot take this recording: {}", panic_capture::take())))??;
     let replay = compared(plan, options, fed);
     for warning in &replay.warnings {
         say(format_args!("warning: {warning}"));

@@ -5,8 +5,8 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use crate::cli::Failure;
-use crate::cli::execution::{Ending, conclude};
+use crate::cli::execution::{OutputArgs, report_outcome};
+use crate::cli::failure::Failure;
 use crate::cli::results_folder::open;
 
 /// Which run is reported on, and where to.
@@ -19,12 +19,12 @@ pub(super) struct Options {
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
-    ending: Ending,
+    outcome: OutputArgs,
 }
 
-pub(super) fn report_anew(results: &Path, options: &Options) -> Result<ExitCode, Failure> {
+pub(super) fn report(results: &Path, options: &Options) -> Result<ExitCode, Failure> {
     let repository = open(results, options.results.as_deref())?;
     let folder = repository.path().parent().unwrap_or(results);
     let page = options.output.clone().unwrap_or_else(|| folder.join("report.html"));
-    conclude(&repository, folder, &page, &options.ending)
+    report_outcome(&repository, folder, &page, &options.outcome)
 }

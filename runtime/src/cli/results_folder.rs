@@ -5,8 +5,8 @@ use std::path::Path;
 use sesame_plan::CampaignPlan;
 use sesame_results::record::{self, Repository};
 
-use crate::cli::Failure;
 use crate::cli::execution::shown;
+use crate::cli::failure::Failure;
 
 /// The results in this folder, or those of the campaign's latest run.
 pub(super) fn open(results: &Path, folder: Option<&Path>) -> Result<Repository, Failure> {

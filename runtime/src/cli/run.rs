@@ -8,8 +8,8 @@ use clap::Args;
 use sesame_plan::{CampaignPlan, Search};
 use sesame_results::record::{self, Recorder};
 
-use crate::cli::Failure;
-use crate::cli::execution::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled, shown};
+use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled, shown};
+use crate::cli::failure::Failure;
 use crate::cli::results_folder::same_model;
 use crate::runner::Runner;
 
@@ -29,9 +29,9 @@ pub(super) struct Options {
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
     #[command(flatten)]
-    work: Work,
+    execution: ExecutionArgs,
     #[command(flatten)]
-    ending: Ending,
+    output: OutputArgs,
 }
 
 /// How a stopped run is taken up again.
@@ -41,9 +41,9 @@ pub(super) struct ResumeOptions {
     #[arg(value_name = "DIR")]
     results: Option<PathBuf>,
     #[command(flatten)]
-    work: Work,
+    execution: ExecutionArgs,
     #[command(flatten)]
-    ending: Ending,
+    output: OutputArgs,
 }
 
 pub(super) fn run(
@@ -70,8 +70,8 @@ pub(super) fn run(
     refuse_unfilled(runner, &plan, options.allow_unimplemented)?;
     let seed = options.seed.unwrap_or(plan.campaign.seed);
     let results = options.results.as_deref().unwrap_or(results);
-    let (recorder, folder) = begin(results, &seed.to_string(), &plan, seed, &options.work)?;
-    carry_out(&plan, recorder, &folder, seed, &options.work, &options.ending, files)
+    let (recorder, folder) = begin(results, &seed.to_string(), &plan, seed, &options.execution)?;
+    execute(&plan, recorder, &folder, seed, &options.execution, &options.output, files)
 }
 
 pub(super) fn resume(
@@ -86,7 +86,7 @@ pub(super) fn resume(
             Failure(format!("there is nothing to go on with: no run in {} is unfinished", results.display()))
         })?,
     };
-    let recorder = Recorder::resume(&folder, options.work.workers())?;
+    let recorder = Recorder::resume(&folder, options.execution.workers())?;
     let campaign = recorder.repository().campaign();
     let (recorded, seed) = (campaign.plan.clone(), campaign.seed);
     if !same_model(&recorded, plan) {
@@ -97,5 +97,5 @@ pub(super) fn resume(
     }
     let files = claim_files(runner, plan)?;
     refuse_unfilled(runner, plan, true)?;
-    carry_out(&recorded, recorder, &folder, seed, &options.work, &options.ending, files)
+    execute(&recorded, recorder, &folder, seed, &options.execution, &options.output, files)
 }

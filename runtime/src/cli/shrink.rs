@@ -9,8 +9,8 @@ use sesame_base::observation::{Observation, Outcome};
 use sesame_plan::{CampaignPlan, Failing, KnownTest, KnownTestId, RequirementId, Search};
 use sesame_results::record::{Origin, Repository, TestRecord, Verdict, verdict};
 
-use crate::cli::Failure;
-use crate::cli::execution::{Ending, Work, begin, carry_out, claim_files, refuse_unfilled};
+use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
+use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_changed};
 use crate::runner::Runner;
 
@@ -37,9 +37,9 @@ pub(super) struct Options {
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     evaluations: u32,
     #[command(flatten)]
-    work: Work,
+    execution: ExecutionArgs,
     #[command(flatten)]
-    ending: Ending,
+    output: OutputArgs,
 }
 
 pub(super) fn shrink(
@@ -66,8 +66,8 @@ pub(super) fn shrink(
     shrinking(&mut plan, &name, &record, failing, options);
     let files = claim_files(runner, &plan)?;
     refuse_unfilled(runner, &plan, true)?;
-    let (recorder, folder) = begin(into, &format!("shrink-{name}"), &plan, seed, &options.work)?;
-    carry_out(&plan, recorder, &folder, seed, &options.work, &options.ending, files)
+    let (recorder, folder) = begin(into, &format!("shrink-{name}"), &plan, seed, &options.execution)?;
+    execute(&plan, recorder, &folder, seed, &options.execution, &options.output, files)
 }
 
 /// How a test failed, and with which requirements.
@@ -108,7 +108,7 @@ pub(super) fn failing(repository: &Repository, record: &TestRecord, wanted: &[St
     if caused.is_empty() {
         let names: Vec<&str> = chosen.iter().map(named).collect();
         return Err(Failure(format!(
-            "the undisturbed run violates {} too, so {test} is not what makes it so",
+            "the reference run violates {} too, so {test} is not what makes it so",
             names.join(", ")
         )));
     }
@@ -178,7 +178,7 @@ mod tests {
         let repository = sample::campaign(folder.path(), &plan, 20);
         let record = repository.test(1).unwrap();
         let Err(Failure(words)) = failing(&repository, &record, &["R1".to_owned()]) else { panic!("it is refused") };
-        assert!(words.starts_with("the undisturbed run violates R1 too"), "{words}");
+        assert!(words.starts_with("the reference run violates R1 too"), "{words}");
     }
 
     #[test]
@@ -192,8 +192,8 @@ mod tests {
             requirement: Vec::new(),
             runs: 3,
             evaluations: 50,
-            work: Work::default(),
-            ending: Ending::default(),
+            execution: ExecutionArgs::default(),
+            output: OutputArgs::default(),
         };
         let mut changed = plan.clone();
         shrinking(&mut changed, "T9", &record, Failing::Crash, &options);

@@ -4,9 +4,21 @@ use std::fmt;
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
+use clap::ValueEnum;
+
 use sesame_results::report::TextOptions;
 
-use crate::cli::Failure;
+use crate::cli::failure::Failure;
+
+/// How a command shows what was asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(super) enum Format {
+    /// For people
+    #[default]
+    Text,
+    /// For programs
+    Json,
+}
 
 /// Says a line on standard error: progress, notes, warnings, errors. A full disk under a log, a reader that has gone away
 /// or a connection that is lost is no reason to end a run, so a line that cannot be written is dropped.

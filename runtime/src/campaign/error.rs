@@ -1,0 +1,82 @@
+//! Why a campaign could not go on.
+
+use sesame_results::record::RecordError;
+use sesame_search::SearchError;
+use sesame_search::coverage::GridError;
+
+use crate::campaign::executor::ExecutorError;
+use crate::campaign::reference::Unheard;
+
+/// Why a campaign could not go on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CampaignError {
+    /// The plan leaves nothing to search.
+    #[error(transparent)]
+    Search(#[from] SearchError),
+    /// The axes of the plan's coverage do not make a grid.
+    #[error("the campaign's coverage cannot be counted: {0}")]
+    Grid(#[from] GridError),
+    /// Tests cannot be run.
+    #[error(transparent)]
+    Executor(#[from] ExecutorError),
+    /// Results could not be kept.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// The reference run crashed or timed out, so nothing that follows would mean anything.
+    #[error(
+        "the reference run failed: {0}\nnothing was fuzzed: a campaign needs a system that works without disturbance"
+    )]
+    Reference(String),
+    /// A reference run was killed, and killed again when it was repeated. It is not recorded, so that `resume` runs it again.
+    #[error(
+        "the reference run failed: {reason}\nT{test} is not recorded, and what was recorded before is kept: `resume` runs it \
+         again. If you did not kill it, give it more memory, or the campaign fewer `--workers`"
+    )]
+    Killed {
+        /// The test.
+        test: u32,
+        /// What is known of it.
+        reason: String,
+    },
+    /// No part of the system receives what operations disturb, so tests with them would show nothing.
+    #[error(
+        "{}\nnothing was fuzzed: such tests would pass without having disturbed anything. Disturb what the simulator \
+         subscribes to, let it subscribe to this topic, or read the topic by a metric with `outbound`. To run the campaign \
+         as it is, pass `--allow-unheard`",
+        .0.iter().map(Unheard::to_string).collect::<Vec<_>>().join("\n")
+    )]
+    Unheard(Vec<Unheard>),
+    /// A trace could not be written. The test is not recorded, so that `resume` runs it again with its trace.
+    #[error(
+        "{reason}\nT{test} is not recorded without its trace, and what was recorded before is kept: when this is mended, \
+         `resume` goes on"
+    )]
+    Trace {
+        /// The test.
+        test: u32,
+        /// Why not.
+        reason: String,
+    },
+    /// A resumed campaign asks for other tests than those recorded.
+    #[error(
+        "test T{0} of these results is not the one that this runner asks for: the results come from another model or \
+         version; start a new run with `run`"
+    )]
+    OtherCampaign(u32),
+}
+
+/// Why a campaign halts before its end.
+#[derive(Debug)]
+pub(super) enum Halt {
+    /// The user stopped it. What had ended by then is recorded.
+    Stopped,
+    /// It cannot go on.
+    Failed(CampaignError),
+}
+
+impl<E: Into<CampaignError>> From<E> for Halt {
+    fn from(error: E) -> Self {
+        Halt::Failed(error.into())
+    }
+}

@@ -1,0 +1,181 @@
+//! Tests are handed to an executor, and their results recorded.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::ops::RangeInclusive;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use sesame_plan::{CampaignPlan, Recorded};
+use sesame_results::record::{self, Event, EventKind, Origin, RecordError, Recorder, Repetition, TestRecord};
+
+use crate::campaign::error::{CampaignError, Halt};
+use crate::campaign::executor::{Executor, Job, JobResult, TraceRequest};
+use crate::campaign::numbering::PlannedTest;
+
+/// How many recorded tests are read at once when a campaign is resumed.
+const READ_TOGETHER: u32 = 50;
+
+/// How long an executor is waited for before it is looked whether the user stopped the campaign.
+const WAIT: Duration = Duration::from_millis(100);
+
+/// Runs tests and records them; what is recorded already is read instead.
+pub(super) struct Evaluator<'a> {
+    pub(super) recorder: &'a mut Recorder,
+    pub(super) executor: &'a mut dyn Executor,
+    /// Numbers of the tests that were recorded when the campaign was resumed.
+    recorded: BTreeSet<u32>,
+    /// The recorded repetitions of each test, in their order.
+    pub(super) repetitions: BTreeMap<u32, Vec<Repetition>>,
+    traces: Option<Traces>,
+    /// Whether the search looks at how metrics went in the course of a run.
+    series: bool,
+    interrupted: &'a AtomicBool,
+}
+
+/// Which traces are kept, and in which folder of results.
+struct Traces {
+    folder: PathBuf,
+    keep: Recorded,
+}
+
+impl Traces {
+    fn request(&self, test: &PlannedTest) -> TraceRequest {
+        // The others are compared with the reference run.
+        let keep = if test.origin == Origin::Reference { Recorded::All } else { self.keep };
+        TraceRequest { file: record::trace_file(&self.folder, test.number), keep }
+    }
+}
+
+impl<'a> Evaluator<'a> {
+    /// One that goes on with what the recorder holds.
+    pub(super) fn new(
+        plan: &CampaignPlan,
+        recorder: &'a mut Recorder,
+        executor: &'a mut dyn Executor,
+        interrupted: &'a AtomicBool,
+    ) -> Result<Self, RecordError> {
+        let repository = recorder.repository();
+        let recorded = repository.numbers()?.into_iter().collect();
+        let repetitions = repository.repetitions()?;
+        let traces = match plan.campaign.record {
+            Some(keep) => Some(Traces { folder: repository.make_trace_folder()?, keep }),
+            None => None,
+        };
+        let series = sesame_search::needs_trajectories(plan);
+        Ok(Evaluator { recorder, executor, recorded, repetitions, traces, series, interrupted })
+    }
+
+    /// One that only repeats tests that are recorded.
+    pub(super) fn for_repetitions(
+        recorder: &'a mut Recorder,
+        executor: &'a mut dyn Executor,
+        interrupted: &'a AtomicBool,
+    ) -> Result<Self, RecordError> {
+        let repetitions = recorder.repository().repetitions()?;
+        let recorded = BTreeSet::new();
+        Ok(Evaluator { recorder, executor, recorded, repetitions, traces: None, series: false, interrupted })
+    }
+
+    /// Runs tests and records each as it ends; `each` sees all of them, in the order in which they end.
+    pub(super) fn evaluate(
+        &mut self,
+        planned: Vec<PlannedTest>,
+        each: &mut dyn FnMut(&TestRecord),
+    ) -> Result<(), Halt> {
+        let mut waiting = BTreeMap::new();
+        let mut duplicates = Vec::new();
+        let mut read_ahead = VecDeque::new();
+        let last = planned.last().map_or(0, |test| test.number);
+        for test in planned {
+            if self.recorded.contains(&test.number) {
+                let record = self.read(&mut read_ahead, test.number..=last, test.origin)?;
+                if record.test != test.test || record.simulator_seed != test.simulator_seed {
+                    return Err(CampaignError::OtherCampaign(test.number).into());
+                }
+                each(&record);
+            } else if let Some(original) = test.duplicate_of {
+                duplicates.push((original, test));
+            } else {
+                self.executor.submit(Job {
+                    number: test.number,
+                    test: test.test.clone(),
+                    simulator_seed: test.simulator_seed,
+                    trace: self.traces.as_ref().map(|traces| traces.request(&test)),
+                });
+                waiting.insert(test.number, test);
+            }
+        }
+        while !waiting.is_empty() {
+            let JobResult { number, observation, notes, trace_failure, killed } = self.next()?;
+            let Some(test) = waiting.remove(&number) else { continue };
+            if let Some(reason) = trace_failure {
+                return Err(CampaignError::Trace { test: number, reason }.into());
+            }
+            if killed && test.origin == Origin::Reference {
+                // All tests are compared with it: they would be compared with that kill, for good.
+                let reason = observation.outcome.detail().unwrap_or_default();
+                return Err(CampaignError::Killed { test: number, reason }.into());
+            }
+            self.record(&test.observed(observation), each)?;
+            for text in notes {
+                self.recorder.put_event(&Event { kind: EventKind::Session, test: Some(number), text })?;
+            }
+        }
+        for (original, test) in duplicates {
+            let observation = self.read(&mut VecDeque::new(), original..=original, test.origin)?.observation;
+            self.record(&test.observed(observation), each)?;
+        }
+        Ok(())
+    }
+
+    /// Waits for the next result of the executor.
+    pub(super) fn next(&mut self) -> Result<JobResult, Halt> {
+        loop {
+            if self.interrupted.load(Ordering::Relaxed) {
+                return Err(Halt::Stopped);
+            }
+            if let Some(result) = self.executor.next(WAIT)? {
+                return Ok(result);
+            }
+        }
+    }
+
+    /// Records a warning, of one test or of the campaign.
+    pub(super) fn warn(&mut self, test: Option<u32>, text: String) -> Result<(), RecordError> {
+        self.recorder.put_event(&Event { kind: EventKind::Warning, test, text })
+    }
+
+    /// The first of these tests as it is recorded, with its series only if the campaign looks at them. Those that follow are
+    /// read together with it, into `ahead`.
+    fn read(
+        &self,
+        ahead: &mut VecDeque<TestRecord>,
+        numbers: RangeInclusive<u32>,
+        origin: Origin,
+    ) -> Result<TestRecord, RecordError> {
+        let number = *numbers.start();
+        while ahead.front().is_some_and(|record| record.number < number) {
+            ahead.pop_front();
+        }
+        if ahead.is_empty() {
+            let series = self.series || origin == Origin::Reference;
+            let together = if series { number } else { number.saturating_add(READ_TOGETHER).min(*numbers.end()) };
+            ahead.extend(self.recorder.repository().records(number..=together, series)?);
+        }
+        match ahead.pop_front() {
+            Some(record) if record.number == number => Ok(record),
+            // It is missing: the error says so.
+            _ => self.recorder.repository().test(number),
+        }
+    }
+
+    fn record(&mut self, record: &TestRecord, each: &mut dyn FnMut(&TestRecord)) -> Result<(), RecordError> {
+        self.recorder.commit(record)?;
+        for warning in &record.observation.warnings {
+            self.warn(Some(record.number), warning.clone())?;
+        }
+        each(record);
+        Ok(())
+    }
+}

@@ -1,0 +1,45 @@
+//! What a campaign tells its listeners while it runs: a progress bar today, a live view later.
+
+use sesame_optimise::front::Front;
+use sesame_results::record::TestRecord;
+use sesame_search::coverage::Coverage;
+
+/// Something that happened in a campaign.
+#[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
+pub enum CampaignEvent<'a> {
+    /// The first reference run has ended, and the search begins.
+    SearchStarted,
+    /// A test has ended and is recorded; in a resumed campaign also one that was recorded before.
+    TestEnded(&'a TestRecord),
+    /// Runs to confirm tests have begun, or one of them has ended and is recorded.
+    ConfirmationAdvanced,
+    /// All tests of a generation have ended, and those to be confirmed are confirmed.
+    GenerationEnded {
+        /// Which, from 0.
+        generation: u32,
+    },
+    /// No more tests are asked for.
+    SearchEnded {
+        /// Why, in words.
+        reason: &'a str,
+    },
+}
+
+/// How far a campaign is.
+#[derive(Debug, Clone, Copy)]
+pub struct Progress<'a> {
+    /// Tests evaluated, without reference runs.
+    pub done: u32,
+    /// Tests to be evaluated in total; a search may stop earlier.
+    pub total: u32,
+    /// Runs to confirm tests so far. They are not tests, and `done` leaves them out.
+    pub confirmation_runs: u32,
+    /// The front so far.
+    pub front: &'a Front,
+    /// The cells covered so far, if the campaign counts them.
+    pub coverage: Option<&'a Coverage>,
+}
+
+/// Hears each event of a campaign, in order, with how far the campaign is after it.
+pub type Listener<'l> = dyn FnMut(CampaignEvent<'_>, Progress<'_>) + 'l;

@@ -1,0 +1,73 @@
+//! Where tests run: the seam between a campaign and what carries out its tests.
+//!
+//! Tests are independent of each other, and results depend neither on the order in which they end nor on where they ran.
+//! So an executor may be [processes of this machine](crate::campaign::pool), or machines far away.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use sesame_base::observation::Observation;
+use sesame_plan::{Recorded, Test};
+
+/// Carries out tests, in any order.
+pub trait Executor {
+    /// Takes a test. It is run as soon as there is room for it.
+    fn submit(&mut self, job: Job);
+
+    /// The next test that has ended; `None` if none ends within `wait`.
+    fn next(&mut self, wait: Duration) -> Result<Option<JobResult>, ExecutorError>;
+
+    /// Changes the wall time after which a test is stopped, for tests that have not begun yet.
+    fn set_timeout(&mut self, timeout: Duration);
+}
+
+/// A test to be run.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Job {
+    /// A number that no other job of the executor has at the same time; it comes back with the result.
+    pub number: u32,
+    /// The test.
+    pub test: Test,
+    /// Seed of the simulator's own randomness.
+    pub simulator_seed: u64,
+    /// The trace that is asked for, if any.
+    pub trace: Option<TraceRequest>,
+}
+
+/// Asks for the trace of a test.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct TraceRequest {
+    /// The file it is to be, in a folder that exists.
+    pub file: PathBuf,
+    /// Whether to keep it whatever the outcome.
+    pub keep: Recorded,
+}
+
+/// A test that has ended.
+#[derive(Debug)]
+pub struct JobResult {
+    /// The job's number.
+    pub number: u32,
+    /// What the run showed.
+    pub observation: Observation,
+    /// What happened to its worker: that it was killed and the test run again, what it printed last before it died. Of this
+    /// one session: it may hold process numbers.
+    pub notes: Vec<String>,
+    /// Why the trace that was asked for could not be written: the result must not be recorded without it.
+    pub trace_failure: Option<String>,
+    /// Whether its worker or its simulator was killed, and killed again when the test was repeated. The observation says so;
+    /// it may say nothing of the test, but only of this machine today.
+    pub killed: bool,
+}
+
+/// Why tests cannot be run.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot start worker {worker}: {reason}")]
+pub struct ExecutorError {
+    /// Which worker, from 1.
+    pub worker: usize,
+    /// Why.
+    pub reason: String,
+}

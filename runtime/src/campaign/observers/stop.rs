@@ -1,0 +1,35 @@
+//! The campaign's rules to stop.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use sesame_plan::CampaignPlan;
+use sesame_results::record::{RecordError, Recorder};
+use sesame_search::StopRules;
+
+use crate::campaign::observer::{Generation, Observer};
+
+/// Ends the search when one of the campaign's rules to stop holds.
+pub(super) struct Rules {
+    rules: StopRules,
+    /// When the search began: a rule by wall time counts from here.
+    begun: Instant,
+}
+
+impl Rules {
+    /// Those of a plan, from now on.
+    pub(super) fn new(plan: &CampaignPlan) -> Self {
+        Rules { rules: StopRules::from_plan(plan), begun: Instant::now() }
+    }
+}
+
+impl Observer for Rules {
+    fn generation_ended(
+        &mut self,
+        generation: Generation<'_>,
+        _: &mut Recorder,
+    ) -> Result<ControlFlow<String>, RecordError> {
+        self.rules.tell(generation.tests);
+        Ok(self.rules.reached(self.begun.elapsed()).map_or(ControlFlow::Continue(()), ControlFlow::Break))
+    }
+}

@@ -1,0 +1,305 @@
+//! A campaign from its first reference run to its last: ask the search for tests, run them, record them, tell the search.
+
+use std::collections::BTreeSet;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use sesame_base::observation::{Observation, Outcome};
+use sesame_optimise::front::Front;
+use sesame_plan::{CampaignPlan, Search};
+use sesame_results::record::{self, Recorder, Repository, ResultSet, Status};
+use sesame_search as search;
+use sesame_search::{Evaluated, Neighbours, Strategy, VariableTrajectories};
+
+use crate::campaign::confirmation::ConfirmedSearch;
+use crate::campaign::error::{CampaignError, Halt};
+use crate::campaign::evaluator::Evaluator;
+use crate::campaign::events::{CampaignEvent, Listener, Progress};
+use crate::campaign::executor::Executor;
+use crate::campaign::numbering::{Numbering, PlannedTest};
+use crate::campaign::observer::{EndedTest, Generation, Observer};
+use crate::campaign::observers::{counted_point, observers};
+use crate::campaign::pool::Pool;
+use crate::campaign::reference::{self, Unheard};
+use crate::campaign::settings::{FIRST_TIMEOUT, Settings, default_timeout};
+
+/// How a campaign ended.
+#[derive(Debug)]
+pub enum CampaignEnd {
+    /// All tests were evaluated, or a rule ended the search.
+    Finished(Box<Repository>),
+    /// The user stopped it; `resume` goes on.
+    Interrupted,
+}
+
+/// Runs a campaign in worker processes and records it; what the recorder already holds is not simulated again. Each worker
+/// gets a folder of its own in `directory`.
+pub fn run_campaign(
+    plan: &CampaignPlan,
+    recorder: Recorder,
+    settings: &Settings,
+    directory: &Path,
+    interrupted: &AtomicBool,
+    listener: &mut Listener<'_>,
+) -> Result<CampaignEnd, CampaignError> {
+    // Before any process is started, so that a plan without a search is refused at once.
+    let strategy = search::strategy(plan, settings.seed)?;
+    let mut pool = Pool::start(&settings.pool(plan.campaign.search.evaluations(), directory, FIRST_TIMEOUT))?;
+    run_with(plan, strategy, recorder, settings, &mut pool, interrupted, listener)
+}
+
+/// Runs a campaign by any executor.
+fn run_with(
+    plan: &CampaignPlan,
+    strategy: Box<dyn Strategy>,
+    mut recorder: Recorder,
+    settings: &Settings,
+    executor: &mut dyn Executor,
+    interrupted: &AtomicBool,
+    listener: &mut Listener<'_>,
+) -> Result<CampaignEnd, CampaignError> {
+    let evaluator = Evaluator::new(plan, &mut recorder, executor, interrupted)?;
+    let run = Campaign::begin(plan, strategy, evaluator, settings, listener).and_then(Campaign::finish);
+    match run {
+        Ok(stop) => Ok(CampaignEnd::Finished(Box::new(recorder.finish(&stop)?))),
+        Err(Halt::Stopped) => {
+            recorder.interrupt()?;
+            Ok(CampaignEnd::Interrupted)
+        }
+        Err(Halt::Failed(error)) => {
+            match error {
+                // The reference run stays recorded as it is, so there is nothing that `resume` could go on with.
+                CampaignError::Reference(_) => drop(recorder.finish("the reference run failed")?),
+                // The run stays unfinished, so that `resume --allow-unheard` can go on with it.
+                CampaignError::Unheard(_) => recorder.interrupt()?,
+                _ => {}
+            }
+            Err(error)
+        }
+    }
+}
+
+/// A campaign whose first reference run has ended.
+struct Campaign<'a, 'l> {
+    plan: &'a CampaignPlan,
+    evaluator: Evaluator<'a>,
+    strategy: Box<dyn Strategy>,
+    numbering: Numbering,
+    /// What the first reference run showed.
+    reference: Observation,
+    observers: Vec<Box<dyn Observer>>,
+    confirmed: Option<ConfirmedSearch>,
+    neighbours: Option<Neighbours>,
+    front: Front,
+    /// Tests evaluated.
+    done: u32,
+    listener: &'a mut Listener<'l>,
+}
+
+impl<'a, 'l> Campaign<'a, 'l> {
+    /// Performs the first reference run, and checks that the campaign makes sense.
+    fn begin(
+        plan: &'a CampaignPlan,
+        mut strategy: Box<dyn Strategy>,
+        mut evaluator: Evaluator<'a>,
+        settings: &Settings,
+        listener: &'a mut Listener<'l>,
+    ) -> Result<Self, Halt> {
+        let mut numbering = Numbering::new(settings.seed);
+        let reference = reference_run(&mut evaluator, &mut numbering)?;
+        if let Outcome::Crash { .. } | Outcome::Timeout { .. } = reference.outcome {
+            return Err(CampaignError::Reference(reference.outcome.detail().unwrap_or_default()).into());
+        }
+        let unheard = reference::unheard(plan, &reference);
+        if unheard.iter().any(Unheard::wholly) && !settings.allow_unheard {
+            return Err(CampaignError::Unheard(unheard.into_iter().filter(Unheard::wholly).collect()).into());
+        }
+        for unheard in unheard {
+            evaluator.warn(Some(0), unheard.to_string())?;
+        }
+        for text in reference::violations(plan, &reference) {
+            evaluator.warn(Some(0), text)?;
+        }
+        if settings.timeout.is_none() {
+            evaluator.executor.set_timeout(default_timeout(reference.wall.run));
+        }
+        let observers = observers(plan, &reference)?;
+        for text in observers.iter().filter_map(|observer| observer.warning()) {
+            evaluator.warn(None, text)?;
+        }
+        if let Some(trajectories) =
+            VariableTrajectories::from_observation(plan, &reference).filter(|_| search::needs_trajectories(plan))
+        {
+            strategy.reference(trajectories);
+        }
+        let mut campaign = Campaign {
+            plan,
+            evaluator,
+            strategy,
+            numbering,
+            reference,
+            observers,
+            confirmed: plan.campaign.confirm.map(|confirmation| ConfirmedSearch::new(confirmation, settings.seed)),
+            neighbours: Neighbours::from_plan(plan),
+            front: Front::default(),
+            done: 0,
+            listener,
+        };
+        campaign.tell(CampaignEvent::SearchStarted);
+        Ok(campaign)
+    }
+
+    /// Goes on to the end, with the last reference run; returns why the search ended.
+    fn finish(mut self) -> Result<String, Halt> {
+        let mut reason = loop {
+            if let ControlFlow::Break(reason) = self.step()? {
+                break reason;
+            }
+        };
+        if let Some(text) = self.confirmed.as_ref().and_then(ConfirmedSearch::warning) {
+            self.evaluator.warn(None, text)?;
+        }
+        for text in self.strategy.given_up() {
+            self.evaluator.warn(None, text)?;
+        }
+        if let Some(why) = self.strategy.ended() {
+            reason = why;
+        }
+        self.tell(CampaignEvent::SearchEnded { reason: &reason });
+        let last = reference_run(&mut self.evaluator, &mut self.numbering)?;
+        if let Some(text) = reference::difference(self.plan, &self.reference, &last) {
+            self.evaluator.warn(Some(self.numbering.last()), text)?;
+        }
+        if !self.plan.campaign.objectives.is_empty() {
+            self.evaluator.recorder.put_result_set(&ResultSet {
+                name: "final".to_owned(),
+                generation: None,
+                status: Status::Final,
+                members: self.front.numbers(),
+            })?;
+        }
+        Ok(reason)
+    }
+
+    /// One generation: asked for, run, confirmed, seen by observers, told to the search. `Break` says why there is
+    /// no next one.
+    fn step(&mut self) -> Result<ControlFlow<String>, Halt> {
+        let candidates = self.strategy.ask();
+        let Some(number) = candidates.first().map(|candidate| candidate.generation) else {
+            return Ok(ControlFlow::Break("all tests were evaluated".to_owned()));
+        };
+        let planned = candidates.into_iter().map(|candidate| self.numbering.candidate(candidate)).collect();
+        let (mut tests, violating) = self.evaluate(planned)?;
+        self.confirm(&mut tests, &violating)?;
+
+        let generation = Generation { number, tests: &tests, front: &self.front, done: self.done };
+        let mut end = None;
+        for observer in &mut self.observers {
+            if let ControlFlow::Break(reason) = observer.generation_ended(generation, self.evaluator.recorder)? {
+                end.get_or_insert(reason);
+            }
+        }
+        if let Some(neighbours) = &mut self.neighbours {
+            neighbours.average(&mut tests, |number| self.numbering.stands_for(number));
+        }
+        self.strategy.tell(&tests);
+        self.tell(CampaignEvent::GenerationEnded { generation: number });
+        Ok(end.map_or(ControlFlow::Continue(()), ControlFlow::Break))
+    }
+
+    /// Runs the tests of a generation. Returns them in the order of their numbers, and the numbers of those that violate a
+    /// requirement.
+    fn evaluate(&mut self, planned: Vec<PlannedTest>) -> Result<(Vec<Evaluated>, BTreeSet<u32>), Halt> {
+        let plan = self.plan;
+        let (needs_trajectories, needs_margins) = (search::needs_trajectories(plan), search::needs_margins(plan));
+        let total = plan.campaign.search.evaluations();
+        let mut tests = Vec::with_capacity(planned.len());
+        let mut violating = BTreeSet::new();
+        let Campaign { evaluator, observers, confirmed, front, done, listener, .. } = self;
+        evaluator.evaluate(planned, &mut |record| {
+            let fitness = search::fitness(plan, &record.observation);
+            let point = counted_point(plan, record);
+            *done += 1;
+            front.add(record.number, &fitness);
+            for observer in &mut *observers {
+                observer.test_ended(EndedTest { record, fitness: &fitness, point: point.as_ref() });
+            }
+            if let Some(confirmed) = confirmed {
+                confirmed.remember(record);
+            }
+            if reference::violates(plan, &record.observation) {
+                violating.insert(record.number);
+            }
+            tests.push(Evaluated {
+                number: record.number,
+                test: record.test.clone(),
+                fitness,
+                point,
+                trajectories: if needs_trajectories {
+                    VariableTrajectories::from_observation(plan, &record.observation)
+                } else {
+                    None
+                },
+                margins: if needs_margins { search::margins(plan, &record.observation) } else { Vec::new() },
+                failing: is_failing(plan, &record.observation),
+            });
+            listener(
+                CampaignEvent::TestEnded(record),
+                Progress {
+                    done: *done,
+                    total,
+                    confirmation_runs: confirmed.as_ref().map_or(0, ConfirmedSearch::runs),
+                    front,
+                    coverage: coverage(observers),
+                },
+            );
+        })?;
+        tests.sort_by_key(|evaluated| evaluated.number);
+        Ok((tests, violating))
+    }
+
+    /// Confirms what is to be confirmed of a generation, and puts confirmed values in place of those of single runs.
+    fn confirm(&mut self, tests: &mut [Evaluated], violating: &BTreeSet<u32>) -> Result<(), Halt> {
+        let Campaign { plan, evaluator, observers, confirmed, numbering, front, done, listener, .. } = self;
+        let Some(confirmed) = confirmed else { return Ok(()) };
+        let (done, total) = (*done, plan.campaign.search.evaluations());
+        confirmed.confirm(plan, evaluator, numbering, tests, violating, &mut |confirmation_runs, front| {
+            let progress = Progress { done, total, confirmation_runs, front, coverage: coverage(observers) };
+            listener(CampaignEvent::ConfirmationAdvanced, progress);
+        })?;
+        *front = confirmed.front();
+        Ok(())
+    }
+
+    fn tell(&mut self, event: CampaignEvent<'_>) {
+        let progress = Progress {
+            done: self.done,
+            total: self.plan.campaign.search.evaluations(),
+            confirmation_runs: self.confirmed.as_ref().map_or(0, ConfirmedSearch::runs),
+            front: &self.front,
+            coverage: coverage(&self.observers),
+        };
+        (self.listener)(event, progress);
+    }
+}
+
+fn coverage(observers: &[Box<dyn Observer>]) -> Option<&search::coverage::Coverage> {
+    observers.iter().find_map(|observer| observer.coverage())
+}
+
+/// Whether a run fails as the test that is being shrunk does; false in all other campaigns.
+fn is_failing(plan: &CampaignPlan, observation: &Observation) -> bool {
+    let Search::Shrink { failing, .. } = &plan.campaign.search else { return false };
+    record::fails(plan, failing, &observation.outcome, |id| observation.value(id))
+}
+
+/// Performs a reference run: it is a test without operations.
+fn reference_run(evaluator: &mut Evaluator<'_>, numbering: &mut Numbering) -> Result<Observation, Halt> {
+    let mut shown = None;
+    evaluator.evaluate(vec![numbering.reference_run()], &mut |record| shown = Some(record.observation.clone()))?;
+    Ok(shown.unwrap_or_else(|| unreachable!("each test that is evaluated is shown")))
+}
+
+#[cfg(test)]
+mod tests;

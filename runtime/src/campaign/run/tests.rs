@@ -1,0 +1,202 @@
+//! Campaigns without processes: an executor in this thread, which ends tests in whatever order it is told to.
+
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use sesame_plan::{Confirmation, CoverageGoal, Dimension, GridAxis, Statistic};
+use sesame_results::record::sample;
+use sesame_rng::Stream;
+
+use super::*;
+use crate::campaign::executor::{ExecutorError, Job, JobResult};
+
+/// Computes what a run shows, without a simulator.
+struct InThread<'a> {
+    plan: &'a CampaignPlan,
+    /// The seed of the order in which tests end; `None` for the order in which they came.
+    order: Option<Stream>,
+    waiting: Vec<Job>,
+    /// Tests run so far, and after how many the user stops the campaign.
+    run: u32,
+    stop_after: Option<u32>,
+    interrupted: &'a AtomicBool,
+}
+
+impl Executor for InThread<'_> {
+    fn submit(&mut self, job: Job) {
+        self.waiting.push(job);
+    }
+
+    fn next(&mut self, _: Duration) -> Result<Option<JobResult>, ExecutorError> {
+        if self.waiting.is_empty() {
+            return Ok(None);
+        }
+        let next = self.order.as_mut().map_or(0, |order| order.below(self.waiting.len()));
+        let Job { number, test, simulator_seed, .. } = self.waiting.remove(next);
+        self.run += 1;
+        if Some(self.run) == self.stop_after {
+            self.interrupted.store(true, Ordering::Relaxed);
+        }
+        let observation = sample::observe(self.plan, &test, simulator_seed);
+        Ok(Some(JobResult { number, observation, notes: Vec::new(), trace_failure: None, killed: false }))
+    }
+
+    fn set_timeout(&mut self, _: Duration) {}
+}
+
+/// The sample campaign, with all that a campaign can do on the way.
+fn plan() -> CampaignPlan {
+    let mut plan = sample::plan();
+    plan.campaign.search = Search::Nsga2 { population: 10, evaluations: 60 };
+    let axis = |dimension| GridAxis { dimension, low: 0.0, high: 1.0, cells: 4 };
+    plan.campaign.coverage =
+        Some(CoverageGoal { axes: vec![axis(Dimension::T1), axis(Dimension::T2)], hits: 1, stop_at: None });
+    plan.campaign.confirm = Some(Confirmation { times: 2, by: Statistic::Median, violations: true });
+    plan
+}
+
+fn settings(plan: &CampaignPlan) -> Settings {
+    let (seed, program) = (plan.campaign.seed, PathBuf::new());
+    Settings { seed, workers: 1, timeout: None, program, allow_unheard: false }
+}
+
+/// Begins or resumes a campaign; returns how it ended, how many tests were run, and its events.
+fn campaign(
+    plan: &CampaignPlan,
+    folder: &Path,
+    order: Option<u64>,
+    stop_after: Option<u32>,
+) -> (Result<CampaignEnd, CampaignError>, u32, Vec<String>) {
+    let recorder = if folder.join(record::DATABASE).exists() {
+        Recorder::resume(folder, 1)
+    } else {
+        Recorder::create(folder, plan, plan.campaign.seed, 1)
+    };
+    let interrupted = AtomicBool::new(false);
+    let order = order.map(|seed| Stream::derive(seed, "order", &[]));
+    let mut executor = InThread { plan, order, waiting: Vec::new(), run: 0, stop_after, interrupted: &interrupted };
+    let strategy = search::strategy(plan, plan.campaign.seed).unwrap();
+    let mut events = Vec::new();
+    let end = run_with(
+        plan,
+        strategy,
+        recorder.unwrap(),
+        &settings(plan),
+        &mut executor,
+        &interrupted,
+        &mut |event, progress| {
+            events.push(match event {
+                CampaignEvent::SearchStarted => "search started".to_owned(),
+                CampaignEvent::TestEnded(record) => format!("test {} of {}", progress.done, record.number),
+                CampaignEvent::ConfirmationAdvanced => "confirmation".to_owned(),
+                CampaignEvent::GenerationEnded { generation } => format!("generation {generation}"),
+                CampaignEvent::SearchEnded { reason } => reason.to_owned(),
+            });
+        },
+    );
+    (end, executor.run, events)
+}
+
+fn digest(folder: &Path) -> String {
+    record::digest(&folder.join(record::DATABASE)).unwrap()
+}
+
+#[test]
+fn results_depend_neither_on_the_order_in_which_tests_end_nor_on_interruptions() {
+    let plan = plan();
+    let whole = tempfile::tempdir().unwrap();
+    let (end, runs, events) = campaign(&plan, whole.path(), None, None);
+    assert!(matches!(end.unwrap(), CampaignEnd::Finished(_)));
+    assert!(runs > 62, "60 tests, two reference runs, and repetitions: {runs}");
+    assert_eq!(events.first().map(String::as_str), Some("search started"));
+    assert_eq!(events.last().map(String::as_str), Some("all tests were evaluated"));
+    for generation in 0..6 {
+        let at = |event: &str| events.iter().position(|other| other == event).unwrap_or_else(|| panic!("{event}"));
+        let ended = at(&format!("generation {generation}"));
+        let (first, last) = (10 * generation + 1, 10 * generation + 10);
+        assert!((first..=last).all(|test| at(&format!("test {test} of {test}")) < ended), "{generation}");
+    }
+
+    for seed in 0..4 {
+        let shuffled = tempfile::tempdir().unwrap();
+        campaign(&plan, shuffled.path(), Some(seed), None).0.unwrap();
+        assert_eq!(digest(shuffled.path()), digest(whole.path()), "order {seed}");
+    }
+
+    let stopped = tempfile::tempdir().unwrap();
+    let mut sessions = 0;
+    let mut run = 0;
+    loop {
+        sessions += 1;
+        let (end, more, _) = campaign(&plan, stopped.path(), Some(sessions), Some(7));
+        run += more;
+        match end.unwrap() {
+            CampaignEnd::Finished(_) => break,
+            CampaignEnd::Interrupted => assert_eq!(more, 7, "it stops when it is told to"),
+        }
+    }
+    assert!(sessions > 8, "{sessions}");
+    // A test whose result was not taken any more is run again.
+    assert!(run < runs + 2 * u32::try_from(sessions).unwrap(), "{run} of {runs}");
+    assert_eq!(digest(stopped.path()), digest(whole.path()));
+}
+
+#[test]
+fn a_search_ends_at_the_generation_that_reaches_its_coverage() {
+    let mut plan = plan();
+    let goal = plan.campaign.coverage.as_mut().unwrap();
+    goal.stop_at = Some(0.1);
+    let folder = tempfile::tempdir().unwrap();
+    let (end, _, events) = campaign(&plan, folder.path(), None, None);
+    let CampaignEnd::Finished(repository) = end.unwrap() else { panic!("nobody stopped it") };
+    let reason = repository.campaign().stop.clone().unwrap();
+    assert!(reason.starts_with("its coverage was reached: "), "{reason}");
+    assert_eq!(events.last(), Some(&reason));
+    assert_eq!(events.iter().filter(|event| event.starts_with("generation")).count(), 1);
+}
+
+#[test]
+fn a_campaign_whose_operations_reach_nothing_ends_before_it_searches_and_can_be_resumed() {
+    let plan = plan();
+    let folder = tempfile::tempdir().unwrap();
+    let interrupted = AtomicBool::new(false);
+    let run = |allow_unheard: bool, recorder: Recorder| {
+        let mut executor = Deaf(InThread {
+            plan: &plan,
+            order: None,
+            waiting: Vec::new(),
+            run: 0,
+            stop_after: None,
+            interrupted: &interrupted,
+        });
+        let strategy = search::strategy(&plan, 1).unwrap();
+        let settings = Settings { allow_unheard, ..settings(&plan) };
+        run_with(&plan, strategy, recorder, &settings, &mut executor, &interrupted, &mut |_, _| {})
+    };
+    let refused = run(false, Recorder::create(folder.path(), &plan, plan.campaign.seed, 1).unwrap());
+    assert!(matches!(refused, Err(CampaignError::Unheard(_))), "{refused:?}");
+    let resumed = run(true, Recorder::resume(folder.path(), 1).unwrap());
+    assert!(matches!(resumed, Ok(CampaignEnd::Finished(_))), "{resumed:?}");
+}
+
+/// As [`InThread`], with a simulator that subscribes to nothing.
+struct Deaf<'a>(InThread<'a>);
+
+impl Executor for Deaf<'_> {
+    fn submit(&mut self, job: Job) {
+        self.0.submit(job);
+    }
+
+    fn next(&mut self, wait: Duration) -> Result<Option<JobResult>, ExecutorError> {
+        let mut next = self.0.next(wait)?;
+        if let Some(result) = &mut next {
+            result.observation.unheard = self.0.plan.topics.iter().flat_map(|topic| topic.paths.clone()).collect();
+        }
+        Ok(next)
+    }
+
+    fn set_timeout(&mut self, timeout: Duration) {
+        self.0.set_timeout(timeout);
+    }
+}
