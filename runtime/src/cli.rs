@@ -55,7 +55,7 @@ enum Command {
     Run(run::Options),
     /// Go on with a run that was stopped, to the same results
     Resume(run::ResumeOptions),
-    /// Run the known tests and compare what comes out with what they expect
+    /// Run the regression tests and check their expectations
     Known(known::Options),
     /// Run one test again and again, to see what of its result is chance
     Repeat(repeat::Options),
@@ -163,7 +163,7 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
     }
 }
 
-/// What commands ask of recorded results beside what reports do: whether a gate closes, how a test is to be made smaller, and
+/// What commands ask of recorded results beside what reports do: whether a gate closes, how a test is shrunk, and
 /// how long it may take when it is run again.
 #[cfg(test)]
 pub(crate) fn asked_beside_reports(repository: &sesame_results::record::Repository, test: &str) -> Result<(), String> {

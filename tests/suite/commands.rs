@@ -37,7 +37,7 @@ fn known_tests_are_held_to_what_they_expect() {
     let project = Project::kuka_cell_with("kuka_cell_known", MISTAKEN);
     let runner = project.build("coverage_experiment");
     let both = runner.run(&["known", "--results", "r", "--junit", "known.xml"]).expect(3);
-    assert!(both.out.contains("1 of 2 expectations kept"), "{}", both.out);
+    assert!(both.out.contains("1 of 2 expectations satisfied"), "{}", both.out);
     assert!(both.out.contains("Report r/known/report.html"), "{}", both.out);
     let repository = Repository::open(&runner.folder.join("r/known")).unwrap();
     assert_eq!(repository.find("mistaken").unwrap(), 4);
@@ -49,7 +49,7 @@ fn known_tests_are_held_to_what_they_expect() {
 
     let kept = runner.run(&["known", "known_jitter", "--results", "r", "--format", "json"]).expect(0);
     let kept = json(&kept);
-    assert_eq!(kept["expectations"][0]["verdict"], "kept");
+    assert_eq!(kept["expectations"][0]["verdict"], "satisfied");
     assert_eq!(kept["results"], "r/known-2");
     runner.run(&["known", "known_jitter", "--results", "r", "--fail-on", "violation"]).expect(3);
     let stranger = runner.run(&["known", "jitter", "--results", "r"]).expect(1);
@@ -97,7 +97,7 @@ fn a_repetition_has_seeds_of_its_own_and_says_how_often_requirements_were_violat
     let found = json(&found);
     assert_eq!(found["results"], "r/repeat-T3");
     assert_eq!(found["repetition"]["test"], "T3");
-    assert_eq!(found["repetition"]["requirements"][0]["said"], 4);
+    assert_eq!(found["repetition"]["requirements"][0]["conclusive"], 4);
     assert_eq!(found["counts"]["evaluations"], 4);
     let original = Repository::open(&runner.folder.join("r/5")).unwrap();
     let repeated = Repository::open(&runner.folder.join("r/repeat-T3")).unwrap();
@@ -138,7 +138,7 @@ fn an_exported_test_reproduces_its_values_in_the_space_it_is_written_into() {
     fs::write(&project.space, format!("{text}\n{block}\n{}", named["block"].as_str().unwrap())).unwrap();
     let runner = project.build("coverage_experiment");
     let kept = runner.run(&["known", "coverage_experiment_T4", "five", "--results", "r"]).expect(0);
-    assert!(kept.out.contains("4 expectations kept"), "{}", kept.out);
+    assert!(kept.out.contains("4 expectations satisfied"), "{}", kept.out);
     let found = Repository::open(&runner.folder.join("r/5")).unwrap();
     let again = Repository::open(&runner.folder.join("r/known")).unwrap();
     for (number, known) in [(4, "coverage_experiment_T4"), (5, "five")] {

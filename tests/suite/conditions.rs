@@ -50,7 +50,7 @@ fn holds_together(space: &ConditionSpace, records: &[TestRecord]) {
             assert!(!spans.is_empty() || !effect.counters.any_effect(), "T{} did what it did not do", record.number);
         }
         let active = record.observation.operations.iter().any(|effect| effect.counters.any_effect());
-        assert_eq!(record.observation.outcome == Outcome::Void, !active, "T{}", record.number);
+        assert_eq!(record.observation.outcome == Outcome::NoEffect, !active, "T{}", record.number);
     }
     let active = records.iter().filter(|record| record.observation.outcome == Outcome::Completed).count();
     assert!(active > 20, "only {active} of 60 tests disturbed anything");
@@ -158,10 +158,10 @@ fn known_tests_by_condition_are_held_to_what_they_expect_and_void_ones_said_to_b
     );
     let runner = project.build("condition_experiment");
     let known = runner.run(&["known", "near", "burst", "never", "--results", "r"]).expect(0);
-    assert!(known.out.contains("3 expectations kept"), "{}", known.out);
+    assert!(known.out.contains("3 expectations satisfied"), "{}", known.out);
     let repository = Repository::open(&runner.folder.join("r/known")).unwrap();
     let test = |name: &str| repository.test(repository.find(name).unwrap()).unwrap();
-    assert_eq!(test("never").observation.outcome, Outcome::Void);
+    assert_eq!(test("never").observation.outcome, Outcome::NoEffect);
     for span in &test("burst").observation.operations[0].intervals {
         assert!((span.length() - 2.0).abs() < 2e-9 || span.end >= 60.0, "{span:?}");
     }
@@ -201,7 +201,7 @@ fn an_exported_test_by_condition_reproduces_its_values() {
     let runner = project.build("condition_experiment");
     let names = campaigns.map(campaign_test);
     let known = runner.run(&[&["known"], &names[..], &["--results", "again"]].concat()).expect(0);
-    assert!(known.out.contains("6 expectations kept"), "{}", known.out);
+    assert!(known.out.contains("6 expectations satisfied"), "{}", known.out);
     let again = Repository::open(&runner.folder.join("again/known")).unwrap();
     for (campaign, record) in found {
         let repeated = again.test(again.find(campaign_test(campaign)).unwrap()).unwrap();

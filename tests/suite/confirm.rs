@@ -62,12 +62,16 @@ fn a_front_is_of_confirmed_tests_and_says_how_often_each_finding_came_again() {
         let first = rows[number as usize].verdict(requirement) == Verdict::Violated;
         let said: Vec<Verdict> = repetitions[&number].iter().map(|run| run.verdict(requirement)).collect();
         let count = |wanted| said.iter().filter(|&&it| it == wanted).count();
-        let (violated, kept) = (count(Verdict::Violated), count(Verdict::Kept));
+        let (violated, kept) = (count(Verdict::Violated), count(Verdict::Satisfied));
         let finding = test["findings"].as_array().unwrap().iter().find(|it| it["finding"] == "R1");
         assert_eq!(finding.is_some(), first || violated > 0, "T{number}");
         let Some(finding) = finding else { continue };
         assert_eq!(finding["first"], first);
-        assert_eq!((&finding["again"], &finding["said"]), (&violated.into(), &(violated + kept).into()), "T{number}");
+        assert_eq!(
+            (&finding["again"], &finding["conclusive"]),
+            (&violated.into(), &(violated + kept).into()),
+            "T{number}"
+        );
         let standing = match (violated, kept) {
             (0, 0) => "none",
             (0, _) => "not_confirmed",
@@ -95,7 +99,7 @@ fn a_front_is_of_confirmed_tests_and_says_how_often_each_finding_came_again() {
     let header = table.lines().next().unwrap();
     assert_eq!(
         header,
-        "test,fuzzing_time,worst,same_as,finding,confirmed,said,repetitions,confirmed_low,confirmed_high,standing"
+        "test,fuzzing_time,worst,same_as,finding,confirmed,conclusive,repetitions,confirmed_low,confirmed_high,standing"
     );
     let listed: BTreeSet<&str> = table.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
     assert!(front.iter().all(|test| listed.contains(format!("T{test}").as_str())), "{table}");
@@ -139,7 +143,7 @@ fn a_violation_that_only_fresh_runs_show_closes_the_gate() {
         let done = done.expect(3);
         assert!(done.err.contains("not as required: R1 is violated in "), "{}", done.err);
         assert!(
-            done.out.contains("requirement broken (R1 by ") && done.out.contains("not in its first run"),
+            done.out.contains("requirement violated (R1 by ") && done.out.contains("not in its first run"),
             "{}",
             done.out
         );

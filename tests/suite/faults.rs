@@ -43,7 +43,7 @@ fn every_fault_is_the_outcome_of_its_test_and_the_campaign_goes_on() {
             _ => "undisturbed".to_owned(),
         };
         // An operation may end before the first message reaches it.
-        if row.outcome != Outcome::Void {
+        if row.outcome != Outcome::NoEffect {
             by_fault.entry(fault).or_default().push((row.number, row.outcome));
         }
     }
@@ -120,7 +120,10 @@ fn a_run_that_the_simulator_ends_early_is_complete_at_its_own_end() {
     let repository = Repository::open(&runner.folder.join("early end/3")).unwrap();
     let rows = repository.tests().unwrap();
     assert_eq!(rows.len(), 62, "{}", said.out);
-    assert!(rows.iter().all(|row| row.end == 0.5 && matches!(row.outcome.word(), "completed" | "void")), "{rows:?}");
+    assert!(
+        rows.iter().all(|row| row.end == 0.5 && matches!(row.outcome.word(), "completed" | "no_effect")),
+        "{rows:?}"
+    );
 }
 
 /// Where workers inherit their connection it is their standard input, until they put an empty one in its place.

@@ -230,7 +230,7 @@ fn an_imported_search_has_indicators_of_its_sets() {
         assert_eq!(row.set.as_ref(), Some(&set.name));
         let evaluations = row.evaluations.unwrap();
         assert!(set.name.ends_with(&format!("-{evaluations}")) && evaluations % 10 == 0, "{}", set.name);
-        assert_eq!((row.void, row.unique), (None, None), "nobody counted");
+        assert_eq!((row.no_effect, row.unique), (None, None), "nobody counted");
     }
     let last = analysis.generations.last().unwrap();
     assert_eq!((last.evaluations, last.igd_plus), (Some(220), Some(0.0)));

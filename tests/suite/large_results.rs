@@ -108,7 +108,7 @@ fn record(plan: &CampaignPlan, permitted: &TestSpace, number: u32) -> TestRecord
         simulator_seed: 1,
         duplicate_of: None,
         observation: Observation {
-            outcome: if number % 50 == 7 { Outcome::Void } else { Outcome::Completed },
+            outcome: if number % 50 == 7 { Outcome::NoEffect } else { Outcome::Completed },
             end: 100.0,
             operations: test.operations.iter().map(|it| effect(&it.activation)).collect(),
             unheard: Vec::new(),
@@ -137,7 +137,7 @@ fn generate(folder: &Path, plan: &CampaignPlan, tests: u32) -> usize {
         indicators.add(&record.observation.outcome, false, &fitness);
         standing.push((number, fitness));
         if let Some(point) = sspr::observed_point(plan, &record.test, &record.observation)
-            && record.observation.outcome != Outcome::Void
+            && record.observation.outcome != Outcome::NoEffect
         {
             coverage.add(&point);
         }

@@ -197,7 +197,7 @@ fn runs(program: &Path, seed: u64, home: &Path, runner: &Path) {
 fn came_out_well(seed: u64, results: &Path) {
     let database = rusqlite::Connection::open(results.join("results.sqlite")).unwrap();
     let count = |what: &str| database.query_row(what, [], |row| row.get::<_, i64>(0)).unwrap();
-    assert_eq!(count("SELECT count(*) FROM tests WHERE outcome NOT IN ('completed', 'void')"), 0, "space {seed}");
+    assert_eq!(count("SELECT count(*) FROM tests WHERE outcome NOT IN ('completed', 'no_effect')"), 0, "space {seed}");
     assert!(count("SELECT count(*) FROM tests") >= 2, "space {seed}");
     assert_eq!(count("SELECT count(*) FROM results"), count("SELECT count(*) FROM tests"), "space {seed}");
     assert_eq!(count(&format!("SELECT count(*) FROM sqlite_master WHERE name LIKE '%{MARK}%'")), 0, "space {seed}");

@@ -67,7 +67,7 @@ fn run(runner: &Runner, campaign: &str, seed: u32) -> Ran {
         front.add(row.number, &fitness_of(plan, &row.outcome, |metric| row.value(metric).value));
     }
     let points: Vec<&[f64]> = front.members().iter().map(|member| member.objectives.as_slice()).collect();
-    let void = tests.iter().filter(|row| row.outcome == Outcome::Void).count();
+    let void = tests.iter().filter(|row| row.outcome == Outcome::NoEffect).count();
     Ran { half, covered, volume: hypervolume(&points, &REFERENCE), void }
 }
 

@@ -10,10 +10,10 @@ use sesame_plan::{Span, Trend};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Outcome {
-    /// It ran to its end, and what it disturbs was disturbed (or it disturbs nothing by design).
+    /// It ran to its end, and an operation had an effect (or it has no operations by design).
     Completed,
     /// It ran to its end, but no operation had any effect.
-    Void,
+    NoEffect,
     /// It ran to its end in another program, which did not count what operations did: whether they had any effect is not
     /// known, and its counters are all zero. Only imported tests end so.
     Unknown,
@@ -47,14 +47,14 @@ impl Outcome {
 
     /// Whether the run came to its planned end.
     pub fn is_whole(&self) -> bool {
-        matches!(self, Outcome::Completed | Outcome::Void | Outcome::Unknown)
+        matches!(self, Outcome::Completed | Outcome::NoEffect | Outcome::Unknown)
     }
 
     /// One word for tables and the database.
     pub fn word(&self) -> &'static str {
         match self {
             Outcome::Completed => "completed",
-            Outcome::Void => "void",
+            Outcome::NoEffect => "no_effect",
             Outcome::Unknown => "unknown",
             Outcome::Crash { .. } => "crash",
             Outcome::Timeout { .. } => "timeout",
@@ -64,7 +64,7 @@ impl Outcome {
     /// What the word leaves out.
     pub fn detail(&self) -> Option<String> {
         match self {
-            Outcome::Completed | Outcome::Void | Outcome::Unknown => None,
+            Outcome::Completed | Outcome::NoEffect | Outcome::Unknown => None,
             Outcome::Crash { message } => Some(message.clone()),
             Outcome::Timeout { limit } => Some(format!("stopped after {limit} s of wall time")),
         }

@@ -1,4 +1,4 @@
-//! What a run says about a requirement: kept, violated, or unsaid.
+//! What a run says about a requirement: satisfied, violated, or inconclusive.
 
 use serde::Serialize;
 
@@ -11,38 +11,38 @@ use crate::observation::{MetricValue, Outcome, Reach};
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// The run ended as planned and the metric's value is inside the bound.
-    Kept,
-    /// The metric's value is outside the bound, or would have been whatever the rest of the run had brought.
+    Satisfied,
+    /// The metric's value is outside the bound; after a run that broke off, it could not have returned inside.
     Violated,
     /// There is no value, the run broke off before it could be known, or the metric read a number that was not finite.
-    Unsaid,
+    Inconclusive,
 }
 
 impl Verdict {
     /// One word for tables and the database.
     pub fn word(self) -> &'static str {
         match self {
-            Verdict::Kept => "kept",
+            Verdict::Satisfied => "satisfied",
             Verdict::Violated => "violated",
-            Verdict::Unsaid => "unsaid",
+            Verdict::Inconclusive => "inconclusive",
         }
     }
 }
 
-/// The verdict on a requirement. Everything that says of a run what it means for a requirement goes by this rule: tables,
-/// margins, confirmations, and the views of the database.
+/// The verdict of a run on a requirement. This rule is the only one: tables, margins, confirmations, and the views of the
+/// database follow it.
 ///
-/// It is violated if the bound holds for none of the values that the metric could have had at the end of the run. It is kept
-/// if the run came to its planned end, everything that the metric read was finite, and the bound holds for its value. Otherwise
-/// nothing is said.
+/// The requirement is violated if the bound holds for none of the values that the metric could have taken by the planned end
+/// of the run. It is satisfied if the run reached its planned end, everything that the metric read was finite, and the bound
+/// holds for its value. Otherwise the run is inconclusive.
 pub fn verdict(bound: Bound, outcome: &Outcome, shown: MetricValue) -> Verdict {
     if breaks(bound, shown.reach) {
         return Verdict::Violated;
     }
     let trusted = outcome.is_whole() && shown.not_finite.is_none();
     match shown.value {
-        Some(x) if trusted && bound.holds(x) => Verdict::Kept,
-        Some(_) | None => Verdict::Unsaid,
+        Some(x) if trusted && bound.holds(x) => Verdict::Satisfied,
+        Some(_) | None => Verdict::Inconclusive,
     }
 }
 
@@ -54,7 +54,7 @@ fn breaks(bound: Bound, reach: Reach) -> bool {
     too_low || too_high
 }
 
-/// Whether a run failed in a given way. One in which nothing was disturbed did not, whatever it shows.
+/// Whether a run failed in a given way. A run without effect never counts as failing.
 pub fn fails(
     plan: &CampaignPlan,
     failing: &Failing,
@@ -65,7 +65,7 @@ pub fn fails(
         Failing::Crash => matches!(outcome, Outcome::Crash { .. }),
         Failing::Timeout => matches!(outcome, Outcome::Timeout { .. }),
         Failing::Violation { requirements } => {
-            *outcome != Outcome::Void
+            *outcome != Outcome::NoEffect
                 && requirements.iter().all(|&id| {
                     let requirement = plan.requirement(id);
                     verdict(requirement.bound, outcome, value(requirement.metric)) == Verdict::Violated
@@ -127,9 +127,9 @@ mod tests {
     #[test]
     fn a_default_counts_as_measured_when_the_run_ended() {
         let at_most_zero = Bound::AtMost { value: 0.0 };
-        assert_eq!(verdict(at_most_zero, &Outcome::Completed, value(Some(0.0), false)), Verdict::Kept);
+        assert_eq!(verdict(at_most_zero, &Outcome::Completed, value(Some(0.0), false)), Verdict::Satisfied);
         assert_eq!(verdict(at_most_zero, &Outcome::Completed, value(Some(999.0), false)), Verdict::Violated);
-        assert_eq!(verdict(at_most_zero, &Outcome::Completed, value(None, false)), Verdict::Unsaid);
+        assert_eq!(verdict(at_most_zero, &Outcome::Completed, value(None, false)), Verdict::Inconclusive);
     }
 
     #[test]
@@ -137,12 +137,16 @@ mod tests {
         let (at_most, at_least) = (Bound::AtMost { value: 2.0 }, Bound::AtLeast { value: 10.0 });
         let said = |bound, value, trend| verdict(bound, &crash(), cut_off(value, trend));
         assert_eq!(said(at_most, 3.0, Some(Trend::Rising)), Verdict::Violated);
-        assert_eq!(said(at_most, 2.0, Some(Trend::Rising)), Verdict::Unsaid);
-        assert_eq!(said(at_most, 3.0, Some(Trend::Falling)), Verdict::Unsaid);
-        assert_eq!(said(at_most, 3.0, None), Verdict::Unsaid);
-        assert_eq!(said(at_least, 4.0, Some(Trend::Rising)), Verdict::Unsaid, "ten may still come");
+        assert_eq!(said(at_most, 2.0, Some(Trend::Rising)), Verdict::Inconclusive);
+        assert_eq!(said(at_most, 3.0, Some(Trend::Falling)), Verdict::Inconclusive);
+        assert_eq!(said(at_most, 3.0, None), Verdict::Inconclusive);
+        assert_eq!(said(at_least, 4.0, Some(Trend::Rising)), Verdict::Inconclusive, "ten may still come");
         assert_eq!(said(at_least, 4.0, Some(Trend::Falling)), Verdict::Violated);
-        assert_eq!(said(at_least, 12.0, Some(Trend::Rising)), Verdict::Unsaid, "a run that broke off keeps nothing");
+        assert_eq!(
+            said(at_least, 12.0, Some(Trend::Rising)),
+            Verdict::Inconclusive,
+            "a run that broke off keeps nothing"
+        );
         assert_eq!(said(Bound::Within { low: 0.0, high: 2.0 }, 3.0, Some(Trend::Rising)), Verdict::Violated);
         assert_eq!(said(Bound::Below { value: 3.0 }, 3.0, Some(Trend::Rising)), Verdict::Violated);
         assert_eq!(said(Bound::Above { value: 3.0 }, 3.0, Some(Trend::Falling)), Verdict::Violated);
@@ -151,7 +155,7 @@ mod tests {
     #[test]
     fn the_default_of_a_metric_that_was_never_set_says_nothing_after_a_crash() {
         let shown = MetricValue { value: Some(999.0), ..MetricValue::default() };
-        assert_eq!(verdict(Bound::AtMost { value: 70.0 }, &crash(), shown), Verdict::Unsaid);
+        assert_eq!(verdict(Bound::AtMost { value: 70.0 }, &crash(), shown), Verdict::Inconclusive);
     }
 
     #[test]
@@ -161,7 +165,7 @@ mod tests {
             let shown = MetricValue { not_finite: Some(1.0), ..cut_off(x, Some(Trend::Rising)) };
             verdict(at_most, &Outcome::Completed, shown)
         };
-        assert_eq!((said(1.0), said(3.0)), (Verdict::Unsaid, Verdict::Violated));
+        assert_eq!((said(1.0), said(3.0)), (Verdict::Inconclusive, Verdict::Violated));
     }
 
     #[test]
@@ -185,7 +189,7 @@ mod tests {
         let both = violation(&[0, 1]);
         assert!(with(&Outcome::Completed, &both, 1.0, 71.0));
         assert!(!with(&Outcome::Completed, &both, 1.0, 69.0) && with(&Outcome::Completed, &violation(&[0]), 1.0, 69.0));
-        assert!(!with(&Outcome::Void, &both, 1.0, 71.0), "nothing was disturbed");
+        assert!(!with(&Outcome::NoEffect, &both, 1.0, 71.0), "nothing was disturbed");
         let crash = crash();
         assert!(with(&crash, &both, 1.0, 71.0), "a violation seen before a crash stands");
         assert!(with(&crash, &Failing::Crash, 0.0, 0.0) && !with(&crash, &Failing::Timeout, 0.0, 0.0));

@@ -75,9 +75,9 @@ pub fn evaluate_tapped(
     let outcome = match failure {
         Some(message) => Outcome::crash(message),
         None if test.operations.is_empty() || effect => Outcome::Completed,
-        None => Outcome::Void,
+        None => Outcome::NoEffect,
     };
-    let ended = matches!(outcome, Outcome::Completed | Outcome::Void);
+    let ended = matches!(outcome, Outcome::Completed | Outcome::NoEffect);
     Ok(Observation {
         outcome,
         end: end.seconds(),

@@ -90,7 +90,7 @@ fn search_word(search: &Search) -> &'static str {
         Search::Falsification { .. } => "falsification",
         Search::Random { .. } => "random",
         Search::Repeat { .. } => "repeat",
-        Search::Known { .. } => "known tests",
+        Search::Known { .. } => "regression tests",
         Search::Shrink { .. } => "shrink",
     }
 }
@@ -139,7 +139,7 @@ fn operations(plan: &CampaignPlan, test: &ScannedTest) -> String {
 /// own fronts. Without a selection these are the tests of the whole file.
 ///
 /// Where tests were run again, `finding` is what fresh runs show most often (a requirement, `crash` or `timeout`), `confirmed`
-/// is in how many of the `said` runs that say anything about it, of all `repetitions`. From `confirmed_low` to
+/// is in how many of the `conclusive` runs, of all `repetitions`. From `confirmed_low` to
 /// `confirmed_high` is the 95 % Wilson interval, and `standing` is `confirmed`, `flaky` or `not confirmed`.
 pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, RecordError> {
     let plan = repository.plan();
@@ -159,7 +159,7 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, 
     };
     let again: &[&str] = match confirmed.len() {
         0 => &[],
-        _ => &["finding", "confirmed", "said", "repetitions", "confirmed_low", "confirmed_high", "standing"],
+        _ => &["finding", "confirmed", "conclusive", "repetitions", "confirmed_low", "confirmed_high", "standing"],
     };
     let again_columns = again.iter().map(|&column| column.to_owned());
     let mut dataset =
@@ -181,7 +181,7 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Dataset, 
         let came_again = [
             surest.map_or(Datum::Missing, |finding| Datum::Text(finding.finding.clone())),
             surest.map_or(Datum::Missing, |finding| Datum::count(finding.again)),
-            surest.map_or(Datum::Missing, |finding| Datum::count(finding.said)),
+            surest.map_or(Datum::Missing, |finding| Datum::count(finding.conclusive)),
             of.map_or(Datum::Missing, |test| Datum::count(test.repetitions)),
             Datum::real(ends.map(|[low, _]| low)),
             Datum::real(ends.map(|[_, high]| high)),
@@ -224,8 +224,8 @@ pub struct CoverageAnalysis {
     curve: Vec<CurvePoint>,
 }
 
-/// Counts the cells of a grid that the tests of a selection hit, in the order of their numbers; void tests and
-/// duplicates cover nothing.
+/// Counts the cells of a grid that the tests of a selection hit, in the order of their numbers; tests
+/// without effect and duplicates cover nothing.
 pub fn coverage(
     repository: &Repository,
     selection: &Selection,

@@ -112,9 +112,9 @@ impl Repetition {
 /// Where a test comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
-    /// The undisturbed run for comparison.
+    /// A run without disturbance, for comparison.
     Reference,
-    /// A known test of the space.
+    /// A regression test of the space.
     Known(KnownTestId),
     /// The campaign's search.
     Search,

@@ -20,7 +20,7 @@ pub use grid::{Grid, GridError, MOST_CELLS, edge};
 
 /// Whether a run counts: one without effect, and one that stands for a run that was counted already, covers no cell.
 pub fn counts(outcome: &Outcome, duplicate: bool) -> bool {
-    !duplicate && !matches!(outcome, Outcome::Void)
+    !duplicate && !matches!(outcome, Outcome::NoEffect)
 }
 
 /// How often each cell of a grid was hit.
@@ -141,7 +141,7 @@ mod tests {
     fn runs_without_effect_and_duplicates_cover_nothing() {
         assert!(counts(&Outcome::Completed, false));
         assert!(counts(&Outcome::Crash { message: "gone".to_owned() }, false));
-        assert!(!counts(&Outcome::Void, false));
+        assert!(!counts(&Outcome::NoEffect, false));
         assert!(!counts(&Outcome::Completed, true));
     }
 

@@ -26,7 +26,7 @@ pub struct GenerationIndicators {
     /// Of these, those that were simulated: no exact duplicates of an earlier one.
     pub unique: u32,
     /// Of these, those in which no operation had any effect.
-    pub void: u32,
+    pub no_effect: u32,
     /// Of these, those that ended in a crash.
     pub crashes: u32,
     /// Of these, those that were stopped at their time limit.
@@ -49,7 +49,7 @@ pub struct Indicators {
     reference: Option<Vec<f64>>,
     evaluations: u32,
     duplicates: u32,
-    void: u32,
+    no_effect: u32,
     crashes: u32,
     timeouts: u32,
     /// The front's members at the latest generation with their hypervolume: mostly the next one has the same.
@@ -69,7 +69,7 @@ impl Indicators {
         self.duplicates += u32::from(duplicate);
         match outcome {
             Outcome::Completed | Outcome::Unknown => {}
-            Outcome::Void => self.void += 1,
+            Outcome::NoEffect => self.no_effect += 1,
             Outcome::Crash { .. } => self.crashes += 1,
             Outcome::Timeout { .. } => self.timeouts += 1,
         }
@@ -95,7 +95,7 @@ impl Indicators {
             generation,
             evaluations: self.evaluations,
             unique: self.evaluations - self.duplicates,
-            void: self.void,
+            no_effect: self.no_effect,
             crashes: self.crashes,
             timeouts: self.timeouts,
             front: u32::try_from(front.members().len()).unwrap_or(u32::MAX),

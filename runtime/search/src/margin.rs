@@ -21,12 +21,12 @@ pub fn margins(plan: &CampaignPlan, observation: &Observation) -> Vec<Margin> {
         let shown = observation.value(requirement.metric);
         let verdict = verdict(requirement.bound, &observation.outcome, shown);
         let value = match verdict {
-            Verdict::Kept => shown.value.map(|value| to_bound(requirement.bound, value)),
+            Verdict::Satisfied => shown.value.map(|value| to_bound(requirement.bound, value)),
             Verdict::Violated => {
                 let ends = [shown.reach.low, shown.reach.high].into_iter().flatten();
                 ends.map(|end| to_bound(requirement.bound, end)).reduce(f64::max)
             }
-            Verdict::Unsaid => None,
+            Verdict::Inconclusive => None,
         };
         Margin { value, violated: verdict == Verdict::Violated }
     };
@@ -105,7 +105,7 @@ mod tests {
             let verdict = verdict(Bound::AtMost { value: 70.0 }, &outcome, (&shown).into());
             let margin = margin(outcome, shown);
             prop_assert_eq!(margin.violated, verdict == Verdict::Violated);
-            prop_assert_eq!(margin.value.is_none(), verdict == Verdict::Unsaid);
+            prop_assert_eq!(margin.value.is_none(), verdict == Verdict::Inconclusive);
             prop_assert!(margin.value.is_none_or(|value| (value < 0.0) == margin.violated));
         }
 

@@ -14,7 +14,7 @@ pub fn fitness_of(plan: &CampaignPlan, outcome: &Outcome, value: impl Fn(MetricI
     match outcome {
         // What was imported stands in fronts as it did there.
         Outcome::Completed | Outcome::Unknown => {}
-        Outcome::Void => return Fitness::Unfit(Unfit::Void),
+        Outcome::NoEffect => return Fitness::Unfit(Unfit::Void),
         Outcome::Crash { .. } => return Fitness::Unfit(Unfit::Crash),
         Outcome::Timeout { .. } => return Fitness::Unfit(Unfit::Timeout),
     }
@@ -79,7 +79,7 @@ mod tests {
             Fitness::Unfit(why) => why,
             other => panic!("{other:?}"),
         };
-        assert_eq!(unfit(Outcome::Void, &values), Unfit::Void);
+        assert_eq!(unfit(Outcome::NoEffect, &values), Unfit::Void);
         assert_eq!(unfit(Outcome::Crash { message: "x".to_owned() }, &[]), Unfit::Crash);
         assert_eq!(unfit(Outcome::Timeout { limit: 9.0 }, &values), Unfit::Timeout);
         assert_eq!(unfit(Outcome::Completed, &[Some(12.5), None]), Unfit::Unmeasured);

@@ -1,6 +1,6 @@
 //! Gates: what was found decides the exit code.
 //!
-//! Verdicts are those of the summary: a test that was run again is what its fresh runs say, and what no fresh run shows
+//! Verdicts are those of the summary: if a test was run again, its fresh runs decide, and a finding that none of them shows
 //! closes no gate.
 
 use std::collections::BTreeSet;
@@ -23,10 +23,10 @@ pub(super) struct Gate {
     fail_on: Vec<Finding>,
 }
 
-/// What a gate can be closed by.
+/// The findings that can close a gate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Finding {
-    /// A test violates a requirement, or a known test an expectation
+    /// A test violates a requirement, or a regression test an expectation
     Violation,
     /// A test crashes
     Crash,
@@ -34,11 +34,11 @@ enum Finding {
     Timeout,
     /// A metric read a number that is not finite, such as NaN
     NotFinite,
-    /// A test says nothing about a requirement, or a known test about an expectation
+    /// A test is inconclusive about a requirement, or a regression test about an expectation
     Inconclusive,
     /// Any of these
     Any,
-    /// Nothing, not even a campaign that says too little
+    /// Nothing, not even insufficient results
     Nothing,
 }
 
@@ -59,7 +59,7 @@ impl Gate {
         if asked(Finding::Violation) {
             let broken = summary.requirements.iter().filter(|requirement| requirement.violated > 0);
             objections.extend(broken.map(|it| format!("{} is violated in {}", it.requirement, tests(it.violated))));
-            objections.extend(expectations(summary, Verdict::Violated, "is not kept"));
+            objections.extend(expectations(summary, Verdict::Violated, "is violated"));
         }
         for (finding, word) in [(Finding::Crash, "crash"), (Finding::Timeout, "timeout")] {
             let found = broken_off(summary, &[word]).len();
@@ -71,15 +71,16 @@ impl Gate {
             objections.push(format!("metrics read numbers that are not finite in {}", tests(summary.not_finite.len())));
         }
         if asked(Finding::Inconclusive) {
-            let open = summary.requirements.iter().filter(|requirement| requirement.unsaid > 0);
-            objections.extend(open.map(|it| format!("{} is left open by {}", it.requirement, tests(it.unsaid))));
-            objections.extend(expectations(summary, Verdict::Unsaid, "is left open"));
+            let open = summary.requirements.iter().filter(|requirement| requirement.inconclusive > 0);
+            objections
+                .extend(open.map(|it| format!("{} is inconclusive in {}", it.requirement, tests(it.inconclusive))));
+            objections.extend(expectations(summary, Verdict::Inconclusive, "is inconclusive"));
         }
         if matches!(plan.campaign.search, Search::Known { .. }) {
             objections.extend(not_as_expected(summary));
         }
         if !self.fail_on.contains(&Finding::Nothing) {
-            objections.extend(says_too_little(summary, &plan.campaign.search));
+            objections.extend(insufficient(summary, &plan.campaign.search));
         }
         objections.dedup();
         objections
@@ -104,22 +105,22 @@ fn broken_off<'a>(summary: &'a Summary, words: &[&str]) -> BTreeSet<&'a str> {
 
 fn expectations<'a>(summary: &'a Summary, verdict: Verdict, what: &'a str) -> impl Iterator<Item = String> + 'a {
     let found = summary.expectations.iter().filter(move |it| it.verdict == verdict);
-    found.map(move |it| format!("what `{}` expects of {} {what}", it.known_test, it.metric))
+    found.map(move |it| format!("the expectation of `{}` about {} {what}", it.known_test, it.metric))
 }
 
-/// Who runs known tests asks that each comes to its end as expected; what no run tells is not as expected.
+/// Regression tests must end, and as expected: an inconclusive expectation is not as expected.
 fn not_as_expected(summary: &Summary) -> Vec<String> {
     let failed = summary.failures.iter().filter(|failure| failure.stands());
     let mut objections: Vec<String> = failed.map(|it| format!("{} ended by {}", it.test, it.outcome)).collect();
-    objections.extend(expectations(summary, Verdict::Violated, "is not kept"));
-    objections.extend(expectations(summary, Verdict::Unsaid, "is left open"));
+    objections.extend(expectations(summary, Verdict::Violated, "is violated"));
+    objections.extend(expectations(summary, Verdict::Inconclusive, "is inconclusive"));
     objections
 }
 
-/// Why a campaign says too little to be taken for one in which nothing was found, whatever gates were asked for.
+/// Why results are insufficient: so little is known that "nothing was found" would mislead, whichever gates are set.
 ///
-/// Making a test smaller, and repeating one, are about that test: where it crashes, so do most of their runs.
-fn says_too_little(summary: &Summary, search: &Search) -> Vec<String> {
+/// Shrinking and repeating are about a single test: if it crashes, so do most of their runs.
+fn insufficient(summary: &Summary, search: &Search) -> Vec<String> {
     let counts = summary.counts;
     let ran = counts.evaluations - counts.duplicates;
     if ran == 0 || matches!(search, Search::Repeat { .. } | Search::Shrink { .. }) {
@@ -128,14 +129,14 @@ fn says_too_little(summary: &Summary, search: &Search) -> Vec<String> {
     let mut objections = Vec::new();
     let broken = broken_off(summary, &["crash", "timeout"]).len();
     if 2 * broken > ran {
-        objections.push(format!("{broken} of {} broke off by crash or timeout, which is more than half", tests(ran)));
+        objections.push(format!("{broken} of {} broke off by crash or timeout, more than half", tests(ran)));
     }
-    if counts.void == counts.evaluations {
-        objections.push(format!("in none of {} an operation had an effect", tests(ran)));
+    if counts.no_effect == counts.evaluations {
+        objections.push(format!("no operation had an effect in any of {}", tests(ran)));
     }
-    let judged = summary.requirements.iter().any(|requirement| requirement.kept + requirement.violated > 0);
+    let judged = summary.requirements.iter().any(|requirement| requirement.satisfied + requirement.violated > 0);
     if !summary.requirements.is_empty() && !judged {
-        objections.push(format!("none of {} says anything about a requirement", tests(ran)));
+        objections.push(format!("none of {} is conclusive about any requirement", tests(ran)));
     }
     objections
 }
@@ -153,7 +154,7 @@ mod tests {
         let mut summary = summary(&sample::campaign(folder.path(), &plan, 12)).unwrap();
         summary.failures.clear();
         for requirement in &mut summary.requirements {
-            (requirement.violated, requirement.kept, requirement.unsaid) = (0, 13, 0);
+            (requirement.violated, requirement.satisfied, requirement.inconclusive) = (0, 13, 0);
         }
         (summary, plan)
     }
@@ -181,12 +182,12 @@ mod tests {
             (Finding::NotFinite, |it| {
                 it.not_finite.push(NotFinite { test: "T4".to_owned(), at: 1.0, metrics: vec!["speed".to_owned()] });
             }),
-            (Finding::Inconclusive, |it| it.requirements[1].unsaid = 1),
+            (Finding::Inconclusive, |it| it.requirements[1].inconclusive = 1),
         ];
         for (at, (finding, change)) in changes.iter().enumerate() {
             let mut summary = clean.clone();
             change(&mut summary);
-            assert_eq!(objections(&[], &summary, &plan), [""; 0], "nobody asked");
+            assert_eq!(objections(&[], &summary, &plan), [""; 0], "no gate is set");
             assert_eq!(objections(&[Finding::Any], &summary, &plan).len(), 1, "{finding:?}");
             for (other, (gate, _)) in changes.iter().enumerate() {
                 assert_eq!(
@@ -205,7 +206,7 @@ mod tests {
         summary.failures = (1..=6).map(crash).collect();
         assert_eq!(objections(&[], &summary, &plan), [""; 0], "six of thirteen are not more than half");
         summary.failures = (1..=9).map(crash).collect();
-        let said = ["9 of 13 tests broke off by crash or timeout, which is more than half"];
+        let said = ["9 of 13 tests broke off by crash or timeout, more than half"];
         assert_eq!(objections(&[], &summary, &plan), said);
         assert_eq!(objections(&[Finding::Violation], &summary, &plan), said);
         assert_eq!(objections(&[Finding::Nothing], &summary, &plan), [""; 0]);
@@ -214,13 +215,13 @@ mod tests {
     #[test]
     fn a_campaign_that_judges_nothing_or_disturbs_nothing_is_not_green() {
         let (mut summary, plan) = found();
-        summary.counts.void = summary.counts.evaluations;
-        assert_eq!(objections(&[], &summary, &plan), ["in none of 13 tests an operation had an effect"]);
-        summary.counts.void = 0;
+        summary.counts.no_effect = summary.counts.evaluations;
+        assert_eq!(objections(&[], &summary, &plan), ["no operation had an effect in any of 13 tests"]);
+        summary.counts.no_effect = 0;
         for requirement in &mut summary.requirements {
-            (requirement.kept, requirement.unsaid) = (0, 13);
+            (requirement.satisfied, requirement.inconclusive) = (0, 13);
         }
-        assert_eq!(objections(&[], &summary, &plan), ["none of 13 tests says anything about a requirement"]);
+        assert_eq!(objections(&[], &summary, &plan), ["none of 13 tests is conclusive about any requirement"]);
         summary.requirements.clear();
         assert_eq!(objections(&[], &summary, &plan), [""; 0], "there was nothing to judge");
     }
@@ -233,8 +234,8 @@ mod tests {
             finding: "crash".to_owned(),
             first: true,
             again: 0,
-            said: 4,
-            unsaid: 0,
+            conclusive: 4,
+            inconclusive: 0,
             interval: None,
             standing: Some(Standing::NotConfirmed),
         });

@@ -1,4 +1,4 @@
-//! `known`: the known tests against what they expect.
+//! `known`: runs regression tests and checks their expectations.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -11,10 +11,10 @@ use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execu
 use crate::cli::failure::Failure;
 use crate::runner::Runner;
 
-/// Which known tests are run, and how.
+/// Which regression tests are run, and how.
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// Names of known tests; by default all that this campaign can run
+    /// Names of regression tests; by default all that this campaign can run
     #[arg(value_name = "NAME")]
     names: Vec<String>,
     /// The seed of the simulator's randomness; by default the campaign's
@@ -50,11 +50,11 @@ pub(super) fn known(
     execute(&plan, recorder, &folder, seed, &options.execution, &options.output, files)
 }
 
-/// The known tests of these names, each once and in the space's order; all of them when no name is given.
+/// The regression tests of these names, each once and in the space's order; all of them when no name is given.
 fn chosen(plan: &CampaignPlan, names: &[String]) -> Result<Vec<KnownTestId>, String> {
     if plan.tests.is_empty() {
         return Err(format!(
-            "campaign `{}` can run none of the space's known tests: it runs those whose operations are all its own and \
+            "campaign `{}` can run none of the space's regression tests: it runs those whose operations are all its own and \
              that begin before its end",
             plan.campaign.name
         ));
@@ -63,7 +63,7 @@ fn chosen(plan: &CampaignPlan, names: &[String]) -> Result<Vec<KnownTestId>, Str
     if let Some(stranger) = names.iter().find(|name| !known().any(|known| known == *name)) {
         let known: Vec<&str> = known().collect();
         return Err(format!(
-            "campaign `{}` can run no known test `{stranger}`; it can run {}",
+            "campaign `{}` cannot run a regression test `{stranger}`; it can run {}",
             plan.campaign.name,
             known.join(", ")
         ));
@@ -93,6 +93,6 @@ mod tests {
         assert_eq!(chosen(&["second", "known_jitter"]), Ok(vec![KnownTestId(0), KnownTestId(1)]));
         assert!(chosen(&["third"]).unwrap_err().ends_with("it can run known_jitter, second"));
         plan.tests.clear();
-        assert!(super::chosen(&plan, &[]).unwrap_err().contains("none of the space's known tests"));
+        assert!(super::chosen(&plan, &[]).unwrap_err().contains("none of the space's regression tests"));
     }
 }

@@ -16,7 +16,7 @@ use crate::runner::Runner;
 /// Which test is repeated, and how.
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// A known test's name, or a recorded test, for example `T158`
+    /// A regression test's name, or a recorded test, for example `T158`
     test: String,
     /// How often
     #[arg(value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]

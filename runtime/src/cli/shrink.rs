@@ -1,4 +1,4 @@
-//! `shrink`: a failing test made smaller, for as long as it fails as it did.
+//! `shrink`: reduces a failing test while it still fails in the same way.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -14,7 +14,7 @@ use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_changed};
 use crate::runner::Runner;
 
-/// Which test is made smaller, and how.
+/// Which test is shrunk, and how.
 #[derive(Debug, Args)]
 pub(super) struct Options {
     /// The test, for example `T158`
@@ -100,15 +100,15 @@ pub(super) fn failing(repository: &Repository, record: &TestRecord, wanted: &[St
     let chosen: Vec<RequirementId> =
         violated.iter().copied().filter(|id| wanted.is_empty() || wanted.iter().any(|it| it == named(id))).collect();
     // What needs no disturbance says nothing about one.
-    let undisturbed = match repository.tests()?.iter().find(|row| row.origin == Origin::Reference) {
+    let reference = match repository.tests()?.iter().find(|row| row.origin == Origin::Reference) {
         Some(row) => self::violated(plan, &repository.test(row.number)?.observation),
         None => Vec::new(),
     };
-    let caused: Vec<RequirementId> = chosen.iter().copied().filter(|id| !undisturbed.contains(id)).collect();
+    let caused: Vec<RequirementId> = chosen.iter().copied().filter(|id| !reference.contains(id)).collect();
     if caused.is_empty() {
         let names: Vec<&str> = chosen.iter().map(named).collect();
         return Err(Failure(format!(
-            "the reference run violates {} too, so {test} is not what makes it so",
+            "the reference run violates {} too, so {test} is not its cause",
             names.join(", ")
         )));
     }
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_test_is_kept_to_what_it_did_and_the_undisturbed_run_did_not() {
+    fn a_test_is_shrunk_by_the_requirements_that_it_violates_and_the_reference_run_does_not() {
         let violation = |requirements: &[u32]| {
             Ok(Failing::Violation { requirements: requirements.iter().copied().map(RequirementId).collect() })
         };

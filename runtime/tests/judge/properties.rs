@@ -37,9 +37,9 @@ fn value_of(case: &Case, metric: &Metric, ledger: &Ledger, active: f64) -> Resul
 
 fn verdict_of(bound: Bound, value: Option<f64>) -> Verdict {
     match value {
-        Some(value) if bound.holds(value) => Verdict::Kept,
+        Some(value) if bound.holds(value) => Verdict::Satisfied,
         Some(_) => Verdict::Violated,
-        None => Verdict::Unsaid,
+        None => Verdict::Inconclusive,
     }
 }
 
@@ -141,7 +141,7 @@ fn only_worsens(metric: &Metric, bound: Bound) -> bool {
 pub(crate) fn contradictions(case: &Case) -> Vec<String> {
     let mut wrong = Vec::new();
     let (truth, told) = adapter::run(&case.plan, &case.test, &case.truth());
-    if !matches!(truth.outcome, Outcome::Completed | Outcome::Void) {
+    if !matches!(truth.outcome, Outcome::Completed | Outcome::NoEffect) {
         wrong.push(format!("the robot without faults ended with {:?}", truth.outcome));
         return wrong;
     }
@@ -160,7 +160,7 @@ pub(crate) fn contradictions(case: &Case) -> Vec<String> {
                 "{} of {}: {said:?} with the value {:?}, while the judge has {value:?}",
                 requirement.name, metric.name, observed.value
             )),
-            Err(_) if said == Verdict::Kept => {
+            Err(_) if said == Verdict::Satisfied => {
                 wrong.push(format!("{} of {}: kept, though it heard what is no number", requirement.name, metric.name));
             }
             _ => {}
@@ -219,8 +219,10 @@ fn faulty(
             let Ok(value) = value else { continue };
             let (said, true_one) = (said(requirement, report), verdict_of(requirement.bound, *value));
             let metric = &case.plan.metric(requirement.metric);
-            let contradicts =
-                matches!((said, true_one), (Verdict::Kept, Verdict::Violated) | (Verdict::Violated, Verdict::Kept));
+            let contradicts = matches!(
+                (said, true_one),
+                (Verdict::Satisfied, Verdict::Violated) | (Verdict::Violated, Verdict::Satisfied)
+            );
             if contradicts {
                 wrong.push(format!(
                     "{what}: {} of {} is {said:?} with {:?}, in truth {true_one:?} with {value:?}",
@@ -232,7 +234,7 @@ fn faulty(
         }
         if broke_off {
             for requirement in &case.plan.requirements {
-                if said(requirement, report) == Verdict::Kept {
+                if said(requirement, report) == Verdict::Satisfied {
                     wrong.push(format!("{what}: {} is kept by a run that broke off", requirement.name));
                 }
             }
@@ -254,7 +256,7 @@ fn faulty(
         let metric = case.plan.metric(requirement.metric);
         let said = said(requirement, &observed);
         if first_blank(&case.plan, metric, &ledger).is_some() {
-            if said == Verdict::Kept {
+            if said == Verdict::Satisfied {
                 wrong.push(format!("{} of {}: kept, though it heard what is no number", requirement.name, metric.name));
             }
         } else if broke_off && only_worsens(metric, requirement.bound) && said != Verdict::Violated {
@@ -360,7 +362,7 @@ fn effects(case: &Case, observed: &Observation, ledger: &Ledger) -> Vec<String> 
     };
     let flushed = case.test.operations.iter().any(|used| flushes(used.operation));
     let alone = !flushed && paths.iter().all(|path| on(path) <= 1);
-    let void = observed.outcome == Outcome::Void;
+    let void = observed.outcome == Outcome::NoEffect;
     if heard && void {
         wrong.push("void, though somebody heard what was not published so".to_owned());
     }

@@ -12,7 +12,7 @@ use sesame_search::sspr::extent;
 
 /// A number that may be anything in a range counts as so many values.
 const STEPS: f64 = 100.0;
-/// Undisturbed runs of a campaign, one before and one after its tests.
+/// Reference runs of a campaign, one before and one after its tests.
 const REFERENCE_RUNS: u64 = 2;
 
 /// The space that a campaign searches, and its cost in simulated time, as comments of a `.sesame` file.
@@ -40,7 +40,7 @@ pub(super) fn described(plan: &CampaignPlan) -> String {
     lines.push((
         "cost",
         format!(
-            "at most {runs} runs of {end} s, {REFERENCE_RUNS} of them undisturbed: {} of simulated time",
+            "at most {runs} runs of {end} s, {REFERENCE_RUNS} of them reference runs: {} of simulated time",
             duration(runs as f64 * end)
         ),
     ));

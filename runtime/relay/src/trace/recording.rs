@@ -52,7 +52,7 @@ pub struct RecordedRun {
     pub campaign: String,
     /// The test's name.
     pub test: String,
-    /// `completed`, `void`, `crash` or `timeout`.
+    /// `completed`, `no_effect` (`void` in traces of earlier releases), `crash` or `timeout`.
     pub outcome: String,
     /// What the run showed; empty when its worker died.
     pub metrics: Vec<RecordedMetric>,
@@ -368,7 +368,7 @@ impl Feeder<'_> {
             };
             let outcome = text(ending, "outcome");
             end = match ending.get("end_s") {
-                Some(end) if matches!(outcome.as_str(), "completed" | "void") => {
+                Some(end) if matches!(outcome.as_str(), "completed" | "no_effect" | "void") => {
                     let seconds = end.parse().map_err(|_| damaged("its end is no number"))?;
                     Some(SimTime::from_seconds(seconds).max(self.now))
                 }

@@ -72,7 +72,7 @@ struct Measured {
     seed: u64,
     tests: u32,
     unique: u32,
-    void: u32,
+    no_effect: u32,
     crashes: u32,
     timeouts: u32,
     front: Front,
@@ -200,7 +200,7 @@ fn measure(run: &Run, cells: Option<&(Grid, u32)>) -> Result<Measured, RecordErr
         seed: run.repository.campaign().seed,
         tests: 0,
         unique: 0,
-        void: 0,
+        no_effect: 0,
         crashes: 0,
         timeouts: 0,
         front: Front::default(),
@@ -220,7 +220,7 @@ fn measure(run: &Run, cells: Option<&(Grid, u32)>) -> Result<Measured, RecordErr
         measured.unique += u32::from(test.duplicate_of.is_none());
         match test.outcome {
             Outcome::Completed | Outcome::Unknown => {}
-            Outcome::Void => measured.void += 1,
+            Outcome::NoEffect => measured.no_effect += 1,
             Outcome::Crash { .. } => measured.crashes += 1,
             Outcome::Timeout { .. } => measured.timeouts += 1,
         }
@@ -252,7 +252,7 @@ const MEASURES: [Measure; 9] = [
     ("coverage", |run| run.coverage),
     ("tests", |run| Some(f64::from(run.tests))),
     ("unique", |run| Some(f64::from(run.unique))),
-    ("void", |run| Some(f64::from(run.void))),
+    ("no_effect", |run| Some(f64::from(run.no_effect))),
     ("crashes", |run| Some(f64::from(run.crashes))),
     ("timeouts", |run| Some(f64::from(run.timeouts))),
 ];
@@ -271,7 +271,7 @@ impl Comparison {
             "seed",
             "tests",
             "unique",
-            "void",
+            "no_effect",
             "crashes",
             "timeouts",
             "front",
@@ -291,7 +291,7 @@ impl Comparison {
                 Datum::Text(run.seed.to_string()),
                 whole(run.tests),
                 whole(run.unique),
-                whole(run.void),
+                whole(run.no_effect),
                 whole(run.crashes),
                 whole(run.timeouts),
                 Datum::count(run.front.members().len()),

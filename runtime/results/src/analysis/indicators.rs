@@ -25,7 +25,7 @@ pub struct Indicator {
     /// Of these, no exact duplicates. `None` where nobody counted, as of the next three.
     pub unique: Option<u32>,
     /// Of these, without effect.
-    pub void: Option<u32>,
+    pub no_effect: Option<u32>,
     /// Of these, crashes.
     pub crashes: Option<u32>,
     /// Of these, timeouts.
@@ -121,7 +121,7 @@ pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<
                 generation: Some(it.generation),
                 evaluations: Some(it.evaluations),
                 unique: Some(it.unique),
-                void: Some(it.void),
+                no_effect: Some(it.no_effect),
                 crashes: Some(it.crashes),
                 timeouts: Some(it.timeouts),
                 front: it.front,
@@ -228,7 +228,7 @@ fn of_sets(
             generation: set.generation,
             evaluations,
             unique: None,
-            void: None,
+            no_effect: None,
             crashes: None,
             timeouts: None,
             front: u32::try_from(front.members().len()).unwrap_or(u32::MAX),
@@ -253,7 +253,7 @@ impl IndicatorAnalysis {
     pub fn dataset(&self) -> Dataset {
         let imported = self.generations.iter().any(|it| it.set.is_some());
         let head = if imported { vec!["set"] } else { Vec::new() };
-        let counts = ["generation", "evaluations", "unique", "void", "crashes", "timeouts", "front"];
+        let counts = ["generation", "evaluations", "unique", "no_effect", "crashes", "timeouts", "front"];
         let measures = ["hypervolume", "standard_error", "igd_plus"];
         let cells: &[&str] = if self.cells.is_some() { &["covered", "cells", "coverage"] } else { &[] };
         let columns = head.into_iter().chain(counts).chain(measures).chain(cells.iter().copied());
@@ -261,7 +261,8 @@ impl IndicatorAnalysis {
         let whole = |count: Option<u32>| count.map_or(Datum::Missing, |count| Datum::Whole(i64::from(count)));
         for it in &self.generations {
             let head = imported.then(|| it.set.clone().map_or(Datum::Missing, Datum::Text));
-            let counts = [it.generation, it.evaluations, it.unique, it.void, it.crashes, it.timeouts, Some(it.front)];
+            let counts =
+                [it.generation, it.evaluations, it.unique, it.no_effect, it.crashes, it.timeouts, Some(it.front)];
             let cells = self.cells.map(|cells| {
                 let share = it.covered.map(|covered| covered as f64 / cells as f64);
                 [it.covered.map_or(Datum::Missing, Datum::count), Datum::count(cells), Datum::real(share)]

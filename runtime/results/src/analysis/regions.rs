@@ -2,7 +2,7 @@
 //!
 //! For each requirement that tests violate (and for crashes and timeouts) a [tree](tree) of a few questions divides the
 //! tests into regions, and says of each how many of its tests fail. The regions of a tree do not overlap, and together
-//! they hold every test that says anything about the requirement; void tests are among them, duplicates and undisturbed
+//! they hold every test that says anything about the requirement; tests without effect are among them, duplicates and reference
 //! runs are not.
 
 mod feature;
@@ -205,8 +205,8 @@ fn fails(plan: &CampaignPlan, judge: &Judge<'_>, target: Target, test: &ScannedT
     };
     match said {
         Verdict::Violated => Some(true),
-        Verdict::Kept => Some(false),
-        Verdict::Unsaid => None,
+        Verdict::Satisfied => Some(false),
+        Verdict::Inconclusive => None,
     }
 }
 

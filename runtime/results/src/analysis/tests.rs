@@ -181,7 +181,7 @@ fn indicators_are_those_recorded_and_end_on_the_front() {
     assert_eq!(last.covered, Some(reported.coverage.as_ref().unwrap().covered));
     let counts = reported.counts;
     assert_eq!((last.evaluations, last.unique), (Some(61), Some(60)));
-    assert_eq!(last.void, u32::try_from(counts.void).ok());
+    assert_eq!(last.no_effect, u32::try_from(counts.no_effect).ok());
     assert_eq!((last.crashes, last.timeouts), (Some(2), Some(1)));
     assert_eq!(last.front as usize, reported.front.len());
     insta::assert_snapshot!("indicators", dataset.text(TextOptions { width: None, colour: false }));

@@ -110,7 +110,9 @@ fn outcome(outcome: &Outcome) -> String {
     match outcome {
         Outcome::Crash { message } => format!("{}: {message}", outcome.word()),
         // How long it was waited for is wall time.
-        Outcome::Completed | Outcome::Void | Outcome::Unknown | Outcome::Timeout { .. } => outcome.word().to_owned(),
+        Outcome::Completed | Outcome::NoEffect | Outcome::Unknown | Outcome::Timeout { .. } => {
+            outcome.word().to_owned()
+        }
     }
 }
 
@@ -148,7 +150,7 @@ mod tests {
     #[test]
     fn everything_observed_is_compared() {
         let whats = |change: fn(&mut Observation)| said(change).into_iter().map(|(what, ..)| what).collect::<Vec<_>>();
-        assert_eq!(whats(|run| run.outcome = Outcome::Void), ["the outcome"]);
+        assert_eq!(whats(|run| run.outcome = Outcome::NoEffect), ["the outcome"]);
         assert_eq!(whats(|run| run.end = 1.0), ["the end of the run"]);
         assert_eq!(whats(|run| run.messages += 1), ["the number of messages"]);
         let operation = "operation 1 (`jitter_link1`)";

@@ -1,4 +1,4 @@
-//! One hash for the whole content of a results repository.
+//! One hash of the whole content of a results repository.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,9 +8,9 @@ use rusqlite::types::ValueRef;
 use sha2::{Digest as _, Sha256};
 
 use crate::record::series::PIECES_SINCE;
-use crate::record::{RecordError, Repository};
+use crate::record::{RecordError, Repository, schema};
 
-/// What is hashed, in this order: a name, and the rows in an order that depends on nothing but the content.
+/// What is hashed, in this order: a name, and a query whose order of rows depends on nothing but the content.
 const CONTENT: &[(&str, &str)] = &[
     (
         "campaign",
@@ -31,7 +31,7 @@ const CONTENT: &[(&str, &str)] = &[
     ("parents", "SELECT test, position, parent FROM parents ORDER BY test, position"),
     (
         "operations",
-        "SELECT test, position, operation, start_s, end_s, start_condition, end_condition, length_s, times, draw_seed, \
+        "SELECT test, position, operation, start_s, end_s, start_condition, end_condition, length_s, times, operation_seed, \
          seen, changed, dropped, delayed, queued, injected, side_effects, unheard, first_touch_s, last_touch_s \
          FROM operations ORDER BY test, position",
     ),
@@ -67,45 +67,48 @@ const CONTENT: &[(&str, &str)] = &[
     ("coverage", "SELECT generation, evaluations, covered, cells, feasible FROM coverage ORDER BY generation"),
     (
         "indicators",
-        "SELECT generation, evaluations, unique_tests, void, crashes, timeouts, front, hypervolume, estimated, \
+        "SELECT generation, evaluations, unique_tests, no_effect, crashes, timeouts, front, hypervolume, estimated, \
          standard_error FROM indicators ORDER BY generation",
     ),
     ("reference_point", "SELECT objective, metric, value FROM reference_point ORDER BY objective"),
-    // Warnings of the campaign itself may come in another order with other workers, so their order is their text's.
+    // With another number of workers the campaign's own warnings may arrive in another order, so they are sorted by text.
     ("events", "SELECT test, text FROM events WHERE kind = 'warning' ORDER BY test, text"),
 ];
 
-/// What was hashed in place of `series_pieces` in results of schemas before [`PIECES_SINCE`].
+/// Hashed instead of `series_pieces` in results of schemas before [`PIECES_SINCE`].
 const POINTS: (&str, &str) = (
     "change_points",
     "SELECT test, metric, position, time_s, value FROM change_points ORDER BY test, metric, position",
 );
 
-/// Bytes that are collected before they are hashed: single numbers are too short for the hash to be fast.
+/// Bytes that are collected before they are hashed: hashing each number by itself would be slow.
 const PORTION: usize = 1 << 16;
 
 /// SHA-256 over the canonical content of a results repository, as 64 hexadecimal digits.
 ///
-/// Left out are wall times and limits of wall time, hosts, processes, session notes, paths, and the order in which things were written. The
+/// Wall times and limits of wall time, hosts, processes, session notes, paths, and the order of writing are left out. The
 /// rest is hashed in the order of this module's list: for each table its name as a text, then its rows, then the byte
-/// `;`. A row is the byte `(` and its columns: `N` for null, `I` and 8 bytes (little endian) for an integer, `F` and
-/// the 8 bytes of the IEEE 754 double (little endian, zero without sign), `T`, the length in bytes as 8 bytes (little
-/// endian) and the UTF-8 bytes for a text, `B`, the length likewise and the bytes for a blob. All of it is read from the
-/// file each time: nothing is taken from a hash that is stored. Results of an earlier schema have the digest that their
-/// release gave them.
+/// `;`. A row is the byte `(` and the content of its columns: `N` for null, `I` and 8 bytes (little endian) for an integer,
+/// `F` and the 8 bytes of the IEEE 754 double (little endian, zero without sign), `T`, the length in bytes as 8 bytes (little
+/// endian) and the UTF-8 bytes for a text, `B`, the length likewise and the bytes for a blob. Everything is read from the
+/// file each time: no stored hash is used.
+///
+/// Results of an earlier schema have the digest that their release computed. Names of columns and verdicts are not hashed,
+/// so the content of a run hashes the same in schemas 6 and 7, except for two things: the plan's JSON, and the outcome of a
+/// test without effect, which is `no_effect` in schema 7 and was `void` before.
 pub fn digest(path: &Path) -> Result<String, RecordError> {
     Repository::open(path)?.digest()
 }
 
-pub(super) fn of_connection(connection: &Connection, schema: i64) -> rusqlite::Result<String> {
+pub(super) fn of_connection(connection: &Connection, version: i64) -> rusqlite::Result<String> {
     // One read transaction, so that a run writing meanwhile is seen at one point.
     let transaction = connection.unchecked_transaction()?;
     let mut hash = Sha256::new();
     let mut portion = Vec::with_capacity(2 * PORTION);
     for &content in CONTENT {
-        let (name, sql) = if content.0 == "series_pieces" && schema < PIECES_SINCE { POINTS } else { content };
+        let (name, sql) = if content.0 == "series_pieces" && version < PIECES_SINCE { POINTS } else { content };
         feed(&mut portion, ValueRef::Text(name.as_bytes()));
-        let mut statement = transaction.prepare(sql)?;
+        let mut statement = transaction.prepare(&schema::query(sql, version))?;
         let columns = statement.column_count();
         let mut rows = statement.query([])?;
         while let Some(row) = rows.next()? {

@@ -91,7 +91,7 @@ fn holds_nothing(folder: &Path) -> Result<bool, RecordError> {
 }
 
 /// The folder of the campaign's run whose results were written last, if there is any: the first of those that
-/// [`latest_unfinished`] goes through. Its name begins with its seed: what else was run on the side (known tests, repetitions)
+/// [`latest_unfinished`] goes through. Its name begins with its seed: what else was run on the side (regression tests, repetitions)
 /// is looked at when it is asked for.
 pub fn latest_folder(results: &Path) -> Result<Option<PathBuf>, RecordError> {
     Ok(latest_first(results)?.into_iter().next())

@@ -13,9 +13,9 @@ pub struct Tally {
     /// Runs that violate it.
     pub violated: usize,
     /// Runs that keep it.
-    pub kept: usize,
+    pub satisfied: usize,
     /// Runs that say nothing about it.
-    pub unsaid: usize,
+    pub inconclusive: usize,
 }
 
 /// Whether a finding is to be believed.
@@ -48,28 +48,28 @@ impl Tally {
         for said in runs {
             match said {
                 Verdict::Violated => tally.violated += 1,
-                Verdict::Kept => tally.kept += 1,
-                Verdict::Unsaid => tally.unsaid += 1,
+                Verdict::Satisfied => tally.satisfied += 1,
+                Verdict::Inconclusive => tally.inconclusive += 1,
             }
         }
         tally
     }
 
     /// Runs that say anything.
-    pub fn said(self) -> usize {
-        self.violated + self.kept
+    pub fn conclusive(self) -> usize {
+        self.violated + self.satisfied
     }
 
     /// What the test says, whose first run said this.
     ///
     /// It violates the requirement if a fresh run does, and keeps it if fresh runs say something and none violates it.
     /// Where no fresh run says anything, a violation by the first run stands, since nothing speaks against it, but that the
-    /// first run kept it is not enough. A test that was never run again says what its one run said.
+    /// first run satisfied it is not enough. A test that was never run again says what its one run said.
     pub fn verdict(self, first: Verdict) -> Verdict {
         match self {
             Tally { violated: 1.., .. } => Verdict::Violated,
-            Tally { kept: 1.., .. } => Verdict::Kept,
-            Tally { unsaid: 1.., .. } if first == Verdict::Kept => Verdict::Unsaid,
+            Tally { satisfied: 1.., .. } => Verdict::Satisfied,
+            Tally { inconclusive: 1.., .. } if first == Verdict::Satisfied => Verdict::Inconclusive,
             _ => first,
         }
     }
@@ -77,9 +77,9 @@ impl Tally {
     /// Whether the violation is to be believed; `None` where there is none, and where no fresh run says anything.
     pub fn standing(self, first: Verdict) -> Option<Standing> {
         match self {
-            Tally { violated: 1.., kept: 0, .. } => Some(Standing::Confirmed),
+            Tally { violated: 1.., satisfied: 0, .. } => Some(Standing::Confirmed),
             Tally { violated: 1.., .. } => Some(Standing::Flaky),
-            Tally { kept: 1.., .. } if first == Verdict::Violated => Some(Standing::NotConfirmed),
+            Tally { satisfied: 1.., .. } if first == Verdict::Violated => Some(Standing::NotConfirmed),
             _ => None,
         }
     }
@@ -87,7 +87,7 @@ impl Tally {
 
 #[cfg(test)]
 mod tests {
-    use Verdict::{Kept, Unsaid, Violated};
+    use Verdict::{Inconclusive, Satisfied, Violated};
     use proptest::prelude::*;
 
     use super::*;
@@ -95,28 +95,28 @@ mod tests {
     #[test]
     fn a_requirement_that_only_the_first_run_kept_is_violated() {
         let tally = Tally::of([Violated; 4]);
-        assert_eq!((tally.verdict(Kept), tally.standing(Kept)), (Violated, Some(Standing::Confirmed)));
-        let tally = Tally::of([Kept, Violated, Kept, Violated]);
-        assert_eq!((tally.verdict(Kept), tally.standing(Kept)), (Violated, Some(Standing::Flaky)));
+        assert_eq!((tally.verdict(Satisfied), tally.standing(Satisfied)), (Violated, Some(Standing::Confirmed)));
+        let tally = Tally::of([Satisfied, Violated, Satisfied, Violated]);
+        assert_eq!((tally.verdict(Satisfied), tally.standing(Satisfied)), (Violated, Some(Standing::Flaky)));
     }
 
     #[test]
     fn a_violation_that_no_fresh_run_shows_is_none() {
-        let tally = Tally::of([Kept, Unsaid, Kept]);
-        assert_eq!((tally.verdict(Violated), tally.standing(Violated)), (Kept, Some(Standing::NotConfirmed)));
+        let tally = Tally::of([Satisfied, Inconclusive, Satisfied]);
+        assert_eq!((tally.verdict(Violated), tally.standing(Violated)), (Satisfied, Some(Standing::NotConfirmed)));
     }
 
     #[test]
     fn runs_that_say_nothing_are_neither_for_nor_against() {
-        let tally = Tally::of([Violated, Unsaid, Unsaid]);
-        assert_eq!((tally.said(), tally.standing(Violated)), (1, Some(Standing::Confirmed)));
-        let nothing = Tally::of([Unsaid; 3]);
+        let tally = Tally::of([Violated, Inconclusive, Inconclusive]);
+        assert_eq!((tally.conclusive(), tally.standing(Violated)), (1, Some(Standing::Confirmed)));
+        let nothing = Tally::of([Inconclusive; 3]);
         assert_eq!((nothing.verdict(Violated), nothing.standing(Violated)), (Violated, None));
-        assert_eq!(nothing.verdict(Kept), Unsaid, "one lucky run is not enough where all others broke off");
+        assert_eq!(nothing.verdict(Satisfied), Inconclusive, "one lucky run is not enough where all others broke off");
     }
 
     fn said() -> impl Strategy<Value = Verdict> {
-        prop::sample::select(vec![Kept, Violated, Unsaid])
+        prop::sample::select(vec![Satisfied, Violated, Inconclusive])
     }
 
     proptest! {
@@ -128,18 +128,18 @@ mod tests {
                 first
             } else if any(Violated) {
                 Violated
-            } else if any(Kept) {
-                Kept
+            } else if any(Satisfied) {
+                Satisfied
             } else if first == Violated {
                 Violated
             } else {
-                Unsaid
+                Inconclusive
             };
-            let standing = if any(Violated) && any(Kept) {
+            let standing = if any(Violated) && any(Satisfied) {
                 Some(Standing::Flaky)
             } else if any(Violated) {
                 Some(Standing::Confirmed)
-            } else if any(Kept) && first == Violated {
+            } else if any(Satisfied) && first == Violated {
                 Some(Standing::NotConfirmed)
             } else {
                 None
@@ -147,7 +147,7 @@ mod tests {
             let tally = Tally::of(runs.iter().copied());
             prop_assert_eq!(tally.verdict(first), verdict);
             prop_assert_eq!(tally.standing(first), standing);
-            prop_assert_eq!(tally.said() + tally.unsaid, runs.len());
+            prop_assert_eq!(tally.conclusive() + tally.inconclusive, runs.len());
         }
     }
 }

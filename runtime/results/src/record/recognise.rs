@@ -1,9 +1,8 @@
 //! Whether a database has the tables and views that this program makes.
 //!
-//! The file may come from anywhere, and SQLite runs what a schema says: a view under the name of a table can go on for ever,
-//! a trigger can change what is written. So each table and view that is read is compared with the words it was made by,
-//! before anything is asked of it. What others have added beside them, such as an index or a view of their own, is left
-//! alone.
+//! The file may come from anywhere, and SQLite executes what its schema says: a view with the name of a table can run for
+//! ever, and a trigger can change what is written. So each table and view is compared with the statement that creates it here,
+//! before it is queried. Anything else that users have added, such as an index or a view of their own, is left alone.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,13 +12,17 @@ use rusqlite::Connection;
 
 use sesame_plan::CampaignPlan;
 
-use crate::record::schema::{DDL, SCHEMA, wide_views};
+use crate::record::schema::{DDL, STANDARD_WORDS_SINCE, wide_views};
+use crate::record::series::PIECES_SINCE;
 use crate::record::{RecordError, series};
 
-/// What a schema holds, by name: the kind of each object, and the words it was made by.
+/// The objects of a schema by name: the kind of each, and the words of the statement that creates it.
 type Objects = BTreeMap<String, (String, String)>;
 
-/// What turns the tables of this program into those of schema 5, whose series had a row per point.
+/// The tables and views of schema 6, which differ from those of this release in their words.
+const DDL_6: &str = include_str!("schema_6.sql");
+
+/// Turns the tables of schema 6 into those of schema 5, whose series had a row per point.
 const TO_SCHEMA_5: &str = "
 DROP TABLE series_pieces;
 DROP INDEX events_by_test;
@@ -37,18 +40,21 @@ CREATE VIEW series AS
       FROM tests t JOIN change_points c ON c.test = coalesce(t.duplicate_of, t.number) JOIN metrics m ON m.id = c.metric;
 ";
 
-/// Makes sure of all that does not depend on the campaign, and that nothing happens by itself when something is written.
-/// Results may be of any schema that is read.
+/// Checks all tables and views that do not depend on the campaign, and that there are no triggers. Results may be of any
+/// schema that this release reads.
 pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Result<(), RecordError> {
     static CURRENT: OnceLock<Objects> = OnceLock::new();
+    static SCHEMA_6: OnceLock<Objects> = OnceLock::new();
     static SCHEMA_5: OnceLock<Objects> = OnceLock::new();
     let sound = |made: rusqlite::Result<Objects>| {
         made.unwrap_or_else(|error| unreachable!("the schema of this program is sound: {error}"))
     };
-    let ours = if schema == SCHEMA {
+    let ours = if schema >= STANDARD_WORDS_SINCE {
         CURRENT.get_or_init(|| sound(made_by(&[DDL, &series::views()])))
+    } else if schema >= PIECES_SINCE {
+        SCHEMA_6.get_or_init(|| sound(made_by(&[DDL_6, &series::views()])))
     } else {
-        SCHEMA_5.get_or_init(|| sound(made_by(&[DDL, TO_SCHEMA_5])))
+        SCHEMA_5.get_or_init(|| sound(made_by(&[DDL_6, TO_SCHEMA_5])))
     };
     let found = objects(connection).map_err(|error| RecordError::database("read the results", path, error))?;
     if let Some((name, _)) = found.iter().find(|(_, (kind, _))| kind == "trigger") {
@@ -57,10 +63,10 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
     same(ours, &found, path)
 }
 
-/// Makes sure of the views that have a column for each metric of the campaign.
+/// Checks the views that have a column for each metric of the campaign.
 pub(super) fn views(connection: &Connection, path: &Path, plan: &CampaignPlan) -> Result<(), RecordError> {
     let failed = |error| RecordError::database("read the results", path, error);
-    // SQLite cannot say what the views of a plan are without the tables that they are about.
+    // SQLite cannot create the views of a plan without the tables that they read.
     let mut ours = made_by(&[DDL, &wide_views(plan)]).map_err(failed)?;
     ours.retain(|name, _| ["results", "front"].contains(&name.as_str()));
     same(&ours, &objects(connection).map_err(failed)?, path)
@@ -79,14 +85,14 @@ fn same(ours: &Objects, found: &Objects, path: &Path) -> Result<(), RecordError>
     Ok(())
 }
 
-/// What these statements make.
+/// The objects that these statements create.
 fn made_by(statements: &[&str]) -> rusqlite::Result<Objects> {
     let connection = Connection::open_in_memory()?;
     statements.iter().try_for_each(|sql| connection.execute_batch(sql))?;
     objects(&connection)
 }
 
-/// All objects but those that SQLite makes by itself. The table that is read here is always SQLite's own.
+/// All objects except those that SQLite creates itself. The table that is read here is always SQLite's own.
 fn objects(connection: &Connection) -> rusqlite::Result<Objects> {
     let mut statement = connection.prepare("SELECT name, type, sql FROM sqlite_schema WHERE sql IS NOT NULL")?;
     let rows = statement.query_map([], |row| {
@@ -96,7 +102,7 @@ fn objects(connection: &Connection) -> rusqlite::Result<Objects> {
     rows.collect()
 }
 
-/// The words of a statement, without comments: these may say something better in a later release of the same schema.
+/// The words of a statement, without comments, which a later release of the same schema may improve.
 fn words(sql: &str) -> String {
     let lines = sql.lines().map(|line| line.split_once("--").map_or(line, |(code, _)| code));
     lines.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")

@@ -221,7 +221,7 @@ impl Recorder {
             generation,
             evaluations,
             unique,
-            void,
+            no_effect,
             crashes,
             timeouts,
             front,
@@ -231,14 +231,14 @@ impl Recorder {
         let written = self.repository.connection.transaction().and_then(|transaction| {
             transaction
                 .prepare_cached(
-                    "INSERT OR REPLACE INTO indicators (generation, evaluations, unique_tests, void, crashes, timeouts, \
+                    "INSERT OR REPLACE INTO indicators (generation, evaluations, unique_tests, no_effect, crashes, timeouts, \
                      front, hypervolume, estimated, standard_error) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
                 )?
                 .execute(params![
                     generation,
                     evaluations,
                     unique,
-                    void,
+                    no_effect,
                     crashes,
                     timeouts,
                     front,
@@ -436,7 +436,7 @@ fn write_test(transaction: &Transaction<'_>, plan: &CampaignPlan, record: &TestR
         Origin::Reference | Origin::Search => None,
     };
     let (detail, limit) = match &observation.outcome {
-        Outcome::Completed | Outcome::Void | Outcome::Unknown => (None, None),
+        Outcome::Completed | Outcome::NoEffect | Outcome::Unknown => (None, None),
         Outcome::Crash { message } => (Some(message.as_str()), None),
         Outcome::Timeout { limit } => (None, Some(*limit)),
     };
@@ -513,7 +513,7 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
         transaction
             .prepare_cached(
                 "INSERT INTO operations (test, position, operation, start_s, end_s, start_condition, end_condition, \
-                 length_s, times, draw_seed, seen, changed, dropped, delayed, queued, injected, side_effects, unheard, \
+                 length_s, times, operation_seed, seen, changed, dropped, delayed, queued, injected, side_effects, unheard, \
                  first_touch_s, last_touch_s) \
                  VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20)",
             )?

@@ -120,7 +120,7 @@ impl Recorder {
         let path = self.repository().path().to_owned();
         let unrecordable = |what: String| RecordError::Unrecordable { test: *test, what, path: path.clone() };
         let (detail, limit) = match outcome {
-            Outcome::Completed | Outcome::Void | Outcome::Unknown => (None, None),
+            Outcome::Completed | Outcome::NoEffect | Outcome::Unknown => (None, None),
             Outcome::Crash { message } => (Some(message.as_str()), None),
             Outcome::Timeout { limit } => (None, Some(*limit)),
         };
@@ -257,7 +257,7 @@ mod tests {
         let mut empty = repetition(3, 2, crash, None);
         empty.values.clear();
         vec![
-            repetition(5, 1, Outcome::Void, Some(0.0)),
+            repetition(5, 1, Outcome::NoEffect, Some(0.0)),
             repetition(3, 1, Outcome::Completed, Some(1.0 / 3.0)),
             empty,
             repetition(3, 3, Outcome::Timeout { limit: 30.0 }, Some(2.0)),
@@ -318,7 +318,10 @@ mod tests {
         assert!(refused.unwrap_err().to_string().contains("repetition 1 is inf"));
         let first = repetition(3, 1, Outcome::Completed, Some(1.0));
         recorder.put_repetition(&first, &["`top_speed` refused NaN".to_owned()]).unwrap();
-        assert!(recorder.put_repetition(&repetition(3, 1, Outcome::Void, None), &[]).is_err(), "it is there already");
+        assert!(
+            recorder.put_repetition(&repetition(3, 1, Outcome::NoEffect, None), &[]).is_err(),
+            "it is there already"
+        );
         let repository = recorder.finish("all evaluations done").unwrap();
         assert_eq!(repository.repetitions().unwrap()[&3], [first]);
         let warned = repository
@@ -368,7 +371,7 @@ mod tests {
     /// A run: how it ended, and whether it shows a collision; `None` where it has no value.
     fn run() -> impl Strategy<Value = (Outcome, Option<bool>)> {
         let crash = Outcome::Crash { message: String::new() };
-        let outcomes = vec![Outcome::Completed, Outcome::Void, Outcome::Timeout { limit: 1.0 }, crash];
+        let outcomes = vec![Outcome::Completed, Outcome::NoEffect, Outcome::Timeout { limit: 1.0 }, crash];
         (prop::sample::select(outcomes), prop::option::of(any::<bool>()))
     }
 
@@ -382,16 +385,16 @@ mod tests {
         ) {
             let said = |(outcome, shows): &(Outcome, Option<bool>)| match (outcome, shows) {
                 (_, Some(true)) => "violated",
-                (Outcome::Completed | Outcome::Void, Some(false)) => "kept",
-                _ => "unsaid",
+                (Outcome::Completed | Outcome::NoEffect, Some(false)) => "satisfied",
+                _ => "inconclusive",
             };
             let count = |word: &str| fresh.iter().filter(|run| said(run) == word).count();
-            let expected = match (fresh.len(), count("violated"), count("kept")) {
+            let expected = match (fresh.len(), count("violated"), count("satisfied")) {
                 (0, ..) => said(&first),
                 (_, 1.., _) => "violated",
-                (_, _, 1..) => "kept",
+                (_, _, 1..) => "satisfied",
                 _ if said(&first) == "violated" => "violated",
-                _ => "unsaid",
+                _ => "inconclusive",
             };
             let value = |shows: Option<bool>| shows.map(|shows| f64::from(u8::from(shows)));
 
@@ -418,14 +421,14 @@ mod tests {
             prop_assert_eq!(word("verdicts"), expected);
             prop_assert_eq!(word("first_verdicts"), said(&first));
             let counts: Vec<(u32, u32, u32)> = open
-                .prepare("SELECT confirmed, said, repetitions FROM confirmations")
+                .prepare("SELECT confirmed, conclusive, repetitions FROM confirmations")
                 .unwrap()
                 .query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
                 .unwrap()
                 .collect::<Result<_, _>>()
                 .unwrap();
             let listed = !fresh.is_empty() && (said(&first) == "violated" || count("violated") > 0);
-            let counted = [count("violated"), count("violated") + count("kept"), fresh.len()];
+            let counted = [count("violated"), count("violated") + count("satisfied"), fresh.len()];
             let [violated, told, all] = counted.map(|count| u32::try_from(count).unwrap());
             prop_assert_eq!(counts, if listed { vec![(violated, told, all)] } else { vec![] });
             let is_finding: bool = open

@@ -15,6 +15,7 @@ use sesame_search::indicators::GenerationIndicators;
 
 use crate::record::folder::{DATABASE, trace_file};
 use crate::record::scan::Cursor;
+use crate::record::schema::STANDARD_WORDS_SINCE;
 use crate::record::{
     Event, EventKind, GenerationCoverage, MetricValue, Origin, RecordError, ResultSet, Session, Status, TestRecord,
     TestRow, digest, recognise, schema,
@@ -129,7 +130,7 @@ impl Repository {
             .map_err(|e| RecordError::database("read the results", &self.path, e))
     }
 
-    /// How many tests there are, the undisturbed runs left aside.
+    /// How many tests there are, without reference runs.
     pub fn evaluated(&self) -> Result<usize, RecordError> {
         let count = self.read("SELECT count(*) FROM tests WHERE origin <> 'reference'", [], |row| position(row, 0))?;
         Ok(count.into_iter().sum())
@@ -151,8 +152,8 @@ impl Repository {
         self.rows(number..=number)?.pop().ok_or_else(missing)
     }
 
-    /// The number of the test that a user calls `T158`, `158`, by the name of a known test or by the one it had before it
-    /// was imported, or `reference` (the first undisturbed run).
+    /// The number of the test that a user calls `T158`, `158`, by the name of a regression test or by its name before it was
+    /// imported, or `reference` (the first reference run).
     pub fn find(&self, name: &str) -> Result<u32, RecordError> {
         let found = self.read(
             "SELECT min(number) FROM tests WHERE name = ?1 OR name = 'T' || ?1 OR known_test = ?1 \
@@ -323,7 +324,7 @@ impl Repository {
     /// The indicators after each generation; none of an imported campaign, whose tests are of no generation.
     pub fn indicators(&self) -> Result<Vec<GenerationIndicators>, RecordError> {
         self.read(
-            "SELECT generation, evaluations, unique_tests, void, crashes, timeouts, front, hypervolume, standard_error \
+            "SELECT generation, evaluations, unique_tests, no_effect, crashes, timeouts, front, hypervolume, standard_error \
              FROM indicators ORDER BY generation",
             [],
             |row| {
@@ -331,7 +332,7 @@ impl Repository {
                     generation: row.get(0)?,
                     evaluations: row.get(1)?,
                     unique: row.get(2)?,
-                    void: row.get(3)?,
+                    no_effect: row.get(3)?,
                     crashes: row.get(4)?,
                     timeouts: row.get(5)?,
                     front: row.get(6)?,
@@ -384,10 +385,10 @@ impl Repository {
         let alone = self.connection.is_autocommit();
         let _transaction = alone.then(|| self.connection.unchecked_transaction()).transpose().map_err(failed)?;
         let damaged = |problem: String| RecordError::damaged(&self.path, problem);
-        let prepare = |sql: &str| self.connection.prepare_cached(sql).map_err(failed);
+        let prepare = |sql: &str| self.connection.prepare_cached(&schema::query(sql, self.schema)).map_err(failed);
         let within = params![numbers.start(), numbers.end()];
         let mut operations = prepare(
-            "SELECT test, position, operation, draw_seed, start_s, end_s, start_condition, end_condition, length_s, times \
+            "SELECT test, position, operation, operation_seed, start_s, end_s, start_condition, end_condition, length_s, times \
              FROM operations WHERE test BETWEEN ?1 AND ?2 ORDER BY test, position",
         )?;
         let mut choices = prepare(
@@ -439,7 +440,7 @@ impl Repository {
                 of.push(choice);
             }
             let mut used = Vec::new();
-            for (at, name, draw_seed, window, conditions) in operations.of(number).map_err(failed)? {
+            for (at, name, operation_seed, window, conditions) in operations.of(number).map_err(failed)? {
                 self.in_order(number, "operations", at, used.len())?;
                 let operation = *ids
                     .get(name.as_str())
@@ -450,7 +451,7 @@ impl Repository {
                     operation,
                     activation: self.activation(number, operation, window, conditions)?,
                     parameters,
-                    draw_seed: self.seed(&draw_seed)?,
+                    draw_seed: self.seed(&operation_seed)?,
                 });
             }
             if !chosen.is_empty() {
@@ -631,7 +632,7 @@ impl Repository {
                 .zip(&self.plan().tests)
                 .find(|(_, test)| test.name == name)
                 .map(|(id, _)| Origin::Known(KnownTestId(id)))
-                .ok_or_else(|| RecordError::damaged(&self.path, format!("the plan has no known test `{name}`"))),
+                .ok_or_else(|| RecordError::damaged(&self.path, format!("the plan has no regression test `{name}`"))),
             _ => Err(RecordError::damaged(&self.path, format!("a test cannot come from `{origin}`"))),
         }
     }
@@ -644,7 +645,8 @@ impl Repository {
     ) -> Result<Outcome, RecordError> {
         match (word, detail, limit) {
             ("completed", None, None) => Ok(Outcome::Completed),
-            ("void", None, None) => Ok(Outcome::Void),
+            ("no_effect", None, None) if self.schema >= STANDARD_WORDS_SINCE => Ok(Outcome::NoEffect),
+            ("void", None, None) if self.schema < STANDARD_WORDS_SINCE => Ok(Outcome::NoEffect),
             ("unknown", None, None) => Ok(Outcome::Unknown),
             ("crash", Some(message), None) => Ok(Outcome::Crash { message }),
             // A length of wall time, as programs count it.
@@ -683,7 +685,7 @@ impl Repository {
     ) -> Result<Vec<T>, RecordError> {
         let rows = self
             .connection
-            .prepare_cached(sql)
+            .prepare_cached(&schema::query(sql, self.schema))
             .and_then(|mut statement| statement.query_map(parameters, row)?.collect::<rusqlite::Result<Vec<T>>>());
         rows.map_err(|e| RecordError::database("read the results", &self.path, e))
     }

@@ -64,7 +64,7 @@ fn break_off(plan: &CampaignPlan, observation: &mut Observation, outcome: Outcom
     }
 }
 
-/// A campaign on a robot cell: two objectives, four requirements, four operations, one known test.
+/// A campaign on a robot cell: two objectives, four requirements, four operations, one regression test.
 pub fn plan() -> CampaignPlan {
     let hook = || MetricSource::Hook { topics: vec![TopicId(2)] };
     let offset = Parameter {
@@ -283,7 +283,7 @@ pub fn observe(plan: &CampaignPlan, test: &Test, seed: u64) -> Observation {
     };
     let disturbs = test.operations.is_empty() || effects.iter().any(|effect| effect.counters.any_effect());
     Observation {
-        outcome: if disturbs { Outcome::Completed } else { Outcome::Void },
+        outcome: if disturbs { Outcome::Completed } else { Outcome::NoEffect },
         end: 70.0,
         operations: effects,
         unheard: Vec::new(),
@@ -354,7 +354,7 @@ pub fn record(plan: &CampaignPlan, number: u32, origin: Origin, test: Test) -> T
     }
 }
 
-/// A campaign's records: the reference run, the known test, and random tests with every outcome among them.
+/// A campaign's records: the reference run, the regression test, and random tests with every outcome among them.
 pub fn records(plan: &CampaignPlan, searched: u32) -> Vec<TestRecord> {
     let mut records = vec![
         record(plan, 0, Origin::Reference, Test::default()),

@@ -1,5 +1,6 @@
 //! The database's schema: made new, and recognised.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::Read as _;
 use std::path::Path;
@@ -12,7 +13,7 @@ use sesame_plan::{CampaignPlan, Direction};
 use crate::record::{RecordError, series};
 
 /// The schema's version, in the file's `user_version`.
-pub const SCHEMA: i64 = 6;
+pub const SCHEMA: i64 = 7;
 
 /// The earliest schema that is still read. Nothing is written into results of an earlier schema than [`SCHEMA`].
 pub(crate) const EARLIEST: i64 = 5;
@@ -21,6 +22,22 @@ pub(crate) const EARLIEST: i64 = 5;
 pub(crate) const APPLICATION_ID: i64 = 0x5345_534D;
 
 pub(super) const DDL: &str = include_str!("schema.sql");
+
+/// The first schema with the standard words for outcomes, verdicts and columns: `no_effect`, `satisfied`, `inconclusive`,
+/// `conclusive`, `operation_seed`. Before, these were `void`, `kept`, `unsaid`, `said` and `draw_seed`. Verdicts are only in
+/// views, which nothing here reads.
+pub(super) const STANDARD_WORDS_SINCE: i64 = 7;
+
+/// Columns that this release reads from tables, and their names before [`STANDARD_WORDS_SINCE`].
+const RENAMED: [(&str, &str); 2] = [("operation_seed", "draw_seed"), ("no_effect", "void")];
+
+/// A query of tables of the current schema, with the names of columns that a file of another schema has.
+pub(super) fn query(sql: &str, schema: i64) -> Cow<'_, str> {
+    if schema >= STANDARD_WORDS_SINCE {
+        return Cow::Borrowed(sql);
+    }
+    Cow::Owned(RENAMED.iter().fold(sql.to_owned(), |sql, (now, before)| sql.replace(now, before)))
+}
 
 /// Makes all tables and views, and fills in what is fixed for a campaign; all or nothing.
 pub(crate) fn install(connection: &mut Connection, plan: &CampaignPlan, seed: u64) -> rusqlite::Result<()> {

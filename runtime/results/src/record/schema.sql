@@ -3,8 +3,8 @@
 -- Times are seconds of simulation time since the start of a run (columns ending in _s), unless the table says wall time.
 -- Values of metrics and parameters are in the unit that stands beside their name. Numbers that need 64 unsigned bits
 -- (seeds) are decimal text, since SQLite's integers are signed.
--- Questions most people have are answered by the views: results, front, findings, confirmations, verdicts, series.
--- A test that was run again is what its fresh runs say: verdicts and findings go by them.
+-- The views answer common questions: results, front, findings, confirmations, verdicts, series.
+-- If a test was run again, its verdicts and findings are those of its fresh runs.
 
 -- The campaign: one row.
 CREATE TABLE campaign (
@@ -17,7 +17,7 @@ CREATE TABLE campaign (
     seed            TEXT NOT NULL,  -- the one seed that decided everything
     evaluations     INTEGER NOT NULL, -- tests the search was to evaluate
     end_after_s     REAL NOT NULL,  -- simulation time at which a test ends
-    plan            TEXT NOT NULL,  -- everything the runner knew of the campaign, JSON
+    plan            TEXT NOT NULL,  -- everything the runner knew about the campaign, JSON
     stop            TEXT            -- why the run ended; NULL while it is unfinished
 ) STRICT;
 
@@ -45,12 +45,14 @@ CREATE TABLE requirements (
 CREATE TABLE tests (
     number          INTEGER PRIMARY KEY,
     name            TEXT NOT NULL UNIQUE, -- T and the number
-    origin          TEXT NOT NULL CHECK (origin IN ('reference', 'known', 'search')), -- reference: undisturbed
-    known_test      TEXT,           -- name of the known test in the .sesame file
+    origin          TEXT NOT NULL CHECK (origin IN ('reference', 'known', 'search')), -- reference: the reference run;
+                                    -- known: a regression test
+    known_test      TEXT,           -- name of the regression test in the .sesame file
     generation      INTEGER,
     simulator_seed  TEXT NOT NULL,
-    outcome         TEXT NOT NULL CHECK (outcome IN ('completed', 'void', 'unknown', 'crash', 'timeout')), -- void: no effect
-                                    -- unknown: imported, and nobody counted effects
+    outcome         TEXT NOT NULL CHECK (outcome IN ('completed', 'no_effect', 'unknown', 'crash', 'timeout')),
+                                    -- no_effect: no operation had an effect;
+                                    -- unknown: imported from a program that did not count effects
     outcome_detail  TEXT,           -- what is known of a crash
     time_limit_s    REAL,           -- of a timeout, in seconds of wall time
     end_s           REAL NOT NULL,  -- when the run ended
@@ -58,7 +60,7 @@ CREATE TABLE tests (
     duplicate_of    INTEGER REFERENCES tests -- the equal test whose result stands for this one, which was not simulated
 ) STRICT;
 
--- What tests were called in the file they were imported from; empty for a campaign that was run.
+-- The names of tests in the file they were imported from; empty for a campaign that was run.
 CREATE TABLE original_names (
     test            INTEGER PRIMARY KEY REFERENCES tests,
     name            TEXT NOT NULL
@@ -82,7 +84,7 @@ CREATE TABLE operations (
     end_condition   TEXT,           -- what ends it, likewise; NULL where it has a length
     length_s        REAL,           -- how long each activation by condition is; NULL where a condition ends it
     times           INTEGER,        -- how often at most it is activated by condition; NULL where time starts it
-    draw_seed       TEXT NOT NULL,
+    operation_seed  TEXT NOT NULL,  -- of its random draws, in this test
     seen            INTEGER,        -- messages that reached it while it was active
     changed         INTEGER,
     dropped         INTEGER,
@@ -90,9 +92,9 @@ CREATE TABLE operations (
     queued          INTEGER,        -- came while it was not active, and waited behind those it still held
     injected        INTEGER,
     side_effects    INTEGER,
-    unheard         INTEGER,        -- changed, dropped, held back or made up where nobody listens: no effect, and in no other count
-    first_touch_s   REAL,           -- its first effect
-    last_touch_s    REAL,           -- its last effect
+    unheard         INTEGER,        -- changed, dropped, held back or injected where no node subscribes: not an effect, and in no other count
+    first_touch_s   REAL,           -- time of its first effect
+    last_touch_s    REAL,           -- time of its last effect
     PRIMARY KEY (test, position)
 ) STRICT, WITHOUT ROWID;
 
@@ -134,8 +136,8 @@ CREATE TABLE tails (
     PRIMARY KEY (test, operation, position)
 ) STRICT, WITHOUT ROWID;
 
--- Names on the wire that operations of the campaign act on and that nobody heard in a run: the simulator did not subscribe
--- to them, and no outbound metric reads them.
+-- Names on the wire that operations of the campaign act on and that had no receiver in a run: the simulator did not
+-- subscribe to them, and no outbound metric reads them.
 CREATE TABLE unheard (
     test            INTEGER NOT NULL REFERENCES tests,
     position        INTEGER NOT NULL, -- in the order of declaration
@@ -148,8 +150,8 @@ CREATE TABLE metric_values (
     metric          INTEGER NOT NULL REFERENCES metrics,
     value           REAL,           -- NULL: neither set nor defaulted
     is_set          INTEGER NOT NULL, -- 0: the value is the default
-    reach_low       REAL,           -- the least value that it could have had at the end of the run, whatever the rest of a run
-                                    -- that broke off had brought; the value itself in a completed run. NULL: there is no least
+    reach_low       REAL,           -- the least value that it could still have taken by the planned end, if the run broke off;
+                                    -- the value itself in a completed run. NULL: there is no least
     reach_high      REAL,           -- the greatest; NULL: there is no greatest
     not_finite_s    REAL,           -- when it first read a number that was not finite; NULL: never
     PRIMARY KEY (test, metric)
@@ -170,13 +172,13 @@ CREATE TABLE series_pieces (
     PRIMARY KEY (test, metric, position)
 ) STRICT, WITHOUT ROWID;
 
--- Runs of tests again, each with a fresh seed of the simulator and all else the same: to confirm what was found. They are
--- no tests: no search asked for them.
+-- Runs of tests again, each with a fresh seed of the simulator and everything else equal, to confirm findings. They do not
+-- count as tests: no search asked for them.
 CREATE TABLE repetitions (
     test            INTEGER NOT NULL REFERENCES tests,
     position        INTEGER NOT NULL, -- among the repetitions of its test, from 1
     simulator_seed  TEXT NOT NULL,
-    outcome         TEXT NOT NULL CHECK (outcome IN ('completed', 'void', 'crash', 'timeout')),
+    outcome         TEXT NOT NULL CHECK (outcome IN ('completed', 'no_effect', 'crash', 'timeout')),
     outcome_detail  TEXT,           -- what is known of a crash
     time_limit_s    REAL,           -- of a timeout, in seconds of wall time
     end_s           REAL NOT NULL,  -- when the run ended
@@ -190,8 +192,8 @@ CREATE TABLE repetition_values (
     metric          INTEGER NOT NULL REFERENCES metrics,
     value           REAL,           -- NULL: neither set nor defaulted
     is_set          INTEGER NOT NULL, -- 0: the value is the default
-    reach_low       REAL,           -- the least value that it could have had at the end of the run, whatever the rest of a run
-                                    -- that broke off had brought; the value itself in a completed run. NULL: there is no least
+    reach_low       REAL,           -- the least value that it could still have taken by the planned end, if the run broke off;
+                                    -- the value itself in a completed run. NULL: there is no least
     reach_high      REAL,           -- the greatest; NULL: there is no greatest
     not_finite_s    REAL,           -- when it first read a number that was not finite; NULL: never
     PRIMARY KEY (test, position, metric)
@@ -210,40 +212,40 @@ CREATE TABLE result_set_members (
     PRIMARY KEY (result_set, position)
 ) STRICT, WITHOUT ROWID;
 
--- How much of the space was looked at, after each generation of a campaign that counts it.
+-- How much of the space was covered after each generation, for a campaign that counts coverage.
 CREATE TABLE coverage (
     generation      INTEGER PRIMARY KEY,
     evaluations     INTEGER NOT NULL, -- tests evaluated by then
     covered         INTEGER NOT NULL, -- cells that enough tests have hit
     cells           INTEGER NOT NULL,
-    feasible        INTEGER NOT NULL  -- cells that a test can reach, as far as known, or has hit
+    feasible        INTEGER NOT NULL  -- cells that a test can reach, as far as is known, or has hit
 ) STRICT;
 
--- How good the front was after each generation, and what the tests came to by then.
+-- The quality of the front after each generation, and how the tests ended by then.
 CREATE TABLE indicators (
     generation      INTEGER PRIMARY KEY,
     evaluations     INTEGER NOT NULL, -- tests evaluated by then
-    unique_tests    INTEGER NOT NULL, -- of these, no exact duplicates of an earlier one
-    void            INTEGER NOT NULL, -- of these, without effect
+    unique_tests    INTEGER NOT NULL, -- of these, not exact duplicates of an earlier one
+    no_effect       INTEGER NOT NULL, -- of these, in which no operation had an effect
     crashes         INTEGER NOT NULL,
     timeouts        INTEGER NOT NULL,
     front           INTEGER NOT NULL, -- tests on the front
     hypervolume     REAL,           -- of the front up to the reference point; NULL without objectives, before anything was
-                                    -- measured, and where the front has no end
+                                    -- measured, and where the front is unbounded
     estimated       INTEGER NOT NULL CHECK (estimated IN (0, 1)), -- 1: an exact hypervolume would have taken too long
     standard_error  REAL            -- of an estimated hypervolume
 ) STRICT;
 
--- The point that hypervolumes are measured from: of each objective the worst value of the undisturbed run and of the tests
--- up to the first generation with a measured one, and half of the range of these values beyond it. It never moves.
+-- The point that hypervolumes are measured from: for each objective the worst value of the reference run and of the tests
+-- up to the first generation with a measured one, plus half of the range of these values. It never moves.
 CREATE TABLE reference_point (
     objective       INTEGER PRIMARY KEY, -- position among the campaign's objectives, from 0
     metric          INTEGER NOT NULL REFERENCES metrics,
     value           REAL NOT NULL   -- in the metric's unit
 ) STRICT;
 
--- What happened that a user should know. A warning belongs to the content; a session note (interrupted, resumed, a
--- worker restarted) to one way of getting there.
+-- Events that a user should know about. A warning belongs to the content; a session note (interrupted, resumed, a worker
+-- restarted) belongs to the session.
 CREATE TABLE events (
     id              INTEGER PRIMARY KEY,
     kind            TEXT NOT NULL CHECK (kind IN ('warning', 'session')),
@@ -269,19 +271,19 @@ CREATE TABLE wall_times (
     run_s           REAL NOT NULL   -- wall time of the run as its worker saw it
 ) STRICT;
 
--- Per test and requirement what its own run says, the one that selected it: violated if no value that the metric could have
--- had is inside the bound, kept if the run came to its end, everything that the metric read was finite, and its value is
--- inside the bound; otherwise unsaid.
+-- Per test and requirement the verdict of its first run, the one that selected it: violated if no value that the metric could
+-- have taken is inside the bound; satisfied if the run ended as planned, everything that the metric read was finite, and its
+-- value is inside the bound; otherwise inconclusive.
 CREATE VIEW first_verdicts AS
     SELECT t.number AS test, t.name AS test_name, r.name AS requirement, r.text AS requirement_text, v.value AS value,
            CASE
                WHEN v.reach_high < r.low OR v.reach_low > r.high OR (r.low_excluded AND v.reach_high = r.low)
                     OR (r.high_excluded AND v.reach_low = r.high) THEN 'violated'
-               WHEN v.value IS NULL OR v.not_finite_s IS NOT NULL OR t.outcome NOT IN ('completed', 'void', 'unknown')
-                    THEN 'unsaid'
+               WHEN v.value IS NULL OR v.not_finite_s IS NOT NULL OR t.outcome NOT IN ('completed', 'no_effect', 'unknown')
+                    THEN 'inconclusive'
                WHEN v.value < r.low OR v.value > r.high OR (r.low_excluded AND v.value = r.low)
-                    OR (r.high_excluded AND v.value = r.high) THEN 'unsaid'
-               ELSE 'kept'
+                    OR (r.high_excluded AND v.value = r.high) THEN 'inconclusive'
+               ELSE 'satisfied'
            END AS verdict
       FROM tests t CROSS JOIN requirements r LEFT JOIN metric_values v ON v.test = t.number AND v.metric = r.metric;
 
@@ -291,18 +293,18 @@ CREATE VIEW repetition_verdicts AS
            CASE
                WHEN v.reach_high < r.low OR v.reach_low > r.high OR (r.low_excluded AND v.reach_high = r.low)
                     OR (r.high_excluded AND v.reach_low = r.high) THEN 'violated'
-               WHEN v.value IS NULL OR v.not_finite_s IS NOT NULL OR n.outcome NOT IN ('completed', 'void')
-                    THEN 'unsaid'
+               WHEN v.value IS NULL OR v.not_finite_s IS NOT NULL OR n.outcome NOT IN ('completed', 'no_effect')
+                    THEN 'inconclusive'
                WHEN v.value < r.low OR v.value > r.high OR (r.low_excluded AND v.value = r.low)
-                    OR (r.high_excluded AND v.value = r.high) THEN 'unsaid'
-               ELSE 'kept'
+                    OR (r.high_excluded AND v.value = r.high) THEN 'inconclusive'
+               ELSE 'satisfied'
            END AS verdict
       FROM repetitions n CROSS JOIN requirements r
            LEFT JOIN repetition_values v ON v.test = n.test AND v.position = n.position AND v.metric = r.metric;
 
--- Per test and requirement what the test says. One that was run again violates a requirement if a repetition does, and keeps
--- it if repetitions say something and none violates it; where none says anything, only a violation by its own run stands.
--- The value is that of its own run.
+-- Per test and requirement the verdict of the test. If it was run again, it violates the requirement if a repetition does, and
+-- satisfies it if some repetition satisfies it and none violates it; if all repetitions are inconclusive, only a violation by
+-- its first run stands. The value is that of its first run.
 CREATE VIEW verdicts AS
     SELECT f.test AS test, f.test_name AS test_name, f.requirement AS requirement, f.requirement_text AS requirement_text,
            f.value AS value,
@@ -310,17 +312,17 @@ CREATE VIEW verdicts AS
                WHEN EXISTS (SELECT 1 FROM repetition_verdicts n WHERE n.test = coalesce(t.duplicate_of, t.number)
                                AND n.requirement = f.requirement AND n.verdict = 'violated') THEN 'violated'
                WHEN EXISTS (SELECT 1 FROM repetition_verdicts n WHERE n.test = coalesce(t.duplicate_of, t.number)
-                               AND n.requirement = f.requirement AND n.verdict = 'kept') THEN 'kept'
-               WHEN f.verdict = 'kept'
-                    AND EXISTS (SELECT 1 FROM repetitions n WHERE n.test = coalesce(t.duplicate_of, t.number)) THEN 'unsaid'
+                               AND n.requirement = f.requirement AND n.verdict = 'satisfied') THEN 'satisfied'
+               WHEN f.verdict = 'satisfied'
+                    AND EXISTS (SELECT 1 FROM repetitions n WHERE n.test = coalesce(t.duplicate_of, t.number)) THEN 'inconclusive'
                ELSE f.verdict
            END AS verdict
       FROM first_verdicts f JOIN tests t ON t.number = f.test JOIN requirements r ON r.name = f.requirement
      ORDER BY t.number, r.id;
 
--- What a tester looks for: violated requirements, crashes, timeouts, and metrics that read numbers that are not finite (NaN,
--- infinity), with the time of the first one as their value. Duplicates are left out, and so is what a test's own run showed
--- and none of its repetitions does.
+-- Findings: violated requirements, crashes, timeouts, and metrics that read numbers that are not finite (NaN, infinity), with
+-- the time of the first one as their value. Duplicates are left out, and so are findings of a first run that no repetition
+-- shows.
 CREATE VIEW findings AS
     SELECT v.test, v.test_name, 'violation' AS finding, v.requirement, v.value, v.requirement_text AS detail
       FROM verdicts v JOIN tests t ON t.number = v.test
@@ -342,12 +344,12 @@ CREATE VIEW findings AS
      WHERE v.not_finite_s IS NOT NULL AND t.duplicate_of IS NULL
      ORDER BY 1, 3, 4;
 
--- Requirements that a test which was run again violates, in its own run or in a repetition: what its own run says, and how
--- many of the repetitions violate it, of those that say anything, of all.
+-- Requirements that a test which was run again violates, in its first run or in a repetition: the verdict of its first run,
+-- how many repetitions violate it, how many are conclusive, and how many there are.
 CREATE VIEW confirmations AS
     SELECT f.test AS test, f.test_name AS test_name, f.requirement AS requirement, f.verdict AS first,
            count(*) FILTER (WHERE n.verdict = 'violated') AS confirmed,
-           count(*) FILTER (WHERE n.verdict <> 'unsaid') AS said, count(*) AS repetitions
+           count(*) FILTER (WHERE n.verdict <> 'inconclusive') AS conclusive, count(*) AS repetitions
       FROM repetition_verdicts n JOIN first_verdicts f ON f.test = n.test AND f.requirement = n.requirement
            JOIN requirements r ON r.name = f.requirement
      GROUP BY f.test, r.id

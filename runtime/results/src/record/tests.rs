@@ -15,6 +15,8 @@ use sesame_search::{Rates, TestVariation};
 
 use super::*;
 
+mod earlier;
+
 fn folder() -> TempDir {
     tempfile::tempdir().unwrap()
 }
@@ -501,7 +503,7 @@ fn the_verdicts_of_the_view_are_those_of_the_function() {
     let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).unwrap();
     let view: Vec<(u32, String, String)> = rows.collect::<Result<_, _>>().unwrap();
     assert_eq!(view, expected);
-    for word in ["kept", "violated", "unsaid"] {
+    for word in ["satisfied", "violated", "inconclusive"] {
         assert!(view.iter().any(|row| row.2 == word), "the sample has every verdict");
     }
 }
@@ -609,7 +611,7 @@ fn change(record: &mut TestRecord, kind: usize) {
         17 => observation.operations[0].first_touch = Some(0.5),
         18 => {
             let Activation::Time { start, .. } = &mut record.test.operations[0].activation else {
-                panic!("the known test has a window")
+                panic!("the regression test has a window")
             };
             *start = start.next_down();
         }
@@ -837,7 +839,7 @@ proptest! {
         plan.requirements[0].bound = bound;
         let mut record = sample::record(&plan, 3, Origin::Search, Test::default());
         record.observation.outcome = [
-            Outcome::Completed, Outcome::Void, Outcome::Timeout { limit: 1.0 }, Outcome::Crash { message: String::new() },
+            Outcome::Completed, Outcome::NoEffect, Outcome::Timeout { limit: 1.0 }, Outcome::Crash { message: String::new() },
         ][outcome].clone();
         // Of a whole run and of one that broke off; also with values that do not fit their reach, which no run shows.
         let shown = MetricValue {
@@ -892,37 +894,6 @@ fn what_was_imported_keeps_its_intervals_and_names_without_counts() {
     let seen: Option<i64> =
         repository.connection.query_row("SELECT seen FROM operations", [], |row| row.get(0)).unwrap();
     assert_eq!(seen, None, "nobody counted");
-}
-
-/// What a runner of schema 5 recorded, in a folder of its own.
-fn of_schema_5() -> TempDir {
-    let folder = folder();
-    let open = Connection::open(folder.path().join(DATABASE)).unwrap();
-    open.execute_batch(include_str!("schema_5.sql")).unwrap();
-    folder
-}
-
-#[test]
-fn results_of_schema_5_are_read_with_the_digest_they_were_given_and_nothing_is_added_to_them() {
-    let folder = of_schema_5();
-    let before = std::fs::read(folder.path().join(DATABASE)).unwrap();
-    let repository = Repository::open(folder.path()).unwrap();
-    let digest = "159582fa2a626aa26bdf7fa872956f1725ec44b8bf8bda977ea7e54205246737";
-    assert_eq!(repository.digest().unwrap(), digest);
-    let test = repository.test(2).unwrap();
-    let speed = &test.observation.metrics[1].series;
-    assert_eq!((speed.len(), speed[3].0), (4, 0.08));
-    assert_eq!(repository.tests().unwrap().len(), 5);
-    let mut scanned = 0;
-    repository.scan(&mut |_| scanned += 1).unwrap();
-    assert_eq!(scanned, 5);
-    assert!(crate::report::page(&repository).unwrap().contains(digest));
-    drop(repository);
-    for added in [Recorder::resume(folder.path(), 1), Recorder::reopen(folder.path(), 1)] {
-        let said = added.unwrap_err().to_string();
-        assert!(said.contains("schema 5, this release writes 6: they can be read"), "{said}");
-    }
-    assert_eq!(std::fs::read(folder.path().join(DATABASE)).unwrap(), before);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What running tests again says of what was found: how often each finding came again, and how sure that is.
+//! Findings of tests that were run again: how often each was seen again, and how sure that is.
 
 use std::fmt::Write as _;
 
@@ -11,7 +11,7 @@ use crate::record::{Judge, RecordError, Repetition, Repository, Standing, Tally,
 use crate::report::number::{self, fixed, join_words, plural};
 use crate::report::repetition::wilson;
 
-/// What the repetitions of a test say. The run that selected it is none of them.
+/// The findings of a test that was run again. The run that selected the test is not one of its repetitions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ConfirmedTest {
     /// Its name.
@@ -27,13 +27,14 @@ pub struct ConfirmedTest {
     /// A value per objective by which the front takes the test, where the campaign confirms; `None` where too few
     /// repetitions have one.
     pub values: Option<Vec<f64>>,
-    /// All that its first run or a fresh one shows: violated requirements in the space's order, then a crash and a timeout.
+    /// Everything that its first run or a fresh one shows: violated requirements in the space's order, then a crash and a
+    /// timeout.
     pub findings: Vec<FindingAgain>,
-    /// Of its findings, how the surest one stands; `None` where nothing was found, or no fresh run says anything about it.
+    /// The standing of its surest finding; `None` without findings, and if all fresh runs are inconclusive.
     pub standing: Option<Standing>,
 }
 
-/// A finding, and how often it came again.
+/// A finding, and how often it was seen again.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FindingAgain {
     /// The name of the violated requirement, or `crash` or `timeout`.
@@ -42,42 +43,43 @@ pub struct FindingAgain {
     pub first: bool,
     /// Fresh runs that show it.
     pub again: usize,
-    /// Fresh runs that say whether it is there: these, and those that show that it is not.
-    pub said: usize,
-    /// Fresh runs that do not say: they broke off too early, or a value is missing.
-    pub unsaid: usize,
-    /// The 95 % Wilson interval of the probability that a run shows it; `None` where no fresh run says anything.
+    /// Fresh runs that are conclusive about it: those that show it, and those that show that it is absent.
+    pub conclusive: usize,
+    /// Fresh runs that are inconclusive: they broke off too early, or a value is missing.
+    pub inconclusive: usize,
+    /// The 95 % Wilson interval of the probability that a run shows it; `None` if all fresh runs are
+    /// inconclusive.
     pub interval: Option<[f64; 2]>,
-    /// Whether it is to be believed; `None` where no fresh run says anything.
+    /// Whether fresh runs confirm it; `None` if all of them are inconclusive.
     pub standing: Option<Standing>,
 }
 
 impl FindingAgain {
-    /// What fresh runs say of a finding; `None` where neither they nor the first run show it.
+    /// A finding according to fresh runs; `None` if neither they nor the first run show it.
     fn of(finding: &str, tally: Tally, first: Verdict) -> Option<FindingAgain> {
         (first == Verdict::Violated || tally.violated > 0).then(|| FindingAgain {
             finding: finding.to_owned(),
             first: first == Verdict::Violated,
             again: tally.violated,
-            said: tally.said(),
-            unsaid: tally.unsaid,
-            interval: wilson(tally.violated, tally.said()),
+            conclusive: tally.conclusive(),
+            inconclusive: tally.inconclusive,
+            interval: wilson(tally.violated, tally.conclusive()),
             standing: tally.standing(first),
         })
     }
 
-    /// How often it came again, as in `4 of 5 (0.38–0.96) flaky`.
+    /// How often it was seen again, as in `4 of 5 (0.38–0.96) flaky`.
     pub(crate) fn words(&self) -> String {
-        let silent = plural(self.unsaid, "run says nothing", "runs say nothing");
+        let silent = plural(self.inconclusive, "run inconclusive", "runs inconclusive");
         let Some(interval) = self.interval else { return silent };
-        let mut words = rate(self.again, self.said, interval);
+        let mut words = rate(self.again, self.conclusive, interval);
         if let Some(standing) = self.standing.filter(|&it| it != Standing::Confirmed) {
             let _ = write!(words, " {}", standing.words());
         }
         if !self.first {
             words.push_str(", not in its first run");
         }
-        if self.unsaid > 0 {
+        if self.inconclusive > 0 {
             let _ = write!(words, ", {silent}");
         }
         words
@@ -89,30 +91,30 @@ fn rate(shown: usize, said: usize, [low, high]: [f64; 2]) -> String {
     format!("{shown} of {said} ({}–{})", fixed(low, 2), fixed(high, 2))
 }
 
-/// What fresh runs say of a requirement, whichever it is, as in `0 of 5 (0.00–0.43)`.
+/// How many fresh runs violate a requirement, as in `0 of 5 (0.00–0.43)`.
 pub(crate) fn tally_words(tally: Tally) -> String {
-    let silent = plural(tally.unsaid, "run says nothing", "runs say nothing");
-    match wilson(tally.violated, tally.said()) {
+    let silent = plural(tally.inconclusive, "run inconclusive", "runs inconclusive");
+    match wilson(tally.violated, tally.conclusive()) {
         None => silent,
-        Some(interval) if tally.unsaid == 0 => rate(tally.violated, tally.said(), interval),
-        Some(interval) => format!("{}, {silent}", rate(tally.violated, tally.said(), interval)),
+        Some(interval) if tally.inconclusive == 0 => rate(tally.violated, tally.conclusive(), interval),
+        Some(interval) => format!("{}, {silent}", rate(tally.violated, tally.conclusive(), interval)),
     }
 }
 
-/// The outcomes that are findings of their own, by their words.
+/// The outcomes that are findings themselves, by their words.
 pub(crate) const FAILURES: [&str; 2] = ["crash", "timeout"];
 
-/// Whether a run ended with this outcome, said like a verdict: every run says whether it did.
+/// Whether a run ended with this outcome, as a verdict: violated if it did. No run is inconclusive about it.
 pub(crate) fn failed(outcome: &Outcome, word: &str) -> Verdict {
-    if outcome.word() == word { Verdict::Violated } else { Verdict::Kept }
+    if outcome.word() == word { Verdict::Violated } else { Verdict::Satisfied }
 }
 
-/// What runs say of a crash or a timeout.
+/// How many runs ended with a crash or a timeout.
 pub(crate) fn failed_tally(runs: &[Repetition], word: &str) -> Tally {
     Tally::of(runs.iter().map(|run| failed(&run.outcome, word)))
 }
 
-/// What the fresh runs of a test say of a crash or a timeout; `None` where it was run once only, or no run shows it.
+/// How often a crash or a timeout was seen again; `None` if the test was run once only, or no run shows it.
 pub(crate) fn failed_again(judge: &Judge<'_>, row: &TestRow, word: &str) -> Option<FindingAgain> {
     let runs = judge.runs(row.number);
     let tally = failed_tally(runs, word);
@@ -174,7 +176,7 @@ pub(crate) fn confirmed_values(plan: &CampaignPlan, runs: &[Repetition]) -> Opti
 }
 
 impl ConfirmedTest {
-    /// How often each finding came again, as in `R1 4 of 5 (0.38–0.96) flaky`.
+    /// How often each finding was seen again, as in `R1 4 of 5 (0.38–0.96) flaky`.
     pub(crate) fn words(&self) -> String {
         if self.findings.is_empty() {
             return format!("nothing in {}", plural(self.repetitions, "run", "runs"));
@@ -185,13 +187,13 @@ impl ConfirmedTest {
 
     /// The finding that fresh runs show most often; of equal ones the first.
     pub(crate) fn surest(&self) -> Option<&FindingAgain> {
-        let share = |finding: &FindingAgain| finding.again as f64 / finding.said as f64;
-        let said = self.findings.iter().filter(|finding| finding.said > 0);
+        let share = |finding: &FindingAgain| finding.again as f64 / finding.conclusive as f64;
+        let said = self.findings.iter().filter(|finding| finding.conclusive > 0);
         said.reduce(|best, finding| if share(finding) > share(best) { finding } else { best })
     }
 }
 
-/// How many of these tests' findings are how much to be believed, as in `4 confirmed, 1 flaky`; nothing for tests without
+/// How many of these tests are confirmed, flaky and not confirmed, as in `4 confirmed, 1 flaky`; empty for tests without
 /// findings.
 pub(crate) fn standings(tests: &[&ConfirmedTest]) -> String {
     let words = [Standing::Confirmed, Standing::Flaky, Standing::NotConfirmed].into_iter().filter_map(|standing| {
@@ -201,7 +203,7 @@ pub(crate) fn standings(tests: &[&ConfirmedTest]) -> String {
     join_words(&words.collect::<Vec<_>>())
 }
 
-/// How many runs confirmed what, in a sentence; nothing where no test was run again.
+/// How many runs confirmed findings of how many tests, in a sentence; `None` if no test was run again.
 pub(crate) fn confirmation_sentence(tests: &[ConfirmedTest]) -> Option<String> {
     let runs: usize = tests.iter().map(|test| test.repetitions).sum();
     if tests.is_empty() {
@@ -222,26 +224,26 @@ pub(crate) fn confirmation_sentence(tests: &[ConfirmedTest]) -> Option<String> {
     let surprises = tests.iter().filter(|test| test.findings.iter().any(|finding| !finding.first)).count();
     if surprises > 0 {
         let tests = plural(surprises, "test shows", "tests show");
-        let _ = write!(sentence, "; {tests} something that its first run did not");
+        let _ = write!(sentence, "; {tests} a finding that its first run did not");
     }
     Some(sentence)
 }
 
-/// How many tests with violations nobody looked at again, in a sentence; nothing where there is none, and where the
-/// campaign does not confirm and nothing was run again.
+/// How many tests with violations were run once only, in a sentence; `None` if there are none, and if a reader does not
+/// expect confirmation.
 pub(crate) fn once_sentence(once: usize, confirms: bool) -> Option<String> {
     let tests = plural(once, "test that violates a requirement was", "tests that violate a requirement were");
     (confirms && once > 0).then(|| format!("{tests} run once only"))
 }
 
-/// What the values of a front of confirmed tests are, in a sentence.
+/// How the values of a confirmed front were computed, in a sentence.
 pub(crate) fn values_sentence(confirmation: Confirmation) -> String {
     let runs = plural(confirmation.times as usize, "fresh run", "fresh runs");
     match confirmation.by {
         Statistic::Mean => format!("Values are means of {runs} of each test."),
         Statistic::Median => format!("Values are medians of {runs} of each test."),
         Statistic::Quantile { share } => {
-            format!("Values are what {} % of {runs} of each test reach or go beyond.", number::number(100.0 * share))
+            format!("Values are those that {} % of {runs} of each test reach or exceed.", number::number(100.0 * share))
         }
     }
 }

@@ -37,7 +37,7 @@ pub enum ExportError {
     Undisturbed(u32),
 }
 
-/// The test that a user calls `T158`, `158`, or by the name of a known test, as a block of the language.
+/// The test that a user calls `T158`, `158`, or by the name of a regression test, as a block of the language.
 ///
 /// The block has a `name` of its own, by default one that the space does not use yet. It expects of each objective the
 /// value that was measured; in a campaign without objectives, of each metric that a requirement bounds.
@@ -57,7 +57,7 @@ pub fn export(repository: &Repository, test: &str, name: Option<&str>) -> Result
 /// The block of a test that was made out of another one, `original`, in a campaign of this seed.
 pub(super) fn shrunk_block(plan: &CampaignPlan, seed: u64, record: &TestRecord, original: &str) -> String {
     let name = free_name(plan, &format!("{}_{original}_shrunk", plan.campaign.name));
-    block(plan, &format!("{original} of `{}`, seed {seed}, made smaller.", plan.campaign.name), record, &name)
+    block(plan, &format!("{original} of `{}`, seed {seed}, shrunk.", plan.campaign.name), record, &name)
 }
 
 fn block(plan: &CampaignPlan, doc: &str, record: &TestRecord, name: &str) -> String {

@@ -105,14 +105,18 @@ fn charts(markup: &mut Markup, analysis: &IndicatorAnalysis) {
         let all = it.evaluations.filter(|&all| all > 0)?;
         Some(100.0 * f64::from(count?) / f64::from(all))
     };
-    let void = |it: &Indicator| share(it.void, it);
+    let no_effect = |it: &Indicator| share(it.no_effect, it);
     let duplicates = |it: &Indicator| share(it.evaluations?.checked_sub(it.unique?), it);
     let failed = |it: &Indicator| share(it.crashes.zip(it.timeouts).map(|(crashes, timeouts)| crashes + timeouts), it);
     chart(
         markup,
         analysis,
         "share of all tests so far [%]",
-        &[("line void", "void", &void), ("line same", "duplicates", &duplicates), ("line bad", "failed", &failed)],
+        &[
+            ("line no-effect", "no effect", &no_effect),
+            ("line same", "duplicates", &duplicates),
+            ("line bad", "failed", &failed),
+        ],
     );
 }
 

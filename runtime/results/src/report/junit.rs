@@ -1,4 +1,4 @@
-//! What a campaign found, as JUnit XML: for build servers, which show what is broken without knowing what a campaign is.
+//! The results of a campaign as JUnit XML, for build servers.
 
 use std::path::Path;
 
@@ -17,11 +17,11 @@ pub fn write_junit(repository: &Repository, path: &Path) -> Result<(), RecordErr
 
 /// A summary as a JUnit test suite.
 ///
-/// Each requirement is a test case: it fails when a test violates it, and is skipped with a reason when none does but some
-/// say nothing about it. Each expectation of a known test is one: it fails when it is violated, and is an error when nothing
-/// is known. Each crash and each timeout is an error, and so is each test in which a metric read a number that was not finite.
-/// A test that was run again is what its fresh runs say: what its first run showed and no fresh one does fails nothing, and is
-/// named.
+/// Each requirement is a test case: it fails if a test violates it, and is skipped with a reason if none does but some are
+/// inconclusive. Each expectation of a regression test is a test case: it fails if it is violated, and is an error if it is
+/// inconclusive. Each crash and each timeout is an error, and so is each test in which a metric read a number that was not
+/// finite. Tests that were run again count with the verdicts of their fresh runs: a finding of the first run that no fresh
+/// run shows is named, but fails nothing.
 pub fn junit(summary: &Summary) -> String {
     let class = format!("{}.{}", summary.space, summary.campaign);
     let mut cases = Vec::new();
@@ -79,11 +79,11 @@ pub fn junit(summary: &Summary) -> String {
 struct Case {
     class: String,
     name: String,
-    /// `None` for one that passed and has nothing to say.
+    /// `None` for a case that passed without output.
     result: Option<Outcome>,
 }
 
-/// What became of a case that did not pass, or what one that passed has to say.
+/// The result of a case that did not pass, or the output of one that passed.
 struct Outcome {
     tag: &'static str,
     kind: Option<&'static str>,
@@ -92,8 +92,9 @@ struct Outcome {
 }
 
 fn requirement_case(class: &str, requirement: &RequirementSummary, confirmed: &[ConfirmedTest]) -> Case {
-    let RequirementSummary { requirement: name, text, metric, bound, kept, violated, unsaid, worst, .. } = requirement;
-    let counts = format!("{violated} violated, {kept} kept, {unsaid} unsaid");
+    let RequirementSummary { requirement: name, text, metric, bound, satisfied, violated, inconclusive, worst, .. } =
+        requirement;
+    let counts = format!("{violated} violated, {satisfied} satisfied, {inconclusive} inconclusive");
     let again: Vec<String> = confirmed
         .iter()
         .filter_map(|test| {
@@ -107,16 +108,19 @@ fn requirement_case(class: &str, requirement: &RequirementSummary, confirmed: &[
         let worst = worst.as_ref().map_or(String::new(), |worst| format!("; worst is {}: {}", worst.test, worst.text));
         let message = format!("violated by {tests}{worst}, required is {metric} {bound}{again}");
         Some(Outcome { tag: "failure", kind: Some("requirement"), message, text: counts })
-    } else if *kept == 0 {
-        let message = format!("no test says anything about it{again}");
+    } else if *satisfied == 0 {
+        let message = format!("all tests are inconclusive{again}");
         Some(Outcome { tag: "skipped", kind: None, message, text: counts })
-    } else if *unsaid > 0 {
-        let message = format!("{unsaid} of {} tests say nothing about it, the others keep it{again}", unsaid + kept);
+    } else if *inconclusive > 0 {
+        let message = format!(
+            "{inconclusive} of {} tests are inconclusive, the others satisfy it{again}",
+            inconclusive + satisfied
+        );
         Some(Outcome { tag: "skipped", kind: None, message, text: counts })
     } else if again.is_empty() {
         None
     } else {
-        // The case passes; what the first run showed stays named.
+        // The case passes; findings of the first run are still named.
         Some(Outcome { tag: "system-out", kind: None, message: String::new(), text: format!("{counts}{again}") })
     };
     Case { class: format!("{class}.requirements"), name: format!("{name}: {text}"), result }
@@ -128,11 +132,11 @@ fn expectation_case(class: &str, expectation: &ExpectationSummary) -> Case {
     let message = format!("{metric} is {value}, expected is {bound}");
     let text = format!("in {test}");
     let result = match verdict {
-        Verdict::Kept => None,
+        Verdict::Satisfied => None,
         Verdict::Violated => Some(Outcome { tag: "failure", kind: Some("expectation"), message, text }),
-        Verdict::Unsaid => {
-            let message = format!("{message}; the run does not tell");
-            Some(Outcome { tag: "error", kind: Some("unsaid"), message, text })
+        Verdict::Inconclusive => {
+            let message = format!("{message}; the run is inconclusive");
+            Some(Outcome { tag: "error", kind: Some("inconclusive"), message, text })
         }
     };
     Case { class: format!("{class}.{known_test}"), name: format!("{metric} {bound}"), result }
@@ -207,12 +211,12 @@ mod tests {
     }
 
     #[test]
-    fn what_says_nothing_is_no_pass() {
+    fn what_is_inconclusive_does_not_pass() {
         let mut summary = sample_summary();
         summary.requirements.iter_mut().for_each(|requirement| {
-            (requirement.kept, requirement.violated, requirement.worst) = (0, 0, None);
+            (requirement.satisfied, requirement.violated, requirement.worst) = (0, 0, None);
         });
-        summary.expectations.iter_mut().for_each(|expectation| expectation.verdict = Verdict::Unsaid);
+        summary.expectations.iter_mut().for_each(|expectation| expectation.verdict = Verdict::Inconclusive);
         summary.failures.clear();
         let xml = junit(&summary);
         let document = parsed(&xml);
@@ -222,14 +226,15 @@ mod tests {
     }
 
     #[test]
-    fn a_requirement_that_some_tests_leave_open_is_skipped_with_the_reason() {
+    fn a_requirement_about_which_some_tests_are_inconclusive_is_skipped_with_the_reason() {
         let mut summary = sample_summary();
         summary.requirements.truncate(1);
-        (summary.requirements[0].violated, summary.requirements[0].kept, summary.requirements[0].unsaid) = (0, 30, 2);
+        (summary.requirements[0].violated, summary.requirements[0].satisfied, summary.requirements[0].inconclusive) =
+            (0, 30, 2);
         let xml = junit(&summary);
         let document = parsed(&xml);
         let skipped = document.descendants().find(|node| node.has_tag_name("skipped")).unwrap();
-        assert_eq!(skipped.attribute("message"), Some("2 of 32 tests say nothing about it, the others keep it"));
+        assert_eq!(skipped.attribute("message"), Some("2 of 32 tests are inconclusive, the others satisfy it"));
     }
 
     #[test]

@@ -132,20 +132,24 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
         }
     }
     let front_caption = if front.len() < all.len() {
-        format!("{} of the {} tests on the front, evenly chosen; `show` tells the others.", front.len(), all.len())
+        format!("{} of the {} tests on the front, evenly chosen; use `show` for the others.", front.len(), all.len())
     } else {
         "Outlined: planned; filled: active. Red: outside the bound of a requirement.".to_owned()
     };
     let shrunk = summary.shrinking.as_ref().map_or_else(Vec::new, Shrinking::ends);
     more.retain(|number| !shrunk.contains(number));
-    let shrunk_caption = "The test that was made smaller, and what became of it.".to_owned();
+    let shrunk_caption = "The test before and after it was shrunk.".to_owned();
     vec![
         Group { title: "Before and after", caption: shrunk_caption, tests: shrunk },
-        Group { title: "Undisturbed", caption: "The reference run, for comparison.".to_owned(), tests: reference },
+        Group {
+            title: "Reference run",
+            caption: "The run without disturbance, for comparison.".to_owned(),
+            tests: reference,
+        },
         Group { title: "Tests on the front", caption: front_caption, tests: front },
         Group {
             title: "More tests to look at",
-            caption: "The worst violation of each requirement, crashes and timeouts, and known tests.".to_owned(),
+            caption: "The worst violation of each requirement, crashes and timeouts, and regression tests.".to_owned(),
             tests: more,
         },
     ]
@@ -180,9 +184,9 @@ fn header(body: &mut Markup, repository: &Repository, summary: &Summary, digest:
         }
         Search::Random { evaluations } => format!("random, {evaluations} evaluations"),
         Search::Repeat { test, times } => format!("{} repeated {times} times", plan.test(*test).name),
-        Search::Known { tests } => plural(tests.len(), "known test", "known tests"),
+        Search::Known { tests } => plural(tests.len(), "regression test", "regression tests"),
         Search::Shrink { test, evaluations, .. } => {
-            format!("{} made smaller, {evaluations} evaluations at most", plan.test(*test).name)
+            format!("{} shrunk, {evaluations} evaluations at most", plan.test(*test).name)
         }
     };
     let search = match plan.campaign.coverage.as_ref().and_then(|goal| goal.stop_at) {
@@ -225,7 +229,8 @@ fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     body.element("h2", &[], "Requirements");
     body.open("div", &[("class", "scroll")]);
     body.open("table", &[]);
-    let mut titles = vec!["", "Requirement", "Tests", "Violated", "Kept", "Unsaid", "Bound", "Undisturbed", "Worst"];
+    let mut titles =
+        vec!["", "Requirement", "Tests", "Violated", "Satisfied", "Inconclusive", "Bound", "Reference run", "Worst"];
     let again = !summary.confirmed.is_empty();
     titles.extend(again.then_some("Run again"));
     heading_row(body, &titles, 3..6);
@@ -239,11 +244,11 @@ fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
         body.close();
         let broken = if requirement.violated > 0 { "number bad" } else { "number" };
         body.element("td", &[("class", broken)], &requirement.violated.to_string());
-        body.element("td", &[("class", "number")], &requirement.kept.to_string());
-        body.element("td", &[("class", "number")], &requirement.unsaid.to_string());
+        body.element("td", &[("class", "number")], &requirement.satisfied.to_string());
+        body.element("td", &[("class", "number")], &requirement.inconclusive.to_string());
         body.element("td", &[("class", "keep")], &format!("{} {}", requirement.metric, requirement.bound));
-        let undisturbed = if requirement.reference == Some(Verdict::Violated) { "bad" } else { "quiet" };
-        body.element("td", &[("class", undisturbed)], requirement.reference.map_or("–", Verdict::word));
+        let reference = if requirement.reference == Some(Verdict::Violated) { "bad" } else { "quiet" };
+        body.element("td", &[("class", reference)], requirement.reference.map_or("–", Verdict::word));
         body.open("td", &[("class", "keep")]);
         match &requirement.worst {
             Some(worst) => {
@@ -267,15 +272,20 @@ fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     body.close();
 }
 
-/// The shares of tests that violate, keep, and leave unsaid.
+/// The shares of tests that violate a requirement, that satisfy it, and that are inconclusive.
 fn verdict_bar(body: &mut Markup, requirement: &RequirementSummary) {
-    let total = (requirement.violated + requirement.kept + requirement.unsaid).max(1) as f64;
-    let label = format!("{} violated, {} kept, {} unsaid", requirement.violated, requirement.kept, requirement.unsaid);
+    let total = (requirement.violated + requirement.satisfied + requirement.inconclusive).max(1) as f64;
+    let label = format!(
+        "{} violated, {} satisfied, {} inconclusive",
+        requirement.violated, requirement.satisfied, requirement.inconclusive
+    );
     body.open("svg", &[("class", "bar"), ("viewBox", "0 0 100 10"), ("role", "img"), ("aria-label", &label)]);
     let mut left = 0.0;
-    for (count, class) in
-        [(requirement.violated, "violated"), (requirement.kept, "kept"), (requirement.unsaid, "unsaid")]
-    {
+    for (count, class) in [
+        (requirement.violated, "violated"),
+        (requirement.satisfied, "satisfied"),
+        (requirement.inconclusive, "inconclusive"),
+    ] {
         let width = 100.0 * count as f64 / total;
         let (x, width_text) = (coordinate(left), coordinate(width));
         body.leaf("rect", &[("class", class), ("x", &x), ("y", "0"), ("width", &width_text), ("height", "10")]);
@@ -285,7 +295,7 @@ fn verdict_bar(body: &mut Markup, requirement: &RequirementSummary) {
 }
 
 fn front(body: &mut Markup, repository: &Repository, summary: &Summary, rows: &[TestRow], drawn: &[u32]) {
-    // Of tests that differ in a step or two from each other, how far metrics went says nothing.
+    // Tests of a shrink differ in a step or two from each other, so how far metrics went means nothing.
     if summary.shrinking.is_some() {
         return;
     }
@@ -361,7 +371,7 @@ fn points(
         .collect()
 }
 
-/// What a dot says when it is pointed at: the test, what it disturbs, and the values of its objectives.
+/// The tooltip of a dot: the test, its operations, and the values of its objectives.
 pub(crate) fn dot_title(plan: &CampaignPlan, summary: &Summary, row: &TestRow) -> String {
     let values = summary.objectives.iter().enumerate().map(|(at, objective)| {
         let value = shown_value(summary, row, at).map_or("–".to_owned(), number::number);
@@ -369,7 +379,7 @@ pub(crate) fn dot_title(plan: &CampaignPlan, summary: &Summary, row: &TestRow) -
     });
     let values = values.collect::<Vec<String>>().join(", ");
     match row.origin {
-        Origin::Reference => format!("undisturbed: {values}"),
+        Origin::Reference => format!("reference run: {values}"),
         Origin::Known(_) | Origin::Search => format!("T{} ({}): {values}", row.number, operations(plan, row)),
     }
 }
@@ -378,7 +388,7 @@ fn caption(summary: &Summary, repository: &Repository) -> String {
     let counts = &summary.counts;
     let mut hidden = Vec::new();
     for (count, word) in [
-        (counts.void, "void"),
+        (counts.no_effect, "with no effect"),
         (counts.unmeasured, "unmeasured"),
         (counts.crashes, "crashed"),
         (counts.timeouts, "timed out"),
@@ -390,13 +400,13 @@ fn caption(summary: &Summary, repository: &Repository) -> String {
     }
     let mut caption =
         "Each dot is a test; emphasised: no other test is better in one objective without being worse in another. \
-         The ring is the undisturbed run. Point at a dot to see its operations and values. Click one to see it over time, where this page has room for \
-         that; `show` tells the others."
+         The ring is the reference run. Point at a dot to see its operations and values. Click a dot to see its timeline, \
+         if it is on this page; use `show` for other tests."
             .to_owned();
     if let Some(confirmation) = summary.confirmation {
         let _ = write!(
             caption,
-            " {} Tests that never came near the front are where their one run was.",
+            " {} Tests that never came near the front are shown with the values of their only run.",
             values_sentence(confirmation)
         );
     }
@@ -502,10 +512,10 @@ fn expectations(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
         return;
     }
     body.open("section", &[]);
-    body.element("h2", &[], "Known tests");
+    body.element("h2", &[], "Regression tests");
     body.open("div", &[("class", "scroll")]);
     body.open("table", &[]);
-    heading_row(body, &["Known test", "Test", "Metric", "Value", "Expected", "Came out"], 3..4);
+    heading_row(body, &["Regression test", "Test", "Metric", "Value", "Expected", "As expected"], 3..4);
     body.open("tbody", &[]);
     for expectation in &summary.expectations {
         body.open("tr", &[]);
@@ -516,7 +526,7 @@ fn expectations(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
         body.element("td", &[], &expectation.metric);
         body.element("td", &[("class", "number")], &expectation_value(expectation));
         body.element("td", &[], &expectation.bound);
-        let class = if expectation.verdict == Verdict::Kept { "words" } else { "bad" };
+        let class = if expectation.verdict == Verdict::Satisfied { "words" } else { "bad" };
         body.element("td", &[("class", class)], came_out(expectation.verdict));
         body.close();
     }
@@ -536,7 +546,7 @@ fn failures(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     body.open("table", &[]);
     let mut titles = vec!["Test", "Outcome", "At", "Cause"];
     let again = summary.failures.iter().any(|failure| failure.again.is_some());
-    titles.extend(again.then_some("Came again"));
+    titles.extend(again.then_some("Seen again"));
     heading_row(body, &titles, 2..3);
     body.open("tbody", &[]);
     for failure in summary.failures.iter().take(50) {
@@ -559,7 +569,7 @@ fn failures(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
         body.element(
             "p",
             &[("class", "quiet")],
-            &format!("And {} more; `list` tells all.", summary.failures.len() - 50),
+            &format!("And {} more; `list` shows all.", summary.failures.len() - 50),
         );
     }
     body.close();

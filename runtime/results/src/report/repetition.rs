@@ -25,7 +25,7 @@ pub struct ViolationRate {
     /// Runs that violate it.
     pub violated: usize,
     /// Runs that say anything about it: those that keep it, and those that violate it.
-    pub said: usize,
+    pub conclusive: usize,
     /// The 95 % Wilson interval of the probability that a run violates it; `None` when no run says anything.
     pub interval: Option<[f64; 2]>,
 }
@@ -40,8 +40,8 @@ pub(crate) fn repetition(plan: &CampaignPlan, rows: &[TestRow]) -> Option<Repeti
             requirement: requirement.name.clone(),
             text: requirement.text.clone(),
             violated: tally.violated,
-            said: tally.said(),
-            interval: wilson(tally.violated, tally.said()),
+            conclusive: tally.conclusive(),
+            interval: wilson(tally.violated, tally.conclusive()),
         }
     });
     Some(Repetition { test: plan.test(test).name.clone(), requirements: requirements.collect() })

@@ -28,7 +28,7 @@ pub(crate) enum Kind {
     Plain,
     /// A test on the front.
     Front,
-    /// The undisturbed run.
+    /// The reference run.
     Reference,
 }
 

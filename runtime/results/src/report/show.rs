@@ -21,11 +21,11 @@ use crate::report::{export, number, summary};
 pub struct ListedTest {
     /// Its name.
     pub test: String,
-    /// `reference`, `search`, or the name of a known test.
+    /// `reference`, `search`, or the name of a regression test.
     pub origin: String,
     /// The generation it belongs to.
     pub generation: Option<u32>,
-    /// `completed`, `void`, `crash` or `timeout`.
+    /// `completed`, `no_effect`, `unknown`, `crash` or `timeout`.
     pub outcome: String,
     /// The equal test whose result stands for this one.
     pub duplicate_of: Option<String>,
@@ -57,7 +57,7 @@ pub struct TestReport {
     pub test: String,
     /// Its number.
     pub number: u32,
-    /// `reference`, `search`, or the name of a known test.
+    /// `reference`, `search`, or the name of a regression test.
     pub origin: String,
     /// The generation it belongs to.
     pub generation: Option<u32>,
@@ -67,7 +67,7 @@ pub struct TestReport {
     pub simulator_seed: u64,
     /// The equal test whose result stands for this one.
     pub duplicate_of: Option<String>,
-    /// `completed`, `void`, `crash` or `timeout`.
+    /// `completed`, `no_effect`, `unknown`, `crash` or `timeout`.
     pub outcome: String,
     /// What is known of a crash or timeout.
     pub detail: Option<String>,
@@ -117,8 +117,8 @@ pub struct OperationReport {
     pub observed: Option<Vec<Span>>,
     /// What the test chose.
     pub choices: Vec<ChoiceReport>,
-    /// The seed of its draws.
-    pub draw_seed: u64,
+    /// The seed of its random draws.
+    pub operation_seed: u64,
     /// What it counted; `None` where the run could not report it.
     pub counters: Option<Counters>,
     /// Simulation time of its first effect, in seconds.
@@ -222,7 +222,7 @@ fn origin(plan: &CampaignPlan, origin: Origin) -> String {
     }
 }
 
-/// Everything on the test that a user calls `T158`, `158`, `reference`, or by the name of a known test.
+/// Everything on the test that a user calls `T158`, `158`, `reference`, or by the name of a regression test.
 pub fn show(repository: &Repository, name: &str) -> Result<TestReport, RecordError> {
     let record = repository.test(repository.find(name)?)?;
     let front = repository.latest_result_set()?.is_some_and(|set| set.members.contains(&record.number));
@@ -312,7 +312,7 @@ fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> 
                     text: number::choice(&operation.kind, parameter, choice),
                 })
                 .collect(),
-            draw_seed: used.draw_seed,
+            operation_seed: used.draw_seed,
             counters: effect.map(|effect| effect.counters),
             first_touch: effect.and_then(|effect| effect.first_touch),
             last_touch: effect.and_then(|effect| effect.last_touch),
@@ -329,7 +329,7 @@ fn verdicts(plan: &CampaignPlan, record: &TestRecord, fresh: &[Repetition]) -> V
         let value = observation.value(requirement.metric);
         let first = verdict(requirement.bound, &observation.outcome, value);
         let tally = Tally::of(fresh.iter().map(|run| run.verdict(requirement)));
-        let interval = wilson(tally.violated, tally.said());
+        let interval = wilson(tally.violated, tally.conclusive());
         VerdictReport {
             requirement: requirement.name.clone(),
             text: requirement.text.clone(),

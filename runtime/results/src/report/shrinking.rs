@@ -1,4 +1,4 @@
-//! How a test was made smaller: what it was, what became of it, and every test that was tried on the way.
+//! How a test was shrunk: the test before and after, and every test that was tried on the way.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ use crate::report::summary::{operations, value_text};
 use crate::report::table::{Table, TextOptions};
 use crate::report::text::{left, paragraph, right};
 
-/// How a test was made smaller.
+/// How a test was shrunk.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Shrinking {
     /// The test's name in the results that it was found in.
@@ -29,7 +29,7 @@ pub struct Shrinking {
     pub fails: String,
     /// The simulator's runs that a test had to fail in.
     pub runs: u32,
-    /// Whether nothing of the smallest test can be made smaller by one step alone: all of that was tried.
+    /// Whether no single step shrinks the smallest test further: all of them were tried.
     pub minimal: bool,
     /// The test as it was, in these results; `None` where it has not run yet.
     pub before: Option<TestSize>,
@@ -108,16 +108,13 @@ impl Shrinking {
         match (&self.before, &self.after) {
             (None, _) => format!("{} has not run yet", self.test),
             (Some(_), None) => {
-                format!("{} did not fail again, so that nothing was made smaller; it {} once", self.test, self.fails)
+                format!("{} did not fail again, so nothing was shrunk; it {} once", self.test, self.fails)
             }
             (Some(_), Some(after)) if self.minimal => {
-                format!("{} {}; {tried}, and nothing of it can be made smaller by one step", after.test, self.fails)
+                format!("{} {}; {tried}, and it cannot be shrunk by one more step", after.test, self.fails)
             }
             (Some(_), Some(after)) => {
-                format!(
-                    "{} {}; {tried}, and more could perhaps be left out with more evaluations",
-                    after.test, self.fails
-                )
+                format!("{} {}; {tried}, and more evaluations could perhaps shrink it further", after.test, self.fails)
             }
         }
     }
@@ -322,7 +319,7 @@ fn sizes(shrinking: &Shrinking) -> (Vec<String>, Vec<Vec<String>>) {
 /// The way in words: the table of before and after, what was gone on with, and the block.
 pub(crate) fn text(text: &mut String, shrinking: &Shrinking, options: TextOptions) {
     text.push('\n');
-    text.push_str(&options.heading(&format!("{} made smaller", shrinking.test)));
+    text.push_str(&options.heading(&format!("{} shrunk", shrinking.test)));
     text.push('\n');
     let (titles, rows) = sizes(shrinking);
     if !rows.is_empty() {
@@ -345,7 +342,7 @@ pub(crate) fn text(text: &mut String, shrinking: &Shrinking, options: TextOption
         text.push_str(&options.heading("The way there"));
         text.push('\n');
         text.push_str(&table.render(options));
-        paragraph(text, "What did not fail any more is on the page, and in the results as JSON.", options);
+        paragraph(text, "Tests that did not fail are on the page, and in the results as JSON.", options);
     }
     if let Some(block) = &shrinking.block {
         text.push('\n');
@@ -356,7 +353,7 @@ pub(crate) fn text(text: &mut String, shrinking: &Shrinking, options: TextOption
 /// The way as a section of the page: before and after, the block, and every test that was tried.
 pub(crate) fn section(body: &mut Markup, shrinking: &Shrinking, drawn: &[u32]) {
     body.open("section", &[("id", "shrinking")]);
-    body.element("h2", &[], &format!("{} made smaller", shrinking.test));
+    body.element("h2", &[], &format!("{} shrunk", shrinking.test));
     body.element("p", &[], &format!("{}.", shrinking.sentence()));
     let (mut titles, rows) = sizes(shrinking);
     let last = titles.len() - 1;
@@ -503,7 +500,7 @@ mod tests {
         assert_eq!(shrinking.steps.iter().rfind(|step| step.kept).unwrap().test, after.test);
         insta::assert_snapshot!("shrinking", summary_text(&summary, TextOptions { width: Some(110), colour: false }));
         let html = page(&repository).unwrap();
-        assert!(html.contains("made smaller") && html.contains("Every test that was tried"));
+        assert!(html.contains(" shrunk") && html.contains("Every test that was tried"));
         for end in shrinking.ends() {
             assert!(html.contains(&format!("id=\"T{end}\"")), "T{end} has a timeline");
         }

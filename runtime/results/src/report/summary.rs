@@ -1,4 +1,4 @@
-//! What a campaign found, at a glance.
+//! The results of a campaign at a glance.
 
 use std::collections::BTreeSet;
 
@@ -45,36 +45,36 @@ pub struct Summary {
     pub once: usize,
     /// All requirements of the space, in its order.
     pub requirements: Vec<RequirementSummary>,
-    /// Expectations of known tests, in the order of the tests.
+    /// Expectations of regression tests, in the order of the tests.
     pub expectations: Vec<ExpectationSummary>,
     /// Crashes and timeouts, by test: of its first run, and those that only fresh runs showed.
     pub failures: Vec<Failure>,
     /// Tests in which a metric read a number that was not finite, by test.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_finite: Vec<NotFinite>,
-    /// What repeating says, where the campaign repeats one test.
+    /// How often requirements were violated, if the campaign repeats one test.
     pub repetition: Option<Repetition>,
-    /// How a test was made smaller, where the campaign does that.
+    /// How a test was shrunk, if the campaign does that.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shrinking: Option<Shrinking>,
-    /// How far each metric went, in the plan's order; what a campaign without objectives is about.
+    /// The range of each metric, in the plan's order; the main result of a campaign without objectives.
     pub spreads: Vec<Spread>,
-    /// How much of the space was looked at, where the campaign counts it.
+    /// How much of the space is covered, if the campaign counts coverage.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<CoverageSummary>,
-    /// What should be brought to the user's attention.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
-/// How many tests there are of what kind. The reference run is no part of it.
+/// How many tests there are of each kind. Reference runs are not counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Counts {
-    /// Tests that ended, those the search asked for and known ones.
+    /// Tests that ended: those of the search, and regression tests.
     pub evaluations: usize,
     /// Of these, exact duplicates, which were not simulated again.
     pub duplicates: usize,
-    /// Of these, those in which no operation had any effect.
-    pub void: usize,
+    /// Of these, tests in which no operation had any effect.
+    pub no_effect: usize,
     /// Of these, completed ones in which an objective or requirement has neither value nor default.
     pub unmeasured: usize,
     /// Of these, crashes.
@@ -114,8 +114,8 @@ pub struct FrontTest {
     pub violates: Vec<String>,
 }
 
-/// What the campaign says about a requirement. Duplicates and the reference run are not counted. A test that was run again is
-/// what its fresh runs say, see [`Tally::verdict`](crate::record::Tally::verdict).
+/// The verdicts of a campaign's tests on a requirement. Duplicates and reference runs are not counted. The verdict of a test
+/// that was run again is that of its fresh runs, see [`Tally::verdict`](crate::record::Tally::verdict).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RequirementSummary {
     /// Its name.
@@ -126,23 +126,23 @@ pub struct RequirementSummary {
     pub metric: String,
     /// The bound in words, as in `≤ 70 s`.
     pub bound: String,
-    /// Tests that keep it.
-    pub kept: usize,
+    /// Tests that satisfy it.
+    pub satisfied: usize,
     /// Tests that violate it: those whose violation is confirmed or flaky, and those that were run once only.
     pub violated: usize,
-    /// Of these, tests of which every fresh run violates it that says anything.
+    /// Of these, tests of which every conclusive fresh run violates it.
     pub confirmed: usize,
     /// Of these, tests of which some fresh runs violate it and some do not.
     pub flaky: usize,
-    /// Of these, tests that no fresh run says anything about; most were run once only.
+    /// Of these, tests without a conclusive fresh run; most were run once only.
     pub once: usize,
     /// Of these, tests whose first run did not violate it.
     pub fresh_only: usize,
-    /// Tests whose first run violates it, and no fresh one does. They are none of the violated ones.
+    /// Tests whose first run violates it, and no fresh one does. They do not count as violated.
     pub not_confirmed: usize,
-    /// Tests that say nothing about it.
-    pub unsaid: usize,
-    /// What the undisturbed run says; `None` where there was none.
+    /// Tests that are inconclusive about it.
+    pub inconclusive: usize,
+    /// The verdict of the reference run; `None` without one.
     pub reference: Option<Verdict>,
     /// The test farthest outside the bound; of equal ones the one with the smallest number.
     pub worst: Option<Worst>,
@@ -155,16 +155,16 @@ pub struct Worst {
     pub test: String,
     /// The metric's value in it.
     pub value: f64,
-    /// The value and its unit; says so where the metric was never set.
+    /// The value and its unit; `(never set)` follows where it is the default.
     pub text: String,
 }
 
-/// Whether a known test came out as expected.
+/// Whether a metric of a regression test is as expected.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ExpectationSummary {
     /// The test's name in the results.
     pub test: String,
-    /// The known test's name in the space.
+    /// The regression test's name in the space.
     pub known_test: String,
     /// The metric.
     pub metric: String,
@@ -172,7 +172,7 @@ pub struct ExpectationSummary {
     pub bound: String,
     /// The metric's value.
     pub value: Option<f64>,
-    /// Whether it came out.
+    /// Whether it is as expected.
     pub verdict: Verdict,
 }
 
@@ -187,18 +187,18 @@ pub struct Failure {
     pub at: f64,
     /// What is known of the cause.
     pub detail: String,
-    /// What its fresh runs say, where it was run again.
+    /// How often fresh runs show it, if the test was run again.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub again: Option<FindingAgain>,
 }
 
 impl Failure {
-    /// How often it came again, in words; a dash where it was run once only.
+    /// How often it was seen again, in words; a dash if the test was run once only.
     pub(crate) fn again_words(&self) -> String {
         self.again.as_ref().map_or("–".to_owned(), FindingAgain::words)
     }
 
-    /// Whether it counts as a finding: one that no fresh run shows does not.
+    /// Whether it counts as a finding: it does not if fresh runs never show it.
     pub fn stands(&self) -> bool {
         self.again.as_ref().is_none_or(|again| again.standing != Some(Standing::NotConfirmed))
     }
@@ -215,7 +215,7 @@ pub struct NotFinite {
     pub metrics: Vec<String>,
 }
 
-/// How far a metric went over all tests that have a value.
+/// The range of a metric over all tests that have a value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spread {
     /// The metric.
@@ -303,7 +303,7 @@ fn counts(plan: &CampaignPlan, rows: &[TestRow]) -> Counts {
             Outcome::Completed | Outcome::Unknown => {
                 counts.unmeasured += usize::from(needed.iter().any(|&id| row.value(id).value.is_none()));
             }
-            Outcome::Void => counts.void += 1,
+            Outcome::NoEffect => counts.no_effect += 1,
             Outcome::Crash { .. } => counts.crashes += 1,
             Outcome::Timeout { .. } => counts.timeouts += 1,
         }
@@ -311,7 +311,7 @@ fn counts(plan: &CampaignPlan, rows: &[TestRow]) -> Counts {
     counts
 }
 
-/// Whether a test is counted in what is said about requirements.
+/// Whether a test is counted in verdicts on requirements.
 fn counts_as_test(row: &TestRow) -> bool {
     row.origin != Origin::Reference && row.duplicate_of.is_none()
 }
@@ -390,7 +390,7 @@ pub(crate) fn operations(plan: &CampaignPlan, row: &TestRow) -> String {
             }
         })
         .collect();
-    if named.is_empty() { "undisturbed".to_owned() } else { named.join(", ") }
+    if named.is_empty() { "without disturbance".to_owned() } else { named.join(", ") }
 }
 
 fn summarise_requirement(
@@ -406,14 +406,14 @@ fn summarise_requirement(
         text: requirement.text.clone(),
         metric: metric.name.clone(),
         bound: number::bound(requirement.bound, unit),
-        kept: 0,
+        satisfied: 0,
         violated: 0,
         confirmed: 0,
         flaky: 0,
         once: 0,
         fresh_only: 0,
         not_confirmed: 0,
-        unsaid: 0,
+        inconclusive: 0,
         reference: rows.iter().find(|row| row.origin == Origin::Reference).map(|row| row.verdict(requirement)),
         worst: None,
     };
@@ -423,8 +423,8 @@ fn summarise_requirement(
         let standing = tally.standing(first);
         found.not_confirmed += usize::from(standing == Some(Standing::NotConfirmed));
         match tally.verdict(first) {
-            Verdict::Kept => found.kept += 1,
-            Verdict::Unsaid => found.unsaid += 1,
+            Verdict::Satisfied => found.satisfied += 1,
+            Verdict::Inconclusive => found.inconclusive += 1,
             Verdict::Violated => {
                 found.violated += 1;
                 found.confirmed += usize::from(standing == Some(Standing::Confirmed));
@@ -451,8 +451,7 @@ fn summarise_requirement(
 }
 
 impl RequirementSummary {
-    /// What fresh runs say of its violations, as in `3 confirmed, 1 flaky, 8 run once; 2 not confirmed`; a dash where there
-    /// are none.
+    /// How its violations stand, as in `3 confirmed, 1 flaky, 8 run once; 2 not confirmed`; a dash without violations.
     pub(crate) fn standings(&self) -> String {
         let standing = [(self.confirmed, "confirmed"), (self.flaky, "flaky"), (self.once, "run once")];
         let words = standing.iter().filter(|(count, _)| *count > 0).map(|(count, word)| format!("{count} {word}"));
@@ -465,7 +464,7 @@ impl RequirementSummary {
     }
 }
 
-/// A metric's value with its unit; says so where it was never set.
+/// A metric's value with its unit; `(never set)` follows where it is the default.
 pub(crate) fn value_text(shown: MetricValue, unit: Option<&str>) -> String {
     match shown.value {
         None => "unmeasured".to_owned(),

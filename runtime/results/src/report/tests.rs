@@ -42,7 +42,7 @@ fn numbers_that_are_not_finite_are_a_finding_of_their_own() {
     }
     let repository = recorder.finish("all evaluations done").unwrap();
     let summary = summary(&repository).unwrap();
-    assert_eq!(summary.requirements[0].unsaid, 1, "it bounds one of these metrics");
+    assert_eq!(summary.requirements[0].inconclusive, 1, "it bounds one of these metrics");
     let text = summary_text(&summary, WIDE);
     let (_, table) = text.split_once("Numbers that are not finite\n").unwrap();
     let row: Vec<&str> = table.lines().nth(1).unwrap().split_whitespace().collect();
@@ -99,7 +99,7 @@ fn the_page_is_well_formed_and_needs_nothing_but_itself() {
         assert!(spoken, "a picture without words");
     }
     let first = document.descendants().find(|node| node.attribute("class") == Some("test")).unwrap();
-    assert_eq!(first.attribute("id"), Some("T0"), "the undisturbed run comes first");
+    assert_eq!(first.attribute("id"), Some("T0"), "the reference run comes first");
 }
 
 #[test]
@@ -247,7 +247,7 @@ fn an_unfinished_run_without_any_test_has_its_reports() {
     let plan = sample::plan();
     let recorder = crate::record::Recorder::create(folder.path(), &plan, 1, 1).unwrap();
     let text = summary_text(&summary(recorder.repository()).unwrap(), WIDE);
-    assert!(text.starts_with("Front of 0 tests, no requirement broken\n"), "{text}");
+    assert!(text.starts_with("Front of 0 tests, no requirement violated\n"), "{text}");
     assert!(text.contains("0 evaluations; the run is unfinished"), "{text}");
     parsed(&page(recorder.repository()).unwrap());
 }
@@ -403,7 +403,7 @@ fn reports_serialise_with_names_and_units() {
     assert_eq!(json["objectives"][0]["direction"], "minimise");
     assert_eq!(json["requirements"][0]["worst"]["test"], "T1");
     let json = serde_json::to_value(list(&repository).unwrap()).unwrap();
-    assert_eq!(json["tests"][5]["outcome"], "void");
+    assert_eq!(json["tests"][5]["outcome"], "no_effect");
 }
 
 /// The sample's campaign, which confirms by three runs each: some findings come again always, some sometimes, some never.
@@ -480,13 +480,19 @@ fn the_views_of_findings_agree_with_the_report() {
     let mut told = Vec::new();
     for test in &summary.confirmed {
         for it in test.findings.iter().filter(|it| !is_failure(&it.finding)) {
-            told.push((test.number, it.finding.clone(), count(it.again), count(it.said), count(test.repetitions)));
+            told.push((
+                test.number,
+                it.finding.clone(),
+                count(it.again),
+                count(it.conclusive),
+                count(test.repetitions),
+            ));
         }
     }
     assert!(told.len() > 3);
     let open = rusqlite::Connection::open(folder.path().join(crate::record::DATABASE)).unwrap();
     let mut statement =
-        open.prepare("SELECT test, requirement, confirmed, said, repetitions FROM confirmations").unwrap();
+        open.prepare("SELECT test, requirement, confirmed, conclusive, repetitions FROM confirmations").unwrap();
     let rows =
         statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, row.get(4)?))).unwrap();
     assert_eq!(rows.collect::<Result<Vec<(u32, String, u32, u32, u32)>, _>>().unwrap(), told);
@@ -544,12 +550,12 @@ fn run_again(first: bool, fresh: &[Option<bool>]) -> (tempfile::TempDir, Reposit
 }
 
 #[test]
-fn a_requirement_that_only_the_first_run_kept_is_violated_in_every_report() {
+fn a_requirement_that_only_the_first_run_satisfied_is_violated_in_every_report() {
     let (_folder, repository) = run_again(false, &[Some(true), Some(true), Some(false), Some(true)]);
     let summary = summary(&repository).unwrap();
     let r1 = &summary.requirements[0];
-    assert_eq!((r1.violated, r1.flaky, r1.fresh_only, r1.kept), (1, 1, 1, 0));
-    assert!(headline(&summary).contains("1 requirement broken (R1 by 1 test)"), "{}", headline(&summary));
+    assert_eq!((r1.violated, r1.flaky, r1.fresh_only, r1.satisfied), (1, 1, 1, 0));
+    assert!(headline(&summary).contains("1 requirement violated (R1 by 1 test)"), "{}", headline(&summary));
     let said = "3 of 4 (0.30–0.95) flaky, not in its first run";
     assert_eq!(summary.confirmed[0].words(), format!("R1 {said}"));
     assert_eq!(list(&repository).unwrap().tests[1].violates, ["R1"]);
@@ -565,10 +571,10 @@ fn a_violation_that_no_fresh_run_shows_fails_nothing_and_stays_listed() {
     let (_folder, repository) = run_again(true, &[Some(false), None, Some(false)]);
     let summary = summary(&repository).unwrap();
     let r1 = &summary.requirements[0];
-    assert_eq!((r1.violated, r1.not_confirmed, r1.kept), (0, 1, 1));
+    assert_eq!((r1.violated, r1.not_confirmed, r1.satisfied), (0, 1, 1));
     let text = summary_text(&summary, WIDE);
     assert!(text.contains("1 not confirmed"), "{text}");
-    assert_eq!(summary.confirmed[0].findings[0].words(), "0 of 2 (0.00–0.66) not confirmed, 1 run says nothing");
+    assert_eq!(summary.confirmed[0].findings[0].words(), "0 of 2 (0.00–0.66) not confirmed, 1 run inconclusive");
     let junit = junit(&summary);
     assert!(!junit.contains("<failure") && junit.contains("T1 0 of 2"), "{junit}");
     // The crash of a fresh run is a finding, though the first run came to its end.
@@ -576,7 +582,7 @@ fn a_violation_that_no_fresh_run_shows_fails_nothing_and_stays_listed() {
 }
 
 #[test]
-fn violations_that_nobody_looked_at_again_are_counted() {
+fn violations_that_were_seen_in_one_run_only_are_counted() {
     let (_folder, repository) = confirmed();
     let found = summary(&repository).unwrap();
     let rows = list(&repository).unwrap().tests;

@@ -24,30 +24,30 @@ pub(super) fn right(title: &str) -> (String, Align) {
     (title.to_owned(), Align::Right)
 }
 
-/// One sentence on the whole: `Front of 6 tests, 2 requirements broken (R1 by 31 tests, R4 by 3)`.
+/// The whole in one sentence: `Front of 6 tests, 2 requirements violated (R1 by 31 tests, R4 by 3)`.
 pub fn headline(summary: &Summary) -> String {
-    let mut broken: Vec<String> = Vec::new();
+    let mut violated: Vec<String> = Vec::new();
     for requirement in summary.requirements.iter().filter(|requirement| requirement.violated > 0) {
-        let count = match broken.len() {
+        let count = match violated.len() {
             0 => plural(requirement.violated, "test", "tests"),
             _ => requirement.violated.to_string(),
         };
-        broken.push(format!("{} by {count}", requirement.requirement));
+        violated.push(format!("{} by {count}", requirement.requirement));
     }
     let mut parts = Vec::new();
     if !summary.objectives.is_empty() {
         parts.push(format!("front of {}", plural(summary.front.len(), "test", "tests")));
     }
-    parts.push(match broken.len() {
-        0 if summary.requirements.is_empty() => "no requirements to break".to_owned(),
-        0 => "no requirement broken".to_owned(),
-        n => format!("{} broken ({})", plural(n, "requirement", "requirements"), broken.join(", ")),
+    parts.push(match violated.len() {
+        0 if summary.requirements.is_empty() => "no requirements".to_owned(),
+        0 => "no requirement violated".to_owned(),
+        n => format!("{} violated ({})", plural(n, "requirement", "requirements"), violated.join(", ")),
     });
-    let kept = summary.expectations.iter().filter(|expectation| expectation.verdict == Verdict::Kept).count();
+    let satisfied = summary.expectations.iter().filter(|expectation| expectation.verdict == Verdict::Satisfied).count();
     match summary.expectations.len() {
         0 => {}
-        all if kept == all => parts.push(plural(all, "expectation kept", "expectations kept")),
-        all => parts.push(format!("{kept} of {} kept", plural(all, "expectation", "expectations"))),
+        all if satisfied == all => parts.push(plural(all, "expectation satisfied", "expectations satisfied")),
+        all => parts.push(format!("{satisfied} of {} satisfied", plural(all, "expectation", "expectations"))),
     }
     for (word, several) in [("crash", "crashes"), ("timeout", "timeouts")] {
         let count = summary.failures.iter().filter(|failure| failure.outcome == word && failure.stands()).count();
@@ -62,7 +62,7 @@ pub fn headline(summary: &Summary) -> String {
     sentence
 }
 
-/// What a campaign found: the front, the requirements, crashes and timeouts, and what was void.
+/// What a campaign found: the front, the requirements, crashes and timeouts, and how many tests had no effect.
 pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     let mut text = String::new();
     paragraph(&mut text, &headline(summary), options);
@@ -83,7 +83,7 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     }
     if !summary.expectations.is_empty() {
         let mut table =
-            Table::new([left("known test"), left("test"), left("value"), left("expected"), left("came out")]);
+            Table::new([left("regression test"), left("test"), left("value"), left("expected"), left("as expected")]);
         for expectation in &summary.expectations {
             table.row([
                 expectation.known_test.clone(),
@@ -93,7 +93,7 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
                 came_out(expectation.verdict).to_owned(),
             ]);
         }
-        section(&mut text, "Known tests", &table, options);
+        section(&mut text, "Regression tests", &table, options);
     }
     if let Some(repetition) = &summary.repetition
         && !repetition.requirements.is_empty()
@@ -103,7 +103,7 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     if !summary.failures.is_empty() {
         let again = summary.failures.iter().any(|failure| failure.again.is_some());
         let mut columns = vec![left("test"), left("outcome"), right("at")];
-        columns.extend(again.then(|| left("came again")));
+        columns.extend(again.then(|| left("seen again")));
         columns.push(left("cause"));
         let mut table = Table::new(columns);
         for failure in &summary.failures {
@@ -144,13 +144,13 @@ fn confirms(summary: &Summary) -> bool {
     summary.confirmation.is_some() || !summary.confirmed.is_empty()
 }
 
-/// How many tests ran, and what became of those that say nothing.
+/// How many tests ran, and how many of these say nothing about the system.
 pub(crate) fn counts_sentence(summary: &Summary) -> String {
     let counts = &summary.counts;
     let mut left_out = Vec::new();
-    if counts.void > 0 {
-        let share = 100.0 * counts.void as f64 / counts.evaluations as f64;
-        left_out.push(format!("{} void ({share:.0} %: no operation had any effect)", counts.void));
+    if counts.no_effect > 0 {
+        let share = 100.0 * counts.no_effect as f64 / counts.evaluations as f64;
+        left_out.push(format!("{} with no effect ({share:.0} %)", counts.no_effect));
     }
     if counts.unmeasured > 0 {
         left_out.push(format!("{} unmeasured (a metric without value)", counts.unmeasured));
@@ -205,14 +205,14 @@ fn front(summary: &Summary) -> Table {
     table
 }
 
-/// How often what was found in the tests of the front came again; `None` where none of them was run again.
+/// How often findings of the tests on the front were seen again; `None` if none of them was run again.
 pub(crate) fn confirmed_column(summary: &Summary) -> Option<Vec<String>> {
     let of = |number: u32| summary.confirmed.iter().find(|test| test.number == number);
     let any = summary.front.iter().any(|test| of(test.number).is_some());
     any.then(|| summary.front.iter().map(|test| of(test.number).map_or("–".to_owned(), ConfirmedTest::words)).collect())
 }
 
-/// Which operations' copies acted at the same time, and what they came to; `None` where none did.
+/// Which operations' copies acted at the same time, and their sum; `None` if none did.
 pub(crate) fn stacked_column(summary: &Summary) -> Option<Vec<String>> {
     let words = |test: &FrontTest| test.stacked.iter().map(Stacked::words).collect::<Vec<_>>().join("; ");
     let any = summary.front.iter().any(|test| !test.stacked.is_empty());
@@ -233,17 +233,17 @@ pub(crate) fn objective_columns(summary: &Summary) -> Vec<Vec<String>> {
 
 fn requirements(summary: &Summary) -> Table {
     let again = !summary.confirmed.is_empty();
-    let mut columns = vec![left("name"), left("bound"), right("violated"), right("kept"), right("unsaid")];
+    let mut columns = vec![left("name"), left("bound"), right("violated"), right("satisfied"), right("inconclusive")];
     columns.extend(again.then(|| left("run again")));
-    columns.extend([left("undisturbed"), left("worst"), left("sentence")]);
+    columns.extend([left("reference run"), left("worst"), left("sentence")]);
     let mut table = Table::new(columns);
     for requirement in &summary.requirements {
         let mut cells = vec![
             requirement.requirement.clone(),
             format!("{} {}", requirement.metric, requirement.bound),
             requirement.violated.to_string(),
-            requirement.kept.to_string(),
-            requirement.unsaid.to_string(),
+            requirement.satisfied.to_string(),
+            requirement.inconclusive.to_string(),
         ];
         cells.extend(again.then(|| requirement.standings()));
         cells.extend([
@@ -266,22 +266,22 @@ fn repeated(repetition: &Repetition) -> Table {
 
 /// How often a requirement was violated, as in `7 of 10 [40 %, 89 %]`.
 pub(crate) fn rate_text(rate: &ViolationRate) -> String {
-    let Some(interval) = rate.interval else { return "no run tells".to_owned() };
+    let Some(interval) = rate.interval else { return "all runs inconclusive".to_owned() };
     let [low, high] = interval.map(|share| format!("{:.0} %", share * 100.0));
-    format!("{} of {} [{low}, {high}]", rate.violated, rate.said)
+    format!("{} of {} [{low}, {high}]", rate.violated, rate.conclusive)
 }
 
-/// The value that was to be as expected, with all its digits.
+/// The value that is compared with the expected one, with all its digits.
 pub(crate) fn expectation_value(expectation: &ExpectationSummary) -> String {
     expectation.value.map_or("unmeasured".to_owned(), number::exact)
 }
 
-/// Whether it came out as expected.
+/// Whether it is as expected.
 pub(crate) fn came_out(verdict: Verdict) -> &'static str {
     match verdict {
-        Verdict::Kept => "yes",
+        Verdict::Satisfied => "yes",
         Verdict::Violated => "no",
-        Verdict::Unsaid => "unsaid",
+        Verdict::Inconclusive => "inconclusive",
     }
 }
 
@@ -319,7 +319,9 @@ pub fn list_text(list: &TestList, options: TextOptions) -> String {
             format!("{}{}", test.test, if test.front { "*" } else { "" }),
             test.origin.clone(),
             test.generation.map_or(String::new(), |generation| generation.to_string()),
-            test.duplicate_of.as_ref().map_or_else(|| test.outcome.clone(), |original| format!("as {original}")),
+            test.duplicate_of
+                .as_ref()
+                .map_or_else(|| outcome_words(&test.outcome), |original| format!("as {original}")),
         ];
         cells.extend(decimals.iter().enumerate().map(|(at, &decimals)| {
             test.values.get(at).and_then(|shown| shown.value).map_or("–".to_owned(), |value| fixed(value, decimals))
@@ -336,7 +338,7 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     paragraph(&mut text, &options.heading(&format!("{} ({})", test.test, test.origin)), options);
     paragraph(&mut text, &outcome_sentence(test), options);
     if !test.parents.is_empty() {
-        paragraph(&mut text, &format!("made of {}", join_words(&test.parents)), options);
+        paragraph(&mut text, &format!("parents {}", join_words(&test.parents)), options);
     }
     paragraph(&mut text, &format!("simulator seed {}", test.simulator_seed), options);
     if !test.operations.is_empty() {
@@ -408,9 +410,9 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     text
 }
 
-/// What was found in tests that were run again, and how often it came again: a line for each finding.
+/// Findings of tests that were run again, and how often each was seen again: a line for each finding.
 pub fn confirmed_text(tests: &[ConfirmedTest], options: TextOptions) -> String {
-    let mut table = Table::new([left("test"), left("finding"), left("came again")]);
+    let mut table = Table::new([left("test"), left("finding"), left("seen again")]);
     for test in tests {
         if test.findings.is_empty() {
             table.row([test.test.clone(), "nothing".to_owned(), plural(test.repetitions, "run", "runs")]);
@@ -422,9 +424,9 @@ pub fn confirmed_text(tests: &[ConfirmedTest], options: TextOptions) -> String {
     table.render(options)
 }
 
-/// What was found in a test, and how often it came again.
+/// Findings of a test, and how often each was seen again.
 fn run_again(confirmed: &ConfirmedTest) -> Table {
-    let mut table = Table::new([left("finding"), left("came again")]);
+    let mut table = Table::new([left("finding"), left("seen again")]);
     if confirmed.findings.is_empty() {
         table.row(["nothing".to_owned(), plural(confirmed.repetitions, "run", "runs")]);
     }
@@ -434,14 +436,16 @@ fn run_again(confirmed: &ConfirmedTest) -> Table {
     table
 }
 
+/// The word of an outcome as prose has it.
+fn outcome_words(word: &str) -> String {
+    word.replace('_', " ")
+}
+
 /// How a test ended, in a sentence.
 pub(crate) fn outcome_sentence(test: &TestReport) -> String {
     let mut sentence = match &test.detail {
         Some(detail) => format!("{} at {} s: {}", test.outcome, fixed(test.end, 2), visible(detail)),
-        None if test.outcome == "void" => {
-            format!("void: no operation had any effect up to its end at {} s", fixed(test.end, 2))
-        }
-        None => format!("{} at {} s", test.outcome, fixed(test.end, 2)),
+        None => format!("{} at {} s", outcome_words(&test.outcome), fixed(test.end, 2)),
     };
     let _ =
         write!(sentence, ", {}", plural(usize::try_from(test.messages).unwrap_or(usize::MAX), "message", "messages"));
@@ -493,7 +497,7 @@ pub(crate) fn effect_text(operation: &OperationReport) -> String {
         (queued, "queued behind them"),
         (injected, "injected"),
         (side_effects, "side effects"),
-        (unheard, "disturbed where nobody listens"),
+        (unheard, "disturbed without a receiver"),
     ];
     words.extend(named.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}")));
     if !counters.any_effect() {

@@ -137,7 +137,7 @@ mod tests {
         assert_eq!(of(Outcome::Completed, 7, 7), Some([2000.0, 425.0]));
         assert_eq!(of(Outcome::Completed, 0, 7), Some([1000.0, 700.0]));
         assert_eq!(of(Outcome::Crash { message: String::new() }, 7, 0), Some([1000.0, 150.0]));
-        assert_eq!(of(Outcome::Void, 0, 0), None);
+        assert_eq!(of(Outcome::NoEffect, 0, 0), None);
         assert_eq!(of(Outcome::Unknown, 0, 0), Some([2000.0, 425.0]), "imported");
     }
 }

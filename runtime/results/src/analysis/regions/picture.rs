@@ -11,7 +11,7 @@ use crate::report::{Markup, percent};
 const BAND: f64 = 46.0;
 
 /// Colours of a file that stands alone; on the page the page's own count.
-const STYLE: &str = "svg{font:13px system-ui,sans-serif}.kept{fill:#b9c6d3}.violated{fill:#c2410c}.edge{fill:none;stroke:#fff;\
+const STYLE: &str = "svg{font:13px system-ui,sans-serif}.passing{fill:#b9c6d3}.violated{fill:#c2410c}.edge{fill:none;stroke:#fff;\
                      stroke-width:2}.words{fill:#1b2330}";
 
 /// The picture as a file of its own.
@@ -70,7 +70,7 @@ fn bar(
     let place = [("x", x.as_str()), ("y", &y), ("width", &wide), ("height", &high)];
     markup.open("svg", &[&place[..], &[("role", "img"), ("aria-label", &title)]].concat());
     markup.element("title", &[], &title);
-    markup.leaf("rect", &[("class", "kept"), ("width", "100%"), ("height", "100%")]);
+    markup.leaf("rect", &[("class", "passing"), ("width", "100%"), ("height", "100%")]);
     let opacity = format!("{failing:.3}");
     markup.leaf("rect", &[("class", "violated"), ("width", "100%"), ("height", "100%"), ("fill-opacity", &opacity)]);
     markup.leaf("rect", &[("class", "edge"), ("width", "100%"), ("height", "100%")]);

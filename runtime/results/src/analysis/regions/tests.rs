@@ -238,8 +238,8 @@ fn the_counts_of_each_rule_are_those_of_the_tests_that_it_describes() {
                         let requirement = repository.plan().requirements.iter().find(|it| it.name == name).unwrap();
                         match row.verdict(requirement) {
                             Verdict::Violated => Some(true),
-                            Verdict::Kept => Some(false),
-                            Verdict::Unsaid => None,
+                            Verdict::Satisfied => Some(false),
+                            Verdict::Inconclusive => None,
                         }
                     }
                 };

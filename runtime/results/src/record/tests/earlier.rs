@@ -1,0 +1,163 @@
+//! Results of earlier releases: they are read with the digest they were given, and nothing is added to them.
+
+use std::path::Path;
+
+use rusqlite::Connection;
+use tempfile::TempDir;
+
+use super::folder;
+use crate::analysis::{self, Run, Selection, regions};
+use crate::record::{DATABASE, Recorder, Repository, SCHEMA, digest};
+
+const SCHEMA_5: &str = include_str!("../fixtures/results_of_schema_5.sql");
+const SCHEMA_6: &str = include_str!("../fixtures/results_of_schema_6.sql");
+
+/// What a runner of an earlier schema recorded, in a folder of its own.
+fn of_earlier(fixture: &str) -> TempDir {
+    let folder = folder();
+    let open = Connection::open(folder.path().join(DATABASE)).unwrap();
+    open.execute_batch(fixture).unwrap();
+    folder
+}
+
+/// Records everything in a repository once more, as this release does.
+fn recorded_again(repository: &Repository) -> (TempDir, Repository) {
+    let folder = folder();
+    let facts = repository.campaign();
+    let mut recorder = Recorder::create(folder.path(), &facts.plan, facts.seed, 2).unwrap();
+    for number in repository.numbers().unwrap() {
+        recorder.commit(&repository.test(number).unwrap()).unwrap();
+    }
+    for repetition in repository.repetitions().unwrap().values().flatten() {
+        recorder.put_repetition(repetition, &[]).unwrap();
+    }
+    for set in repository.result_sets().unwrap() {
+        recorder.put_result_set(&set).unwrap();
+    }
+    for coverage in repository.coverage().unwrap() {
+        recorder.put_coverage(&coverage).unwrap();
+    }
+    let reference = repository.reference_point().unwrap().map(|point| {
+        let oriented = facts.plan.campaign.objectives.iter().zip(point);
+        oriented.map(|(&id, value)| sesame_search::in_unit(&facts.plan, id, value)).collect::<Vec<_>>()
+    });
+    for indicators in repository.indicators().unwrap() {
+        recorder.put_indicators(&indicators, reference.as_deref()).unwrap();
+    }
+    for event in repository.events().unwrap().into_iter().filter(|event| event.test.is_none()) {
+        recorder.put_event(&event).unwrap();
+    }
+    let stop = facts.stop.clone().unwrap();
+    (folder, recorder.finish(&stop).unwrap())
+}
+
+/// Every analysis of the results in a folder, and the reports, as texts.
+fn analyses(folder: &Path) -> Vec<String> {
+    let repository = &Repository::open(folder).unwrap();
+    let all = Selection::default();
+    let convention = sesame_search::sspr::Convention::Ours;
+    let dimensions = [sesame_plan::Dimension::T1, sesame_plan::Dimension::P1, sesame_plan::Dimension::O1];
+    let axes = dimensions.map(|dimension| sesame_plan::GridAxis { dimension, low: 0.0, high: 1.0, cells: 3 });
+    let grid = sesame_search::coverage::Grid::new(axes.to_vec()).unwrap();
+    let covered = analysis::coverage(repository, &all, grid, 1, convention).unwrap();
+    let run = Run { group: "all".to_owned(), repository: Repository::open(folder).unwrap() };
+    let summary = crate::report::summary(repository).unwrap();
+    let tests = repository.numbers().unwrap();
+    let shown = tests.iter().map(|&number| crate::report::show(repository, &format!("T{number}")).unwrap());
+    vec![
+        analysis::tests(repository, &all).unwrap().csv(),
+        analysis::front(repository, &all).unwrap().csv(),
+        analysis::sspr(repository, &all, &dimensions, convention).unwrap().csv(),
+        covered.curve().csv(),
+        covered.cells().csv(),
+        analysis::indicators(repository, None).unwrap().dataset().csv(),
+        analysis::compare(&[run], None, None).unwrap().groups().csv(),
+        regions::table(&regions::all_regions(repository, &all).unwrap()).csv(),
+        serde_json::to_string(&summary).unwrap(),
+        serde_json::to_string(&shown.collect::<Vec<_>>()).unwrap(),
+        crate::report::junit(&summary),
+    ]
+}
+
+/// Changes a file of results.
+fn change(folder: &Path, sql: &str) {
+    Connection::open(folder.join(DATABASE)).unwrap().execute_batch(sql).unwrap();
+}
+
+#[test]
+fn results_of_schema_5_are_read_with_the_digest_they_were_given_and_nothing_is_added_to_them() {
+    let folder = of_earlier(SCHEMA_5);
+    let before = std::fs::read(folder.path().join(DATABASE)).unwrap();
+    let repository = Repository::open(folder.path()).unwrap();
+    let given = "159582fa2a626aa26bdf7fa872956f1725ec44b8bf8bda977ea7e54205246737";
+    assert_eq!(repository.digest().unwrap(), given);
+    let test = repository.test(2).unwrap();
+    let speed = &test.observation.metrics[1].series;
+    assert_eq!((speed.len(), speed[3].0), (4, 0.08));
+    assert_eq!(repository.tests().unwrap().len(), 5);
+    assert!(crate::report::page(&repository).unwrap().contains(given));
+    let (again, _) = recorded_again(&repository);
+    assert_eq!(analyses(folder.path()), analyses(again.path()));
+    drop(repository);
+    refuses_writers(folder.path(), 5);
+    assert_eq!(std::fs::read(folder.path().join(DATABASE)).unwrap(), before);
+}
+
+#[test]
+fn results_of_schema_6_are_read_with_the_digest_they_were_given_and_nothing_is_added_to_them() {
+    let folder = of_earlier(SCHEMA_6);
+    let before = std::fs::read(folder.path().join(DATABASE)).unwrap();
+    let repository = Repository::open(folder.path()).unwrap();
+    let given = "1650cbb1e0eb56de5689fbbfd3806412512898a26b402f61541d858bb61b8fc7";
+    assert_eq!(repository.digest().unwrap(), given);
+    assert!(crate::report::page(&repository).unwrap().contains(given));
+    let outcomes: Vec<&str> = repository.tests().unwrap().iter().map(|row| row.outcome.word()).collect();
+    for outcome in ["completed", "no_effect", "crash", "timeout"] {
+        assert!(outcomes.contains(&outcome), "{outcome}");
+    }
+    let (again, _) = recorded_again(&repository);
+    assert_eq!(analyses(folder.path()), analyses(again.path()));
+    drop(repository);
+    refuses_writers(folder.path(), 6);
+    assert_eq!(std::fs::read(folder.path().join(DATABASE)).unwrap(), before);
+}
+
+#[test]
+fn the_digest_of_schema_7_differs_from_that_of_schema_6_in_the_plan_and_the_outcome_without_effect_only() {
+    let folder = of_earlier(SCHEMA_6);
+    let repository = Repository::open(folder.path()).unwrap();
+    let given = repository.digest().unwrap();
+    let (again, new) = recorded_again(&repository);
+    drop(new);
+    let of_6 = |sql: &str| -> String {
+        Connection::open(folder.path().join(DATABASE)).unwrap().query_row(sql, [], |row| row.get(0)).unwrap()
+    };
+    let connection = Connection::open(again.path().join(DATABASE)).unwrap();
+    connection.execute("UPDATE campaign SET plan = ?1", [of_6("SELECT plan FROM campaign")]).unwrap();
+    assert_ne!(digest(again.path()).unwrap(), given);
+    let void = "PRAGMA ignore_check_constraints = 1; UPDATE tests SET outcome = 'void' WHERE outcome = 'no_effect'; \
+                UPDATE repetitions SET outcome = 'void' WHERE outcome = 'no_effect'";
+    connection.execute_batch(void).unwrap();
+    assert_eq!(digest(again.path()).unwrap(), given);
+}
+
+#[test]
+fn a_schema_has_its_own_words_and_no_others() {
+    let changes = [
+        (SCHEMA_6, "UPDATE tests SET outcome = 'no_effect' WHERE outcome = 'void'", "cannot have ended as `no_effect`"),
+        (SCHEMA_6, "PRAGMA user_version = 7", "is not the one that a run makes"),
+    ];
+    for (fixture, sql, words) in changes {
+        let folder = of_earlier(fixture);
+        change(folder.path(), &format!("PRAGMA ignore_check_constraints = 1; {sql}"));
+        let said = Repository::open(folder.path()).and_then(|it| it.tests()).unwrap_err().to_string();
+        assert!(said.contains(words), "{said}");
+    }
+}
+
+fn refuses_writers(folder: &Path, schema: i64) {
+    for added in [Recorder::resume(folder, 1), Recorder::reopen(folder, 1)] {
+        let said = added.unwrap_err().to_string();
+        assert!(said.contains(&format!("schema {schema}, this release writes {SCHEMA}: they can be read")), "{said}");
+    }
+}
