@@ -28,6 +28,8 @@ pub struct Language {
     pub format: fn(file: &str, text: &str, look: Look) -> Result<String, Diagnosed>,
     /// The page of a diagnostic's code.
     pub explain: fn(code: &str) -> Option<&'static str>,
+    /// What a space declares by a name, and what mentions it, also if the space has errors; or why that cannot be told.
+    pub find: fn(file: &str, text: &str, name: &str) -> Result<Found, String>,
 }
 
 /// How diagnostics look.
@@ -55,6 +57,21 @@ pub struct Diagnosed {
     pub errors: usize,
 }
 
+/// A thing of a space.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Found {
+    /// Whether it is a campaign.
+    pub campaign: bool,
+    /// Its definition and its uses.
+    pub text: String,
+    /// Its uses alone; empty if it has none.
+    pub uses: String,
+    /// Definition and uses as one line of JSON.
+    pub json: String,
+    /// How many errors the space has. What could not be read is not among the uses.
+    pub errors: usize,
+}
+
 /// What came of checking a space.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Checked {
@@ -79,10 +96,10 @@ enum Deny {
     Warnings,
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 done, 1 the input has errors or generated files are out of date, 2 wrong usage; \
-                          `run` ends with the runner's own.";
+const EXIT_CODES: &str = "Exit codes: 0 success, 1 errors in the input or generated files out of date, 2 wrong usage; \
+                          `run` passes on the exit code of the runner.";
 
-/// Test campaigns for robots from a `.sesame` space: checks it, generates test runners, runs them.
+/// Compiler for `.sesame` spaces: checks them, generates test runners for robots, and runs test campaigns.
 #[derive(Debug, Parser)]
 #[command(name = "sesamec", version, about, after_help = EXIT_CODES)]
 struct Arguments {
@@ -92,64 +109,64 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Make a new project: a space, with a small simulator of its own.
+    /// Create a new project: a space with a small simulator.
     New {
-        /// Its folder; the last part is the space's name.
+        /// The folder of the project; its last part becomes the name of the space.
         folder: PathBuf,
         /// Where the runtime comes from: `path:FOLDER` or a version.
         #[arg(long, value_parser = RuntimeChoice::parse)]
         runtime: Option<RuntimeChoice>,
-        /// A folder with templates in place of sesamec's own, by their names; see the page on the compiler's commands.
+        /// A folder with templates that replace sesamec's own by name; see docs/sesamec.md.
         #[arg(long, value_name = "FOLDER")]
         templates: Option<PathBuf>,
     },
-    /// Check a space, and say all that is wrong with it.
+    /// Check a space and report all errors and warnings.
     Check {
         /// The `.sesame` file.
         file: PathBuf,
-        /// Exit with 1 if there is anything of this kind.
+        /// Exit with code 1 if there is any diagnostic of this kind.
         #[arg(long, value_name = "KIND")]
         deny: Option<Deny>,
         #[command(flatten)]
         diagnostics: Diagnostics,
     },
-    /// Bring `.sesame` files into the one layout. Nothing but blanks and line ends is changed.
+    /// Format `.sesame` files. Only white space changes.
     Fmt {
-        /// The files, or folders whose `.sesame` files are meant, and `-` for standard input to standard output; those in
-        /// this folder if not said.
+        /// Files, folders with `.sesame` files, or `-` for standard input to standard output; the `.sesame` files in the
+        /// current folder if omitted.
         files: Vec<PathBuf>,
-        /// Write nothing; show what would change, and exit with 1 if anything would.
+        /// Write nothing; show what would change, and exit with code 1 if anything would change.
         #[arg(long)]
         check: bool,
         #[command(flatten)]
         diagnostics: Diagnostics,
     },
-    /// Generate the test runners of a space, and stubs for hooks that are not there yet.
+    /// Generate the test runners of a space, and stubs for missing hooks.
     Generate {
         #[command(flatten)]
         generation: Generation,
-        /// Write nothing; exit with 1 if anything would be written.
+        /// Write nothing; exit with code 1 if anything would be written.
         #[arg(long, conflicts_with = "force")]
         check: bool,
         /// Write nothing; show what would be written, and how files would change.
         #[arg(long, conflicts_with = "check")]
         dry_run: bool,
-        /// Put the hooks into each runner's own `src/hooks/`, for a crate that is to be moved elsewhere. They start from the
-        /// shared ones: those in the output folder, or else in `runners` beside the file.
+        /// Put the hooks into each runner's own `src/hooks/`, so that its crate can be moved. They are copied from the shared
+        /// hooks in the output folder, or else in `runners` beside the file.
         #[arg(long)]
         self_contained: bool,
-        /// Copy the runtime, the simulator's crate and all others that are in folders into each runner, which then builds
-        /// without them; `--self-contained` besides.
+        /// Copy the runtime, the simulator's crate and all other crates in local folders into each runner, so that it builds
+        /// without them. Implies `--self-contained`.
         #[arg(long)]
         vendor: bool,
     },
     /// Check, generate, build, and run a campaign.
     #[command(after_help = "Everything after `--` goes to the runner, for example `-- --seed 7 --workers 4`.\n\n\
-                            Exit codes: 1 if the space, the generation or the build failed, 2 wrong usage, else the runner's own.")]
+                            Exit codes: 1 if checking, generating or building failed, 2 wrong usage, otherwise that of the runner.")]
     Run {
         #[command(flatten)]
         generation: Generation,
-        /// What the runner is told.
+        /// Arguments for the runner.
         #[arg(last = true, value_name = "RUNNER ARGUMENTS")]
         arguments: Vec<std::ffi::OsString>,
     },
@@ -158,19 +175,24 @@ enum Command {
     Results(results::Results),
     /// Import a testing space of the original SESAME platform (an EMF file, `.model`), with the tests that it performed.
     Import {
-        /// The file.
+        /// The `.model` file.
         file: PathBuf,
-        /// The folder for the space and the results; it must be empty or not there yet.
+        /// The folder for the space and the results; it must be empty or must not exist.
         #[arg(long, short = 'o', value_name = "FOLDER")]
         out: PathBuf,
     },
-    /// Explain the code of a diagnostic, for example E0203; or a campaign of a space, with every default written out.
+    /// Explain the code of a diagnostic, for example E0203; or something that a space declares, with all its uses.
+    ///
+    /// A campaign is shown with every default written out, and with the space of its tests.
     Explain {
-        /// The code, or the campaign.
-        #[arg(value_name = "CODE or CAMPAIGN")]
+        /// The code, or the name: for a field or parameter with what it belongs to, as in `SafetyZone.level`.
+        #[arg(value_name = "CODE or NAME")]
         what: String,
-        /// The `.sesame` file of the campaign.
+        /// The `.sesame` file that declares the name.
         file: Option<PathBuf>,
+        /// How a definition and its uses are shown: as text, or as one JSON object.
+        #[arg(long, value_enum, default_value_t, requires = "file")]
+        format: ExplainFormat,
     },
     /// Print a script that completes sesamec's command line in a shell.
     #[command(
@@ -201,6 +223,16 @@ enum Format {
     Json,
     /// Annotations for GitHub's workflows.
     Github,
+}
+
+/// How a definition and its uses are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+enum ExplainFormat {
+    /// Text.
+    #[default]
+    Human,
+    /// One JSON object.
+    Json,
 }
 
 /// What is generated, and where.
@@ -276,8 +308,10 @@ pub fn run(
         Command::Run { generation, arguments } => commands::run(shell, language, &generation, &arguments),
         Command::Results(asked) => results::results(shell, asked),
         Command::Import { file, out } => import::import(shell, language, &file, &out),
-        Command::Explain { what, file: Some(file) } => commands::explain_campaign(shell, language, &what, &file),
-        Command::Explain { what, file: None } => commands::explain_code(language, &what),
+        Command::Explain { what, file: Some(file), format } => {
+            commands::explain_name(shell, language, &what, &file, format)
+        }
+        Command::Explain { what, file: None, .. } => commands::explain_code(language, &what),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "sesamec", &mut script);

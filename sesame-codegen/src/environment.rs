@@ -47,7 +47,7 @@ pub enum Error {
         problem: String,
     },
     /// The folder that the `.sesame` file names holds no crate.
-    #[error("{source_file} says the simulator's crate is in `{folder}`, but there is no {}", manifest.display())]
+    #[error("{source_file} places the simulator's crate in `{folder}`, but {} does not exist", manifest.display())]
     NoSimulator {
         /// File name of the `.sesame` file.
         source_file: String,
@@ -58,7 +58,7 @@ pub enum Error {
     },
     /// Nothing says where the simulator's crate comes from.
     #[error(
-        "nothing says where the crate `{name}` of the simulator `{path}` comes from: \
+        "the location of the crate `{name}` of the simulator `{path}` is unknown: \
          add `crate \"its/folder\"` to the simulator in {source_file}, or `{name}` to [dependencies] in {SETTINGS}"
     )]
     UnknownSimulator {
@@ -70,13 +70,13 @@ pub enum Error {
         source_file: String,
     },
     /// There is no runtime where one was said to be.
-    #[error("there is no {RUNTIME} in {}: give the folder of its Cargo.toml", folder.display())]
+    #[error("no {RUNTIME} in {}: give the folder of its Cargo.toml", folder.display())]
     NoRuntime {
         /// Where.
         folder: PathBuf,
     },
     /// The program that the `.sesame` file gives by its path is not there.
-    #[error("{source_file} says the simulator's program is `{program}`, but there is no {}", file.display())]
+    #[error("{source_file} gives the simulator's program as `{program}`, but {} does not exist", file.display())]
     NoProgram {
         /// File name of the `.sesame` file.
         source_file: String,
@@ -95,7 +95,7 @@ pub enum Error {
     },
     /// A runtime that is in no folder cannot be copied.
     #[error(
-        "`--vendor` copies the runtime, and so needs its source in a folder: give it with `--runtime path:FOLDER`, or as \
+        "`--vendor` copies the runtime, so it needs the source in a folder: give it with `--runtime path:FOLDER`, or as \
          `path` in [runtime] of {SETTINGS}"
     )]
     RuntimeHasNoFolder,
@@ -108,7 +108,7 @@ pub enum Error {
         problem: String,
     },
     /// A path that TOML cannot hold.
-    #[error("the path {} is not UTF-8, and so cannot stand in a Cargo.toml", path.display())]
+    #[error("the path {} is not UTF-8 and cannot be written into a Cargo.toml", path.display())]
     NotText {
         /// Which.
         path: PathBuf,
@@ -229,7 +229,7 @@ pub fn environment(
     }
     for (name, value) in &settings.dependencies {
         if name.replace('_', "-") == RUNTIME {
-            let problem = format!("`{name}` does not belong into [dependencies]: choose it in [runtime]");
+            let problem = format!("`{name}` does not belong in [dependencies]: choose it in [runtime]");
             errors.push(Error::Settings { path: home.join(SETTINGS), problem });
             continue;
         }
@@ -461,7 +461,7 @@ fn package_name(manifest: &Path) -> Result<String, Error> {
     let text = input::text(manifest).map_err(|cause| Error::Read { path: manifest.to_owned(), cause })?;
     let table: Table = toml::from_str(&text).map_err(|error| failed(error.to_string()))?;
     let name = table.get("package").and_then(|package| package.get("name")).and_then(Value::as_str);
-    name.map(str::to_owned).ok_or_else(|| failed("it names no package".to_owned()))
+    name.map(str::to_owned).ok_or_else(|| failed("it has no package name".to_owned()))
 }
 
 /// A dependency whose path, if it has one, is as seen from a runner and not from `sesame.toml`.

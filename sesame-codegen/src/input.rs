@@ -1,9 +1,9 @@
 //! Files that people give to `sesamec`, or that lie beside those: opened only if they are regular files, and read up to a
 //! limit.
 //!
-//! So a pipe that nobody writes to cannot keep a command waiting, and a device that never ends cannot fill the memory.
-//! And what is read as text of one kind may be quoted in messages, so a link must not lead from there to a file of
-//! another kind: a checkout of somebody else's would else show a password or an environment in the log of its checks.
+//! So a pipe without a writer cannot block a command, and an endless device cannot fill the memory. Texts may be quoted in
+//! messages, so a link must not lead to a file of another kind: otherwise a checkout from someone else could show a
+//! password or an environment in the log of its checks.
 
 use std::fs::{self, File};
 use std::io::{self, Read as _};
@@ -30,7 +30,7 @@ pub enum Unreadable {
         remedy: &'static str,
     },
     /// It is larger than what is read.
-    #[error("it is larger than {} MiB, the most that is read of such a file", .most >> 20)]
+    #[error("it is larger than {} MiB, which is the limit for such a file", .most >> 20)]
     TooLarge {
         /// The limit in bytes.
         most: u64,
@@ -40,7 +40,7 @@ pub enum Unreadable {
     NotText,
     /// A link that leads to a file of another kind.
     #[error(
-        "it is a link to {}, a file of another kind, which is not read for it: put a copy in the place of the link",
+        "it is a link to {}, a file of another kind, which is not followed; replace the link with a copy",
         target.display()
     )]
     OtherKind {
@@ -106,7 +106,7 @@ fn what_else(metadata: &fs::Metadata) -> (&'static str, &'static str) {
     use std::os::unix::fs::FileTypeExt as _;
     let kind = metadata.file_type();
     if kind.is_fifo() {
-        ("a pipe", ": write what comes out of it into a file, and give that")
+        ("a pipe", "; write its output into a file and use that")
     } else if kind.is_char_device() || kind.is_block_device() {
         ("a device", "")
     } else if kind.is_socket() {
@@ -138,7 +138,7 @@ mod tests {
         assert!(matches!(text(&path), Err(Unreadable::NotText)));
         File::create(&path).unwrap().set_len(MOST_OF_A_TEXT + 1).unwrap();
         let refused = text(&path).unwrap_err().to_string();
-        assert_eq!(refused, "it is larger than 8 MiB, the most that is read of such a file");
+        assert_eq!(refused, "it is larger than 8 MiB, which is the limit for such a file");
     }
 
     #[cfg(unix)]
@@ -148,7 +148,7 @@ mod tests {
         let pipe = folder.path().join("pipe.sesame");
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
         let refused = text(&pipe).unwrap_err().to_string();
-        assert!(refused.starts_with("it is a pipe, not a regular file: write"), "{refused}");
+        assert!(refused.starts_with("it is a pipe, not a regular file; write"), "{refused}");
         let refused = bytes(Path::new("/dev/zero"), 10).unwrap_err().to_string();
         assert_eq!(refused, "it is a device, not a regular file");
     }

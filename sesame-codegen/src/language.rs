@@ -2,17 +2,20 @@
 
 use std::path::Path;
 
+use sesame_dsl::Analysis;
 use sesame_dsl::diagnostic::{Diagnostic, Severity, page, render};
+use sesame_dsl::index::Kind;
 use sesame_dsl::model::Space;
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 
-use crate::cli::{Checked, Diagnosed, Language, Look};
+use crate::cli::{Checked, Diagnosed, Found, Language, Look};
 use crate::input::{self, Unreadable};
 use crate::lower::lower;
+use crate::uses;
 
 /// The language of this version.
-pub const SESAME: Language = Language { check, format, explain: page };
+pub const SESAME: Language = Language { check, format, explain: page, find };
 
 /// What the plan names as its generator.
 const GENERATOR: &str = concat!("sesamec ", env!("CARGO_PKG_VERSION"));
@@ -51,15 +54,15 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
         format!("{file}:{}", sources.position(span).line)
     };
     let mut notes = Vec::new();
-    if let Some(launch) = &space.surroundings.launch {
+    if let Some(launch) = &space.lifecycle.launch {
         let place = at(launch.command.span);
         notes.push(format!("`launch` ({place}) is not used by runners yet: they start the simulator themselves"));
     }
-    if let Some(terminate) = &space.surroundings.terminate {
+    if let Some(terminate) = &space.lifecycle.terminate {
         let place = at(terminate.span);
         notes.push(format!("`terminate` ({place}) is not used by runners yet: they end the simulator themselves"));
     }
-    if let Some(budget) = &space.surroundings.relay_budget {
+    if let Some(budget) = &space.lifecycle.relay_budget {
         let place = at(budget.span);
         notes.push(format!("`relay budget` ({place}) is not used by runners yet: in lock-step a relay adds no delay"));
     }
@@ -76,6 +79,21 @@ fn format(file: &str, text: &str, look: Look) -> Result<String, Diagnosed> {
     let mut sources = SourceMap::new();
     let root = sources.add(file, text);
     sesame_dsl::format::format(&sources, root).map_err(|errors| diagnosed(&errors, &sources, look))
+}
+
+fn find(file: &str, text: &str, name: &str) -> Result<Found, String> {
+    let mut sources = SourceMap::new();
+    let root = sources.add(file, text);
+    sesame_dsl::load_imports(&mut sources, root, read);
+    let Analysis { index, diagnostics, .. } = sesame_dsl::analyse(&sources, root);
+    let id = uses::find(&sources, &index, file, name)?;
+    Ok(Found {
+        campaign: index.definition(id).kind == Kind::Campaign,
+        text: uses::text(&sources, &index, id),
+        uses: uses::uses(&sources, &index, id),
+        json: uses::json(&sources, &index, id),
+        errors: diagnostics.iter().filter(|found| found.severity() == Severity::Error).count(),
+    })
 }
 
 fn diagnosed(diagnostics: &[Diagnostic], sources: &SourceMap, look: Look) -> Diagnosed {

@@ -22,3 +22,5 @@ pub mod names;
 pub mod output;
 pub mod plan;
 pub mod project;
+#[cfg(feature = "cli")]
+pub mod uses;

@@ -72,12 +72,12 @@ struct Selection {
 impl Selection {
     fn of(space: &Space, campaign: &model::Campaign) -> Self {
         let mut operations: Vec<model::OperationId> = match &campaign.search {
-            model::Search::Nsga2 { content, .. }
-            | model::Search::MapElites { content, .. }
-            | model::Search::LatinHypercube { content, .. }
-            | model::Search::Sobol { content, .. }
-            | model::Search::Falsification { content, .. }
-            | model::Search::Random { content, .. } => content.operations.clone(),
+            model::Search::Nsga2 { template, .. }
+            | model::Search::MapElites { template, .. }
+            | model::Search::LatinHypercube { template, .. }
+            | model::Search::Sobol { template, .. }
+            | model::Search::Falsification { template, .. }
+            | model::Search::Random { template, .. } => template.operations.clone(),
             model::Search::Repeat { test, .. } => {
                 space.tests[*test].operations.iter().map(|operation| operation.operation).collect()
             }
@@ -133,7 +133,7 @@ impl Selection {
             name: requirement.declaration.name.clone(),
             text: requirement.text.clone(),
             metric: self.metric(requirement.metric),
-            bound: bound(requirement.bound),
+            bound: requirement.bound,
         }
     }
 
@@ -143,14 +143,14 @@ impl Selection {
             plan::TestOperation {
                 operation: self.operation(it.operation),
                 activation: self.activation(&it.activation, within.end),
-                parameters: it.choices.iter().map(choice).collect(),
+                parameters: it.choices.clone(),
                 draw_seed: it.draw_seed,
             }
         });
-        let expectations = test.expectations.iter().map(|expectation| plan::Expectation {
-            metric: self.metric(expectation.metric),
-            bound: bound(expectation.bound),
-        });
+        let expectations = test
+            .expectations
+            .iter()
+            .map(|expectation| plan::Expectation { metric: self.metric(expectation.metric), bound: expectation.bound });
         plan::KnownTest {
             name: test.declaration.name.clone(),
             doc: test.declaration.doc.clone(),
@@ -164,24 +164,24 @@ impl Selection {
         let failsafe = campaign.coverage.as_ref().and_then(|coverage| coverage.failsafe);
         let limit = |evaluations: u32| failsafe.unwrap_or(evaluations);
         let (search, (operations, count)) = match &campaign.search {
-            model::Search::Nsga2 { content, population, evaluations } => {
-                (plan::Search::Nsga2 { population: *population, evaluations: limit(*evaluations) }, held(content))
+            model::Search::Nsga2 { template, population, evaluations } => {
+                (plan::Search::Nsga2 { population: *population, evaluations: limit(*evaluations) }, held(template))
             }
-            model::Search::MapElites { content, population, evaluations } => {
-                (plan::Search::MapElites { population: *population, evaluations: limit(*evaluations) }, held(content))
+            model::Search::MapElites { template, population, evaluations } => {
+                (plan::Search::MapElites { population: *population, evaluations: limit(*evaluations) }, held(template))
             }
-            model::Search::Random { content, evaluations } => {
-                (plan::Search::Random { evaluations: limit(*evaluations) }, held(content))
+            model::Search::Random { template, evaluations } => {
+                (plan::Search::Random { evaluations: limit(*evaluations) }, held(template))
             }
-            model::Search::LatinHypercube { content, evaluations } => {
-                (plan::Search::LatinHypercube { evaluations: limit(*evaluations) }, held(content))
+            model::Search::LatinHypercube { template, evaluations } => {
+                (plan::Search::LatinHypercube { evaluations: limit(*evaluations) }, held(template))
             }
-            model::Search::Sobol { content, evaluations } => {
-                (plan::Search::Sobol { evaluations: limit(*evaluations) }, held(content))
+            model::Search::Sobol { template, evaluations } => {
+                (plan::Search::Sobol { evaluations: limit(*evaluations) }, held(template))
             }
-            model::Search::Falsification { content, population, evaluations } => (
+            model::Search::Falsification { template, population, evaluations } => (
                 plan::Search::Falsification { population: *population, evaluations: limit(*evaluations) },
-                held(content),
+                held(template),
             ),
             model::Search::Repeat { test, times } => {
                 let held = space.tests[*test].operations.len();
@@ -203,8 +203,8 @@ impl Selection {
             operations: operations.iter().map(|&id| self.operation(id)).collect(),
             count,
             copies: copies(space, campaign),
-            activation: match content(campaign) {
-                Some(content) => self.activation_mode(space, &content.activation),
+            activation: match template(campaign) {
+                Some(template) => self.activation_mode(space, &template.activation),
                 // A repeated test brings its own.
                 None => plan::ActivationMode::Time,
             },
@@ -232,20 +232,20 @@ fn undisturbed() -> plan::KnownTest {
 }
 
 /// What the tests of a search hold; `None` for a campaign that repeats.
-fn content(campaign: &model::Campaign) -> Option<&model::Content> {
-    campaign.search.content()
+fn template(campaign: &model::Campaign) -> Option<&model::TestTemplate> {
+    campaign.search.template()
 }
 
 /// Which operations the tests of a search hold, and how many.
-fn held(content: &model::Content) -> (&Vec<model::OperationId>, plan::Count) {
-    (&content.operations, plan::Count { min: content.min, max: content.max })
+fn held(template: &model::TestTemplate) -> (&Vec<model::OperationId>, plan::Count) {
+    (&template.operations, plan::Count { min: template.min, max: template.max })
 }
 
 /// What holds of several copies of one operation in a campaign's tests. A known test that a campaign repeats is run as tests
 /// of the space's searches are: its copies may act together where those of all of them may.
 fn copies(space: &Space, campaign: &model::Campaign) -> plan::Copies {
-    match content(campaign) {
-        Some(content) => content.copies,
+    match template(campaign) {
+        Some(template) => template.copies,
         None if space.copies_may_overlap() => plan::Copies::MayOverlap,
         None => plan::Copies::Apart,
     }
@@ -253,7 +253,7 @@ fn copies(space: &Space, campaign: &model::Campaign) -> plan::Copies {
 
 /// What a campaign grows conditions from, if it does.
 fn condition_space(campaign: &model::Campaign) -> Option<&model::condition::ConditionSpace> {
-    match &content(campaign)?.activation {
+    match &template(campaign)?.activation {
         model::ActivationMode::Time => None,
         model::ActivationMode::Condition(space) => Some(space),
     }
@@ -364,11 +364,11 @@ fn trend(metric: &model::Metric) -> Option<plan::Trend> {
         model::MetricSource::Hook(_) => metric.trend,
         model::MetricSource::FuzzingTime => Some(plan::Trend::Rising),
         model::MetricSource::Formula(formula) => match formula.aggregate {
-            model::Aggregate::Max(_) | model::Aggregate::Count(_) | model::Aggregate::Duration(_) => {
+            plan::Aggregate::Max { .. } | plan::Aggregate::Count { .. } | plan::Aggregate::Duration { .. } => {
                 Some(plan::Trend::Rising)
             }
-            model::Aggregate::Min(_) => Some(plan::Trend::Falling),
-            model::Aggregate::Last(_) | model::Aggregate::Mean(_) => None,
+            plan::Aggregate::Min { .. } => Some(plan::Trend::Falling),
+            plan::Aggregate::Last { .. } | plan::Aggregate::Mean { .. } => None,
         },
         model::MetricSource::Last(_) | model::MetricSource::Robustness(_) => None,
     }
@@ -434,26 +434,6 @@ fn within(operation: &model::Operation, end_after: f64) -> plan::Span {
     match operation.within {
         Some(window) => plan::Span { start: window.low, end: window.high },
         None => plan::Span { start: 0.0, end: end_after },
-    }
-}
-
-fn choice(choice: &model::Choice) -> plan::Choice {
-    match choice {
-        model::Choice::Value(value) => plan::Choice::Value { value: *value },
-        model::Choice::Range(range) => plan::Choice::Range { low: range.low, high: range.high },
-        model::Choice::Point(point) => plan::Choice::Point { point: *point },
-        model::Choice::Text(text) => plan::Choice::Text { text: text.clone() },
-    }
-}
-
-fn bound(bound: model::Bound) -> plan::Bound {
-    match bound {
-        model::Bound::AtMost(value) => plan::Bound::AtMost { value },
-        model::Bound::Below(value) => plan::Bound::Below { value },
-        model::Bound::AtLeast(value) => plan::Bound::AtLeast { value },
-        model::Bound::Above(value) => plan::Bound::Above { value },
-        model::Bound::Equal(value) => plan::Bound::Equal { value },
-        model::Bound::Within(range) => plan::Bound::Within { low: range.low, high: range.high },
     }
 }
 

@@ -147,8 +147,8 @@ pub enum Error {
     },
     /// The output folder holds the runners of another `.sesame` file.
     #[error(
-        "{} holds the runners of `{other}`, and these are of `{source_file}`: \
-         give them a folder of their own with `-o`, or take this one over with `--force`",
+        "{} contains the runners of `{other}`, not of `{source_file}`: choose another folder with `-o`, or replace \
+         them with `--force`",
         folder.display()
     )]
     OtherSpace {
@@ -161,8 +161,8 @@ pub enum Error {
     },
     /// The runner there carries more with it than this one would.
     #[error(
-        "the runner in {} was generated with `--{option}`: say so again, give this one a folder of its own with `-o`, \
-         or take that one over with `--force`",
+        "the runner in {} was generated with `--{option}`: pass `--{option}` again, choose another folder with `-o`, or \
+         replace it with `--force`",
         folder.display()
     )]
     OtherOption {
@@ -172,14 +172,14 @@ pub enum Error {
         option: &'static str,
     },
     /// A new project would be mixed with something else.
-    #[error("{} is there already and not empty: choose another name", folder.display())]
+    #[error("{} already exists and is not empty: choose another name", folder.display())]
     NotEmpty {
         /// The folder.
         folder: PathBuf,
     },
     /// A manifest that cannot be read.
     #[error(
-        "the manifest {} cannot be used ({problem}): restore it, or delete it and generate with `--force`",
+        "cannot use the manifest {} ({problem}): restore it, or delete it and generate with `--force`",
         path.display()
     )]
     Manifest {
@@ -190,8 +190,8 @@ pub enum Error {
     },
     /// A link where generated files have a folder, or where their manifest is.
     #[error(
-        "{} is a link, and what is generated stays in its folder: remove the link, or generate into the folder that it \
-         leads to with `-o`",
+        "{} is a link, and generated files are never written through links: remove the link, or pass the folder that \
+         it leads to with `-o`",
         path.display()
     )]
     Link {
@@ -199,7 +199,7 @@ pub enum Error {
         path: PathBuf,
     },
     /// Something else where a generated file or folder belongs.
-    #[error("{} is in the way: {what} belongs there; move it elsewhere", path.display())]
+    #[error("{} is in the way of {what} that is generated there: move it elsewhere", path.display())]
     InTheWay {
         /// What is there.
         path: PathBuf,
@@ -231,9 +231,7 @@ fn edited_files(files: &[EditedFile]) -> String {
     for EditedFile { path, diff } in files {
         text = format!("{text}\n{path}\n{diff}");
     }
-    text.push_str(
-        "\nmove what you need into the .sesame file, a hook or sesame.toml; `--force` overwrites these files",
-    );
+    text.push_str("\nmove your changes into the .sesame file, a hook or sesame.toml; `--force` overwrites these files");
     text
 }
 
@@ -357,7 +355,7 @@ fn survey(
             (_, Found::Other) => return Err(Error::InTheWay { path: at.path(), what: "a file" }),
             (Owner::Machine, Found::Link) => {
                 if !mode.forces() {
-                    let diff = "it is a link now, and generated files are none\n".to_owned();
+                    let diff = "it is now a link, but generated files are not links\n".to_owned();
                     edited.push(EditedFile { path: shown.clone(), diff });
                 }
                 Change::Updated

@@ -4,10 +4,10 @@
 //! space of its own and be imported by another. However often and from wherever a file is imported, it is there once.
 
 use std::collections::BTreeMap;
-use std::path::{Component, Path, PathBuf};
+use std::path::Path;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::source::SourceMap;
+use crate::source::{SourceMap, normal_path};
 use crate::span::FileId;
 use crate::syntax::{self, ast};
 
@@ -52,23 +52,7 @@ fn is_space(name: &str) -> bool {
 /// The name of what a file imports: relative to what the importing file's name is relative to.
 fn imported_name(importing: &str, written: &str) -> String {
     let folder = Path::new(importing).parent().unwrap_or(Path::new(""));
-    normal(&folder.join(written))
-}
-
-/// A path without `.`, and without `..` but at its beginning.
-pub(crate) fn normal(path: &Path) -> String {
-    let mut parts: Vec<Component<'_>> = Vec::new();
-    for part in path.components() {
-        match (part, parts.last()) {
-            (Component::ParentDir, Some(Component::Normal(_))) => {
-                parts.pop();
-            }
-            // Nothing is above the root.
-            (Component::CurDir, _) | (Component::ParentDir, Some(Component::RootDir)) => {}
-            _ => parts.push(part),
-        }
-    }
-    parts.into_iter().collect::<PathBuf>().to_string_lossy().into_owned()
+    normal_path(&folder.join(written))
 }
 
 /// The files of a space as one.
@@ -123,14 +107,14 @@ impl Merger<'_> {
         if !is_space(&name) {
             let title = format!("cannot import \"{}\"", import.text);
             let diagnostic = Diagnostic::new(Code::NOT_IMPORTED, import.span, title)
-                .label("the name of an imported file ends in `.sesame`")
-                .note("files of other names are not even looked at, so that no message can show what is in them");
+                .label("the name of an imported file must end in `.sesame`")
+                .note("files with other names are never read, so that no message can show their content");
             self.diagnostics.push(diagnostic);
             return false;
         }
         let Some(id) = self.sources.find(&name) else {
             let title = format!("cannot import \"{}\"", import.text);
-            let why = self.sources.unreadable(&name).unwrap_or("this file was not handed in");
+            let why = self.sources.unreadable(&name).unwrap_or("this file was not provided");
             let diagnostic = Diagnostic::new(Code::NOT_IMPORTED, import.span, title).label(why);
             self.diagnostics.push(
                 diagnostic
@@ -147,8 +131,8 @@ impl Merger<'_> {
             return true;
         }
         if self.open.len() >= MAX_DEPTH {
-            let title = format!("files import each other more than {MAX_DEPTH} deep");
-            self.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, import.span, title).label("too deep"));
+            let title = format!("imports are nested more than {MAX_DEPTH} levels deep");
+            self.diagnostics.push(Diagnostic::new(Code::TOO_LARGE, import.span, title).label("nested too deeply"));
             return false;
         }
         self.visit(id, imported_name(importing_name, &import.text));
@@ -162,9 +146,9 @@ impl Merger<'_> {
             format!("{first} imports itself")
         } else {
             let by: Vec<&str> = self.open[at + 1..].iter().map(|&id| name(id)).collect();
-            format!("{first} imports itself by way of {}", by.join(", "))
+            format!("{first} imports itself through {}", by.join(", "))
         };
-        let diagnostic = Diagnostic::new(Code::CIRCLE, import.span, title).label("this import closes the circle");
+        let diagnostic = Diagnostic::new(Code::CIRCLE, import.span, title).label("this import closes the cycle");
         self.diagnostics.push(diagnostic);
     }
 }
@@ -179,8 +163,8 @@ fn append(all: &mut ast::File, mut file: ast::File) {
     all.campaigns.append(&mut file.campaigns);
     all.eddis.append(&mut file.eddis);
     all.physicals.append(&mut file.physicals);
-    all.broken.append(&mut file.broken);
-    all.damaged |= file.damaged;
+    all.undeclared.append(&mut file.undeclared);
+    all.has_errors |= file.has_errors;
     all.incomplete |= file.incomplete;
 }
 
@@ -206,7 +190,7 @@ mod tests {
         let mut diagnostics = Vec::new();
         merge(&sources, root, &mut diagnostics);
         assert_eq!(diagnostics.len(), 3, "{diagnostics:?}");
-        assert!(diagnostics.iter().all(|found| found.label.contains("ends in `.sesame`")), "{diagnostics:?}");
+        assert!(diagnostics.iter().all(|found| found.label.contains("must end in `.sesame`")), "{diagnostics:?}");
     }
 
     #[test]

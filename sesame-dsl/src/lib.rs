@@ -7,6 +7,7 @@ mod check;
 pub mod diagnostic;
 pub mod format;
 mod import;
+pub mod index;
 pub mod model;
 mod resolve;
 mod similar;
@@ -16,16 +17,19 @@ mod syntax;
 pub mod units;
 
 use diagnostic::{Diagnostic, Severity};
+use index::Index;
 use model::Space;
 use source::SourceMap;
 use span::FileId;
 
 pub use import::load_imports;
-pub use syntax::MAX_BYTES;
+pub use syntax::{MAX_BYTES, quoted};
 
 /// What an analysis found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Analysis {
+    /// What is declared and where it is mentioned, as far as it could be read: also there if something is an error.
+    pub index: Index,
     /// The model; `Some` exactly when no diagnostic is an error.
     pub model: Option<Space>,
     /// Errors and warnings, sorted by position.
@@ -45,18 +49,14 @@ impl Analysis {
 pub fn analyse(sources: &SourceMap, root: FileId) -> Analysis {
     let mut diagnostics = Vec::new();
     let merged = import::merge(sources, root, &mut diagnostics);
+    let index = index::build::index(&merged);
     let model = resolve::resolve(sources, root, merged, &mut diagnostics);
     if let Some(space) = &model {
         diagnostics.extend(check::check(space, root));
     }
     diagnostics.sort_by_key(|diagnostic| (diagnostic.span, diagnostic.code));
     diagnostics.dedup();
-    Analysis { model, diagnostics }
-}
-
-/// A text as the language writes it, in quotes.
-pub fn quoted(text: &str) -> String {
-    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
+    Analysis { index, model, diagnostics }
 }
 
 /// Whether a word is reserved, so that nothing but a message field can be named by it.

@@ -1,14 +1,14 @@
 //! "Did you mean": the nearest of some names.
 
-/// Bytes of the longest words that are compared.
+/// The most bytes of a word that is compared.
 const LONGEST: usize = 200;
 
-/// The candidate that looks most like a word, if any is near enough to be meant; the first of equally near ones.
+/// The candidate most similar to a word, if any is near enough; the first of several equally near ones.
 ///
-/// Near enough is a third of the longer one's letters (at least one, at most three) by insertions, deletions,
-/// replacements and swaps, letters of different case counting as equal.
+/// Near enough is an edit distance (insertions, deletions, replacements, swaps; case is ignored) of at most a third of
+/// the longer word's letters, and at least one, at most three.
 pub(crate) fn most_similar<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
-    // Comparing takes as long as both lengths multiplied, and nobody misspells a name of this length.
+    // The time grows with the product of both lengths, and a name of this length is not a typing mistake.
     if word.len() > LONGEST {
         return None;
     }

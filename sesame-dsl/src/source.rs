@@ -2,9 +2,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 
-use crate::import::normal;
 use crate::span::{FileId, Span};
 
 /// The files of one analysis. Nothing here touches a disk: the caller reads files and adds their text.
@@ -26,12 +25,12 @@ pub struct SourceFile {
     line_starts: Vec<u32>,
 }
 
-/// A position for people: line and column count from 1, columns in characters.
+/// A position: line and column count from 1, columns in characters unless something else is said.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct LineColumn {
     /// The line, from 1.
     pub line: u32,
-    /// The character in the line, from 1.
+    /// The column in the line, from 1.
     pub column: u32,
 }
 
@@ -45,7 +44,7 @@ impl SourceMap {
     pub fn add(&mut self, name: impl Into<String>, text: impl Into<String>) -> FileId {
         let id = FileId(u32::try_from(self.files.len()).expect("fewer than 2^32 files"));
         let name = name.into();
-        self.by_name.entry(normal(Path::new(&name))).or_insert(id);
+        self.by_name.entry(normal_path(Path::new(&name))).or_insert(id);
         self.files.push(SourceFile::new(name, text.into()));
         id
     }
@@ -62,7 +61,7 @@ impl SourceMap {
 
     /// The file of a name, `.` and `..` in it worked out.
     pub fn find(&self, name: &str) -> Option<FileId> {
-        self.by_name.get(&normal(Path::new(name))).copied()
+        self.by_name.get(&normal_path(Path::new(name))).copied()
     }
 
     /// The file of an id of this map.
@@ -112,17 +111,54 @@ impl SourceFile {
 
     /// Line and column of a byte offset, which is at most the text's length.
     pub fn position(&self, offset: u32) -> LineColumn {
+        self.position_by(offset, |before| before.chars().count())
+    }
+
+    /// The same with the column in units of UTF-16, as editors count.
+    pub fn position_utf16(&self, offset: u32) -> LineColumn {
+        self.position_by(offset, |before| before.encode_utf16().count())
+    }
+
+    fn position_by(&self, offset: u32, width: fn(&str) -> usize) -> LineColumn {
         let line = self.line_starts.partition_point(|&start| start <= offset);
         let start = self.line_starts[line - 1] as usize;
-        let column = self.text[start..offset as usize].chars().count() + 1;
+        let column = width(&self.text[start..offset as usize]) + 1;
         let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
         LineColumn { line: count(line), column: count(column) }
     }
 }
 
+/// A path without `.`, and without `..` but at its beginning.
+pub(crate) fn normal_path(path: &Path) -> String {
+    let mut parts: Vec<Component<'_>> = Vec::new();
+    for part in path.components() {
+        match (part, parts.last()) {
+            (Component::ParentDir, Some(Component::Normal(_))) => {
+                parts.pop();
+            }
+            // Nothing is above the root.
+            (Component::CurDir, _) | (Component::ParentDir, Some(Component::RootDir)) => {}
+            _ => parts.push(part),
+        }
+    }
+    parts.into_iter().collect::<PathBuf>().to_string_lossy().into_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn editors_count_in_units_of_utf16() {
+        let mut sources = SourceMap::new();
+        let file = sources.add("a.sesame", "a\nµ🤖x");
+        let at =
+            |offset| (sources.file(file).position(offset).column, sources.file(file).position_utf16(offset).column);
+        assert_eq!(at(2), (1, 1));
+        assert_eq!(at(4), (2, 2));
+        assert_eq!(at(8), (3, 4), "a robot is one character and two units");
+        assert_eq!(sources.file(file).position_utf16(9).line, 2);
+    }
 
     #[test]
     fn lines_and_columns_count_from_one_and_in_characters() {

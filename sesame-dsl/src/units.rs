@@ -1,8 +1,8 @@
 //! Units of measurement: dimensions, exact scales, conversion.
 //!
-//! A scale is a ratio of whole numbers times a power of π, so `150mm` is exactly `0.15m`, and a number that goes through
-//! another unit of the same dimension and back comes back but for the rounding of two divisions. Angle is a dimension of
-//! its own here: `rad/s` is not `Hz`.
+//! A scale is a ratio of whole numbers times a power of π, so `150mm` is exactly `0.15m`. Converting a number to another
+//! unit of the same dimension and back changes it by at most the rounding of two divisions. Angle is a dimension of its
+//! own: `rad/s` is not `Hz`.
 
 /// The exponents of the base dimensions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
@@ -32,7 +32,7 @@ impl Dimension {
         Some(Dimension { exponents })
     }
 
-    /// What it is called: `a length`, `a speed`, or its base units when it has no common name.
+    /// Its name with an article, such as `a length`; its base units if it has no common name.
     pub fn name(self) -> String {
         if let Some((name, _)) = NAMES.iter().find(|(_, dimension)| *dimension == self) {
             return (*name).to_owned();
@@ -43,7 +43,7 @@ impl Dimension {
             .filter(|&(_, exponent)| exponent != 0)
             .map(|(base, exponent)| if exponent == 1 { (*base).to_owned() } else { format!("{base}^{exponent}") })
             .collect();
-        format!("a quantity in {}", factors.join("*"))
+        format!("a quantity of dimension {}", factors.join("*"))
     }
 }
 
@@ -128,7 +128,7 @@ fn gcd(a: u128, b: u128) -> u128 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// A unit as written, with what it means.
+/// A unit as written, with its dimension and scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unit {
     text: String,
@@ -136,7 +136,7 @@ pub struct Unit {
     scale: Scale,
 }
 
-/// Why a unit's text means nothing.
+/// Why a text is not a unit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum UnitError {
     /// No unit has this symbol.
@@ -146,12 +146,12 @@ pub enum UnitError {
         /// Known symbols that look like it, best first.
         similar: Vec<&'static str>,
     },
-    /// The product of its parts leaves what can be represented.
+    /// The product of its parts cannot be represented.
     TooLarge,
 }
 
 impl Unit {
-    /// The unit of time on this side of the wire.
+    /// The second, the unit of all times in models.
     pub fn seconds() -> Unit {
         Unit { text: "s".to_owned(), dimension: Dimension::TIME, scale: Scale::ONE }
     }
@@ -204,7 +204,7 @@ impl Unit {
         })
     }
 
-    /// What it measures.
+    /// Its dimension.
     pub fn dimension(&self) -> Dimension {
         self.dimension
     }
@@ -215,8 +215,8 @@ impl Unit {
     }
 }
 
-/// A value from one unit to another of the same dimension; no unit is a plain number. In its own unit it is what it was,
-/// bit for bit.
+/// Converts a value to another unit of the same dimension; no unit is a plain number. In its own unit a value stays the
+/// same, bit for bit.
 pub fn convert(value: f64, from: Option<&Unit>, to: Option<&Unit>) -> f64 {
     debug_assert_eq!(dimension(from), dimension(to), "conversion is between units of one dimension");
     let [from, to] = [from, to].map(|unit| unit.map_or(Scale::ONE, |unit| unit.scale));
@@ -228,8 +228,8 @@ pub fn convert(value: f64, from: Option<&Unit>, to: Option<&Unit>) -> f64 {
     }
 }
 
-/// The unit of a product, or of a quotient; and how many of it the product of one of each is. Symbols that occur on both
-/// sides cancel; what is left without a dimension is a plain number. `None` when it cannot be represented.
+/// The unit of a product or quotient, and the factor that its value is multiplied by. Symbols that occur on both sides
+/// cancel; without a dimension the result is a plain number. `None` if it cannot be represented.
 pub fn product(left: Option<&Unit>, right: Option<&Unit>, divide: bool) -> Option<(Option<Unit>, f64)> {
     let mut scale = 1.0;
     let mut powers: Vec<(&str, i8)> = Vec::new();
@@ -249,7 +249,7 @@ pub fn product(left: Option<&Unit>, right: Option<&Unit>, divide: bool) -> Optio
         }
     }
     powers.retain(|&(_, power)| power != 0);
-    // What is multiplied comes first: a unit does not begin with a stroke.
+    // Factors come before divisors: a unit does not begin with `/`.
     powers.sort_by_key(|&(_, power)| power < 0);
     let mut text = String::new();
     for (symbol, power) in powers {
@@ -273,7 +273,7 @@ pub fn product(left: Option<&Unit>, right: Option<&Unit>, divide: bool) -> Optio
     Some((Some(unit), scale))
 }
 
-/// What a unit measures; no unit is a plain number.
+/// The dimension of a unit; no unit is a plain number.
 pub fn dimension(unit: Option<&Unit>) -> Dimension {
     unit.map_or(Dimension::NONE, Unit::dimension)
 }
@@ -296,7 +296,7 @@ fn similar_symbols(symbol: &str) -> Vec<&'static str> {
     symbols().filter(|known| known.len() > 1 && strsim::osa_distance(known, symbol) == 1).take(3).collect()
 }
 
-/// What people write instead of the symbol.
+/// Common spellings, and the symbols they stand for.
 const SPELT_OUT: &[(&[&str], &str)] = &[
     (&["sec", "secs", "second", "seconds"], "s"),
     (&["msec", "millis", "millisecond", "milliseconds"], "ms"),
@@ -408,7 +408,7 @@ mod tests {
         assert_eq!(unit("W/A").dimension(), unit("V").dimension());
         assert_ne!(unit("rad/s").dimension(), unit("Hz").dimension());
         assert_eq!(unit("m/s").dimension().name(), "a speed");
-        assert_eq!(unit("kg*m").dimension().name(), "a quantity in m*kg");
+        assert_eq!(unit("kg*m").dimension().name(), "a quantity of dimension m*kg");
     }
 
     #[test]

@@ -108,7 +108,7 @@ fn a_mistake_is_shown_in_the_file_it_is_in() {
     let cell = CELL.replace("hook on link0", "hook on lnk0");
     let (sources, analysis, _) = analyse_files(&[("demo.sesame", MAIN), ("shared/cell.sesame", &cell)]);
     let shown = render::short(&analysis.diagnostics, &sources);
-    assert_eq!(shown, "shared/cell.sesame:11:33: error[E0203]: no topic named `lnk0`: not a topic of this space\n");
+    assert_eq!(shown, "shared/cell.sesame:11:33: error[E0203]: no topic named `lnk0`: not found in this space\n");
     let json = render::json(&analysis.diagnostics, &sources);
     assert!(json.contains("shared/cell.sesame"), "{json}");
 }
@@ -128,7 +128,7 @@ fn a_long_chain_of_imports_is_refused_and_not_followed_for_ever() {
     let files: Vec<(String, String)> =
         (0..200).map(|n| (format!("f{n}.sesame"), format!("import \"f{}.sesame\"", n + 1))).collect();
     let files: Vec<(&str, &str)> = files.iter().map(|(name, text)| (name.as_str(), text.as_str())).collect();
-    assert!(said(&files).contains("more than 64 deep"));
+    assert!(said(&files).contains("more than 64 levels deep"));
 }
 
 /// The campaign of a name, after some more text in the demo.
@@ -147,8 +147,8 @@ fn a_clause_replaces_the_inherited_one_whole_and_all_others_stay() {
     assert_eq!((&second.objectives, second.end_after), (&first.objectives, 70.0));
     assert_eq!(second.observed, first.observed);
     assert_eq!(second.from, space.campaign("c"));
-    let Search::Random { evaluations, content } = second.search else { panic!("{second:?}") };
-    assert_eq!((evaluations, content.operations.len()), (20, 1));
+    let Search::Random { evaluations, template } = second.search else { panic!("{second:?}") };
+    assert_eq!((evaluations, template.operations.len()), (20, 1));
     assert_eq!((first.seed, second.seed), (3, 1), "the inherited seed went with its search");
 }
 
@@ -184,7 +184,7 @@ fn explorations_are_inherited_where_they_can_work_and_reasons_to_stop_by_every_s
         });
         assert_eq!(
             campaign.confirm.is_some(),
-            campaign.search.content().is_some(),
+            campaign.search.template().is_some(),
             "every search confirms what it finds"
         );
         (explores, campaign.coverage.is_some(), campaign.stop.len())
@@ -228,8 +228,8 @@ fn conditions_traces_and_custom_operations_come_from_imports_and_other_campaigns
     let space = space(&files);
     let campaign = |name| &space.campaigns[space.campaign(name).unwrap()];
     let variables = |name| {
-        let Search::Random { content, .. } = &campaign(name).search else { panic!("{name} searches") };
-        let ActivationMode::Condition(grown) = &content.activation else { panic!("{name} grows conditions") };
+        let Search::Random { template, .. } = &campaign(name).search else { panic!("{name} searches") };
+        let ActivationMode::Condition(grown) = &template.activation else { panic!("{name} grows conditions") };
         let names = grown.variables.iter().map(|it| space.metrics[it.metric].declaration.name.as_str());
         names.collect::<Vec<_>>()
     };
@@ -247,5 +247,5 @@ fn what_inherited_conditions_cannot_contain_is_said_of_the_campaign_that_wrote_t
         "space demo import \"cell.sesame\" campaign more from base { end after 60s } campaign most from more { }";
     let said = said(&[("demo.sesame", main), ("cell.sesame", &cell)]);
     assert_eq!(said.matches("error[E0505]").count(), 1, "{said}");
-    assert!(said.contains("no variable of campaign `base`"), "{said}");
+    assert!(said.contains("not a variable of campaign `base`"), "{said}");
 }

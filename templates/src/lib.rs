@@ -1,6 +1,6 @@
 //! The texts of this project that people read and edit: stubs, READMEs, new projects and the report's shell.
 //!
-//! Templates hold loops and plain conditions, nothing else: names, types and sentences are computed by whoever fills
+//! Templates contain loops and simple conditions only: names, types and sentences are computed by the code that fills
 //! them in.
 
 pub mod project;

@@ -28,8 +28,8 @@ fn following_what_new_prints_leads_to_a_front() {
         let rest = said.split(after).nth(1).unwrap_or_else(|| panic!("no `{after}` in: {said}"));
         rest.split([',', '`']).next().unwrap().trim().to_owned()
     };
-    let hook = folder.join(words("fill the stub in: in "));
-    let function = words("let the body of `");
+    let hook = folder.join(words("fill in the stub: in "));
+    let function = words("replace the body of `");
     let stub = fs::read_to_string(&hook).unwrap();
     let (before, rest) = stub.split_once(&format!("fn {function}(")).expect("the stub has the function");
     let (signature, rest) = rest.split_once("{\n").unwrap();

@@ -41,7 +41,7 @@ fn a_new_metric_and_operation_leave_earlier_hooks_as_they_are() {
     assert!(!project.runners.join("hooks/loudest.rs").exists(), "`--check` writes nothing");
 
     let said = project.sesamec("generate", &[]).expect(0).err;
-    assert!(said.contains("loudest.rs: yours to fill in"), "{said}");
+    assert!(said.contains("loudest.rs: fill this in"), "{said}");
     assert_eq!(fs::read(&hook).unwrap(), mine, "byte for byte");
     assert!(fs::read_to_string(project.runners.join("hooks/loudest.rs")).unwrap().contains("ctx.unimplemented()"));
     project.sesamec("generate", &["--check"]).expect(0);

@@ -36,7 +36,7 @@ pub(super) fn build(shell: Shell, folder: &Path, campaign: &str) -> anyhow::Resu
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .context("cannot start `cargo`, which builds the runner: is Rust installed? (https://rustup.rs)")?;
+        .context("cannot start `cargo` to build the runner; install Rust from https://rustup.rs")?;
     let mut errors = cargo.stderr.take().expect("it is piped");
     let errors = std::thread::spawn(move || {
         let mut text = Vec::new();
@@ -45,7 +45,7 @@ pub(super) fn build(shell: Shell, folder: &Path, campaign: &str) -> anyhow::Resu
     let mut program = None;
     for line in BufReader::new(cargo.stdout.take().expect("it is piped")).lines() {
         // Other lines are what build scripts print.
-        let Ok(message) = serde_json::from_str::<Message>(&line.context("cannot read what cargo says")?) else {
+        let Ok(message) = serde_json::from_str::<Message>(&line.context("cannot read the output of cargo")?) else {
             continue;
         };
         if message.reason == "compiler-artifact" {
@@ -56,7 +56,7 @@ pub(super) fn build(shell: Shell, folder: &Path, campaign: &str) -> anyhow::Resu
         }
     }
     let status = cargo.wait().context("cannot wait for cargo")?;
-    let said = errors.join().expect("reading does not panic").context("cannot read what cargo says")?;
+    let said = errors.join().expect("reading does not panic").context("cannot read the output of cargo")?;
     let said = String::from_utf8_lossy(&said);
     if !said.trim().is_empty() {
         shell.text(&said);
@@ -66,6 +66,6 @@ pub(super) fn build(shell: Shell, folder: &Path, campaign: &str) -> anyhow::Resu
             shell.did("Built", format!("{campaign} in {:.1} s", start.elapsed().as_secs_f64()));
             Ok(program)
         }
-        _ => bail!("the runner in {} does not build, see above", folder.display()),
+        _ => bail!("cannot build the runner in {}; see the errors above", folder.display()),
     }
 }

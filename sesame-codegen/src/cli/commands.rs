@@ -9,7 +9,7 @@ use sesame_dsl::diagnostic::visible;
 use sesame_plan::Transport;
 
 use super::shell::{self, Shell};
-use super::{Checked, Deny, Format, Generation, Language, Purpose, build};
+use super::{Checked, Deny, ExplainFormat, Format, Generation, Language, Purpose, build};
 use crate::emit::Templates;
 use crate::environment::{self, Options, RuntimeChoice, environment};
 use crate::files::{Owner, Tree};
@@ -34,10 +34,10 @@ pub(super) fn new(
     let (sesamec, hook, line) = (shell::command(), hook.display(), project::HOOK_LINE);
     shell.did("Created", format!("{}: a space, a simulator of its own, and a README", folder.display()));
     shell.text(&format!(
-        "\nTo a first front:\n\
+        "\nNext steps to a first front:\n\
          \n  1. generate the runner and a stub for its metric\n\
          \n         {sesamec} generate {space}\n\
-         \n  2. fill the stub in: in {hook}, let the body of `on_clearance` be\n\
+         \n  2. fill in the stub: in {hook}, replace the body of `on_clearance` with\n\
          \n         {line}\n\
          \n  3. run the campaign\n\
          \n         {sesamec} run {space}\n"
@@ -56,8 +56,8 @@ pub(super) fn check_only(
     let checked = check(shell, language, file, format)?;
     match (deny, checked.warnings) {
         (None, _) | (Some(Deny::Warnings), 0) => Ok(ExitCode::SUCCESS),
-        (Some(Deny::Warnings), 1) => bail!("{} has a warning, which `--deny warnings` refuses", file.display()),
-        (Some(Deny::Warnings), n) => bail!("{} has {n} warnings, which `--deny warnings` refuses", file.display()),
+        (Some(Deny::Warnings), 1) => bail!("{} has a warning, and `--deny warnings` is set", file.display()),
+        (Some(Deny::Warnings), n) => bail!("{} has {n} warnings, and `--deny warnings` is set", file.display()),
     }
 }
 
@@ -89,8 +89,8 @@ pub(super) fn check_text(
 pub(super) fn has_errors(file: &Path, errors: usize) -> anyhow::Error {
     let (file, sesamec) = (file.display(), shell::command());
     match errors {
-        1 => anyhow!("{file} has an error; `{sesamec} explain CODE` says more on its code"),
-        n => anyhow!("{file} has {n} errors; `{sesamec} explain CODE` says more on a code"),
+        1 => anyhow!("{file} has an error; `{sesamec} explain CODE` explains its code"),
+        n => anyhow!("{file} has {n} errors; `{sesamec} explain CODE` explains a code"),
     }
 }
 
@@ -123,7 +123,7 @@ pub(super) fn generate(
         for file in files.filter(|file| !matches!(file.change, Change::Unchanged | Change::Kept)) {
             let what = match file.change {
                 Change::Created => "is missing",
-                Change::Removed => "is generated no longer",
+                Change::Removed => "is no longer generated",
                 _ => "is out of date",
             };
             shell.text(&visible(&format!("{} {what}", out.join(&file.path).display())));
@@ -195,23 +195,44 @@ pub(super) fn explain_code(language: &Language, code: &str) -> anyhow::Result<Ex
         bail!("there is no diagnostic `{shown}`; codes look like E0203");
     }
     bail!(
-        "`{shown}` is no code like E0203; to explain a campaign, name its file: `{} explain {shown} FILE`",
+        "`{shown}` is not a code like E0203; to explain a name of a space, add its file: `{} explain {shown} FILE`",
         shell::command()
     )
 }
 
-/// `sesamec explain CAMPAIGN FILE`
-pub(super) fn explain_campaign(
+/// `sesamec explain NAME FILE`
+pub(super) fn explain_name(
     shell: Shell,
     language: &Language,
-    campaign: &str,
+    name: &str,
     file: &Path,
+    format: ExplainFormat,
 ) -> anyhow::Result<ExitCode> {
-    let checked = check(shell, language, file, Format::Human)?;
-    let chosen = choose(&checked, file, Some(campaign))?;
-    let plan = &checked.plans[chosen].plan;
-    let text = format!("{}\n{}", crate::explain::campaign(plan), super::search_space::described(plan));
-    shell::asked_for(&visible(&text))?;
+    let text = input::text(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let found = (language.find)(&file.display().to_string(), &text, name).map_err(|why| anyhow!(why))?;
+    if format == ExplainFormat::Human && found.campaign {
+        let checked = check_text(shell, language, file, &text, Format::Human)?;
+        let plan = &checked.plans[choose(&checked, file, Some(name))?].plan;
+        let mut text = format!("{}\n{}", crate::explain::campaign(plan), super::search_space::described(plan));
+        if !found.uses.is_empty() {
+            // All else is text of the language as well.
+            text.push('\n');
+            text.extend(found.uses.lines().map(|line| format!("// {line}\n")));
+        }
+        shell::asked_for(&visible(&text))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if found.errors > 0 {
+        let (file, sesamec) = (file.display(), shell::command());
+        let has = if found.errors == 1 { "an error".to_owned() } else { format!("{} errors", found.errors) };
+        shell.warning(format!(
+            "{file} has {has}: uses that could not be read are missing; see `{sesamec} check {file}`"
+        ));
+    }
+    match format {
+        ExplainFormat::Human => shell::asked_for(&visible(&found.text))?,
+        ExplainFormat::Json => shell::asked_for(&found.json)?,
+    }
     Ok(ExitCode::SUCCESS)
 }
 
@@ -234,7 +255,7 @@ fn choose(checked: &Checked, file: &Path, name: Option<&str>) -> anyhow::Result<
         Some((distance, campaign)) if distance <= name.len().max(3) / 3 => {
             bail!("{file} has no campaign `{name}`; did you mean `{campaign}`?")
         }
-        _ => bail!("{file} has no campaign `{name}`; it has {}", campaigns.join(", ")),
+        _ => bail!("{file} has no campaign `{name}`; its campaigns are {}", campaigns.join(", ")),
     }
 }
 
@@ -250,7 +271,7 @@ fn write(
     let out = generation.out.clone().unwrap_or_else(|| generation.file.with_file_name(environment::RUNNERS));
     // Nobody named the folder that it leads to.
     if generation.out.is_none() && out.is_symlink() {
-        bail!("{} is a link: say with `-o` which folder the runners belong into", out.display());
+        bail!("{} is a link; choose the folder for the runners with `-o`", out.display());
     }
     let environment = environment(&generation.file, &out, &checked.plans, options).map_err(|errors| all(&errors))?;
     let trees = emit::emit(&checked.plans, &environment).map_err(|problems| all(&problems))?;
@@ -267,15 +288,15 @@ fn write(
     {
         let folder = &environment.simulator_folder;
         shell.warning(format!(
-            "the simulator `{program}` is a program, which is not copied: wherever the runner goes, it starts it in \
-             `{folder}`, as seen from its own folder"
+            "the simulator `{program}` is a program, which is not copied: a runner that is moved still starts it in \
+             `{folder}`, relative to its own folder"
         ));
     }
     if alone && space.operations.iter().any(|operation| operation.topic.is_none()) {
         let folder = &environment.space_folder;
         shell.warning(format!(
-            "custom operations before the start and after the end work on files, which are not copied: wherever the \
-             runner goes, it looks for them in `{folder}`, as seen from its own folder"
+            "custom operations before the start and after the end work on files, which are not copied: a runner that \
+             is moved still looks for them in `{folder}`, relative to its own folder"
         ));
     }
     for note in &checked.notes {
@@ -316,12 +337,11 @@ fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode, s
     }
     if writes {
         for stub in stubs {
-            shell.did("Stub", format!("{}: yours to fill in", out.join(&stub.path).display()));
+            shell.did("Stub", format!("{}: fill this in", out.join(&stub.path).display()));
         }
     }
     for hook in &report.changed_hooks {
-        let mut lines =
-            format!("{} is given something else now; look into {}:", hook.of, out.join(&hook.path).display());
+        let mut lines = format!("the inputs of {} have changed; adapt {}:", hook.of, out.join(&hook.path).display());
         let changes = hook.gone.iter().map(|line| ('-', line)).chain(hook.new.iter().map(|line| ('+', line)));
         for (sign, line) in changes {
             lines = format!("{lines}\n           {sign} {line}");
@@ -331,19 +351,19 @@ fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode, s
     for orphan in &report.orphans {
         shell.warning(match orphan {
             Orphan::Hook { path, of } if declares(space, of) => {
-                format!("{of} takes its hook from elsewhere now; {} is kept but not compiled", out.join(path).display())
+                format!("{of} now uses a hook in another folder; {} is kept but not compiled", out.join(path).display())
             }
             Orphan::Hook { path, of } if of.is_empty() => {
-                format!("{} is not part of the runner any more; it is kept but not compiled", out.join(path).display())
+                format!("{} is no longer part of the runner; it is kept but not compiled", out.join(path).display())
             }
             Orphan::Hook { path, of } => {
-                format!("there is no {of} any more; its hook {} is kept but not compiled", out.join(path).display())
+                format!("{of} no longer exists; its hook {} is kept but not compiled", out.join(path).display())
             }
             Orphan::Edited { path } => {
-                format!("{} is not generated any more; it is kept since it was edited", out.join(path).display())
+                format!("{} is no longer generated; it is kept because it was edited", out.join(path).display())
             }
             Orphan::Runner { folder } => format!(
-                "there is no campaign for {} any more; it is kept, with its results",
+                "the campaign of {} no longer exists; the folder is kept, with its results",
                 out.join(folder).display()
             ),
         });

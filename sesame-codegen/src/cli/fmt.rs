@@ -54,7 +54,7 @@ pub(super) fn fmt(
     }
     if unformatted > 0 {
         let what = if unformatted == 1 { "1 file is".to_owned() } else { format!("{unformatted} files are") };
-        failures.push(anyhow!("{what} not formatted: `{} fmt` does it", shell::command()));
+        failures.push(anyhow!("{what} not formatted; run `{} fmt`", shell::command()));
     }
     match failures.pop() {
         None => Ok(ExitCode::SUCCESS),
@@ -73,7 +73,7 @@ fn read(file: &Path) -> anyhow::Result<String> {
         let mut bounded = std::io::stdin().take(input::MOST_OF_A_TEXT + 1);
         bounded.read_to_string(&mut text).context("cannot read standard input")?;
         if text.len() as u64 > input::MOST_OF_A_TEXT {
-            bail!("standard input holds more than {} MiB, the most that is read", input::MOST_OF_A_TEXT >> 20);
+            bail!("standard input has more than {} MiB, which is the limit", input::MOST_OF_A_TEXT >> 20);
         }
         return Ok(text);
     }
@@ -108,7 +108,7 @@ fn spaces_in(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
         }
     }
     if files.is_empty() {
-        bail!("there is no .sesame file in {}", folder.display());
+        bail!("no .sesame file in {}", folder.display());
     }
     files.sort();
     Ok(files)

@@ -19,7 +19,7 @@ use super::shell::{self, Shell};
 /// What is asked of results files.
 #[derive(Debug, Subcommand)]
 pub(super) enum Results {
-    /// What is in these files: campaigns, how many tests, and the names of result sets.
+    /// Content of results files: campaigns, numbers of tests, and names of result sets.
     Campaigns {
         /// Results files, folders of runs, or folders with such folders below.
         #[arg(required = true, value_name = "FILE")]
@@ -34,7 +34,7 @@ pub(super) enum Results {
         #[command(flatten)]
         output: Output,
     },
-    /// The tests that no other dominates, by their recorded values.
+    /// The front: the tests that no other test dominates, by their recorded values.
     Front {
         #[command(flatten)]
         input: Input,
@@ -45,10 +45,10 @@ pub(super) enum Results {
     Sspr {
         #[command(flatten)]
         input: Input,
-        /// The dimensions, for example `T1,T2,P1`; all if not said.
+        /// The dimensions, for example `T1,T2,P1`; all if omitted.
         #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = dimension)]
         dims: Vec<Dimension>,
-        /// Whose formulas: `original` for the original platform's numbers, `paper` for those of the paper's text.
+        /// The formulas to use: `original` for those of the original platform, `paper` for those of the paper.
         #[arg(long, value_enum, default_value_t)]
         compat: Compat,
         #[command(flatten)]
@@ -58,13 +58,13 @@ pub(super) enum Results {
     Regions {
         #[command(flatten)]
         input: Input,
-        /// Only this requirement, or `crash` or `timeout`; all in which tests fail if not said.
+        /// Only this requirement, or `crash` or `timeout`; everything that tests fail by if omitted.
         #[arg(long, value_name = "NAME")]
         requirement: Option<String>,
-        /// How many questions a rule has at most.
+        /// The maximum number of conditions in a rule.
         #[arg(long, value_name = "N", default_value_t = regions::DEPTH, value_parser = clap::value_parser!(u32).range(1..=8))]
         depth: u32,
-        /// Draw the tree of each into this folder, as `regions-NAME.svg`.
+        /// Draw each tree into this folder, as `regions-NAME.svg`.
         #[arg(long, value_name = "DIR")]
         svg: Option<PathBuf>,
         #[command(flatten)]
@@ -74,19 +74,19 @@ pub(super) enum Results {
     Coverage {
         #[command(flatten)]
         input: Input,
-        /// The cells, for example `T1:0:1:6,T2:0:0.5:6,P1:0:1:3`; those of the campaign if not said.
+        /// The cells, for example `T1:0:1:6,T2:0:0.5:6,P1:0:1:3`; those of the campaign if omitted.
         #[arg(long, value_name = "GRID", value_parser = Grid::parse)]
         grid: Option<Grid>,
-        /// Dimensions of the campaign's grid to keep, for example `T1,T2`; all if not said.
+        /// Dimensions of the campaign's grid to keep, for example `T1,T2`; all if omitted.
         #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = dimension, conflicts_with = "grid")]
         dims: Vec<Dimension>,
-        /// Tests that a cell must have seen to be covered; as the campaign has it, else 1, if not said.
+        /// Tests that a cell needs to be covered; if omitted, the number given in the campaign, or else 1.
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
         hits: Option<u32>,
         /// Show each cell instead of the coverage over evaluations.
         #[arg(long)]
         cells: bool,
-        /// Whose formulas: `original` for the original platform's numbers, `paper` for those of the paper's text.
+        /// The formulas to use: `original` for those of the original platform, `paper` for those of the paper.
         #[arg(long, value_enum, default_value_t)]
         compat: Compat,
         #[command(flatten)]
@@ -96,17 +96,17 @@ pub(super) enum Results {
     Indicators {
         /// A results file, or the folder of a run.
         file: PathBuf,
-        /// Measure hypervolumes from this point, a value per objective in its unit, for example `325,0`; from the one
-        /// fixed while the campaign ran if not said.
+        /// The reference point of hypervolumes, a value per objective in its unit, for example `325,0`; if omitted, the one
+        /// that was fixed while the campaign ran.
         #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "VALUES")]
         reference: Vec<f64>,
         #[command(flatten)]
         output: Output,
     },
-    /// Runs, or groups of runs that differ in their seeds, beside each other.
+    /// Compare runs, or groups of runs that differ in their seeds.
     ///
-    /// Each FILE is a group: a results file, the folder of a run, or a folder with several runs below. With groups of
-    /// several runs medians, quartiles and how each group compares with the first are shown, else the runs.
+    /// Each FILE is a group: a results file, the folder of a run, or a folder with several runs below. For groups
+    /// of several runs, medians, quartiles and a comparison with the first group are shown, otherwise the runs.
     Compare {
         /// Results files, folders of runs, or folders with such folders below.
         #[arg(required = true, value_name = "FILE")]
@@ -114,18 +114,18 @@ pub(super) enum Results {
         /// Group all runs by the names of their campaigns instead.
         #[arg(long)]
         by_campaign: bool,
-        /// Measure hypervolumes from this point, a value per objective in its unit, for example `325,0`; from the worst
-        /// values in any test of any run if not said.
+        /// The reference point of hypervolumes, a value per objective in its unit, for example `325,0`; if omitted, the
+        /// worst values in any test of any run.
         #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "VALUES")]
         reference: Vec<f64>,
-        /// The cells coverage is counted in, for example `T1:0:1:6,T2:0:0.5:6,P1:0:1:3`; those of the campaigns, if they
-        /// are the same in all, if not said.
+        /// The cells in which coverage is counted, for example `T1:0:1:6,T2:0:0.5:6,P1:0:1:3`; if omitted, those of the
+        /// campaigns, provided that all have the same.
         #[arg(long, value_name = "GRID", value_parser = Grid::parse)]
         grid: Option<Grid>,
-        /// Show each run, also where there are groups.
+        /// Show each run, even if there are groups.
         #[arg(long, conflicts_with = "pairs")]
         runs: bool,
-        /// Show of each two runs which share of the second one's front the first one's covers (the C-metric).
+        /// For each pair of runs, show the share of the second front that the first one covers (the C-metric).
         #[arg(long)]
         pairs: bool,
         #[command(flatten)]
@@ -182,7 +182,7 @@ impl Compat {
 }
 
 fn dimension(name: &str) -> Result<Dimension, String> {
-    Dimension::named(name).ok_or_else(|| "there are T1, T2, T3, P1, P2, O0, O1, O2 and O3".to_owned())
+    Dimension::named(name).ok_or_else(|| "expected one of T1, T2, T3, P1, P2, O0, O1, O2 and O3".to_owned())
 }
 
 /// Answers on standard output.
@@ -216,10 +216,10 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
             let (repository, selection) = open(&input)?;
             let found = regions::regions(&repository, &selection, requirement.as_deref(), depth)?;
             if found.is_empty() {
-                shell.warning("no test of these fails: it violates no requirement, crashes or times out");
+                shell.warning("none of these tests violates a requirement, crashes or times out");
             }
             if let Some(folder) = svg {
-                std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+                std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
                 for of in &found {
                     let file = folder.join(format!("regions-{}.svg", of.target));
                     std::fs::write(&file, of.svg(repository.plan()))
@@ -237,19 +237,22 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
                 (None, Some(mut goal)) => {
                     goal.axes.retain(|axis| dims.is_empty() || dims.contains(&axis.dimension));
                     if let Some(missing) = dims.iter().find(|&&it| goal.axes.iter().all(|axis| axis.dimension != it)) {
-                        bail!("the campaign's cells have no dimension {}; give all with `--grid`", missing.name());
+                        bail!(
+                            "the campaign's cells have no dimension {}; give all cells with `--grid`",
+                            missing.name()
+                        );
                     }
                     Grid::new(goal.axes).context("the campaign's cells")?
                 }
                 (None, None) => bail!(
-                    "campaign `{}` does not count its coverage; say which cells, for example `--grid \
+                    "campaign `{}` has no coverage; give the cells, for example `--grid \
                      T1:0:1:6,T2:0:0.5:6,P1:0:1:3`",
                     repository.plan().campaign.name
                 ),
             };
             let analysis = analysis::coverage(&repository, &selection, grid, hits, compat.convention())?;
             if !analysis.feasible_is_exact() {
-                shell.warning("which cells are feasible is known in part: some of them perhaps cannot be reached");
+                shell.warning("not all feasible cells are known: some of these cells may be unreachable");
             }
             print(&if cells { analysis.cells() } else { analysis.curve() }, &output)
         }
@@ -258,7 +261,9 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
             let needed = repository.plan().campaign.objectives.len();
             if !reference.is_empty() && reference.len() != needed {
                 let given = reference.len();
-                bail!("the reference point has {given} values for {needed} objectives; give one for each, in its unit");
+                bail!(
+                    "the reference point has {given} values for {needed} objectives; give one per objective, in its unit"
+                );
             }
             let given = Some(reference.as_slice()).filter(|point| !point.is_empty());
             let analysis = analysis::indicators(&repository, given)?;
@@ -271,9 +276,7 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
             let comparison = analysis::compare(&compared, given, grid)?;
             measured_from(shell, &comparison.reference);
             if !comparison.covers && !pairs {
-                shell.note(
-                    "the campaigns do not count the same cells; `--grid` gives cells to compare their coverage in",
-                );
+                shell.note("the campaigns do not have the same cells; give cells for the comparison with `--grid`");
             }
             let shown = if pairs {
                 comparison.pairs()
@@ -306,7 +309,7 @@ fn to_compare(files: &[PathBuf], by_campaign: bool) -> anyhow::Result<Vec<Run>> 
         }
     }
     if runs.len() < 2 {
-        bail!("there is one run only, and nothing to compare it with: name two or more");
+        bail!("there is only one run; give two or more to compare");
     }
     Ok(runs)
 }
@@ -316,7 +319,7 @@ fn gathered(path: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     gather(path, &mut found)?;
     if found.is_empty() {
-        bail!("no results in {}: name a results file, or a folder with such files below", path.display());
+        bail!("no results in {}; give a results file, or a folder that contains results", path.display());
     }
     Ok(found)
 }

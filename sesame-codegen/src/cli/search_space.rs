@@ -62,8 +62,8 @@ fn space(plan: &CampaignPlan, permitted: &TestSpace, lines: &mut Vec<(&str, Stri
     let ways = total(&chosen(&vec![0.0; kinds.len()], &copies, most)[fewest..]);
     let count = if fewest == most { format!("{fewest}") } else { format!("{fewest} to {most}") };
     let apart = match plan.campaign.copies {
-        Copies::Apart => "; copies of one never act at the same time",
-        Copies::MayOverlap => "; copies of one may act at the same time",
+        Copies::Apart => "; copies of one are never active at the same time",
+        Copies::MayOverlap => "; copies of one may be active at the same time",
         Copies::Once => ", each at most once",
     };
     let ways = format!("{} ways to choose them", power(ways));

@@ -3,13 +3,13 @@
 use sesame_dsl::model::{self, Temporal};
 use sesame_plan::stl::{Formula, Robustness};
 
-use super::formula::{expression, inputs, side};
+use super::formula::{inputs, side};
 use super::raw;
 
 pub(super) fn robustness(of: &model::Robustness) -> Robustness {
     Robustness {
         inputs: inputs(&of.inputs),
-        signals: of.signals.iter().map(expression).collect(),
+        signals: of.signals.clone(),
         formula: formula(&of.formula),
         side: side(of.outbound),
         whole_windows: of.whole_windows,

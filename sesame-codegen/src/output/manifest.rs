@@ -64,7 +64,7 @@ impl Manifest {
         }
         let Version { schema } = serde_json::from_str(text).map_err(|error| error.to_string())?;
         if schema != SCHEMA {
-            return Err(format!("it is of version {schema}, this sesamec writes version {SCHEMA}"));
+            return Err(format!("it has version {schema}, but this sesamec writes version {SCHEMA}"));
         }
         serde_json::from_str(text).map_err(|error| error.to_string())
     }

@@ -242,7 +242,7 @@ fn links_and_manifests_that_lead_outside_are_refused_or_replaced_and_never_follo
     clear(&out.join("day/Cargo.toml"));
     symlink(&victim, out.join("day/Cargo.toml")).unwrap();
     let refused = generate(Mode::Write).unwrap_err().to_string();
-    assert!(refused.contains("day/Cargo.toml\nit is a link") && !refused.contains("mine"), "{refused}");
+    assert!(refused.contains("day/Cargo.toml\nit is now a link") && !refused.contains("mine"), "{refused}");
     generate(Mode::Force).unwrap();
     assert!(fs::symlink_metadata(out.join("day/Cargo.toml")).unwrap().is_file());
 
@@ -387,7 +387,8 @@ fn what_is_not_a_space_is_never_quoted() {
     let imports = format!("import \"secret\" import \"leak.sesame\" import \"{}\"", absolute.display());
     fs::write(at("importing.sesame"), format!("{SPACE}{imports}")).unwrap();
     for format in ["human", "short", "json", "github"] {
-        for (file, words) in [("importing.sesame", "ends in `.sesame`"), ("leak.sesame", "a file of another kind")] {
+        for (file, words) in [("importing.sesame", "must end in `.sesame`"), ("leak.sesame", "a file of another kind")]
+        {
             let (done, text) = said(folder.path(), &["check", file, "--format", format]);
             assert!(!done && !text.contains("tell_nobody") && text.contains(words), "{text}");
         }

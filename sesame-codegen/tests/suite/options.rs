@@ -45,7 +45,10 @@ fn a_runner_that_carries_more_is_not_overwritten_by_one_that_carries_less() {
     apply(out.path(), &own[1..], Mode::Write).unwrap();
     let shared = emit(&[small("a")], &crate::plans::environment()).unwrap();
     let error = apply(out.path(), &shared, Mode::Write).unwrap_err();
-    assert!(error.to_string().contains("was generated with `--self-contained`: say so again"), "{error}");
+    assert!(
+        error.to_string().contains("was generated with `--self-contained`: pass `--self-contained` again"),
+        "{error}"
+    );
     assert!(!out.path().join("hooks").exists());
 
     let report = apply(out.path(), &shared, Mode::Force).unwrap();

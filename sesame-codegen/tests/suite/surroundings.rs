@@ -131,7 +131,7 @@ fn a_program_that_is_given_by_its_path_must_be_there() {
     let missing = dependencies(folder.path(), plan.clone(), Some("1.0.0")).unwrap_err();
     assert_eq!(
         missing,
-        "kuka_cell.sesame says the simulator's program is `bin/robots`, but there is no PROJECT/bin/robots"
+        "kuka_cell.sesame gives the simulator's program as `bin/robots`, but PROJECT/bin/robots does not exist"
     );
     fs::create_dir(folder.path().join("bin")).unwrap();
     fs::write(folder.path().join("bin/robots"), "").unwrap();

@@ -1,34 +1,34 @@
-//! Nodes, topics and operations that probably do not fit together.
+//! Nodes, topics and operations that probably do not belong together.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{Declaration, MetricSource, NodeId, Space, TopicId};
 
-/// Operations whose name ends in the name of a topic that they do not disturb.
+/// Operations whose name ends with the name of a topic that they do not disturb.
 pub(super) fn misnamed_operations(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
     let topics: BTreeMap<&str, &Declaration> =
         space.topics.values().map(|topic| (topic.declaration.name.as_str(), &topic.declaration)).collect();
     for operation in space.operations.values() {
         let name = &operation.declaration.name;
-        // What a name ends in, the longest first.
+        // The endings of a name, the longest first.
         let ends = || name.match_indices('_').map(|(at, _)| &name[at + 1..]);
         let Some(own) = operation.topic().map(|topic| &space.topics[topic].declaration) else { continue };
         if name == &own.name || ends().any(|end| end == own.name) {
             continue;
         }
-        // The longest is meant: `cut_link_speed` is named for `link_speed` where there is a `speed` too.
+        // The longest is meant: `cut_link_speed` is named after `link_speed` even if there is a `speed` too.
         let Some(meant) = ends().find_map(|end| topics.get(end)) else { continue };
-        let title = format!("operation `{name}` is named for `{}` and disturbs `{}`", meant.name, own.name);
+        let title = format!("operation `{name}` is named after `{}` but disturbs `{}`", meant.name, own.name);
         let diagnostic = Diagnostic::new(Code::MISNAMED_OPERATION, operation.declaration.span, title)
-            .label(format!("it acts on `{}`", own.name))
-            .also(meant.span, "its name ends in that of this topic");
+            .label(format!("this acts on `{}`", own.name))
+            .secondary(meant.span, "the operation's name ends with the name of this topic");
         diagnostics.push(diagnostic);
     }
 }
 
-/// Operations on topics that nobody hears, where nodes say what they subscribe to: no node does, no monitor needs the
-/// topic, and no outbound metric reads it.
+/// Operations on topics without a subscriber, if nodes say what they subscribe to: no node subscribes to the topic, no
+/// monitor needs it, and no outbound metric reads it.
 pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
     let mut heard: BTreeSet<TopicId> = space.nodes.values().flat_map(|node| &node.subscribes).copied().collect();
     if heard.is_empty() {
@@ -51,12 +51,13 @@ pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic
     for operation in space.operations.values() {
         let Some(topic) = operation.topic().filter(|topic| !heard.contains(topic)) else { continue };
         let topic = &space.topics[topic].declaration;
-        let title = format!("nobody hears what `{}` does to `{}`", operation.declaration.name, topic.name);
+        let title =
+            format!("operation `{}` has no effect: no node subscribes to `{}`", operation.declaration.name, topic.name);
         diagnostics.push(
             Diagnostic::new(Code::NOBODY_HEARS, operation.declaration.span, title)
-                .label("no node subscribes to its topic, and no outbound metric reads it")
-                .also(topic.span, "the topic")
-                .note("a run in which nobody hears it ends with an error after the undisturbed run"),
+                .label("no monitor and no outbound metric reads its topic either")
+                .secondary(topic.span, "the topic is declared here")
+                .note("if the simulator does not subscribe to the topic either, a campaign ends with an error after the reference run"),
         );
     }
 }
@@ -75,9 +76,9 @@ pub(super) fn two_publishers(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
         let topic = &space.topics[topic].declaration;
         let title = format!("nodes `{}` and `{}` both publish `{}`", first.name, second.name, topic.name);
         let diagnostic = Diagnostic::new(Code::TWO_PUBLISHERS, second.span, title)
-            .label("publishes it too")
-            .also(first.span, "publishes it")
-            .also(topic.span, "the topic");
+            .label("also publishes it")
+            .secondary(first.span, "publishes it")
+            .secondary(topic.span, "the topic is declared here");
         diagnostics.push(diagnostic);
     }
 }

@@ -1,4 +1,4 @@
-//! What is declared and not used.
+//! Declarations that are never used.
 
 use std::collections::BTreeSet;
 
@@ -7,12 +7,12 @@ use crate::model::eddi::Gate;
 use crate::model::{ActivationMode, MetricId, MetricSource, Operation, OperationId, Space, TopicId};
 use crate::span::FileId;
 
-/// Operations of the file itself that no campaign and no known test uses.
+/// Operations of the file itself that no campaign and no test uses.
 pub(super) fn operations(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnostic>) {
     let mut used: BTreeSet<OperationId> = BTreeSet::new();
     for campaign in space.campaigns.values() {
-        if let Some(content) = campaign.search.content() {
-            used.extend(&content.operations);
+        if let Some(template) = campaign.search.template() {
+            used.extend(&template.operations);
         }
     }
     used.extend(space.tests.values().flat_map(|test| &test.operations).map(|operation| operation.operation));
@@ -22,7 +22,7 @@ pub(super) fn operations(space: &Space, root: FileId, diagnostics: &mut Vec<Diag
             let title = format!("operation `{}` is never used", declaration.name);
             diagnostics.push(
                 Diagnostic::new(Code::UNUSED_OPERATION, declaration.span, title)
-                    .label("in no campaign and no known test"),
+                    .label("not used in any campaign or test"),
             );
         }
     }
@@ -36,8 +36,8 @@ pub(super) fn metrics(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnos
         if !used.contains(&id) && declaration.span.file == root {
             let title = format!("metric `{}` is never measured", declaration.name);
             let diagnostic = Diagnostic::new(Code::UNUSED_METRIC, declaration.span, title)
-                .label("in no campaign, requirement, condition or expectation");
-            diagnostics.push(diagnostic.note("a campaign measures it with `observes`"));
+                .label("not used in any campaign, requirement, condition or expectation");
+            diagnostics.push(diagnostic.note("add it to the `observes` of a campaign to measure it"));
         }
     }
 }
@@ -47,8 +47,8 @@ fn used_metrics(space: &Space) -> BTreeSet<MetricId> {
     for campaign in space.campaigns.values() {
         used.extend(&campaign.objectives);
         used.extend(&campaign.observed);
-        if let Some(content) = campaign.search.content()
-            && let ActivationMode::Condition(grown) = &content.activation
+        if let Some(template) = campaign.search.template()
+            && let ActivationMode::Condition(grown) = &template.activation
         {
             used.extend(grown.variables.iter().map(|variable| variable.metric));
         }
@@ -69,7 +69,7 @@ fn used_metrics(space: &Space) -> BTreeSet<MetricId> {
     used
 }
 
-/// Topics of the file itself that are in no node and used by nothing, where nodes say who publishes what.
+/// Topics of the file itself that no node publishes or subscribes to and nothing else uses, if there are nodes.
 pub(super) fn topics(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnostic>) {
     if space.nodes.is_empty() {
         return;
@@ -78,10 +78,10 @@ pub(super) fn topics(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnost
     for (id, topic) in space.topics.iter() {
         let declaration = &topic.declaration;
         if !used.contains(&id) && declaration.span.file == root {
-            let title = format!("topic `{}` has no node and no use", declaration.name);
+            let title = format!("topic `{}` is never used", declaration.name);
             diagnostics.push(
                 Diagnostic::new(Code::UNUSED_TOPIC, declaration.span, title)
-                    .label("no node publishes it, and nothing uses it"),
+                    .label("no node publishes or subscribes to it, and nothing else uses it"),
             );
         }
     }
@@ -110,11 +110,11 @@ fn used_topics(space: &Space) -> BTreeSet<TopicId> {
         used.extend(eddi.otherwise.mitigation.iter().map(|mitigation| mitigation.field.topic));
     }
     used.extend(space.eddis.values().map(|eddi| eddi.publishes));
-    used.extend(space.surroundings.launch.iter().filter_map(|launch| launch.ready).map(|ready| ready.topic));
+    used.extend(space.lifecycle.launch.iter().filter_map(|launch| launch.ready).map(|ready| ready.topic));
     used
 }
 
-/// Evidence and demands that no guarantee of their monitor needs.
+/// Evidence and demands that no guarantee of their monitor uses.
 pub(super) fn evidence(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
     for eddi in space.eddis.values() {
         let mut gates: Vec<&Gate> = eddi.guarantees.iter().map(|guarantee| &guarantee.gate).collect();
@@ -134,7 +134,7 @@ pub(super) fn evidence(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
         let demands = eddi.demands.iter().enumerate().map(|(at, it)| ((true, at), &it.declaration));
         for (key, declaration) in evidence.chain(demands).filter(|(key, _)| !needed.contains(key)) {
             let what = if key.0 { "demand" } else { "evidence" };
-            let title = format!("no guarantee of `{}` needs {what} `{}`", eddi.declaration.name, declaration.name);
+            let title = format!("no guarantee of `{}` uses {what} `{}`", eddi.declaration.name, declaration.name);
             let diagnostic = Diagnostic::new(Code::UNUSED_EVIDENCE, declaration.span, title);
             diagnostics.push(diagnostic.label("the monitor's state does not depend on it"));
         }

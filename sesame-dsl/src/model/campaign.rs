@@ -1,10 +1,11 @@
 //! Campaigns: how tests are found and run.
 
 use super::condition::ConditionSpace;
-use super::{
-    CampaignId, Confirmation, Copies, Declaration, Dimension, Exploration, MetricId, OperationId, Range, Recorded,
-    StopRule, TestId,
-};
+use sesame_plan::{Confirmation, Copies, Dimension, Exploration, Recorded, StopRule};
+
+use super::declaration::Declaration;
+use super::ids::{CampaignId, MetricId, OperationId, TestId};
+use super::metrics::Range;
 
 /// A campaign.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,7 +45,7 @@ pub enum Search {
     /// NSGA-II over tests of these operations.
     Nsga2 {
         /// What a test holds.
-        content: Content,
+        template: TestTemplate,
         /// Tests per generation: even, at least 2.
         population: u32,
         /// Tests in total: at least `population`.
@@ -53,14 +54,14 @@ pub enum Search {
     /// Independent random tests of these operations.
     Random {
         /// What a test holds.
-        content: Content,
+        template: TestTemplate,
         /// Tests in total: at least 1.
         evaluations: u32,
     },
     /// MAP-Elites over the cells of the campaign's coverage, which it has.
     MapElites {
         /// What a test holds.
-        content: Content,
+        template: TestTemplate,
         /// Tests per generation: even, at least 2.
         population: u32,
         /// Tests in total: at least `population`.
@@ -69,21 +70,21 @@ pub enum Search {
     /// Latin hypercube sampling of tests by time.
     LatinHypercube {
         /// What a test holds.
-        content: Content,
+        template: TestTemplate,
         /// Tests in total: at least 1.
         evaluations: u32,
     },
     /// Sobol' sampling of tests by time.
     Sobol {
         /// What a test holds.
-        content: Content,
+        template: TestTemplate,
         /// Tests in total: at least 1.
         evaluations: u32,
     },
     /// Focused falsification of the space's requirements, of which there is one at least, by tests by time.
     Falsification {
         /// What a test holds.
-        content: Content,
+        template: TestTemplate,
         /// Tests at a time: at least 1. Default 1.
         population: u32,
         /// Tests in total: at least 1.
@@ -105,14 +106,14 @@ pub enum Search {
 
 impl Search {
     /// What its tests hold; `None` where nothing is searched.
-    pub fn content(&self) -> Option<&Content> {
+    pub fn template(&self) -> Option<&TestTemplate> {
         match self {
-            Search::Nsga2 { content, .. }
-            | Search::Random { content, .. }
-            | Search::MapElites { content, .. }
-            | Search::LatinHypercube { content, .. }
-            | Search::Sobol { content, .. }
-            | Search::Falsification { content, .. } => Some(content),
+            Search::Nsga2 { template, .. }
+            | Search::Random { template, .. }
+            | Search::MapElites { template, .. }
+            | Search::LatinHypercube { template, .. }
+            | Search::Sobol { template, .. }
+            | Search::Falsification { template, .. } => Some(template),
             Search::Repeat { .. } | Search::Passive { .. } => None,
         }
     }
@@ -145,7 +146,7 @@ pub struct CoverageAxis {
 
 /// What a searched test holds.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Content {
+pub struct TestTemplate {
     /// The operations it may hold, in written order; at least one, each once.
     pub operations: Vec<OperationId>,
     /// At least so many operations: 1 or more.

@@ -2,7 +2,7 @@
 
 pub use sesame_plan::condition::{Comparison, Integers};
 
-use super::MetricId;
+use super::ids::MetricId;
 
 /// A condition over metrics, at most [`Condition::MAX_DEPTH`] levels deep.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,24 +63,24 @@ pub enum Operand {
 
 /// Between what a number is known to lie, both ends included; infinite where nothing is known. `low <= high`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Known {
+pub struct ValueRange {
     /// The least it can be.
     pub low: f64,
     /// The greatest it can be.
     pub high: f64,
 }
 
-impl Known {
+impl ValueRange {
     /// Nothing is known.
-    pub const NOTHING: Known = Known { low: f64::NEG_INFINITY, high: f64::INFINITY };
+    pub const NOTHING: ValueRange = ValueRange { low: f64::NEG_INFINITY, high: f64::INFINITY };
 
     /// It is this number.
-    pub fn exactly(number: f64) -> Known {
-        Known { low: number, high: number }
+    pub fn exactly(number: f64) -> ValueRange {
+        ValueRange { low: number, high: number }
     }
 
     /// Which way a comparison always goes, if it goes one way for all numbers that the two sides can be.
-    pub fn outcome(self, by: Comparison, other: Known) -> Option<bool> {
+    pub fn outcome(self, by: Comparison, other: ValueRange) -> Option<bool> {
         match by {
             Comparison::Below if self.high < other.low => Some(true),
             Comparison::Below if self.low >= other.high => Some(false),
@@ -111,7 +111,7 @@ pub struct ConditionSpace {
     /// The whole numbers that variables are compared with. Default [`ConditionSpace::DEFAULT_INTEGERS`].
     pub integers: Integers,
     /// How long activations last, in seconds, `0 < low <= high`; `None` for activations that a condition ends.
-    pub lengths: Option<super::Range>,
+    pub lengths: Option<super::metrics::Range>,
     /// How often an operation may be activated in one run: at least 1, the default.
     pub times: u32,
 }
@@ -131,7 +131,7 @@ pub struct Variable {
     /// The metric it gets its values from.
     pub metric: MetricId,
     /// Between what it lies, in the metric's unit.
-    pub known: Known,
+    pub known: ValueRange,
 }
 
 /// What the start condition of an operation has to contain wherever a search grows it.
@@ -167,8 +167,8 @@ mod tests {
         (-4i64..4, 0i64..5).prop_map(|(lowest, width)| Integers { lowest, highest: lowest + width })
     }
 
-    fn known(integers: Integers) -> Known {
-        Known { low: integers.lowest as f64, high: integers.highest as f64 }
+    fn known(integers: Integers) -> ValueRange {
+        ValueRange { low: integers.lowest as f64, high: integers.highest as f64 }
     }
 
     proptest! {
@@ -190,7 +190,7 @@ mod tests {
             let open = (integers.lowest..=integers.highest).any(|integer| {
                 [Comparison::Below, Comparison::Above, Comparison::Equal]
                     .iter()
-                    .any(|&by| known(variable).outcome(by, Known::exactly(integer as f64)).is_none())
+                    .any(|&by| known(variable).outcome(by, ValueRange::exactly(integer as f64)).is_none())
             });
             prop_assert_eq!(known(variable).meets(integers), open);
         }
@@ -198,12 +198,12 @@ mod tests {
 
     #[test]
     fn nothing_is_known_of_a_comparison_without_ranges() {
-        let nine = Known::exactly(9.0);
-        assert_eq!(Known::NOTHING.outcome(Comparison::Below, nine), None);
-        assert_eq!(Known::NOTHING.outcome(Comparison::Equal, Known::NOTHING), None);
+        let nine = ValueRange::exactly(9.0);
+        assert_eq!(ValueRange::NOTHING.outcome(Comparison::Below, nine), None);
+        assert_eq!(ValueRange::NOTHING.outcome(Comparison::Equal, ValueRange::NOTHING), None);
         assert_eq!(nine.outcome(Comparison::Equal, nine), Some(true));
         assert_eq!(
-            Known { low: 0.0, high: f64::INFINITY }.outcome(Comparison::Above, Known::exactly(-1.0)),
+            ValueRange { low: 0.0, high: f64::INFINITY }.outcome(Comparison::Above, ValueRange::exactly(-1.0)),
             Some(true)
         );
     }

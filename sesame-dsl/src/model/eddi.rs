@@ -1,6 +1,11 @@
 //! Runtime monitors: conditional safety certificates that watch evidence and publish which guarantee holds.
 
-use super::{Condition, Declaration, EddiId, FieldPath, Input, TopicId};
+use super::declaration::Declaration;
+use sesame_plan::Condition;
+
+use super::formula::Input;
+use super::ids::{EddiId, TopicId};
+use super::system::FieldPath;
 
 /// A runtime monitor.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,11 @@
 //! Fuzzing operations and the known tests that apply them.
 
 use super::condition::{Condition, Constraint};
-use super::{Bound, Declaration, MetricId, Moment, OperationId, OperationKind, Range, Shape, Step, TopicId};
+use sesame_plan::{Bound, Choice, Moment, OperationKind, Shape, Step};
+
+use super::declaration::Declaration;
+use super::ids::{MetricId, OperationId, TopicId};
+use super::metrics::Range;
 use crate::units::Unit;
 
 /// A fuzzing operation with its permitted ranges.
@@ -148,19 +152,6 @@ impl Activation {
         };
         start.into_iter().chain(end)
     }
-}
-
-/// What a test chose for a parameter, in the parameter's unit.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Choice {
-    /// One value.
-    Value(f64),
-    /// A sub-range.
-    Range(Range),
-    /// A point.
-    Point([f64; 3]),
-    /// One of the texts or files.
-    Text(String),
 }
 
 /// What must come out of a known test.

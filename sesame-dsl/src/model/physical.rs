@@ -1,6 +1,10 @@
 //! Physical labs: how tests are chosen for one, run in it, and compared with simulation.
 
-use super::{Bound, Declaration, Dimension, MetricId, Range};
+use sesame_plan::{Bound, Dimension};
+
+use super::declaration::Declaration;
+use super::ids::MetricId;
+use super::metrics::Range;
 
 /// A lab.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,7 @@
 //! The system under test: simulator, messages, topics, nodes.
 
-use super::{Declaration, MessageId, TopicId};
+use super::declaration::Declaration;
+use super::ids::{MessageId, TopicId};
 use crate::span::Span;
 use crate::units::Unit;
 
@@ -39,7 +40,7 @@ pub enum Transport {
 
 /// What a system says beside its simulator.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Surroundings {
+pub struct Lifecycle {
     /// What starts it.
     pub launch: Option<Launch>,
     /// What ends it.

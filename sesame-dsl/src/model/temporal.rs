@@ -1,6 +1,9 @@
 //! Metrics that are the robustness of a formula of signal temporal logic, with units resolved.
 
-use super::{Comparison, Expression, Input, Interval};
+use sesame_plan::stl::Interval;
+use sesame_plan::{Comparison, Expression};
+
+use super::formula::Input;
 
 /// By how much a test keeps a temporal formula (positive) or breaks it (negative), in the unit of its comparisons.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,15 +1,16 @@
 //! Campaigns.
 
+use super::exploration::exploring;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
-    self, Activation, ActivationMode, CampaignId, Content, Copies, Id as _, MetricId, OperationId, Search, TestId,
+    self, Activation, ActivationMode, CampaignId, Copies, Id as _, MetricId, OperationId, Search, TestId, TestTemplate,
 };
 use crate::span::Span;
 use crate::syntax::ast::{self, Count, Strategy};
 use crate::units::Unit;
 
-/// The seed of a campaign that names none.
+/// The seed of a campaign that gives none.
 const DEFAULT_SEED: u64 = 1;
 
 impl<'a> Resolver<'a> {
@@ -43,7 +44,7 @@ impl<'a> Resolver<'a> {
             ast::Record::Failing => model::Recorded::Failing,
             ast::Record::All => model::Recorded::All,
         });
-        let content = self.content(campaign, end_after, activation);
+        let template = self.template(campaign, end_after, activation);
         let coverage = self.coverage(campaign);
         let exploration = self.exploration(campaign);
         let confirm = self.confirm(campaign);
@@ -56,28 +57,35 @@ impl<'a> Resolver<'a> {
         let (search, seed) = match found {
             (_, repeat, Some(passive)) => {
                 self.only_observes(campaign, passive, repeat.map(|repeat| repeat.span));
-                let times = self.count(passive.times, 1, "the system is observed");
+                let times = self.count(passive.times, 1, "the number of runs");
                 (times.map(|times| Search::Passive { times }), self.seed(&passive.seed))
             }
             (_, Some(repeat), None) => {
-                self.only_repeats(campaign, repeat.span, "a campaign that repeats a test", "repeats here");
+                self.only_repeats(
+                    campaign,
+                    repeat.span,
+                    "a campaign that repeats a test",
+                    "this campaign repeats a test",
+                );
                 let search = self.repeat(repeat, end_after);
                 (search, self.seed(&repeat.seed))
             }
-            (Some(search), None, None) => (self.search(campaign, search, content), self.seed(&search.seed)),
+            (Some(search), None, None) => {
+                let explorable = self.explorable(campaign);
+                let resolved = self.search(campaign, search, template).filter(|_| explorable);
+                (resolved, self.seed(&search.seed))
+            }
             (None, None, None) => {
-                if !campaign.damaged {
-                    let title =
-                        format!("campaign `{}` neither searches nor repeats nor observes", campaign.head.name.text);
+                if !campaign.has_errors {
+                    let title = format!("campaign `{}` needs `search`, `repeat` or `passive`", campaign.head.name.text);
                     let diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, campaign.head.name.span, title)
-                        .label("add `search`, `repeat` or `passive`")
+                        .label("add one of them")
                         .note("for example `search nsga2 { population 10  evaluations 200  seed 42 }`");
                     self.report(diagnostic);
                 }
                 return None;
             }
         };
-        let search = search.filter(|search| self.explorable(campaign, search));
         let metric_ids = |found: Vec<usize>| found.into_iter().map(MetricId::from_index).collect();
         Some(model::Campaign {
             declaration: self.declaration(&campaign.head),
@@ -98,7 +106,7 @@ impl<'a> Resolver<'a> {
 
     fn end(&mut self, campaign: &'a ast::Campaign) -> Option<f64> {
         let Some(end) = self.single(&campaign.ends, "end after") else {
-            if !campaign.damaged {
+            if !campaign.has_errors {
                 self.missing(&campaign.head.name, "the time at which its tests end", "end after 70s");
             }
             return None;
@@ -107,7 +115,7 @@ impl<'a> Resolver<'a> {
         if value > 0.0 {
             return Some(value);
         }
-        let title = format!("a test cannot end after `{}`", self.text(end.span));
+        let title = "`end after` must be greater than 0s";
         self.report(Diagnostic::new(Code::OUT_OF_RANGE, end.span, title).label("expected more than 0s"));
         None
     }
@@ -117,7 +125,7 @@ impl<'a> Resolver<'a> {
             if campaign.repeats.is_empty()
                 && campaign.passives.is_empty()
                 && !campaign.searches.is_empty()
-                && !campaign.damaged
+                && !campaign.has_errors
             {
                 self.missing(&campaign.head.name, "its objectives", "objectives fuzzing_time, collision_occurrence");
             }
@@ -125,7 +133,7 @@ impl<'a> Resolver<'a> {
         };
         let found = self.find_all(names, Kind::Metric);
         let mut complete = true;
-        // A campaign without a search optimises nothing, which is reported as that.
+        // A campaign without a search cannot have objectives, which is reported as such.
         for name in names.iter().filter(|_| campaign.repeats.is_empty() && campaign.passives.is_empty()) {
             let Some(definition) = self.names.get(name.text.as_str()).copied() else { continue };
             if definition.kind != Kind::Metric {
@@ -140,29 +148,29 @@ impl<'a> Resolver<'a> {
             let at = declared.ty.as_ref().map_or(declared.head.name.span, |ty| ty.span).end();
             let diagnostic =
                 Diagnostic::new(Code::NO_DIRECTION, name.span, format!("objective `{}` has no direction", name.text))
-                    .label("is more of it of interest, or less?")
-                    .also(declared.head.name.span, "the metric is declared here")
-                    .suggest("search for large values", at, " maximise")
-                    .suggest("search for small values", at, " minimise");
+                    .label("should it be maximised or minimised?")
+                    .secondary(declared.head.name.span, "the metric is declared here")
+                    .suggest("add `maximise` to search for large values", at, " maximise")
+                    .suggest("add `minimise` to search for small values", at, " minimise");
             self.report(diagnostic);
         }
         found.filter(|_| complete)
     }
 
-    /// What the tests of a search hold.
-    fn content(
+    /// What the tests of a search contain.
+    fn template(
         &mut self,
         campaign: &'a ast::Campaign,
         end_after: Option<f64>,
         activation: Option<ActivationMode>,
-    ) -> Option<Content> {
+    ) -> Option<TestTemplate> {
         let spans: Vec<Span> = campaign.operations.iter().map(|it| it.span).collect();
         self.at_most_one(&spans, "operations");
         let Some(operations) = campaign.operations.first() else {
             if campaign.repeats.is_empty()
                 && campaign.passives.is_empty()
                 && !campaign.searches.is_empty()
-                && !campaign.damaged
+                && !campaign.has_errors
             {
                 self.missing(&campaign.head.name, "the operations of its tests", "operations jitter 1..5 per test");
             }
@@ -177,30 +185,30 @@ impl<'a> Resolver<'a> {
             if let Some(end) = end_after {
                 self.window_and_end(name, definition.index, end, campaign);
             }
-            // As above: the campaign that wrote both says it.
+            // It was reported for the campaign that writes both.
             let told = campaign.inherited.operations && campaign.inherited.activate;
             if let (Some(ActivationMode::Condition(space)), false) = (&activation, told) {
                 self.constraints_and_space(name, definition.index, space, campaign);
             }
         }
-        let min = self.count(operations.min, 1, "a test holds");
-        let max = self.count(operations.max, 1, "a test holds");
+        let min = self.count(operations.min, 1, "the number of operations per test");
+        let max = self.count(operations.max, 1, "the number of operations per test");
         let [min, max] = [min?, max?];
         if min > max {
             let span = operations.min.span.to(operations.max.span);
             let mut diagnostic = Diagnostic::new(Code::BAD_COUNT, span, format!("`{min}..{max}` is reversed"))
-                .label("the smaller number comes first");
-            diagnostic = diagnostic.suggest("swap them", span, format!("{max}..{min}"));
+                .label("the smaller number must come first");
+            diagnostic = diagnostic.suggest("swap the two numbers", span, format!("{max}..{min}"));
             self.report(diagnostic);
             return None;
         }
         let found: Vec<OperationId> = found?.into_iter().map(OperationId::from_index).collect();
         let copies = operations.copies.map_or_else(Copies::default, |(_, copies)| copies);
         self.enough_operations(campaign, operations, &found, min)?;
-        Some(Content { operations: found, min, max, copies, activation: activation? })
+        Some(TestTemplate { operations: found, min, max, copies, activation: activation? })
     }
 
-    /// Reports a test that would have to hold more operations than there are, where one may hold each only once.
+    /// Reports a test that needs more operations than there are, if it may contain each only once.
     fn enough_operations(
         &mut self,
         campaign: &'a ast::Campaign,
@@ -212,23 +220,23 @@ impl<'a> Resolver<'a> {
             self.operations[id.index()].as_ref().is_some_and(|operation| operation.kind.is_offline())
         };
         let (once, why) = match written.copies {
-            Some((span, Copies::Once)) => (true, Some((span, "each at most once"))),
+            Some((span, Copies::Once)) => (true, Some(span)),
             Some((_, Copies::MayOverlap)) => return Some(()),
-            // Whatever acts before the start or after the end has no time of its own in which only one copy acts.
+            // Operations before the start and after the end have no time windows that could lie apart.
             Some((_, Copies::Apart)) | None => (operations.iter().all(offline), None),
         };
         let most = operations.len();
         if !once || min as usize <= most {
             return Some(());
         }
-        let title = format!("a test of campaign `{}` cannot hold {min} operations", campaign.head.name.text);
-        let each = if most == 1 { "there is 1".to_owned() } else { format!("there are {most}") };
-        let diagnostic = Diagnostic::new(Code::BAD_COUNT, written.min.span, title).label(format!("{each} to hold"));
+        let title = format!("a test of campaign `{}` cannot contain {min} operations", campaign.head.name.text);
+        let label = if most == 1 { "there is only 1".to_owned() } else { format!("there are only {most}") };
+        let diagnostic = Diagnostic::new(Code::BAD_COUNT, written.min.span, title).label(label);
         self.report(match why {
-            Some((span, words)) => diagnostic.also(span, format!("it may hold {words}")),
+            Some(span) => diagnostic.secondary(span, "each may occur at most once"),
             None => diagnostic.note(
-                "operations before the start and after the end of a run have no windows that could lie apart, so a test \
-                 holds each at most once; say `may overlap` to permit copies",
+                "operations before the start and after the end of a run have no time window, so a test contains each at \
+                 most once; add `may overlap` to permit copies",
             ),
         });
         None
@@ -236,7 +244,7 @@ impl<'a> Resolver<'a> {
 
     /// Compares the permitted window of an operation with the end of a campaign that uses it.
     fn window_and_end(&mut self, name: &ast::Name, index: usize, end: f64, campaign: &'a ast::Campaign) {
-        // It was said of the campaign that wrote both.
+        // It was reported for the campaign that writes both.
         if campaign.inherited.operations && campaign.inherited.end {
             return;
         }
@@ -248,30 +256,33 @@ impl<'a> Resolver<'a> {
         let diagnostic = if within.low >= end {
             let title = format!("`{}` can never be active in campaign `{}`", name.text, campaign.head.name.text);
             Diagnostic::new(Code::AFTER_THE_END, name.span, title)
-                .label(format!("permitted only after the campaign's end at {end_text}"))
+                .label(format!("its permitted window begins after the tests end at {end_text}"))
         } else if within.high > end {
-            let title = format!("`{}` may go on after the end of campaign `{}`", name.text, campaign.head.name.text);
+            let title =
+                format!("`{}` may be active beyond the end of campaign `{}`", name.text, campaign.head.name.text);
             Diagnostic::new(Code::OUTLASTS_THE_END, name.span, title)
-                .label(format!("tests end at {end_text}; what is later never happens"))
+                .label(format!("tests end at {end_text}, so anything later never happens"))
         } else {
             return;
         };
-        self.report(diagnostic.also(written.span, "its permitted window").also(end_written.span, "the end"));
+        self.report(
+            diagnostic.secondary(written.span, "its permitted window").secondary(end_written.span, "tests end here"),
+        );
     }
 
     fn search(
         &mut self,
         campaign: &'a ast::Campaign,
         search: &'a ast::Search,
-        content: Option<Content>,
+        template: Option<TestTemplate>,
     ) -> Option<Search> {
         let strategy = search.strategy?;
         let population = self.single(&search.population, "population").copied();
         let evaluations = self.single(&search.evaluations, "evaluations").copied();
-        if evaluations.is_none() && !search.damaged {
-            self.missing(&campaign.head.name, "the number of tests to evaluate", "evaluations 200");
+        if evaluations.is_none() && !search.has_errors {
+            self.missing(&campaign.head.name, "its number of evaluations", "evaluations 200");
         }
-        let found = evaluations.and_then(|count| self.count(count, 1, "a search evaluates"));
+        let found = evaluations.and_then(|count| self.count(count, 1, "the number of evaluations"));
         match strategy {
             Strategy::Random | Strategy::LatinHypercube | Strategy::Sobol => {
                 if let Some((span, _)) = search.population.first() {
@@ -282,63 +293,65 @@ impl<'a> Resolver<'a> {
                     };
                     let title = format!("a {what} has no setting `population`");
                     let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, *span, title)
-                        .label("leave it out")
+                        .label("remove this")
                         .note("its settings are `evaluations` and `seed`");
                     self.report(diagnostic);
                     return None;
                 }
-                let (content, evaluations) = (content?, found?);
+                let (template, evaluations) = (template?, found?);
                 Some(match strategy {
-                    Strategy::Random => Search::Random { content, evaluations },
-                    Strategy::Sobol => Search::Sobol { content, evaluations },
-                    _ => Search::LatinHypercube { content, evaluations },
+                    Strategy::Random => Search::Random { template, evaluations },
+                    Strategy::Sobol => Search::Sobol { template, evaluations },
+                    _ => Search::LatinHypercube { template, evaluations },
                 })
             }
             Strategy::Falsification => {
                 let population = match population {
-                    Some(count) => self.count(count, 1, "a falsification tries at a time"),
+                    Some(count) => self.count(count, 1, "the population"),
                     None => Some(1),
                 };
-                let (content, population, evaluations) = (content?, population?, found?);
-                Some(Search::Falsification { content, population, evaluations })
+                let (template, population, evaluations) = (template?, population?, found?);
+                Some(Search::Falsification { template, population, evaluations })
             }
             Strategy::Nsga2 | Strategy::MapElites => {
                 let Some(count) = population else {
-                    if !search.damaged {
-                        self.missing(&campaign.head.name, "the size of its population", "population 10");
+                    if !search.has_errors {
+                        self.missing(&campaign.head.name, "its population size", "population 10");
                     }
                     return None;
                 };
-                let size = self.count(count, 2, "a population has")?;
-                if size % 2 == 1 {
-                    let title = format!("a population of {size} is odd");
+                let size = self.count(count, 2, "the population")?;
+                let even = size % 2 == 0;
+                if !even {
+                    let title = format!("the population must be even, not {size}");
                     let diagnostic = Diagnostic::new(Code::BAD_COUNT, count.span, title)
-                        .label("expected an even number: children are made in pairs")
-                        .suggest("make it even", count.span, (size + 1).to_string());
-                    self.report(diagnostic);
-                    return None;
+                        .label("expected an even number, because children are made in pairs");
+                    self.report(match size.checked_add(1) {
+                        Some(even) => diagnostic.suggest(format!("use {even}"), count.span, even.to_string()),
+                        None => diagnostic,
+                    });
                 }
                 let found = found?;
                 if found < size {
-                    let title = format!("{found} evaluations do not fill a population of {size}");
+                    let title = format!("{found} evaluations are too few for a population of {size}");
                     let span = evaluations.map_or(count.span, |count| count.span);
                     let diagnostic = Diagnostic::new(Code::BAD_COUNT, span, title)
                         .label(format!("expected at least {size}"))
-                        .also(count.span, "the population");
+                        .secondary(count.span, "the population");
                     self.report(diagnostic);
                     return None;
                 }
-                let (content, population, evaluations) = (content?, size, found);
+                let (template, population, evaluations) = (template.filter(|_| even)?, size, found);
                 Some(match strategy {
-                    Strategy::Nsga2 => Search::Nsga2 { content, population, evaluations },
-                    _ => Search::MapElites { content, population, evaluations },
+                    Strategy::Nsga2 => Search::Nsga2 { template, population, evaluations },
+                    _ => Search::MapElites { template, population, evaluations },
                 })
             }
         }
     }
 
     fn repeat(&mut self, repeat: &'a ast::Repeat, end_after: Option<f64>) -> Option<Search> {
-        let times = self.count(repeat.times, 1, "a test is repeated");
+        let times = self.count(repeat.times, 1, "the number of repetitions");
         let index = self.find(&repeat.test, Kind::Test)?;
         if let Some(end) = end_after {
             self.test_and_end(index, end, repeat);
@@ -352,7 +365,7 @@ impl<'a> Resolver<'a> {
         let written = &self.file.tests[index].operations;
         for (operation, written) in test.operations.iter().zip(written) {
             let name = &written.operation.text;
-            // A condition may hold at any time: only what the operation permits is known beforehand.
+            // A condition may hold at any time: only the permitted window is known beforehand.
             let (span, window) = match (&operation.activation, &written.activation) {
                 (Activation::Window(window), ast::Activation::Window(written)) => (written.span, *window),
                 _ => match self.operations[operation.operation.index()].as_ref().and_then(|it| it.within) {
@@ -361,27 +374,27 @@ impl<'a> Resolver<'a> {
                 },
             };
             let diagnostic = if window.low >= end {
-                let title = format!("`{name}` is never active: the tests of the campaign are over by then");
-                Diagnostic::new(Code::AFTER_THE_END, span, title).label(format!("begins after the end at {end}s"))
+                let title = format!("`{name}` is never active, because the campaign's tests end earlier");
+                Diagnostic::new(Code::AFTER_THE_END, span, title).label(format!("begins after the tests end at {end}s"))
             } else if window.high > end {
-                let title = format!("`{name}` goes on after the end of the campaign that repeats this test");
+                let title = format!("`{name}` is active beyond the end of the campaign that repeats this test");
                 Diagnostic::new(Code::OUTLASTS_THE_END, span, title)
-                    .label(format!("tests end at {end}s; what is later never happens"))
+                    .label(format!("tests end at {end}s, so anything later never happens"))
             } else {
                 continue;
             };
-            self.report(diagnostic.also(repeat.test.span, "repeated here"));
+            self.report(diagnostic.secondary(repeat.test.span, "repeated here"));
         }
     }
 
-    /// A campaign without disturbances has nothing that makes some.
+    /// Reports clauses that disturb in a campaign that only observes.
     fn only_observes(&mut self, campaign: &'a ast::Campaign, passive: &ast::Passive, repeats: Option<Span>) {
-        self.only_repeats(campaign, passive.span, "a campaign that only observes", "observes here");
+        self.only_repeats(campaign, passive.span, "a campaign that only observes", "this campaign only observes");
         if let Some(repeat) = repeats {
-            let title = "a campaign that only observes repeats no test";
+            let title = "a campaign that only observes cannot repeat a test";
             let diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, repeat, title)
-                .label("a test disturbs")
-                .also(passive.span, "observes here");
+                .label("a test applies operations")
+                .secondary(passive.span, "this campaign only observes");
             self.report(diagnostic);
         }
     }
@@ -389,24 +402,25 @@ impl<'a> Resolver<'a> {
     fn only_repeats(&mut self, campaign: &'a ast::Campaign, place: Span, who: &str, here: &str) {
         let by_condition =
             campaign.activates.iter().find(|(_, mode)| matches!(mode, ast::ActivationMode::Condition(_)));
+        let exploration = campaign.explorations.first();
         let clauses = [
             (by_condition.map(|(span, _)| *span), "activate by condition"),
             (campaign.searches.first().map(|search| search.span), "search"),
             (campaign.operations.first().map(|operations| operations.span), "operations"),
             (campaign.objectives.first().map(|(span, _)| *span), "objectives"),
             (campaign.coverages.first().map(|coverage| coverage.span), "coverage"),
-            (campaign.explorations.first().map(|exploration| exploration.span), exploring(campaign)),
+            (exploration.map(|exploration| exploration.span), exploration.map_or("", exploring)),
             (campaign.confirms.first().map(|confirm| confirm.span), "confirm"),
             (campaign.stops.first().map(|stop| stop.span), "stop"),
         ];
         for (span, word) in clauses {
             let Some(span) = span else { continue };
-            let title = format!("{who} has no `{word}`");
+            let title = format!("{who} cannot have `{word}`");
             let mut diagnostic = Diagnostic::new(Code::SEARCH_OR_REPEAT, span, title)
-                .label("a campaign either searches or repeats or observes")
-                .also(place, here);
+                .label("a campaign either searches, repeats a test or only observes")
+                .secondary(place, here);
             if word == "objectives" {
-                diagnostic = diagnostic.suggest("measure them with", span, "observes");
+                diagnostic = diagnostic.suggest("use `observes` to measure metrics", span, "observes");
             }
             self.report(diagnostic);
         }
@@ -419,35 +433,23 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    /// A count of at least `min`. `what` begins a sentence, for example "a test holds".
+    /// A count of at least `min`. `what` is the subject of "… must be at least 1", for example "the number of runs".
     pub(super) fn count(&mut self, count: Count, min: u32, what: &str) -> Option<u32> {
         let value = count.value?;
         match u32::try_from(value) {
             Ok(found) if found >= min => Some(found),
             Ok(_) => {
-                let repetition = ["repeated", "observed", "activated"].iter().any(|word| what.ends_with(word));
-                let times = if repetition { " times" } else { "" };
-                let title = format!("{what} at least {min}{times}, not {value}{times}");
+                let title = format!("{what} must be at least {min}, not {value}");
                 let diagnostic = Diagnostic::new(Code::BAD_COUNT, count.span, title);
                 self.report(diagnostic.label(format!("expected {min} or more")));
                 None
             }
             Err(_) => {
-                let title = format!("`{value}` is too large a count");
+                let title = format!("{what} cannot be {value}");
                 let diagnostic = Diagnostic::new(Code::BAD_NUMBER, count.span, title);
                 self.report(diagnostic.label(format!("expected at most {}", u32::MAX)));
                 None
             }
         }
-    }
-}
-
-/// The word that a campaign's exploration begins with.
-fn exploring(campaign: &ast::Campaign) -> &'static str {
-    match campaign.explorations.first().map(|exploration| exploration.kind) {
-        Some(ast::ExplorationKind::Construct) => "construct",
-        Some(ast::ExplorationKind::Predict) => "predict",
-        Some(ast::ExplorationKind::Novelty) => "novelty",
-        _ => "boost",
     }
 }

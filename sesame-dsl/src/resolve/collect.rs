@@ -1,4 +1,4 @@
-//! Who is called what; doubles; what a space cannot do without.
+//! Names, duplicates, and the declarations that every space needs.
 
 use std::collections::BTreeMap;
 
@@ -22,15 +22,15 @@ impl<'a> Resolver<'a> {
             };
             let mut diagnostic =
                 Diagnostic::new(Code::DEFINED_TWICE, head.name.span, format!("`{name}` is defined twice"))
-                    .label(format!("here as {}", kind.with_article()))
-                    .also(first.span, format!("first defined here, as {}", first.kind.with_article()));
+                    .label(format!("redefined here as {}", kind.with_article()))
+                    .secondary(first.span, format!("first defined here as {}", first.kind.with_article()));
             if kind != first.kind {
-                diagnostic = diagnostic.note("a name means one thing in a space");
+                diagnostic = diagnostic.note("a name can stand for only one thing in a space");
             }
             self.report(diagnostic);
         }
-        let broken = self.file.broken.iter().map(|name| name.text.as_str());
-        self.silent.extend(broken);
+        let undeclared = self.file.undeclared.iter().map(|name| name.text.as_str());
+        self.silent.extend(undeclared);
         self.collisions(&heads);
         self.required();
     }
@@ -50,8 +50,8 @@ impl<'a> Resolver<'a> {
         add(Kind::Operation, file.operations.iter().map(|it| &it.head).collect());
         add(Kind::Test, file.tests.iter().map(|it| &it.head).collect());
         add(Kind::Campaign, file.campaigns.iter().map(|it| &it.head).collect());
-        add(Kind::Eddi, file.eddis.iter().map(|it| &it.head).collect());
-        add(Kind::Physical, file.physicals.iter().map(|it| &it.head).collect());
+        add(Kind::Monitor, file.eddis.iter().map(|it| &it.head).collect());
+        add(Kind::Lab, file.physicals.iter().map(|it| &it.head).collect());
         heads
     }
 
@@ -59,7 +59,7 @@ impl<'a> Resolver<'a> {
         self.file.systems.iter().flat_map(|system| &system.simulators)
     }
 
-    /// Names that differ in the file but meet in the generated code or on a disk.
+    /// Names that differ in the file but collide in the generated code or on a case-insensitive file system.
     fn collisions(&mut self, heads: &[(Kind, usize, &'a Head)]) {
         let mut taken: BTreeMap<(&str, String), (&str, Span)> = BTreeMap::new();
         for (kind, index, head) in heads {
@@ -89,10 +89,10 @@ impl<'a> Resolver<'a> {
                     // The same name twice is reported as that.
                     Some((first, _)) if *first == name => break,
                     Some(&(first, span)) => {
-                        let title = format!("`{name}` and `{first}` meet in the generated code");
+                        let title = format!("`{name}` and `{first}` collide in the generated code");
                         let diagnostic = Diagnostic::new(Code::GENERATED_COLLISION, head.name.span, title)
                             .label(format!("its {what} would be `{generated}`"))
-                            .also(span, "and so would this one's");
+                            .secondary(span, format!("this one's {what} would be `{generated}` too"));
                         self.report(diagnostic);
                         break;
                     }
@@ -107,9 +107,9 @@ impl<'a> Resolver<'a> {
     fn required(&mut self) {
         let start = Span { file: self.root, lo: 0, hi: 0 };
         let file = self.file;
-        let damaged = file.damaged || file.incomplete;
-        if file.spaces.is_empty() && !damaged {
-            let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, start, "this file names no space")
+        let has_errors = file.has_errors || file.incomplete;
+        if file.spaces.is_empty() && !has_errors {
+            let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, start, "this file has no `space` declaration")
                 .label("expected `space` and a name")
                 .note("for example `space kuka_cell`");
             self.report(diagnostic);
@@ -124,18 +124,20 @@ impl<'a> Resolver<'a> {
         let simulators: Vec<Span> = self.simulators().map(|simulator| simulator.head.name.span).collect();
         self.only_one(&simulators, "simulator");
         match file.systems.first() {
-            None if !damaged => {
+            None if !has_errors => {
                 let at = spaces.first().copied().unwrap_or(start);
-                let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, at, "this space has no system")
-                    .label("nothing says what is tested")
-                    .note("a `system { … }` declares simulator, messages, topics and nodes");
+                let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, at, "this space has no `system`")
+                    .label("expected a `system` block")
+                    .note("a `system { … }` block declares the simulator, messages, topics and nodes");
                 self.report(diagnostic);
             }
             Some(System { span, .. })
-                if simulators.is_empty() && !file.incomplete && !file.systems.iter().any(|system| system.damaged) =>
+                if simulators.is_empty()
+                    && !file.incomplete
+                    && !file.systems.iter().any(|system| system.has_errors) =>
             {
                 let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, *span, "this system has no simulator")
-                    .label("nothing runs it")
+                    .label("expected a `simulator` inside")
                     .note(
                         "for example `simulator cell = in_process \"my_sim::Cell\" { crate \"simulator\"  step 20ms }`",
                     );
@@ -148,10 +150,10 @@ impl<'a> Resolver<'a> {
     fn only_one(&mut self, spans: &[Span], what: &str) {
         for &again in spans.iter().skip(1) {
             let holder = if what == "simulator" { "a space" } else { "a file" };
-            let title = format!("{holder} has one {what}, and this is another");
+            let title = format!("{holder} can have only one `{what}`");
             let diagnostic = Diagnostic::new(Code::MISSING_DECLARATION, again, title)
-                .label("remove it, or move it to a file of its own")
-                .also(spans[0], "the first is here");
+                .label("remove this one, or move it to another file")
+                .secondary(spans[0], "first declared here");
             self.report(diagnostic);
         }
     }

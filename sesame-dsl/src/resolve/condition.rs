@@ -1,8 +1,10 @@
-//! Conditions: those of known tests, what a campaign grows its own from, and what operations ask of these.
+//! Conditions: those of tests, the building blocks of those that a campaign grows, and what operations require of them.
 
 use super::{Kind, Resolver, list};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::condition::{Comparison, Condition, ConditionSpace, Constraint, Integers, Known, Operand, Variable};
+use crate::model::condition::{
+    Comparison, Condition, ConditionSpace, Constraint, Integers, Operand, ValueRange, Variable,
+};
 use crate::model::{Activation, Aggregate, End, Expression, Id as _, Metric, MetricId, MetricSource, Range};
 use crate::span::Span;
 use crate::syntax::ast::{self, ByCondition, Contained, ExpressionKind, Relation, Trigger, TriggerEnd};
@@ -11,7 +13,7 @@ use crate::units::{Unit, convert, dimension};
 const EXAMPLE: &str = "expected a comparison such as `near_zone1 > 2`";
 
 impl<'a> Resolver<'a> {
-    // ----- known tests
+    // ----- tests
 
     pub(super) fn trigger(&mut self, trigger: &'a Trigger) -> Option<Activation> {
         let start = self.switch(&trigger.start);
@@ -27,17 +29,17 @@ impl<'a> Resolver<'a> {
     }
 
     fn length(&mut self, quantity: &ast::Quantity) -> Option<f64> {
-        let seconds = self.value(quantity, Some(&Unit::seconds()), "the length of an activation")?;
+        let seconds = self.value(quantity, Some(&Unit::seconds()), "the duration of an activation")?;
         if seconds > 0.0 {
             return Some(seconds);
         }
-        let title = format!("an activation cannot last `{}`", self.text(quantity.span));
+        let title = "an activation must last longer than 0s";
         self.report(Diagnostic::new(Code::OUT_OF_RANGE, quantity.span, title).label("expected more than 0s"));
         None
     }
 
     fn times_activated(&mut self, times: ast::Count) -> Option<u32> {
-        self.count(times, 1, "an operation is activated")
+        self.count(times, 1, "the number of activations")
     }
 
     /// A whole condition, which switches an operation on or off.
@@ -45,10 +47,10 @@ impl<'a> Resolver<'a> {
         let condition = self.condition_over_metrics(expression)?;
         let depth = condition.depth();
         if depth > Condition::MAX_DEPTH {
-            let title = format!("this condition has {depth} levels, more than {}", Condition::MAX_DEPTH);
+            let title = format!("this condition has {depth} levels, but the limit is {}", Condition::MAX_DEPTH);
             let diagnostic = Diagnostic::new(Code::TOO_LARGE, expression.span, title)
-                .label("too long")
-                .note("each `and` and each `or` is a level; a metric can take part of the condition");
+                .label("nested too deeply")
+                .note("each `and` and each `or` adds a level; move part of the condition into a metric");
             self.report(diagnostic);
             return None;
         }
@@ -64,13 +66,13 @@ impl<'a> Resolver<'a> {
                 let written = self.text(expression.span);
                 let title = match kind {
                     ExpressionKind::Field(_) => format!("`{written}` is not compared with anything"),
-                    _ => format!("`{written}` is no comparison"),
+                    _ => format!("`{written}` is not a comparison"),
                 };
                 self.report(Diagnostic::new(Code::NOT_A_CONDITION, expression.span, title).label(EXAMPLE));
                 return None;
             }
         };
-        // All are looked at, so that a mistake in one does not hide one in another.
+        // All are resolved, so that a mistake in one does not hide one in another.
         let parts: Vec<_> = parts.iter().map(|part| self.condition_over_metrics(part)).collect();
         let parts: Vec<Condition> = parts.into_iter().collect::<Option<_>>()?;
         let join = if all { Condition::And } else { Condition::Or };
@@ -98,18 +100,17 @@ impl<'a> Resolver<'a> {
         let compared = match (left_side, right_side) {
             (Side::Number(left), Side::Number(right)) => {
                 let outcome = match (left.unit.is_none(), right.unit.is_none()) {
-                    (true, true) => Known::exactly(left.value).outcome(by, Known::exactly(right.value)),
+                    (true, true) => ValueRange::exactly(left.value).outcome(by, ValueRange::exactly(right.value)),
                     _ => None,
                 };
-                let label =
-                    outcome.map_or("always the same", |outcome| if outcome { "always holds" } else { "never holds" });
-                let title = format!("`{}` compares two numbers", self.text(whole.span));
+                let label = outcome.map_or("constant", |outcome| if outcome { "always true" } else { "always false" });
+                let title = format!("`{}` compares two constants", self.text(whole.span));
                 self.report(Diagnostic::new(Code::CONSTANT_COMPARISON, whole.span, title).label(label));
                 return None;
             }
             (Side::Metric(metric), Side::Metric(other)) if metric == other => {
                 let title = format!("`{}` compares a metric with itself", self.text(whole.span));
-                let label = if by == Comparison::Equal { "always holds" } else { "never holds" };
+                let label = if by == Comparison::Equal { "always true" } else { "always false" };
                 self.report(Diagnostic::new(Code::CONSTANT_COMPARISON, whole.span, title).label(label));
                 return None;
             }
@@ -138,16 +139,17 @@ impl<'a> Resolver<'a> {
     ) -> Option<Comparison> {
         let gap = Span { lo: left.span.hi, hi: right.span.lo, ..left.span };
         let written = self.text(gap);
-        let mut diagnostic = Diagnostic::new(Code::NOT_A_CONDITION, gap, format!("a condition has no `{sign}`"))
-            .label("expected `<`, `>` or `==`");
+        let mut diagnostic =
+            Diagnostic::new(Code::NOT_A_CONDITION, gap, format!("`{sign}` is not allowed in a condition"))
+                .label("expected `<`, `>` or `==`");
         if let Some(at) = written.find(sign) {
             let lo = gap.lo + u32::try_from(at).expect("files are small");
             let hi = lo + u32::try_from(sign.len()).expect("signs are short");
             let span = Span { lo, hi, ..gap };
             diagnostic.span = span;
-            // A sign inside of a comment is not the one that is meant.
+            // The sign may occur in a comment as well.
             if let Some(near) = near.filter(|_| written.trim() == sign) {
-                diagnostic = diagnostic.suggest(format!("compare with `{near}`"), span, near);
+                diagnostic = diagnostic.suggest(format!("use `{near}` instead"), span, near);
             }
         }
         self.report(diagnostic);
@@ -168,35 +170,35 @@ impl<'a> Resolver<'a> {
                 let written = self.text(side.span);
                 let title = match kind {
                     ExpressionKind::Field(_) | ExpressionKind::Members(..) => {
-                        format!("`{written}` is no metric, and a condition compares metrics")
+                        format!("`{written}` is not a metric")
                     }
                     ExpressionKind::Truth(_)
                     | ExpressionKind::Compare(..)
                     | ExpressionKind::All(_)
                     | ExpressionKind::Any(_) => {
-                        format!("`{written}` holds or does not, and a condition compares metrics")
+                        format!("`{written}` is a condition, not a metric")
                     }
-                    _ => format!("`{written}` is calculated, and a condition compares metrics as they are"),
+                    _ => format!("`{written}` is an expression, not a metric"),
                 };
                 let diagnostic = Diagnostic::new(Code::NOT_A_CONDITION, side.span, title)
                     .label("expected a metric or a number")
-                    .note("a metric can be any formula, for example `metric near = last(near1.level)`");
+                    .note("a condition compares metrics; declare one for what you want to compare, for example `metric near = last(near1.level)`");
                 self.report(diagnostic);
                 None
             }
         }
     }
 
-    /// A robustness is known when the test is over: no condition ever sees it.
+    /// A robustness is known when the test has ended, so no condition can read it.
     fn known_during_a_test(&mut self, id: MetricId, span: Span) -> Option<()> {
         let metric = self.metric_of(id);
         if !matches!(metric.source, MetricSource::Robustness(_)) {
             return Some(());
         }
-        let title = format!("`{}` has no value before the test is over", self.text(span));
+        let title = format!("`{}` has no value before the test has ended", self.text(span));
         let diagnostic = Diagnostic::new(Code::NOT_A_CONDITION, span, title)
-            .label("a robustness, known at the end")
-            .also(metric.declaration.span, "declared here");
+            .label("a robustness is known only at the end of a test")
+            .secondary(metric.declaration.span, "declared here");
         self.report(diagnostic);
         None
     }
@@ -210,7 +212,7 @@ impl<'a> Resolver<'a> {
         self.value(number, unit.as_ref(), &format!("metric `{}`", self.text(span)))
     }
 
-    /// Two metrics are compared as the numbers they are, so they have one unit.
+    /// Two metrics are compared as plain numbers, so they must have the same unit.
     fn one_unit(&mut self, metric: MetricId, span: Span, other: MetricId, other_span: Span) -> Option<()> {
         let [unit, other_unit] = [metric, other].map(|id| self.metric_of(id).unit.clone());
         let [unit, other_unit] = [unit.as_ref(), other_unit.as_ref()];
@@ -221,35 +223,32 @@ impl<'a> Resolver<'a> {
         }
         let [name, other_name] = [span, other_span].map(|span| self.text(span));
         let title = format!("`{other_name}` is {}, but `{name}` is {}", in_words(other_unit), in_words(unit));
-        let mut diagnostic =
-            Diagnostic::new(Code::WRONG_UNIT, span.to(other_span), title).label("metrics are compared in one unit");
+        let mut diagnostic = Diagnostic::new(Code::WRONG_UNIT, span.to(other_span), title)
+            .label("only metrics of the same unit can be compared");
         if dimension(unit) == dimension(other_unit) {
-            diagnostic = diagnostic.note("let one of them be computed in the unit of the other");
+            diagnostic = diagnostic.note("compute one of the metrics in the unit of the other");
         }
         self.report(diagnostic);
         None
     }
 
-    /// Reports a comparison that what is known of its metrics decides beforehand.
+    /// Reports a comparison whose outcome follows from what is known of its metrics.
     fn open_outcome(&mut self, span: Span, (left, right): (Operand, Operand), by: Comparison) -> Option<()> {
         let known = [left, right].map(|side| match side {
-            Operand::Number(number) => Known::exactly(number),
+            Operand::Number(number) => ValueRange::exactly(number),
             Operand::Variable(metric) => known_of(self.metric_of(metric)),
         });
         let Some(outcome) = known[0].outcome(by, known[1]) else { return Some(()) };
-        let mut diagnostic = Diagnostic::new(
-            Code::CONSTANT_COMPARISON,
-            span,
-            format!("`{}` {} holds", self.text(span), if outcome { "always" } else { "never" }),
-        )
-        .label("decided before the test begins");
+        let mut diagnostic =
+            Diagnostic::new(Code::CONSTANT_COMPARISON, span, format!("`{}` is always {outcome}", self.text(span)))
+                .label("this is known before the test begins");
         for (side, known) in [left, right].into_iter().zip(known) {
             if let Operand::Variable(id) = side
-                && known != Known::NOTHING
+                && known != ValueRange::NOTHING
             {
                 let declared = &self.metric_of(id).declaration;
                 let label = format!("`{}` is {}", declared.name, in_words(known, self.metric_of(id).unit.as_ref()));
-                diagnostic = diagnostic.also(declared.span, label);
+                diagnostic = diagnostic.secondary(declared.span, label);
             }
         }
         self.report(diagnostic);
@@ -295,12 +294,12 @@ impl<'a> Resolver<'a> {
         let span = by.variables[0].span.to(by.variables[by.variables.len() - 1].span);
         let diagnostic = Diagnostic::new(Code::NOTHING_TO_GROW, span, "every condition of this campaign is constant")
             .label(format!(
-                "no whole number from {} to {} lies inside what is known of {}",
+                "no whole number from {} to {} lies within the known range of {}",
                 space.integers.lowest,
                 space.integers.highest,
                 list(&names)
             ))
-            .note("change `integers`, or measure something that moves among them");
+            .note("change `integers`, or add a metric whose values pass some of them");
         self.report(diagnostic);
         None
     }
@@ -328,19 +327,19 @@ impl<'a> Resolver<'a> {
         if let Some(initial) = initial
             && !(found.low..=found.high).contains(&initial)
         {
-            let title = format!("`{}` begins outside of this range", name.text);
+            let title = format!("the initial value of `{}` is outside this range", name.text);
             let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, range.span, title)
-                .label(format!("expected a range that holds its `initial {initial}{}`", unit_text(unit.as_ref())))
-                .also(declared, "declared here");
+                .label(format!("expected a range that contains its `initial {initial}{}`", unit_text(unit.as_ref())))
+                .secondary(declared, "declared here");
             self.report(diagnostic);
             return None;
         }
-        let known = Known { low: found.low.max(own.low), high: found.high.min(own.high) };
+        let known = ValueRange { low: found.low.max(own.low), high: found.high.min(own.high) };
         if known.low > known.high {
-            let title = format!("`{}` never lies in this range", name.text);
+            let title = format!("`{}` can never be in this range", name.text);
             let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, range.span, title)
                 .label(format!("it is {}", in_words(own, unit.as_ref())))
-                .also(declared, "declared here");
+                .secondary(declared, "declared here");
             self.report(diagnostic);
             return None;
         }
@@ -348,14 +347,14 @@ impl<'a> Resolver<'a> {
     }
 
     fn depth(&mut self, count: ast::Count) -> Option<u32> {
-        let depth = self.count(count, 1, "the depth of a condition is")?;
+        let depth = self.count(count, 1, "the depth of a condition")?;
         if depth <= ConditionSpace::MAX_DEPTH {
             return Some(depth);
         }
-        let title = format!("a condition has at most {} levels, not {depth}", ConditionSpace::MAX_DEPTH);
+        let title = format!("a condition can have at most {} levels, not {depth}", ConditionSpace::MAX_DEPTH);
         let diagnostic = Diagnostic::new(Code::BAD_COUNT, count.span, title)
             .label(format!("expected {} or less", ConditionSpace::MAX_DEPTH))
-            .note("a level doubles how many comparisons a condition may have");
+            .note("each level doubles the number of comparisons that a condition can have");
         self.report(diagnostic);
         None
     }
@@ -371,16 +370,16 @@ impl<'a> Resolver<'a> {
     }
 
     fn lengths(&mut self, range: &ast::Range) -> Option<Range> {
-        let found = self.times(range, "the length of an activation")?;
+        let found = self.times(range, "the duration of an activation")?;
         if found.low > 0.0 {
             return Some(found);
         }
-        let title = format!("an activation cannot last `{}`", self.text(range.low.span));
+        let title = "an activation must last longer than 0s";
         self.report(Diagnostic::new(Code::OUT_OF_RANGE, range.low.span, title).label("expected more than 0s"));
         None
     }
 
-    // ----- what operations ask for
+    // ----- what operations require
 
     pub(super) fn constraints(&mut self, clauses: &'a [(Span, Vec<Contained>)]) -> Option<Vec<Constraint>> {
         let mut found: Vec<(Constraint, Span)> = Vec::new();
@@ -400,9 +399,10 @@ impl<'a> Resolver<'a> {
                 continue;
             };
             if let Some((_, before)) = found.iter().find(|(known, _)| *known == constraint) {
-                let title = format!("`{}` is asked for twice", self.text(span));
-                let diagnostic =
-                    Diagnostic::new(Code::LISTED_TWICE, span, title).label("again here").also(*before, "first here");
+                let title = format!("`{}` is required twice", self.text(span));
+                let diagnostic = Diagnostic::new(Code::LISTED_TWICE, span, title)
+                    .label("required again here")
+                    .secondary(*before, "first required here");
                 self.report(diagnostic);
                 complete = false;
                 continue;
@@ -412,7 +412,7 @@ impl<'a> Resolver<'a> {
         complete.then(|| found.into_iter().map(|(constraint, _)| constraint).collect())
     }
 
-    /// Checks that conditions of a campaign can contain what an operation of it asks for.
+    /// Checks that conditions of a campaign can contain what one of its operations requires.
     pub(super) fn constraints_and_space(
         &mut self,
         name: &ast::Name,
@@ -430,9 +430,11 @@ impl<'a> Resolver<'a> {
                 (Constraint::Variable(metric), Contained::Variable(variable)) => {
                     let offered = space.variables.iter().find(|offered| offered.metric == *metric);
                     let wrong = match offered {
-                        None => format!("`{}` is no variable of campaign `{}`", variable.text, campaign.head.name.text),
+                        None => {
+                            format!("`{}` is not a variable of campaign `{}`", variable.text, campaign.head.name.text)
+                        }
                         Some(offered) if !self.is_comparable(space, offered) => {
-                            format!("no comparison with `{}` may go both ways", variable.text)
+                            format!("every comparison with `{}` is constant", variable.text)
                         }
                         Some(_) => continue,
                     };
@@ -441,11 +443,11 @@ impl<'a> Resolver<'a> {
                 (Constraint::Integer(bounds), Contained::Integer(span, _)) => {
                     let wrong = match bounds.shared(space.integers) {
                         None => format!(
-                            "the integers of campaign `{}` are from {} to {}",
+                            "the integers of campaign `{}` range from {} to {}",
                             campaign.head.name.text, space.integers.lowest, space.integers.highest
                         ),
                         Some(shared) if !space.variables.iter().any(|variable| variable.known.meets(shared)) => {
-                            "no variable can be on both sides of such a number".to_owned()
+                            "no variable can be both below and above such a number".to_owned()
                         }
                         Some(_) => continue,
                     };
@@ -454,18 +456,18 @@ impl<'a> Resolver<'a> {
                 _ => continue,
             };
             failed = true;
-            let title = format!("no start condition can contain what `{}` asks for", name.text);
+            let title = format!("no start condition can contain what `{}` requires", name.text);
             let diagnostic = Diagnostic::new(Code::CANNOT_CONTAIN, name.span, title).label(wrong);
-            self.report(diagnostic.also(span, "asked for here"));
+            self.report(diagnostic.secondary(span, "required here"));
         }
         let (needed, most) = (comparisons_needed(&constraints), 1_usize << (space.depth - 1));
         if !failed && needed > most {
             let title =
-                format!("a condition of depth {} cannot contain all that `{}` asks for", space.depth, name.text);
-            let label = format!("needs {needed} comparisons, and there is room for {most}");
+                format!("a condition of depth {} cannot contain everything that `{}` requires", space.depth, name.text);
+            let label = format!("this needs {needed} comparisons, but there is room for only {most}");
             let mut diagnostic = Diagnostic::new(Code::CANNOT_CONTAIN, name.span, title).label(label);
             if let Some((clause, _)) = body.contains.first() {
-                diagnostic = diagnostic.also(*clause, "asked for here");
+                diagnostic = diagnostic.secondary(*clause, "required here");
             }
             self.report(diagnostic);
         }
@@ -479,36 +481,38 @@ enum Side<'a> {
     Metric(MetricId),
 }
 
-/// What is certain of a metric's values before any test, its initial value included.
-fn known_of(metric: &Metric) -> Known {
+/// What is known of a metric's values before any test, its initial value included.
+fn known_of(metric: &Metric) -> ValueRange {
     let from_zero = match &metric.source {
         // It needs no message, so it has a value from the beginning.
-        MetricSource::FuzzingTime => return Known { low: 0.0, high: f64::INFINITY },
+        MetricSource::FuzzingTime => return ValueRange { low: 0.0, high: f64::INFINITY },
         MetricSource::Formula(formula) => match &formula.aggregate {
-            Aggregate::Count(_) | Aggregate::Duration(_) => true,
+            Aggregate::Count { .. } | Aggregate::Duration { .. } => true,
             // Over groups and keys these are the least, the greatest or the sum of values that are not negative.
-            Aggregate::Last(of) | Aggregate::Min(of) | Aggregate::Max(of) | Aggregate::Mean(of) => never_negative(of),
+            Aggregate::Last { of } | Aggregate::Min { of } | Aggregate::Max { of } | Aggregate::Mean { of } => {
+                never_negative(of)
+            }
         },
         MetricSource::Hook(_) | MetricSource::Last(_) | MetricSource::Robustness(_) => false,
     };
     if !from_zero {
-        return Known::NOTHING;
+        return ValueRange::NOTHING;
     }
-    Known { low: metric.initial.map_or(0.0, |initial| initial.min(0.0)), high: f64::INFINITY }
+    ValueRange { low: metric.initial.map_or(0.0, |initial| initial.min(0.0)), high: f64::INFINITY }
 }
 
 fn never_negative(expression: &Expression) -> bool {
     match expression {
         Expression::Constant(value) => *value >= 0.0,
-        Expression::Absolute(_) | Expression::Distance(..) => true,
+        Expression::Absolute(_) | Expression::Distance { .. } => true,
         Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) => of.iter().all(never_negative),
         Expression::Max(of) => of.iter().any(never_negative),
-        Expression::Divide(value, by) => never_negative(value) && never_negative(by),
+        Expression::Divide { value, by } => never_negative(value) && never_negative(by),
         Expression::Input(_) | Expression::Negate(_) => false,
     }
 }
 
-/// The fewest comparisons that hold these: a comparison has at most two variables, or a variable and a number.
+/// The fewest comparisons that contain these: a comparison has at most two variables, or a variable and a number.
 fn comparisons_needed(constraints: &[Constraint]) -> usize {
     let variables = constraints.iter().filter(|it| matches!(it, Constraint::Variable(_))).count();
     let mut bounds: Vec<Integers> = constraints
@@ -534,13 +538,13 @@ fn same_unit(unit: Option<&Unit>, other: Option<&Unit>) -> bool {
     dimension(unit) == dimension(other) && convert(1.0, other, unit) == 1.0
 }
 
-/// What is known of a number, for example `0s and more`.
-fn in_words(known: Known, unit: Option<&Unit>) -> String {
+/// What is known of a number, for example `0s or more`.
+fn in_words(known: ValueRange, unit: Option<&Unit>) -> String {
     let unit = unit_text(unit);
     match (known.low.is_finite(), known.high.is_finite()) {
         (true, true) => format!("from {}{unit} to {}{unit}", known.low, known.high),
-        (true, false) => format!("{}{unit} and more", known.low),
-        (false, true) => format!("{}{unit} and less", known.high),
+        (true, false) => format!("{}{unit} or more", known.low),
+        (false, true) => format!("{}{unit} or less", known.high),
         (false, false) => "any number".to_owned(),
     }
 }

@@ -17,37 +17,40 @@ impl<'a> Resolver<'a> {
     ) -> Option<(Option<Target>, OperationKind, Vec<Parameter>)> {
         let parameters = self.custom_parameters(custom);
         let (target, moment) = match (&body.target, custom.moment) {
-            (Some(topic), None) => (Some(self.whole_messages(topic, "a custom operation takes")?), Moment::OnMessage),
+            (Some(topic), None) => {
+                (Some(self.whole_messages(topic, "a custom operation receives")?), Moment::OnMessage)
+            }
             (None, Some((_, ast::Moment::BeforeStart))) => (None, Moment::BeforeStart),
             (None, Some((_, ast::Moment::AfterEnd))) => (None, Moment::AfterEnd),
             (Some(topic), Some((moment, _))) => {
-                let title = format!("an operation {} has no topic: there are no messages then", self.text(moment));
+                let title = format!("an operation `{}` cannot have a topic", self.text(moment));
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, topic.span, title)
-                    .label("leave `on` and the topic out")
-                    .also(moment, "not during the run");
+                    .label("remove `on` and the topic")
+                    .secondary(moment, "no messages are sent at this time");
                 self.report(diagnostic);
                 return None;
             }
             (None, None) => {
-                let title = "a custom operation says when its code is called";
-                let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, custom.span, title).label(
-                    "expected `on` and a topic before the `=`, or `before start` or `after end` after this word",
-                );
+                let title = "a custom operation needs a topic, `before start` or `after end`";
+                let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, custom.span, title)
+                    .label("add `on` and a topic before the `=`, or `before start` or `after end` after `custom`");
                 self.report(diagnostic);
                 return None;
             }
         };
-        if let (None, Some((span, _))) = (&target, body.within.first()) {
-            let title = "`within` means nothing for an operation that acts before the start or after the end";
-            self.report(Diagnostic::new(Code::BAD_WINDOW, *span, title).label("leave this out"));
-            return None;
+        let mut complete = true;
+        if target.is_none() {
+            let within = body.within.first().map(|(span, _)| (*span, "within"));
+            let contains = body.contains.first().map(|(span, _)| (*span, "start contains"));
+            for (span, word) in within.into_iter().chain(contains) {
+                let title =
+                    format!("`{word}` has no effect on an operation before the start or after the end of a run");
+                self.report(Diagnostic::new(Code::BAD_WINDOW, span, title).label("remove this"));
+                complete = false;
+            }
         }
-        if let (None, Some((span, _))) = (&target, body.contains.first()) {
-            let title = "no condition activates an operation that acts before the start or after the end";
-            self.report(Diagnostic::new(Code::BAD_WINDOW, *span, title).label("leave this out"));
-            return None;
-        }
-        Some((target, OperationKind::Custom { moment }, parameters?))
+        let parameters = parameters?;
+        complete.then_some((target, OperationKind::Custom { moment }, parameters))
     }
 
     fn custom_parameters(&mut self, custom: &'a ast::Custom) -> Option<Vec<Parameter>> {
@@ -69,7 +72,7 @@ impl<'a> Resolver<'a> {
                 domain,
             }));
         }
-        (parameters.len() == custom.parameters.len() && !custom.damaged).then_some(parameters)
+        (parameters.len() == custom.parameters.len() && !custom.has_errors).then_some(parameters)
     }
 
     fn domain(&mut self, domain: &'a ast::Domain, what: &str) -> Option<(Option<Unit>, Domain)> {
@@ -113,21 +116,22 @@ impl<'a> Resolver<'a> {
         let from = self.coordinates(low, unit, what);
         let to = self.coordinates(high, unit, what);
         let [from, to] = [from?, to?];
+        let mut complete = true;
         for axis in 0..3 {
             if from[axis] > to[axis] {
                 let [a, b] = [low, high].map(|point| self.text(point.coordinates[axis].span).to_owned());
-                let title = format!("this box is reversed on its {} axis", ["x", "y", "z"][axis]);
+                let title = format!("this box is reversed along its {} axis", ["x", "y", "z"][axis]);
                 let diagnostic = Diagnostic::new(Code::REVERSED_RANGE, low.coordinates[axis].span.to(high.span), title)
-                    .label(format!("`{a}` is more than `{b}`"));
+                    .label(format!("`{a}` is greater than `{b}`"));
                 self.report(diagnostic);
-                return None;
+                complete = false;
             }
         }
-        Some((from, to))
+        complete.then_some((from, to))
     }
 
-    /// The first unit that is written, if any is; the outer `None` for one that does not exist.
-    #[expect(clippy::option_option, reason = "the outer says whether it was in order")]
+    /// The first unit that is written, if any; the outer `None` for one that does not exist.
+    #[expect(clippy::option_option, reason = "the outer `None` means a mistake")]
     fn declared_unit(&mut self, written: [Option<&ast::UnitName>; 3]) -> Option<Option<Unit>> {
         match written.into_iter().flatten().next() {
             Some(name) => self.unit(name).map(Some),
@@ -138,10 +142,10 @@ impl<'a> Resolver<'a> {
     /// The coordinates of a point in a unit.
     pub(super) fn coordinates(&mut self, point: &ast::Point, unit: Option<&Unit>, what: &str) -> Option<[f64; 3]> {
         if let (None, Some(unit)) = (&point.coordinates[0].unit, unit) {
-            let title = format!("`{}` lacks its unit", self.text(point.span));
+            let title = format!("`{}` has no unit", self.text(point.span));
             let diagnostic = Diagnostic::new(Code::WRONG_UNIT, point.span, title)
                 .label(format!("{what} is in `{}`", unit.text()))
-                .suggest(format!("write it in `{}`", unit.text()), point.span.end(), unit.text());
+                .suggest(format!("add the unit `{}`", unit.text()), point.span.end(), unit.text());
             self.report(diagnostic);
             return None;
         }
@@ -170,7 +174,7 @@ impl<'a> Resolver<'a> {
         let plain = |part: &str| !part.is_empty() && part != "." && part != "..";
         let good = text.text.split('/').all(plain) && !text.text.contains(['\\', ':', '\0']);
         if !good {
-            let title = format!("`{}` is no path of a file below the folder of the space", self.text(text.span));
+            let title = format!("`{}` is not the path of a file below the folder of the space", self.text(text.span));
             let diagnostic = Diagnostic::new(Code::BAD_PATH, text.span, title)
                 .label("expected a path such as `config/calibration.yaml`");
             self.report(diagnostic);
@@ -178,7 +182,7 @@ impl<'a> Resolver<'a> {
         good
     }
 
-    /// Whether a test gives a moment to an operation that acts then, and a window or conditions to any other.
+    /// Whether a test gives an operation `before start` or `after end` exactly if the operation acts then.
     pub(super) fn fits_moment(
         &mut self,
         test: &'a ast::TestOperation,
@@ -199,8 +203,11 @@ impl<'a> Resolver<'a> {
             ast::Activation::Window(window) => window.span,
             ast::Activation::Trigger(trigger) => trigger.start.span,
         };
-        let words = if declared == ast::Moment::BeforeStart { "before start" } else { "after end" };
-        let title = format!("`{}` acts {words}", test.operation.text);
+        let (words, when) = match declared {
+            ast::Moment::BeforeStart => ("before start", "before the start of a run"),
+            ast::Moment::AfterEnd => ("after end", "after the end of a run"),
+        };
+        let title = format!("`{}` acts {when}", test.operation.text);
         let diagnostic = Diagnostic::new(Code::BAD_WINDOW, span, title).label(format!("expected `{words}`"));
         self.report(diagnostic);
         false
@@ -208,11 +215,11 @@ impl<'a> Resolver<'a> {
 
     fn no_moment(&mut self, test: &'a ast::TestOperation, index: usize) -> bool {
         let ast::Activation::Moment(span, _) = test.activation else { return true };
-        let title = format!("`{}` acts during the run", test.operation.text);
+        let title = format!("`{}` acts during a run", test.operation.text);
         let declared = self.file.operations[index].head.name.span;
         let diagnostic = Diagnostic::new(Code::BAD_WINDOW, span, title)
             .label("expected a window such as `from 8s to 57s`, or `when` and a condition")
-            .also(declared, "declared here");
+            .secondary(declared, "declared here");
         self.report(diagnostic);
         false
     }

@@ -1,4 +1,4 @@
-//! What operations disturb, and what they permit tests to choose: each kind with its units and bounds.
+//! What operations disturb, and what tests may choose: each kind with its units and bounds.
 
 use super::Resolver;
 use super::system::type_in_words;
@@ -14,7 +14,7 @@ use crate::units::{Dimension, Unit, dimension};
 /// The most copies of a message that one operation makes.
 const MOST_COPIES: f64 = 100.0;
 
-/// What the places of an operation hold.
+/// The type of the values that an operation disturbs.
 enum Held {
     Number { unit: Option<Unit>, integer: bool },
     Point { unit: Option<Unit> },
@@ -29,7 +29,7 @@ impl<'a> Resolver<'a> {
         match kind {
             ast::OperationKind::Random { absolute, amounts } => self.random_value(target, *absolute, amounts),
             ast::OperationKind::RandomText(texts) => {
-                let found = self.values(target, "a random text", "a text", |ty| matches!(ty, Type::Text));
+                let found = self.values(target, "a random text", "a `text`", |ty| matches!(ty, Type::Text));
                 let texts = self.items(texts)?;
                 Some((found?.0, OperationKind::RandomText { texts }, Vec::new()))
             }
@@ -58,7 +58,7 @@ impl<'a> Resolver<'a> {
                 let sigma = self.range(range, unit.as_ref(), "`sigma`")?;
                 let all = Range { low: 0.0, high: f64::INFINITY };
                 let parameter = number("sigma", unit, sigma);
-                let fits = self.inside(sigma, range.span, all, "a standard deviation", "0 and more", None);
+                let fits = self.inside(sigma, range.span, all, "a standard deviation", "0 or more", None);
                 fits.then_some((target.found, OperationKind::Noise, vec![parameter]))
             }
             ast::OperationKind::Scale(range) => {
@@ -69,7 +69,7 @@ impl<'a> Resolver<'a> {
             ast::OperationKind::NotFinite(written) => {
                 let wants = "a real number or a point";
                 let real = |ty: &Type| matches!(ty, Type::Real(_) | Type::Point(_));
-                let (target, _) = self.values(target, "an operation that makes numbers not finite", wants, real)?;
+                let (target, _) = self.values(target, "this operation", wants, real)?;
                 let number = match written {
                     ast::NotFinite::Nan => NotFinite::Nan,
                     ast::NotFinite::Infinity => NotFinite::Infinity,
@@ -117,9 +117,9 @@ impl<'a> Resolver<'a> {
                         },
                         None if name == "loss" => {}
                         None => {
-                            let title = format!("burst loss does not say `{name}`: {what} with a message");
+                            let title = format!("burst loss is missing `{name}`, {what}");
                             let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, *span, title)
-                                .label(format!("expected in its braces for example `{name} [0%, 20%]`"));
+                                .label(format!("add it in the braces, for example `{name} [0%, 20%]`"));
                             self.report(diagnostic);
                             complete = false;
                         }
@@ -143,10 +143,10 @@ impl<'a> Resolver<'a> {
             ast::OperationKind::Latency { range, distribution, drain } => {
                 let target = self.whole_messages(target, "latency delays");
                 if let [(first, _), (again, _), ..] = distribution.as_slice() {
-                    let title = "a latency has one distribution";
+                    let title = "a latency can have only one distribution";
                     let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, *again, title)
-                        .label("remove this one or the other")
-                        .also(*first, "first here");
+                        .label("remove one of the two")
+                        .secondary(*first, "first given here");
                     self.report(diagnostic);
                 }
                 let (distribution, shape) = match distribution.first() {
@@ -170,7 +170,7 @@ impl<'a> Resolver<'a> {
                 let copies = self.range(range, None, "`copies`")?;
                 let all = Range { low: 1.0, high: MOST_COPIES };
                 if !self.whole_ends(copies, range, "`copies`")
-                    || !self.inside(copies, range.span, all, "the copies of a message", "1 to 100", None)
+                    || !self.inside(copies, range.span, all, "the number of copies", "1 to 100", None)
                 {
                     return None;
                 }
@@ -224,7 +224,7 @@ impl<'a> Resolver<'a> {
                 Some((target.found, OperationKind::StuckAt { truth: None }, vec![parameter]))
             }
             ast::Stuck::Texts(texts) => {
-                let found = self.values(target, "`stuck at` texts", "a text", |ty| matches!(ty, Type::Text));
+                let found = self.values(target, "`stuck at` texts", "a `text`", |ty| matches!(ty, Type::Text));
                 let domain = Domain::Texts(self.items(texts)?);
                 let parameter = Parameter { name: "value".to_owned(), doc: String::new(), unit: None, domain };
                 Some((found?.0, OperationKind::StuckAt { truth: None }, vec![parameter]))
@@ -271,7 +271,7 @@ impl<'a> Resolver<'a> {
         Some((Amounted { found, first: target.places[0].span }, held))
     }
 
-    /// A parameter for one amount of what is held: a range of numbers, or a box of points.
+    /// A parameter for an amount: a range of numbers, or a box of points.
     fn one_amount(
         &mut self,
         name: &str,
@@ -279,7 +279,7 @@ impl<'a> Resolver<'a> {
         held: &Held,
         target: &Amounted,
     ) -> Option<Parameter> {
-        // A rate is in another unit than what it is a rate of.
+        // A rate has another unit than the value that changes at this rate.
         let what = if name == "rate" { "the rate".to_owned() } else { format!("`{}`", self.text(target.first)) };
         let (unit, domain) = match (held, amounts) {
             (Held::Number { unit, integer }, ast::Amounts::Range(range)) => {
@@ -296,14 +296,15 @@ impl<'a> Resolver<'a> {
             (held, amounts) => {
                 let (Held::Number { unit, .. } | Held::Point { unit }) = held;
                 let unit = unit.as_ref().map_or("", Unit::text);
-                let (title, example) = match held {
-                    Held::Number { .. } => ("is a number, so", format!("[0{unit}, 1{unit}]")),
-                    Held::Point { .. } => ("is a point, so", format!("[(0, 0, 0){unit}, (1, 1, 1){unit}]")),
+                let (is, needs, example) = match held {
+                    Held::Number { .. } => ("a number", "a range of numbers", format!("[0{unit}, 1{unit}]")),
+                    Held::Point { .. } => {
+                        ("a point", "a range of points", format!("[(0, 0, 0){unit}, (1, 1, 1){unit}]"))
+                    }
                 };
-                let permits = if matches!(held, Held::Point { .. }) { "a box between two points" } else { "a range" };
-                let title = format!("`{}` {title} its `{name}` is permitted in {permits}", self.text(target.first));
+                let title = format!("`{}` is {is}, so `{name}` must be {needs}", self.text(target.first));
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, amounts.span(), title)
-                    .label(format!("expected for example `{example}`"));
+                    .label(format!("expected, for example, `{example}`"));
                 self.report(diagnostic);
                 return None;
             }
@@ -323,7 +324,7 @@ impl<'a> Resolver<'a> {
         let (found, _) = self.values(target, does, "whole messages", |_| true)?;
         let [place] = target.places.as_slice() else {
             let title = format!("{does} whole messages of one topic");
-            let diagnostic = Diagnostic::new(Code::WRONG_TYPE, target.span, title).label("expected a topic");
+            let diagnostic = Diagnostic::new(Code::WRONG_TYPE, target.span, title).label("expected one topic");
             self.report(diagnostic);
             return None;
         };
@@ -331,9 +332,9 @@ impl<'a> Resolver<'a> {
             return Some(Target { topic: found.topic, places: Vec::new() });
         }
         let parts = Span { lo: place.topic.span.hi, ..place.span };
-        let title = format!("{does} whole messages, not a part of them");
+        let title = format!("{does} whole messages, not parts of them");
         let diagnostic = Diagnostic::new(Code::WRONG_TYPE, parts, title).label("expected a topic").suggest(
-            "leave this out",
+            "use the whole topic",
             parts,
             "",
         );
@@ -341,8 +342,8 @@ impl<'a> Resolver<'a> {
         None
     }
 
-    /// The values at the places of a target, all of one topic and one type, of which an operation is for the types that
-    /// `is_for` says, `wants` in words.
+    /// The values at the places of a target, all of one topic and one type, which must satisfy `is_for`; `wants` is that
+    /// in words.
     fn values(
         &mut self,
         target: &'a ast::Target,
@@ -351,73 +352,71 @@ impl<'a> Resolver<'a> {
         is_for: impl Fn(&Type) -> bool,
     ) -> Option<(Target, Type)> {
         let mut found: Vec<(TopicId, Vec<Step>, Type)> = Vec::new();
+        let mut first_words = "";
+        let mut complete = true;
         for place in &target.places {
-            let (topic, steps, ty) = self.place(place)?;
+            let Some((topic, steps, ty)) = self.place(place) else {
+                complete = false;
+                continue;
+            };
             let written = self.text(place.span);
             if let Some((first_topic, _, first_type)) = found.first() {
-                let first = target.places[0].span;
-                let first_words = self.text(first);
                 let wrong = if *first_topic != topic {
                     Some((
                         Code::WRONG_TYPE,
-                        format!("`{written}` is of another topic than `{first_words}`"),
-                        "an operation disturbs one topic: declare another one for this".to_owned(),
+                        format!("`{written}` and `{first_words}` are on different topics"),
+                        "an operation acts on one topic; declare another operation for this one".to_owned(),
                     ))
                 } else if *first_type != ty {
                     let label =
-                        format!("it is {}, and `{first_words}` is {}", type_in_words(&ty), type_in_words(first_type));
-                    Some((Code::WRONG_TYPE, format!("`{written}` is of another type than `{first_words}`"), label))
+                        format!("this is {}, but `{first_words}` is {}", type_in_words(&ty), type_in_words(first_type));
+                    Some((Code::WRONG_TYPE, format!("`{written}` and `{first_words}` have different types"), label))
                 } else if found.iter().any(|(_, before, _)| *before == steps) {
-                    Some((
-                        Code::LISTED_TWICE,
-                        format!("`{written}` stands twice in this list"),
-                        "again here".to_owned(),
-                    ))
+                    Some((Code::LISTED_TWICE, format!("`{written}` is listed twice"), "listed again here".to_owned()))
                 } else {
                     None
                 };
                 if let Some((code, title, label)) = wrong {
                     self.report(Diagnostic::new(code, place.span, title).label(label));
-                    return None;
+                    complete = false;
+                    continue;
                 }
+            } else {
+                first_words = written;
             }
             if !is_for(&ty) {
                 self.report_unfit(place, user, wants, &ty, &is_for);
-                return None;
+                complete = false;
             }
             found.push((topic, steps, ty));
         }
-        let (topic, _, ty) = found.first().cloned()?;
+        let (topic, _, ty) = found.first().filter(|_| complete).cloned()?;
         Some((Target { topic, places: found.into_iter().map(|(_, steps, _)| steps).collect() }, ty))
     }
 
     fn report_unfit(&mut self, place: &ast::Place, user: &str, wants: &str, ty: &Type, is_for: impl Fn(&Type) -> bool) {
         let written = self.text(place.span);
-        let title = format!("{user} needs {wants}, but `{written}` is not one");
-        let mut diagnostic =
-            Diagnostic::new(Code::WRONG_TYPE, place.span, title).label(format!("it is {}", type_in_words(ty)));
+        let title = format!("{user} needs {wants}, but `{written}` is {}", type_in_words(ty));
+        let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, place.span, title).label(format!("expected {wants}"));
         match ty {
             Type::Message(id) => {
                 if let Some(message) = self.system.messages[id.index()].as_ref() {
                     for field in message.fields.iter().filter(|field| is_for(&field.ty)).take(3) {
                         let name = &field.declaration.name;
-                        diagnostic = diagnostic.suggest(
-                            format!("its field `{name}` is one"),
-                            place.span.end(),
-                            format!(".{name}"),
-                        );
+                        diagnostic =
+                            diagnostic.suggest(format!("use its field `{name}`"), place.span.end(), format!(".{name}"));
                     }
                 }
             }
             Type::List(of) if is_for(of) => {
-                diagnostic = diagnostic.suggest("each of its elements is one", place.span.end(), "[*]");
+                diagnostic = diagnostic.suggest("use each of its elements", place.span.end(), "[*]");
             }
             _ => {}
         }
         self.report(diagnostic);
     }
 
-    /// Where a place is, and of which type.
+    /// Where a place is, and its type.
     fn place(&mut self, place: &'a ast::Place) -> Option<(TopicId, Vec<Step>, Type)> {
         let index = self.find(&place.topic, super::Kind::Topic)?;
         let mut ty = self.system.topics[index].as_ref()?.ty.clone();
@@ -434,7 +433,7 @@ impl<'a> Resolver<'a> {
                 ast::Step::Each(span) => (*span, Step::Each),
                 ast::Step::Element(at, span) => {
                     let Ok(index) = u32::try_from(at.value?) else {
-                        let title = format!("`{}` is not the position of an element", self.text(at.span));
+                        let title = format!("`{}` is not a valid index", self.text(at.span));
                         let label = "expected a whole number below 2^32";
                         self.report(Diagnostic::new(Code::BAD_NUMBER, at.span, title).label(label));
                         return None;

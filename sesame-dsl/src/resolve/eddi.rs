@@ -8,25 +8,25 @@ use crate::model::eddi::{Demand, Eddi, Evidence, Gate, Guarantee, Literal, Mitig
 use crate::model::{EddiId, Id as _, TopicId, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
+use crate::syntax::ast::eddi as written;
 use crate::syntax::ast::{self, ExpressionKind, Name};
-use crate::syntax::eddi as written;
 use crate::units::Unit;
 
-/// The names inside of a monitor, and what each stands for.
+/// The names inside a monitor, and what each stands for.
 type Members<'a> = BTreeMap<&'a str, (Member, Span)>;
 
 #[derive(Clone, Copy)]
 enum Member {
     Evidence(usize),
     Demand(usize),
-    /// A guarantee, or what holds otherwise.
+    /// A guarantee, or the state when none holds.
     State,
 }
 
 impl<'a> Resolver<'a> {
     pub(super) fn eddis(&mut self) -> Vec<Option<Eddi>> {
         let file = self.file;
-        self.circles_of_demands();
+        self.cycles_of_demands();
         file.eddis.iter().map(|eddi| self.eddi(eddi)).collect()
     }
 
@@ -37,11 +37,11 @@ impl<'a> Resolver<'a> {
         let demands: Vec<_> = eddi.demands.iter().map(|demand| self.demand(demand)).collect();
         let evidence: Vec<_> = eddi.evidence.iter().map(|evidence| self.evidence(evidence)).collect();
         let mut guarantees = self.guarantees(eddi, &members);
-        if eddi.otherwise.is_empty() && !eddi.damaged {
-            self.missing(name, "what holds when no guarantee does", "otherwise not_safe");
+        if eddi.otherwise.is_empty() && !eddi.has_errors {
+            self.missing(name, "its state when no guarantee holds", "otherwise not_safe");
         }
         let otherwise = self.single(&eddi.otherwise, "otherwise").and_then(|otherwise| self.otherwise(otherwise));
-        if eddi.guarantees.is_empty() && !eddi.damaged {
+        if eddi.guarantees.is_empty() && !eddi.has_errors {
             self.missing(name, "a guarantee", "guarantee safe  integrity 1 = brakes_ok");
             return None;
         }
@@ -73,7 +73,7 @@ impl<'a> Resolver<'a> {
         let title = format!("a monitor cannot publish its state on `{}`", name.text);
         let diagnostic = Diagnostic::new(Code::WRONG_TYPE, name.span, title).label(format!("it is {is}"));
         self.report(diagnostic.note(
-            "one topic of type `bool` (whether a guarantee holds), `int` (its integrity) or `text` (its name) fits",
+            "the topic must be of type `bool` (whether a guarantee holds), `int` (its integrity) or `text` (its name)",
         ));
         None
     }
@@ -100,17 +100,18 @@ impl<'a> Resolver<'a> {
     /// A demand names a guarantee of another monitor.
     fn demand(&mut self, demand: &'a written::Demand) -> Option<Demand> {
         let name = &demand.head.name;
-        let index = self.find(&demand.eddi, Kind::Eddi)?;
+        let index = self.find(&demand.eddi, Kind::Monitor)?;
         let other = &self.file.eddis[index];
         let guarantees: Vec<&str> = other.guarantees.iter().map(|it| it.head.name.text.as_str()).collect();
-        if !guarantees.contains(&name.text.as_str()) && !other.damaged {
+        if !guarantees.contains(&name.text.as_str()) && !other.has_errors {
             let title = format!("monitor `{}` has no guarantee named `{}`", demand.eddi.text, name.text);
             let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title)
-                .label("no such guarantee")
-                .also(other.head.name.span, "the monitor is declared here");
+                .label("unknown guarantee")
+                .secondary(other.head.name.span, "the monitor is declared here");
             diagnostic = match most_similar(&name.text, guarantees.iter().copied()) {
-                Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
-                None => diagnostic.note(format!("its guarantees: {}", super::list(&guarantees))),
+                Some(similar) => diagnostic.did_you_mean(name.span, similar),
+                None if guarantees.is_empty() => diagnostic.note("it has no guarantees"),
+                None => diagnostic.note(format!("its guarantees are {}", super::list(&guarantees))),
             };
             self.report(diagnostic);
             return None;
@@ -118,18 +119,18 @@ impl<'a> Resolver<'a> {
         Some(Demand { declaration: self.declaration(&demand.head), eddi: EddiId::from_index(index) })
     }
 
-    /// Monitors that would have to know their own state to know it.
-    fn circles_of_demands(&mut self) {
+    /// Reports monitors whose state depends on itself.
+    fn cycles_of_demands(&mut self) {
         let file = self.file;
         let demanded = |index: usize| {
             let names = file.eddis[index].demands.iter().map(|demand| &demand.eddi);
             names.filter_map(|name| {
                 let definition = self.names.get(name.text.as_str())?;
-                (definition.kind == Kind::Eddi).then_some((definition.index, name.span))
+                (definition.kind == Kind::Monitor).then_some((definition.index, name.span))
             })
         };
         let edges: Vec<Vec<(usize, Span)>> = (0..file.eddis.len()).map(|index| demanded(index).collect()).collect();
-        // Whoever is left when monitors without open demands are taken away is in a circle, or demands of one.
+        // Monitors that remain when those without open demands are removed are in a cycle, or depend on one.
         let mut settled = vec![false; edges.len()];
         let mut before = usize::MAX;
         let mut open = edges.len();
@@ -159,18 +160,18 @@ impl<'a> Resolver<'a> {
             }
             let Some(begin) = chain.iter().position(|&(member, _)| member == at) else { continue };
             let name = |index: usize| &file.eddis[index].head.name;
-            let circle = &chain[begin..];
-            let by: Vec<String> = circle[1..].iter().map(|&(member, _)| format!("`{}`", name(member).text)).collect();
-            let first = name(circle[0].0);
-            let title = if by.is_empty() {
-                format!("monitor `{}` demands something of itself", first.text)
+            let cycle = &chain[begin..];
+            let through: Vec<&str> = cycle[1..].iter().map(|&(member, _)| name(member).text.as_str()).collect();
+            let first = name(cycle[0].0);
+            let title = if through.is_empty() {
+                format!("monitor `{}` depends on itself", first.text)
             } else {
-                format!("monitor `{}` demands something of itself by way of {}", first.text, by.join(", "))
+                format!("monitor `{}` depends on itself through {}", first.text, super::list(&through))
             };
-            let closing = circle[circle.len() - 1].1;
-            let mut diagnostic = Diagnostic::new(Code::CIRCLE, closing, title).label("this demand closes the circle");
-            if !by.is_empty() {
-                diagnostic = diagnostic.also(first.span, "declared here");
+            let closing = cycle[cycle.len() - 1].1;
+            let mut diagnostic = Diagnostic::new(Code::CIRCLE, closing, title).label("this demand closes the cycle");
+            if !through.is_empty() {
+                diagnostic = diagnostic.secondary(first.span, "declared here");
             }
             self.report(diagnostic);
         }
@@ -181,12 +182,12 @@ impl<'a> Resolver<'a> {
         let before = self.diagnostics.len();
         let condition = self.condition(&mut inputs, &evidence.condition);
         if condition.is_some() && inputs.is_empty() {
-            // That its comparisons have one outcome is the same mistake as the one below.
+            // That its comparisons are constant is the same mistake as the one below.
             self.diagnostics.truncate(before);
         }
         let seconds = Unit::seconds();
         let held = match self.single(&evidence.held, "held") {
-            Some(held) => self.positive(held, &seconds, "the time that evidence holds"),
+            Some(held) => self.positive(held, &seconds, "the time that evidence must hold"),
             None => Some(0.0),
         };
         let stale = match self.single(&evidence.stale, "stale after") {
@@ -197,15 +198,19 @@ impl<'a> Resolver<'a> {
         };
         let condition = condition?;
         if inputs.is_empty() {
-            let title = "this evidence hears no topic";
+            let title = "this evidence reads no topic";
             let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, evidence.condition.span, title);
-            self.report(diagnostic.label("always the same").note("evidence is a condition on messages"));
+            self.report(
+                diagnostic
+                    .label("this condition is constant")
+                    .note("evidence is a condition on messages, so it must name a topic"),
+            );
             return None;
         }
         Some(Evidence { declaration: self.declaration(&evidence.head), inputs, condition, held: held?, stale: stale? })
     }
 
-    /// A quantity of more than zero.
+    /// A quantity greater than zero.
     pub(super) fn positive(&mut self, quantity: &ast::Quantity, unit: &Unit, what: &str) -> Option<f64> {
         let value = self.value(quantity, Some(unit), what)?;
         if value > 0.0 {
@@ -223,14 +228,14 @@ impl<'a> Resolver<'a> {
         let mut complete = true;
         for guarantee in &eddi.guarantees {
             let gate = self.gate(eddi, members, &guarantee.gate);
-            let integrity = self.count(guarantee.integrity, 1, "an integrity is");
+            let integrity = self.count(guarantee.integrity, 1, "the integrity of a guarantee");
             if let Some(integrity) = integrity {
                 if let Some(&before) = first.get(&integrity) {
                     let title = format!("two guarantees have integrity {integrity}");
                     let diagnostic = Diagnostic::new(Code::BAD_MONITOR, guarantee.integrity.span, title)
-                        .label("again here")
-                        .also(before, "first here")
-                        .note("the strongest guarantee that holds is the monitor's state, so they need an order");
+                        .label("used again here")
+                        .secondary(before, "first used here")
+                        .note("the state of a monitor is the strongest guarantee that holds, so no two can be equally strong");
                     self.report(diagnostic);
                     complete = false;
                 }
@@ -260,9 +265,13 @@ impl<'a> Resolver<'a> {
                 return self.gate_member(eddi, members, &path.topic);
             }
             _ => {
-                let title = "a guarantee needs evidence and demands, joined by `and` and `or`";
+                let title = "a guarantee can only combine evidence and demands with `and` and `or`";
                 let diagnostic = Diagnostic::new(Code::BAD_MONITOR, expression.span, title);
-                self.report(diagnostic.label("neither").note("a condition on messages is `evidence` with a name"));
+                self.report(
+                    diagnostic
+                        .label("expected evidence or a demand")
+                        .note("declare a condition on messages as `evidence`, which gives it a name"),
+                );
                 return None;
             }
         };
@@ -276,10 +285,10 @@ impl<'a> Resolver<'a> {
             Some((Member::Evidence(at), _)) => return Some(Gate::Evidence(*at)),
             Some((Member::Demand(at), _)) => return Some(Gate::Demand(*at)),
             Some((Member::State, declared)) => {
-                let title = format!("`{}` is not evidence and not a demand", name.text);
+                let title = format!("`{}` is a state of the monitor, not evidence or a demand", name.text);
                 let diagnostic = Diagnostic::new(Code::OTHER_KIND, name.span, title)
-                    .label("a guarantee needs evidence and demands")
-                    .also(*declared, "it is declared here");
+                    .label("expected evidence or a demand")
+                    .secondary(*declared, "declared here");
                 self.report(diagnostic);
                 return None;
             }
@@ -290,15 +299,15 @@ impl<'a> Resolver<'a> {
             .filter(|(_, (member, _))| !matches!(member, Member::State))
             .map(|(known, _)| *known)
             .collect();
-        if eddi.damaged {
+        if eddi.has_errors {
             return None;
         }
-        let title = format!("monitor `{}` has no evidence and no demand named `{}`", eddi.head.name.text, name.text);
-        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("not of this monitor");
+        let title = format!("monitor `{}` has no evidence or demand named `{}`", eddi.head.name.text, name.text);
+        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("not found in this monitor");
         diagnostic = match most_similar(&name.text, known.iter().copied()) {
-            Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
-            None if known.is_empty() => diagnostic.note("it has none at all"),
-            None => diagnostic.note(format!("it has {}", super::list(&known))),
+            Some(similar) => diagnostic.did_you_mean(name.span, similar),
+            None if known.is_empty() => diagnostic.note("it has no evidence and no demands"),
+            None => diagnostic.note(format!("its evidence and demands are {}", super::list(&known))),
         };
         self.report(diagnostic);
         None

@@ -1,31 +1,36 @@
-//! What a campaign's search does to cover more cells, and what the strategies need that go by cells or windows.
+//! How a campaign's search explores (`boost`, `construct`, `predict`, `novelty`), and whether the campaign has what its
+//! strategies need: cells, time windows, conditions or requirements.
 
 use super::Resolver;
 use super::quantity::percent;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{ActivationMode, BoostedChildren, Dimension, Exploration, Search};
+use crate::model::{BoostedChildren, Dimension, Exploration};
 use crate::span::Span;
-use crate::syntax::ast::{self, ExplorationKind, Strategy};
+use crate::syntax::ast::{self, ActivationMode, ExplorationKind, Strategy};
 
-/// Numbers that a boost has unless it says otherwise: those of the original platform.
+/// Default settings of a boost: those of the original platform.
 const EVERY: u32 = 2;
 const TRIES: u32 = 10;
 const DROP: u32 = 1;
-/// Candidates that a prediction compares unless it is said.
+/// Default number of candidates that a prediction compares.
 const CANDIDATES: u32 = 20;
-/// The share of a generation that is constructed unless it is said.
+/// Default share of a generation that is constructed.
 const SHARE: f64 = 0.5;
-/// Nearest tests that make up novelty unless it is said.
+/// Default number of nearest tests that novelty is measured by.
 const NEIGHBOURS: u32 = 10;
 
 impl<'a> Resolver<'a> {
-    /// The campaign's exploration. The outer `None` says that it is not in order.
-    #[expect(clippy::option_option, reason = "the outer says whether it was in order, the inner is the model's")]
+    /// The campaign's exploration. The outer `None` means that it has mistakes.
+    #[expect(clippy::option_option, reason = "the outer `None` means a mistake, the inner is the model's")]
     pub(super) fn exploration(&mut self, campaign: &'a ast::Campaign) -> Option<Option<Exploration>> {
         if let Some(again) = campaign.explorations.get(1) {
-            let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, again.span, "a search explores in one way")
-                .label("remove this one or the other")
-                .also(campaign.explorations[0].span, "first here");
+            let diagnostic = Diagnostic::new(
+                Code::CLAUSE_TWICE,
+                again.span,
+                "a search can have only one of `boost`, `construct`, `predict` and `novelty`",
+            )
+            .label("remove one of the two")
+            .secondary(campaign.explorations[0].span, "first given here");
             self.report(diagnostic);
         }
         let Some(written) = campaign.explorations.first() else { return Some(None) };
@@ -34,7 +39,7 @@ impl<'a> Resolver<'a> {
             ExplorationKind::Construct => self.construct(written),
             ExplorationKind::Novelty => self.novelty(written),
             ExplorationKind::Predict => match self.single(&written.candidates, "candidates") {
-                Some(&count) => self.count(count, 1, "a prediction compares"),
+                Some(&count) => self.count(count, 1, "the number of candidates"),
                 None => Some(CANDIDATES),
             }
             .map(|candidates| Exploration::Predict { candidates }),
@@ -44,18 +49,18 @@ impl<'a> Resolver<'a> {
 
     fn boost(&mut self, written: &'a ast::Exploration) -> Option<Exploration> {
         let every_generations = match self.single(&written.generations, "every … generations") {
-            Some(&count) => self.count(count, 1, "the generations from one boost to the next are"),
+            Some(&count) => self.count(count, 1, "the number of generations from one boost to the next"),
             None => Some(EVERY),
         };
         let tries = match self.single(&written.tries, "tries") {
-            Some(&count) => self.count(count, 1, "a boost tries"),
+            Some(&count) => self.count(count, 1, "the number of tries"),
             None => Some(TRIES),
         };
         let children = if written.kind == ExplorationKind::BoostFixed {
             self.of_the_other(written, &written.children, "from … to");
             self.of_the_other(written, &written.drops, "drop");
             match self.single(&written.iterations, "every … iterations") {
-                Some(&count) => self.count(count, 1, "the children from one boost to the next are"),
+                Some(&count) => self.count(count, 1, "the number of children from one boosted child to the next"),
                 None => Some(EVERY),
             }
             .map(|iterations| BoostedChildren::Every { iterations })
@@ -68,25 +73,33 @@ impl<'a> Resolver<'a> {
 
     fn falling(&mut self, written: &'a ast::Exploration) -> Option<BoostedChildren> {
         let drop = match self.single(&written.drops, "drop") {
-            Some(&count) => self.count(count, 0, "a boost drops"),
+            Some(&count) => self.count(count, 0, "the decrease per boost"),
             None => Some(DROP),
         };
         let Some(&[from, to]) = self.single(&written.children, "from … to") else {
-            if !written.damaged {
-                let diagnostic =
-                    Diagnostic::new(Code::CLAUSE_MISSING, written.span, "this boost does not say how many")
-                        .label("add how many children are boosted at first and at last")
-                        .note("for example `from 10 to 1`");
+            if !written.has_errors {
+                let diagnostic = Diagnostic::new(
+                    Code::CLAUSE_MISSING,
+                    written.span,
+                    "a linear boost needs the numbers of boosted children",
+                )
+                .label("add the first and the last number")
+                .note("for example `from 10 to 1`");
                 self.report(diagnostic);
             }
             return None;
         };
-        let [first, last] = [from, to].map(|count| self.count(count, 0, "a boost takes"));
+        let [first, last] = [from, to].map(|count| self.count(count, 0, "the number of boosted children"));
         let (first, last, drop) = (first?, last?, drop?);
         if first < last {
-            let diagnostic = Diagnostic::new(Code::BAD_COUNT, from.span.to(to.span), "a linear boost becomes less")
-                .label("expected the larger number first");
-            self.report(diagnostic.suggest("swap them", from.span.to(to.span), format!("{last} to {first}")));
+            let diagnostic =
+                Diagnostic::new(Code::BAD_COUNT, from.span.to(to.span), "the number of boosted children must decrease")
+                    .label("expected the larger number first");
+            self.report(diagnostic.suggest(
+                "swap the two numbers",
+                from.span.to(to.span),
+                format!("{last} to {first}"),
+            ));
             return None;
         }
         Some(BoostedChildren::Falling { first, last, drop })
@@ -101,8 +114,8 @@ impl<'a> Resolver<'a> {
         };
         let title = format!("a {this} boost has no setting `{setting}`");
         let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, *span, title)
-            .label("leave it out")
-            .note(format!("`boost {other}` has it"));
+            .label("remove this")
+            .note(format!("only `boost {other}` has this setting"));
         self.report(diagnostic);
     }
 
@@ -120,7 +133,7 @@ impl<'a> Resolver<'a> {
 
     fn novelty(&mut self, written: &'a ast::Exploration) -> Option<Exploration> {
         let neighbours = match self.single(&written.neighbours, "neighbours") {
-            Some(&count) => self.count(count, 1, "novelty looks at"),
+            Some(&count) => self.count(count, 1, "the number of neighbours"),
             None => Some(NEIGHBOURS),
         };
         let over = match self.single(&written.overs, "over") {
@@ -146,70 +159,76 @@ impl<'a> Resolver<'a> {
         None
     }
 
-    /// Whether a campaign has what its strategies work on.
-    pub(super) fn explorable(&mut self, campaign: &'a ast::Campaign, search: &Search) -> bool {
-        // A campaign that searches nothing was told so.
-        let Some(content) = search.content() else { return true };
-        let mut complete = true;
-        let by_condition = matches!(content.activation, ActivationMode::Condition(_));
-        let mut refuse = |resolver: &mut Self, span: Span, what: &str, lacks: &str, label: &str| {
-            let title = format!("{what} {lacks}");
-            resolver.report(Diagnostic::new(Code::NOTHING_TO_EXPLORE, span, title).label(label));
-            complete = false;
+    /// Whether a campaign that searches has what its strategies need. Reports also if the search itself has mistakes.
+    pub(super) fn explorable(&mut self, campaign: &'a ast::Campaign) -> bool {
+        let before = self.diagnostics.len();
+        let without_requirements = self.without_requirements(campaign);
+        let mut refuse = |span: Span, title: String, label: &str| {
+            self.diagnostics.push(Diagnostic::new(Code::NOTHING_TO_EXPLORE, span, title).label(label));
         };
-        let written = campaign.searches.first();
-        let strategy = written.and_then(|search| Some((search.span, search.strategy?)));
-        let without_requirements = self.file.requirements.is_empty() && !campaign.unread;
-        let without_cells = campaign.coverages.is_empty() && !campaign.unread;
-        match strategy {
-            Some((span, Strategy::MapElites)) if without_cells => {
-                refuse(self, span, "MAP-Elites", "has no cells to keep tests in", "add a `coverage`");
+        let by_condition =
+            campaign.activates.first().is_some_and(|(_, mode)| matches!(mode, ActivationMode::Condition(_)));
+        // Clauses that could not be read may be the missing ones.
+        let without_conditions = !by_condition && !campaign.inherited_errors;
+        let without_cells = campaign.coverages.is_empty() && !campaign.inherited_errors;
+        let strategy = campaign.searches.first().and_then(|search| Some((search.span, search.strategy?)));
+        if let Some((span, strategy)) = strategy {
+            let keyword = match strategy {
+                Strategy::Nsga2 => "nsga2",
+                Strategy::MapElites => "map_elites",
+                Strategy::Random => "random",
+                Strategy::LatinHypercube => "latin_hypercube",
+                Strategy::Sobol => "sobol",
+                Strategy::Falsification => "falsification",
+            };
+            if strategy == Strategy::MapElites && without_cells {
+                let title = "`search map_elites` needs a `coverage`".to_owned();
+                refuse(span, title, "add a `coverage`; the search keeps the best tests of each cell");
             }
-            Some((span, by_windows @ (Strategy::LatinHypercube | Strategy::Sobol | Strategy::Falsification)))
-                if by_condition =>
-            {
-                let what = match by_windows {
-                    Strategy::Sobol => "a Sobol search",
-                    Strategy::Falsification => "a falsification",
-                    _ => "a Latin hypercube",
-                };
-                let lacks = "has no windows of time to choose";
-                refuse(self, span, what, lacks, "leave `activate by condition` out, or search otherwise");
+            let by_windows = matches!(strategy, Strategy::LatinHypercube | Strategy::Sobol | Strategy::Falsification);
+            if by_windows && by_condition {
+                let title = format!("`search {keyword}` cannot be combined with `activate by condition`");
+                refuse(span, title, "this search chooses time windows: use `activate by time`, or another search");
             }
-            Some((span, Strategy::Falsification)) if without_requirements => {
-                refuse(self, span, "a falsification", "has no requirement to violate", "add a `requirement`");
+            if strategy == Strategy::Falsification && without_requirements {
+                let title = "`search falsification` needs a `requirement`".to_owned();
+                refuse(span, title, "add a `requirement` that the search can try to violate");
             }
-            _ => {}
         }
         if let Some(exploration) = campaign.explorations.first() {
-            let what = match exploration.kind {
-                ExplorationKind::BoostFixed | ExplorationKind::BoostLinear => "a boost",
-                ExplorationKind::Construct => "construction",
-                ExplorationKind::Predict => "a prediction",
-                ExplorationKind::Novelty => "novelty",
-            };
-            let novel = exploration.kind == ExplorationKind::Novelty;
-            let predicts = exploration.kind == ExplorationKind::Predict;
+            let span = exploration.span;
+            let (word, kind) = (exploring(exploration), exploration.kind);
             if strategy.is_some_and(|(_, strategy)| strategy != Strategy::Nsga2) {
-                refuse(self, exploration.span, what, "changes an evolution", "search by `nsga2` to have one");
-            } else if novel {
-                // Distances are between points: neither cells nor windows are needed.
-            } else if without_cells {
-                refuse(self, exploration.span, what, "has no cells to go for", "add a `coverage`");
-            } else if predicts && !by_condition {
-                let label = "say `activate by condition`, or take `construct` instead";
-                refuse(self, exploration.span, what, "has no conditions to weigh", label);
-            } else if by_condition && !predicts {
-                let lacks = "has no windows of time to choose";
-                refuse(
-                    self,
-                    exploration.span,
-                    what,
-                    lacks,
-                    "leave `activate by condition` out, or take `predict` instead",
-                );
+                let title = format!("`{word}` only works with `search nsga2`");
+                refuse(span, title, "use `search nsga2`, or remove this");
+            } else if kind != ExplorationKind::Novelty {
+                if without_cells {
+                    refuse(span, format!("`{word}` needs a `coverage`"), "add a `coverage`, whose cells it aims at");
+                }
+                if kind == ExplorationKind::Predict && without_conditions {
+                    let title = format!("`{word}` needs `activate by condition`");
+                    refuse(span, title, "add `activate by condition`, or use `construct` instead");
+                } else if kind != ExplorationKind::Predict && by_condition {
+                    let title = format!("`{word}` cannot be combined with `activate by condition`");
+                    refuse(span, title, "remove `activate by condition`, or use `predict` instead");
+                }
             }
         }
-        complete
+        self.diagnostics.len() == before
+    }
+
+    /// Whether the space has no requirement, as far as its files and this campaign could be read.
+    pub(super) fn without_requirements(&self, campaign: &ast::Campaign) -> bool {
+        self.file.requirements.is_empty() && !self.file.incomplete && !campaign.inherited_errors
+    }
+}
+
+/// The keyword of an exploration.
+pub(super) fn exploring(exploration: &ast::Exploration) -> &'static str {
+    match exploration.kind {
+        ExplorationKind::BoostFixed | ExplorationKind::BoostLinear => "boost",
+        ExplorationKind::Construct => "construct",
+        ExplorationKind::Predict => "predict",
+        ExplorationKind::Novelty => "novelty",
     }
 }

@@ -1,6 +1,7 @@
-//! Formulas of metrics: their inputs, their units, and what becomes of their values over time.
+//! Formulas of metrics: their inputs, their units, and how values over time are reduced to one.
 
 use super::Resolver;
+use super::depth;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{Aggregate, Condition, Expression, FieldPath, Formula, Id as _, Input, Members};
 use crate::model::{MetricSource, Type};
@@ -9,9 +10,9 @@ use crate::span::Span;
 use crate::syntax::ast::{self, ExpressionKind, FormulaKind, Name, Path, PrefixWord};
 use crate::units::{Unit, convert, dimension, product};
 
-/// What begins a formula. `last` is first: it is what a formula without any most likely means.
+/// The outermost functions of a formula. `last` is first: a formula without any most likely means it.
 const AGGREGATES: [&str; 7] = ["last", "min", "max", "mean", "count", "duration", "robustness"];
-/// What stands inside of one.
+/// The functions inside a formula.
 const FUNCTIONS: [&str; 4] = ["abs", "min", "max", "distance"];
 /// The deepest expression. A plan is JSON, whose readers limit its depth.
 pub(super) const MAX_DEPTH: usize = 40;
@@ -40,7 +41,7 @@ impl<'a> Resolver<'a> {
                     (first, Some(second)) => Condition::All(vec![first, second?]),
                 };
                 let (value, unit) = value?;
-                return self.finish(formula, inputs, Aggregate::Last(value), Some(condition), unit);
+                return self.finish(formula, inputs, Aggregate::Last { of: value }, Some(condition), unit);
             }
             FormulaKind::Plain(expression) => self.aggregate(&mut inputs, expression)?,
         };
@@ -63,35 +64,37 @@ impl<'a> Resolver<'a> {
             FormulaKind::WhenThen(condition, value) => condition.span.to(value.span),
             FormulaKind::Plain(expression) => expression.span,
         };
+        // All clauses are resolved, so that a mistake in one does not hide one in another.
         let every = match self.single(&formula.every, "every") {
-            Some(every) => Some(self.every(formula.every[0].0, every, &aggregate)?),
-            None => None,
+            Some(every) => self.every(formula.every[0].0, every, &aggregate).map(Some),
+            None => Some(None),
         };
         let per = match self.single(&formula.per, "per") {
-            Some(per) => Some(self.per(per, &inputs)?),
-            None => None,
+            Some(per) => self.per(per, &inputs).map(Some),
+            None => Some(None),
         };
         if let Some(&span) = formula.whole.first() {
-            let title = "`whole windows` goes with `robustness(…)` only";
-            let note = "only temporal formulas look at windows of time that the end of a run could cut";
-            self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("leave it out").note(note));
+            let title = "`whole windows` is only allowed with `robustness(…)`";
+            let note = "only temporal formulas have windows of time that the end of a run can cut short";
+            self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("remove this").note(note));
         }
         self.at_most_one(&formula.outbound, "outbound");
         let outbound = !formula.outbound.is_empty();
         if inputs.is_empty() {
-            let title = "this formula hears no topic";
+            let title = "this formula reads no topic";
             let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, whole, title)
-                .label("always the same")
-                .note("a metric is computed from messages, so its formula names a topic");
+                .label("this value is constant")
+                .note("a metric is computed from messages, so its formula must name a topic");
             self.report(diagnostic);
             return None;
         }
-        if depth(&aggregate).max(when.as_ref().map_or(0, Condition::depth)) > MAX_DEPTH {
-            let title = format!("this formula is nested more than {MAX_DEPTH} deep");
-            self.report(Diagnostic::new(Code::TOO_LARGE, whole, title).label("too deep"));
+        let (every, per) = (every?, per?);
+        if depth::of_aggregate(&aggregate).max(when.as_ref().map_or(0, depth::of_condition)) > MAX_DEPTH {
+            let title = format!("this formula is nested more than {MAX_DEPTH} levels deep");
+            self.report(Diagnostic::new(Code::TOO_LARGE, whole, title).label("nested too deeply"));
             return None;
         }
-        if let (Aggregate::Last(Expression::Input(0)), None, None, None, false) =
+        if let (Aggregate::Last { of: Expression::Input(0) }, None, None, None, false) =
             (&aggregate, &when, every, &per, outbound)
             && self.members_of(&inputs[0].field) == 1
         {
@@ -100,12 +103,12 @@ impl<'a> Resolver<'a> {
         Some((MetricSource::Formula(Formula { inputs, aggregate, when, every, per, outbound }), unit))
     }
 
-    /// How many topics on the wire a field is that of.
+    /// How many topics on the wire have this field.
     pub(super) fn members_of(&self, field: &FieldPath) -> usize {
         self.system.topics[field.topic.index()].as_ref().map_or(0, |topic| topic.paths.len())
     }
 
-    // ----- what becomes of values over time
+    // ----- reducing values over time to one
 
     fn aggregate(
         &mut self,
@@ -129,20 +132,20 @@ impl<'a> Resolver<'a> {
                 return None;
             }
             let title = format!("`{}(…)` takes one value, not {}", name.text, arguments.len());
-            let label = "what it is of stands between its parentheses";
+            let label = "expected one value between the parentheses";
             self.report(Diagnostic::new(Code::NOT_A_FORMULA, expression.span, title).label(label));
             return None;
         };
         Some(match name.text.as_str() {
-            "count" => (Aggregate::Count(self.condition(inputs, argument)?), None),
-            "duration" => (Aggregate::Duration(self.condition(inputs, argument)?), Some(Unit::seconds())),
+            "count" => (Aggregate::Count { of: self.condition(inputs, argument)? }, None),
+            "duration" => (Aggregate::Duration { of: self.condition(inputs, argument)? }, Some(Unit::seconds())),
             word => {
                 let (value, unit) = self.number(inputs, argument)?;
                 let aggregate = match word {
-                    "min" => Aggregate::Min(value),
-                    "max" => Aggregate::Max(value),
-                    "mean" => Aggregate::Mean(value),
-                    _ => Aggregate::Last(value),
+                    "min" => Aggregate::Min { of: value },
+                    "max" => Aggregate::Max { of: value },
+                    "mean" => Aggregate::Mean { of: value },
+                    _ => Aggregate::Last { of: value },
                 };
                 (aggregate, unit)
             }
@@ -157,14 +160,17 @@ impl<'a> Resolver<'a> {
             return;
         }
         let word = if condition { "count" } else { "last" };
-        let title = format!("`{}` changes during a test, and a metric is one number", self.text(span));
+        let title = format!("`{}` changes during a test, but a metric is a single number", self.text(span));
         let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, span, title).label(if condition {
-            "how often did it hold, or how long?"
+            "reduce it to a number with `count` or `duration`"
         } else {
-            "its last value, its least, its greatest, its mean?"
+            "reduce it to a single number with `last`, `min`, `max` or `mean`"
         });
         diagnostic.suggestions.push(Suggestion {
-            message: format!("take {}", if condition { "the number of messages" } else { "the last value" }),
+            message: format!(
+                "use {}",
+                if condition { "the number of messages for which it holds" } else { "its last value" }
+            ),
             edits: vec![(Span { hi: span.lo, ..span }, format!("{word}(")), (span.end(), ")".to_owned())],
         });
         self.report(diagnostic);
@@ -172,10 +178,10 @@ impl<'a> Resolver<'a> {
 
     fn no_robustness(&mut self, expression: &'a ast::Expression) {
         let span = expression.span;
-        let title = format!("`{}` holds or does not, and a metric is a number", self.text(span));
-        let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, span, title).label("by how much is it kept?");
+        let title = format!("`{}` is a condition, but a metric is a number", self.text(span));
+        let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, span, title).label("expected a number");
         diagnostic.suggestions.push(Suggestion {
-            message: "take its robustness".to_owned(),
+            message: "use its robustness: by how much it holds".to_owned(),
             edits: vec![(Span { hi: span.lo, ..span }, "robustness(".to_owned()), (span.end(), ")".to_owned())],
         });
         self.report(diagnostic);
@@ -184,12 +190,12 @@ impl<'a> Resolver<'a> {
     fn every(&mut self, word: Span, every: &ast::Quantity, aggregate: &Aggregate) -> Option<f64> {
         let seconds = self.value(every, Some(&Unit::seconds()), "`every`")?;
         let name = match aggregate {
-            Aggregate::Min(_) => "min",
-            Aggregate::Max(_) => "max",
-            Aggregate::Duration(_) => "duration",
-            Aggregate::Last(_) | Aggregate::Mean(_) | Aggregate::Count(_) => {
+            Aggregate::Min { .. } => "min",
+            Aggregate::Max { .. } => "max",
+            Aggregate::Duration { .. } => "duration",
+            Aggregate::Last { .. } | Aggregate::Mean { .. } | Aggregate::Count { .. } => {
                 if seconds <= 0.0 {
-                    let title = format!("`every {}` is no limit", self.text(every.span));
+                    let title = "the interval of `every` must be greater than 0s";
                     self.report(Diagnostic::new(Code::OUT_OF_RANGE, every.span, title).label("expected more than 0s"));
                     return None;
                 }
@@ -197,9 +203,9 @@ impl<'a> Resolver<'a> {
             }
         };
         let diagnostic =
-            Diagnostic::new(Code::IDLE_CLAUSE, word.to(every.span), format!("`every` limits no `{name}(…)`"))
-                .label("leave it out")
-                .note("only `count`, `mean`, `last` and `when … then …` depend on how often messages come");
+            Diagnostic::new(Code::IDLE_CLAUSE, word.to(every.span), format!("`every` has no effect on `{name}(…)`"))
+                .label("remove this")
+                .note("only `count`, `mean`, `last` and `when … then …` depend on how often messages arrive");
         self.report(diagnostic);
         None
     }
@@ -207,15 +213,16 @@ impl<'a> Resolver<'a> {
     fn per(&mut self, path: &'a Path, inputs: &[Input]) -> Option<FieldPath> {
         let (field, ty) = self.field(path)?;
         if !matches!(ty, Type::Text | Type::Int(_)) {
-            let title = format!("`{}` tells nothing apart", self.text(path.span));
-            let label = format!("expected a text or a whole number, not {}", super::system::type_in_words(&ty));
+            let is = super::system::type_in_words(&ty);
+            let title = format!("`per` needs a `text` or an integer, but `{}` is {is}", self.text(path.span));
+            let label = "expected a `text` or an integer";
             self.report(Diagnostic::new(Code::WRONG_TYPE, path.span, title).label(label));
             return None;
         }
         if !inputs.iter().any(|input| input.field.topic == field.topic) {
-            let title = format!("the formula does not hear `{}`", path.topic.text);
+            let title = format!("the formula does not read `{}`", path.topic.text);
             let diagnostic = Diagnostic::new(Code::IDLE_CLAUSE, path.span, title)
-                .label("expected a field of a topic that stands in the formula");
+                .label("expected a field of a topic that the formula reads");
             self.report(diagnostic);
             return None;
         }
@@ -253,15 +260,15 @@ impl<'a> Resolver<'a> {
             | ExpressionKind::Prefixed(..)
             | ExpressionKind::Until(..)
             | ExpressionKind::Implies(..) => {
-                let title = format!("`{}` holds or does not, but a number is needed", self.text(expression.span));
+                let title = format!("`{}` is a condition, but a number is needed", self.text(expression.span));
                 self.report(Diagnostic::new(Code::WRONG_TYPE, expression.span, title).label("expected a number"));
                 None
             }
         }
     }
 
-    /// The unit of a number inside of a formula, where `2rad*link0` is a likely slip.
-    #[expect(clippy::option_option, reason = "the outer says whether it was in order, the inner is the number's")]
+    /// The unit of a number in a formula, where `2rad*link0` is a likely mistake.
+    #[expect(clippy::option_option, reason = "the outer `None` means a mistake, the inner is the number's")]
     fn unit_in_formula(&mut self, quantity: &ast::Quantity) -> Option<Option<Unit>> {
         let Some(name) = &quantity.unit else { return Some(None) };
         let unit = self.unit(name);
@@ -269,7 +276,7 @@ impl<'a> Resolver<'a> {
             && name.text.contains(['*', '/'])
             && let Some(diagnostic) = self.diagnostics.last_mut()
         {
-            diagnostic.notes.push("to calculate, put a blank before `*` and `/`".to_owned());
+            diagnostic.notes.push("to multiply or divide, put a space before `*` or `/`".to_owned());
         }
         Some(Some(unit?))
     }
@@ -292,15 +299,16 @@ impl<'a> Resolver<'a> {
         path: &'a Path,
         field: FieldPath,
         members: Option<(ast::Members, Span)>,
-    ) -> Option<usize> {
+    ) -> Option<u32> {
         if let Some((_, word)) = members
             && self.members_of(&field) == 1
         {
             let title = format!("`{}` is one topic, not a group", path.topic.text);
             let span = word.to(path.span);
             let diagnostic = Diagnostic::new(Code::IDLE_CLAUSE, span, title)
-                .label(format!("`{} of` chooses among the members of a group", self.text(word)));
-            self.report(diagnostic.suggest("leave it out", Span { hi: path.span.lo, ..word }, ""));
+                .label(format!("`{} of` combines the members of a group", self.text(word)));
+            let remove = format!("remove `{} of`", self.text(word));
+            self.report(diagnostic.suggest(remove, Span { hi: path.span.lo, ..word }, ""));
             return None;
         }
         let members = match members {
@@ -310,14 +318,15 @@ impl<'a> Resolver<'a> {
             Some((ast::Members::Each, _)) => Members::Each,
         };
         let input = Input { field, members };
-        Some(inputs.iter().position(|known| *known == input).unwrap_or_else(|| {
+        let at = inputs.iter().position(|known| *known == input).unwrap_or_else(|| {
             inputs.push(input);
             inputs.len() - 1
-        }))
+        });
+        Some(u32::try_from(at).expect("a formula has fewer than 2^32 inputs"))
     }
 
     fn product(&mut self, inputs: &mut Vec<Input>, factors: &'a [(bool, ast::Expression)]) -> Option<Number> {
-        // All are looked at, so that a mistake in one does not hide one in another.
+        // All are resolved, so that a mistake in one does not hide one in another.
         let numbers: Vec<_> = factors.iter().map(|(_, factor)| self.number(inputs, factor)).collect();
         let mut whole: Option<Number> = None;
         for ((divides, factor), number) in factors.iter().zip(numbers) {
@@ -333,7 +342,7 @@ impl<'a> Resolver<'a> {
                 return None;
             };
             let value = match (left, *divides) {
-                (left, true) => Expression::Divide(Box::new(left), Box::new(number)),
+                (left, true) => Expression::Divide { value: Box::new(left), by: Box::new(number) },
                 (Expression::Product(mut before), false) => {
                     before.push(number);
                     Expression::Product(before)
@@ -345,7 +354,7 @@ impl<'a> Resolver<'a> {
         whole
     }
 
-    /// Numbers that are added, compared or chosen from, all in one unit: that of the first that is no constant.
+    /// Numbers that are added, compared or chosen from, all in the unit of the first that is not a constant.
     pub(super) fn common(
         &mut self,
         inputs: &mut Vec<Input>,
@@ -358,7 +367,7 @@ impl<'a> Resolver<'a> {
         let leading = parts.iter().position(|part| literal(part).is_none()).unwrap_or(0);
         let first = self.number(inputs, parts[leading]);
         let Some((first, unit)) = first else {
-            // The others may hold mistakes of their own.
+            // The others may contain mistakes of their own.
             for (_, part) in parts.iter().enumerate().filter(|(at, part)| *at != leading && literal(part).is_none()) {
                 self.number(inputs, part);
             }
@@ -421,12 +430,12 @@ impl<'a> Resolver<'a> {
             ("abs", _) => "one value",
             ("distance", _) => "two points",
             ("min" | "max", [_]) | ("last" | "mean" | "count" | "duration" | "robustness", _) => {
-                let title = format!("`{}(…)` over time cannot stand inside a formula", name.text);
+                let title = format!("`{}(…)` over time cannot be nested in a formula", name.text);
                 let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, call.span, title)
-                    .label("it begins a formula, or is none")
-                    .note("inside of a formula, the name of a topic is its last value");
+                    .label("only allowed as the outermost function of a formula")
+                    .note("inside a formula, the name of a topic stands for its last value");
                 if name.text == "min" || name.text == "max" {
-                    diagnostic = diagnostic.note(format!("of several values it is `{}(a, b)`", name.text));
+                    diagnostic = diagnostic.note(format!("to compare several values, use `{}(a, b)`", name.text));
                 }
                 self.report(diagnostic);
                 return None;
@@ -444,10 +453,10 @@ impl<'a> Resolver<'a> {
 
     fn unknown_function(&mut self, name: &Name, known: &[&'static str]) {
         let title = format!("no function named `{}`", name.text);
-        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("not a function");
+        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("unknown function");
         diagnostic = match most_similar(&name.text, known.iter().copied()) {
-            Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
-            None => diagnostic.note(format!("there are {}", super::list(known))),
+            Some(similar) => diagnostic.did_you_mean(name.span, similar),
+            None => diagnostic.note(format!("the functions allowed here are {}", super::list(known))),
         };
         self.report(diagnostic);
     }
@@ -469,15 +478,18 @@ impl<'a> Resolver<'a> {
             self.report(Diagnostic::new(Code::WRONG_UNIT, to.span, title).label(label));
             return None;
         }
-        Some((Expression::Distance(from_at, to_at, convert(1.0, to_unit.as_ref(), unit.as_ref())), unit))
+        Some((
+            Expression::Distance { from: from_at, to: to_at, scale: convert(1.0, to_unit.as_ref(), unit.as_ref()) },
+            unit,
+        ))
     }
 
-    fn point(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<(usize, Option<Unit>)> {
+    fn point(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<(u32, Option<Unit>)> {
         let (path, members) = match &expression.kind {
             ExpressionKind::Field(path) => (path, None),
             ExpressionKind::Members(members, word, path) => (path, Some((*members, *word))),
             _ => {
-                let title = format!("`{}` is no point", self.text(expression.span));
+                let title = format!("`{}` is not a point", self.text(expression.span));
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, expression.span, title);
                 self.report(diagnostic.label("expected a topic or field of type `point`"));
                 return None;
@@ -485,16 +497,16 @@ impl<'a> Resolver<'a> {
         };
         let (field, ty) = self.field(path)?;
         let Type::Point(unit) = ty else {
-            let title = format!("`{}` is no point", self.text(path.span));
+            let title = format!("`{}` is not a point", self.text(path.span));
             let label = format!("it is {}", super::system::type_in_words(&ty));
             self.report(Diagnostic::new(Code::WRONG_TYPE, path.span, title).label(label));
             return None;
         };
         if self.members_of(&field) > 1 && !matches!(members, Some((ast::Members::Each, _))) {
-            let title = format!("`{}` is a group, and no point of several is the least", path.topic.text);
+            let title = format!("`{}` is a group of topics, but `distance` needs a single point", path.topic.text);
             let diagnostic = Diagnostic::new(Code::WRONG_TYPE, expression.span, title)
                 .label("expected one point")
-                .suggest("take each of them", expression.span, format!("each of {}", self.text(path.span)));
+                .suggest("use each member of the group", expression.span, format!("each of {}", self.text(path.span)));
             self.report(diagnostic);
             return None;
         }
@@ -502,7 +514,7 @@ impl<'a> Resolver<'a> {
     }
 }
 
-/// Whether an expression speaks of stretches of time.
+/// Whether an expression has a temporal operator.
 fn of_time(expression: &ast::Expression) -> bool {
     match &expression.kind {
         ExpressionKind::Until(..) => true,
@@ -521,14 +533,5 @@ pub(super) fn scaled(value: Expression, scale: f64) -> Expression {
         value if scale == 1.0 => value,
         Expression::Constant(constant) => Expression::Constant(constant * scale),
         value => Expression::Product(vec![value, Expression::Constant(scale)]),
-    }
-}
-
-fn depth(aggregate: &Aggregate) -> usize {
-    match aggregate {
-        Aggregate::Last(value) | Aggregate::Min(value) | Aggregate::Max(value) | Aggregate::Mean(value) => {
-            value.depth()
-        }
-        Aggregate::Count(condition) | Aggregate::Duration(condition) => condition.depth(),
     }
 }

@@ -1,12 +1,12 @@
-//! Operations and known tests.
+//! Operations and tests.
 
 use super::quantity::percent;
-use super::{Kind, Resolver};
+use super::{Kind, Resolver, list};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{self, Activation, Choice, Domain, Id as _, OperationId, OperationKind, Parameter, Range, Shape};
-use crate::quoted;
+
 use crate::span::Span;
-use crate::syntax::ast;
+use crate::syntax::{ast, quoted};
 use crate::units::{Unit, convert};
 
 impl<'a> Resolver<'a> {
@@ -74,12 +74,12 @@ impl<'a> Resolver<'a> {
         Some((Some(target), kind, parameters))
     }
 
-    /// A range without width leaves nothing to choose.
+    /// Warns of a range that leaves nothing to choose.
     pub(super) fn one_value(&mut self, found: Range, span: Span) {
         if found.low == found.high {
-            let title = "this range has one value only";
+            let title = "this range contains only one value";
             let diagnostic = Diagnostic::new(Code::ONE_VALUE, span, title);
-            self.report(diagnostic.label("tests have nothing to choose here"));
+            self.report(diagnostic.label("a search has nothing to vary here"));
         }
     }
 
@@ -100,7 +100,7 @@ impl<'a> Resolver<'a> {
             #[expect(clippy::cast_possible_truncation, reason = "it is whole and in the range of i32")]
             return Some(value as i32);
         }
-        let title = format!("`{}` cannot be a priority", self.text(quantity.span));
+        let title = format!("`{}` is not a valid priority", self.text(quantity.span));
         self.report(Diagnostic::new(Code::BAD_NUMBER, quantity.span, title).label("expected a whole number"));
         None
     }
@@ -113,7 +113,7 @@ impl<'a> Resolver<'a> {
             .then(|| self.probability(quantity, value))
     }
 
-    // ----- known tests
+    // ----- tests
 
     pub(super) fn tests(&mut self) {
         for test in &self.file.tests {
@@ -123,8 +123,8 @@ impl<'a> Resolver<'a> {
     }
 
     fn test(&mut self, test: &'a ast::Test) -> Option<model::Test> {
-        let mut complete = !test.damaged;
-        if test.operations.is_empty() && !test.damaged {
+        let mut complete = !test.has_errors;
+        if test.operations.is_empty() && !test.has_errors {
             self.missing(&test.head.name, "an operation", "jitter offset [0.1rad, 0.2rad] from 8s to 57s");
             complete = false;
         }
@@ -154,8 +154,8 @@ impl<'a> Resolver<'a> {
         complete.then(|| model::Test { declaration: self.declaration(&test.head), operations, expectations })
     }
 
-    /// Warns of copies of one operation that act at the same time, where no campaign's tests do, and of copies that draw
-    /// alike. Of each copy, only the first before it that it clashes with is named.
+    /// Warns of copies of one operation that are active at the same time, unless the campaigns permit it, and of copies
+    /// with equal seeds. For each copy, only the first conflicting one before it is named.
     fn copies_in_test(&mut self, test: &'a ast::Test, operations: &[model::TestOperation]) {
         if operations.len() != test.operations.len() {
             return;
@@ -177,23 +177,24 @@ impl<'a> Resolver<'a> {
                 (a.low < b.high && b.low < a.high).then_some((first.span, second.span))
             });
             if let (Some((first, second)), false) = (clash, may_overlap) {
-                let title = format!("`{name}` acts twice at the same time in test `{}`", test.head.name.text);
+                let title =
+                    format!("two copies of `{name}` are active at the same time in test `{}`", test.head.name.text);
                 let diagnostic = Diagnostic::new(Code::COPIES_OVERLAP, second, title)
-                    .label("together the two may go beyond what the operation declares")
-                    .also(first, "it acts here already")
-                    .note("where that is meant, say `may overlap` behind `per test` in the campaigns");
+                    .label("together the copies may exceed what the operation declares")
+                    .secondary(first, "the first copy is active here")
+                    .note("if this is intended, add `may overlap` after `per test` in the campaigns");
                 self.report(diagnostic);
             }
             let twin = earlier().find(|(earlier, _)| earlier.draw_seed == later.draw_seed);
             if let (Some((_, twin)), Some(seed)) = (twin, at_later.seed) {
                 let span = twin.seed.map_or(twin.operation.span, |seed| seed.span);
-                let title = format!("two copies of `{name}` draw alike in test `{}`", test.head.name.text);
+                let title = format!("two copies of `{name}` have the same seed in test `{}`", test.head.name.text);
                 let diagnostic = Diagnostic::new(Code::EQUAL_SEEDS, seed.span, title)
-                    .label("the same seed as an earlier copy")
-                    .also(span, "the earlier copy");
-                self.report(
-                    diagnostic.note("where both act on a message, both draw the same; give each a seed of its own"),
-                );
+                    .label("the seed of an earlier copy")
+                    .secondary(span, "the earlier copy");
+                self.report(diagnostic.note(
+                    "with the same seed, both copies draw the same random numbers for a message; give each its own",
+                ));
             }
         }
     }
@@ -219,11 +220,11 @@ impl<'a> Resolver<'a> {
             let mut diagnostic = Diagnostic::new(
                 Code::BAD_WINDOW,
                 written.span,
-                format!("`{}` may not be active all of this time", test.operation.text),
+                format!("`{}` is active outside its permitted window", test.operation.text),
             )
-            .label("leaves what `within` permits");
+            .label("leaves the window given by `within`");
             if let Some((_, range)) = declared {
-                diagnostic = diagnostic.also(range.span, "permitted is this");
+                diagnostic = diagnostic.secondary(range.span, "the permitted window");
             }
             self.report(diagnostic);
             return None;
@@ -260,9 +261,9 @@ impl<'a> Resolver<'a> {
         let parameters = &operation.parameters;
         if parameters.is_empty() {
             let Some((word, choice)) = test.choices.first() else { return Some(Vec::new()) };
-            let title = format!("`{name}` has no parameter to choose");
+            let title = format!("`{name}` has no parameters");
             let span = word.span.to(choice.span());
-            self.report(Diagnostic::new(Code::WRONG_CHOICE, span, title).label("leave this out"));
+            self.report(Diagnostic::new(Code::WRONG_CHOICE, span, title).label("remove this"));
             return None;
         }
         let named = |name: &str| parameters.iter().any(|parameter| parameter.name == name);
@@ -271,46 +272,38 @@ impl<'a> Resolver<'a> {
         for parameter in parameters {
             let example = example(parameter, &operation.kind);
             let mut written = test.choices.iter().filter(|(word, _)| word.text == parameter.name);
-            let Some((_, choice)) = written.next() else {
-                // A name that no parameter has was meant for this one.
+            let Some((first, choice)) = written.next() else {
+                // An unknown name was meant for this one.
                 let meant = unknown.next().map(|(word, _)| word);
                 let (span, title) = match meant {
                     Some(word) => (word.span, format!("`{name}` has no parameter named `{}`", word.text)),
-                    None => (test.operation.span, format!("no `{}` is chosen for `{name}`", parameter.name)),
+                    None => (test.operation.span, format!("`{name}` is missing a value for `{}`", parameter.name)),
                 };
-                let mut diagnostic =
-                    Diagnostic::new(Code::WRONG_CHOICE, span, title).label(format!("expected for example `{example}`"));
+                let mut diagnostic = Diagnostic::new(Code::WRONG_CHOICE, span, title)
+                    .label(format!("expected, for example, `{example}`"));
                 if meant.is_some() {
-                    let what = if parameters.len() == 1 { "its parameter is" } else { "a parameter it has is" };
-                    diagnostic = diagnostic.suggest(what, span, parameter.name.clone());
+                    diagnostic = diagnostic.did_you_mean(span, &parameter.name);
                 }
                 self.report(diagnostic);
                 continue;
             };
             for (again, _) in written {
-                let title = format!("`{}` is chosen twice", again.text);
-                let label = self.has_parameters(parameters);
-                self.report(Diagnostic::new(Code::CLAUSE_TWICE, again.span, title).label(label));
+                let title = format!("duplicate value for `{}`", again.text);
+                let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, again.span, title).label("remove one of the two");
+                self.report(diagnostic.secondary(first.span, "first given here"));
             }
             choices.extend(self.chosen(choice, index, operation, parameter, &example));
         }
         for (other, _) in unknown {
             let title = format!("`{name}` has no parameter named `{}`", other.text);
-            let label = self.has_parameters(parameters);
+            let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+            let label = match names.as_slice() {
+                [only] => format!("its only parameter is `{only}`"),
+                several => format!("its parameters are {}", list(several)),
+            };
             self.report(Diagnostic::new(Code::WRONG_CHOICE, other.span, title).label(label));
         }
         (choices.len() == parameters.len()).then_some(choices)
-    }
-
-    #[expect(clippy::unused_self, reason = "it reads as one of the resolver's sentences")]
-    fn has_parameters(&self, parameters: &[Parameter]) -> String {
-        match parameters {
-            [only] => format!("its only parameter is `{}`", only.name),
-            several => {
-                let names: Vec<String> = several.iter().map(|parameter| format!("`{}`", parameter.name)).collect();
-                format!("its parameters are {}", names.join(", "))
-            }
-        }
     }
 
     fn chosen(
@@ -327,27 +320,27 @@ impl<'a> Resolver<'a> {
             (ast::Choice::Point(point), Domain::Point { low, high }) => {
                 let chosen = self.coordinates(point, parameter.unit.as_ref(), &what)?;
                 let declared = self.declared(index, parameter);
-                let permitted = declared.map_or(String::new(), |declared| format!("`{}`", self.text(declared)));
+                let unit = parameter.unit.as_ref().map_or("", Unit::text);
+                let mut complete = true;
                 for axis in 0..3 {
                     let found = Range { low: chosen[axis], high: chosen[axis] };
                     let all = Range { low: low[axis], high: high[axis] };
+                    let permitted = format!("{}{unit} to {}{unit}", all.low, all.high);
                     let place = point.coordinates[axis].span;
-                    if !self.inside(found, place, all, &what, &permitted, declared) {
-                        return None;
-                    }
+                    complete &= self.inside(found, place, all, &what, &permitted, declared);
                 }
-                Some(Choice::Point(chosen))
+                complete.then_some(Choice::Point { point: chosen })
             }
             (ast::Choice::Text(text), Domain::Texts(items) | Domain::Files(items)) => {
                 if items.contains(&text.text) {
-                    return Some(Choice::Text(text.text.clone()));
+                    return Some(Choice::Text { text: text.text.clone() });
                 }
-                let title = format!("`{}` is none of what {what} may be", self.text(text.span));
+                let title = format!("`{}` is not a permitted value of {what}", self.text(text.span));
                 let listed: Vec<String> = items.iter().map(|item| quoted(item)).collect();
                 let mut diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, text.span, title)
-                    .label(format!("permitted is {}", listed.join(", ")));
+                    .label(format!("expected one of {}", listed.join(", ")));
                 if let Some(declared) = self.declared(index, parameter) {
-                    diagnostic = diagnostic.also(declared, "by this declaration");
+                    diagnostic = diagnostic.secondary(declared, "the permitted values are declared here");
                 }
                 self.report(diagnostic);
                 None
@@ -360,10 +353,10 @@ impl<'a> Resolver<'a> {
                 let kind = match domain {
                     Domain::Number { .. } => "a number",
                     Domain::Point { .. } => "a point",
-                    Domain::Texts(_) | Domain::Files(_) => "a text in double quotes",
+                    Domain::Texts(_) | Domain::Files(_) => "a `text` in double quotes",
                 };
-                let diagnostic = Diagnostic::new(Code::WRONG_CHOICE, span, format!("{what} is {kind}"))
-                    .label(format!("expected for example `{example}`"));
+                let diagnostic = Diagnostic::new(Code::WRONG_CHOICE, span, format!("{what} must be {kind}"))
+                    .label(format!("expected, for example, `{example}`"));
                 self.report(diagnostic);
                 None
             }
@@ -387,34 +380,34 @@ impl<'a> Resolver<'a> {
             (ast::Choice::Value(quantity), Shape::Value) => {
                 let value = self.value(quantity, unit, &what)?;
                 let value = if probability { self.probability(quantity, value) } else { value };
-                (Range { low: value, high: value }, Choice::Value(value))
+                (Range { low: value, high: value }, Choice::Value { value })
             }
             (ast::Choice::Range(range), Shape::Range) => {
                 let range = self.range(range, unit, &what)?;
-                (range, Choice::Range(range))
+                (range, Choice::Range { low: range.low, high: range.high })
             }
             (_, Shape::Range) => {
                 let written = self.text(span);
-                let diagnostic = Diagnostic::new(
-                    Code::WRONG_CHOICE,
-                    span,
-                    format!("{what} is a range, from which each message draws anew"),
-                )
-                .label(format!("expected a range, for example `{example}`"))
-                .suggest("always draw this value", span, format!("[{written}, {written}]"));
+                let diagnostic = Diagnostic::new(Code::WRONG_CHOICE, span, format!("{what} must be a range in a test"))
+                    .label(format!("expected a range, for example `{example}`"))
+                    .note("a value is drawn from the range for each message")
+                    .suggest("use a range with this value only", span, format!("[{written}, {written}]"));
                 self.report(diagnostic);
                 return None;
             }
             (_, Shape::Value) => {
-                let diagnostic =
-                    Diagnostic::new(Code::WRONG_CHOICE, span, format!("{what} is one value in a test, not a range"))
-                        .label(format!("expected one value, for example `{example}`"));
+                let diagnostic = Diagnostic::new(
+                    Code::WRONG_CHOICE,
+                    span,
+                    format!("{what} must be a single value in a test, not a range"),
+                )
+                .label(format!("expected one value, for example `{example}`"));
                 self.report(diagnostic);
                 return None;
             }
         };
         let declared = self.declared(index, parameter);
-        let permitted = declared.map_or(String::new(), |declared| format!("`{}`", self.text(declared)));
+        let permitted = declared.map_or(String::new(), |declared| format!("a value in `{}`", self.text(declared)));
         if !self.inside(found, span, permitted_range, &what, &permitted, declared) {
             return None;
         }
@@ -424,7 +417,7 @@ impl<'a> Resolver<'a> {
         Some(chosen)
     }
 
-    /// Where it is written what a parameter of an operation may be.
+    /// Where the permitted values of a parameter are declared.
     fn declared(&self, index: usize, parameter: &Parameter) -> Option<Span> {
         match &self.file.operations[index].body.as_ref()?.kind {
             ast::OperationKind::Custom(custom) => {
@@ -435,7 +428,7 @@ impl<'a> Resolver<'a> {
     }
 }
 
-/// A choice as the language writes it.
+/// A choice in the notation of the language.
 fn example(parameter: &Parameter, kind: &OperationKind) -> String {
     let probability = kind.has_probabilities();
     let unit = parameter.unit.as_ref().map_or("", Unit::text);

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use super::list;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::syntax::ast::{ActivationMode, Campaign, Exploration, ExplorationKind, File, Strategy};
 
-/// Hands clauses down. A clause that a campaign writes replaces the inherited one whole; `search`, `repeat` and
-/// `passive` are one clause in this, and what belongs to a search only is not handed to a campaign that has none.
+/// Copies inherited clauses. A clause that a campaign writes replaces the inherited one as a whole; `search`, `repeat` and
+/// `passive` count as one clause here, and clauses of a search are not copied to a campaign without one.
 ///
-/// A base that is none is left for resolution to report.
+/// A base that does not exist is left for resolution to report.
 pub(super) fn inherit(file: &mut File, diagnostics: &mut Vec<Diagnostic>) {
     let mut positions: BTreeMap<&str, usize> = BTreeMap::new();
     for (index, campaign) in file.campaigns.iter().enumerate() {
@@ -22,9 +23,9 @@ pub(super) fn inherit(file: &mut File, diagnostics: &mut Vec<Diagnostic>) {
         let mut next = Some(start);
         while let Some(index) = next.filter(|&index| !done[index]) {
             if let Some(at) = chain.iter().position(|&before| before == index) {
-                let circle = chain[at..].to_vec();
-                diagnostics.push(circle_of(file, &circle));
-                for &member in &circle {
+                let cycle = chain[at..].to_vec();
+                diagnostics.push(cycle_of(file, &cycle));
+                for &member in &cycle {
                     bases[member] = None;
                 }
                 break;
@@ -39,10 +40,10 @@ pub(super) fn inherit(file: &mut File, diagnostics: &mut Vec<Diagnostic>) {
                         file.campaigns.get_disjoint_mut([index, base]).expect("no campaign is its base");
                     hand_down(base, child);
                 }
-                // What is inherited is not known, so nothing is missing.
+                // What is inherited is unknown, so nothing is reported as missing.
                 None if file.campaigns[index].from.is_some() => {
-                    file.campaigns[index].damaged = true;
-                    file.campaigns[index].unread = true;
+                    file.campaigns[index].has_errors = true;
+                    file.campaigns[index].inherited_errors = true;
                 }
                 None => {}
             }
@@ -51,22 +52,22 @@ pub(super) fn inherit(file: &mut File, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-fn circle_of(file: &File, circle: &[usize]) -> Diagnostic {
+fn cycle_of(file: &File, cycle: &[usize]) -> Diagnostic {
     let name = |index: usize| &file.campaigns[index].head.name;
-    let first = name(circle[0]);
-    let title = if circle.len() == 1 {
+    let first = name(cycle[0]);
+    let title = if cycle.len() == 1 {
         format!("campaign `{}` inherits from itself", first.text)
     } else {
-        let by: Vec<String> = circle[1..].iter().map(|&index| format!("`{}`", name(index).text)).collect();
-        format!("campaign `{}` inherits from itself by way of {}", first.text, by.join(", "))
+        let through: Vec<&str> = cycle[1..].iter().map(|&index| name(index).text.as_str()).collect();
+        format!("campaign `{}` inherits from itself through {}", first.text, list(&through))
     };
-    let last = circle[circle.len() - 1];
+    let last = cycle[cycle.len() - 1];
     let closes = file.campaigns[last].from.as_ref().map_or(first.span, |from| from.span);
-    let diagnostic = Diagnostic::new(Code::CIRCLE, closes, title).label("this closes the circle");
-    if circle.len() == 1 { diagnostic } else { diagnostic.also(first.span, "declared here") }
+    let diagnostic = Diagnostic::new(Code::CIRCLE, closes, title).label("this closes the cycle");
+    if cycle.len() == 1 { diagnostic } else { diagnostic.secondary(first.span, "declared here") }
 }
 
-/// Whether a campaign says how its tests are found.
+/// Whether a campaign itself says where its tests come from.
 fn finds(campaign: &Campaign) -> bool {
     !(campaign.searches.is_empty() && campaign.repeats.is_empty() && campaign.passives.is_empty())
 }
@@ -79,9 +80,9 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
         child.passives.clone_from(&base.passives);
     }
     let searches = !child.searches.is_empty();
-    // What the base lacks was said of it.
-    child.damaged |= base.damaged || !own || searches != base.searches.is_empty();
-    child.unread |= base.unread;
+    // What is missing in the base was reported there.
+    child.has_errors |= base.has_errors || !own || searches != base.searches.is_empty();
+    child.inherited_errors |= base.inherited_errors;
     if child.observes.is_empty() {
         child.observes.clone_from(&base.observes);
     }
@@ -119,8 +120,8 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
     }
 }
 
-/// Whether a campaign can explore like its base: a search that is no evolution has nothing to be changed, and of windows
-/// of time and conditions each is explored in its own way, but for novelty. Where the base itself is like that, it is said of the base.
+/// Whether a campaign can explore like its base. Explorations change an evolution, and except for novelty each works
+/// either on time windows or on conditions. If the base itself does not fit, that is reported there.
 fn suits(exploration: &Exploration, child: &Campaign) -> bool {
     let evolves = child.searches.iter().all(|search| search.strategy.is_none_or(|it| it == Strategy::Nsga2));
     let by_condition = child.activates.iter().any(|(_, mode)| matches!(mode, ActivationMode::Condition(_)));

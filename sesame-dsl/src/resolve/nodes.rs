@@ -1,4 +1,4 @@
-//! `from` and `to` of an operation: whose messages it disturbs, and on their way to whom.
+//! `from` and `to` of an operation: the nodes that send and receive the messages it applies to.
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
@@ -6,7 +6,7 @@ use crate::span::Span;
 use crate::syntax::ast::{Name, OperationBody, Target, Transport};
 
 impl<'a> Resolver<'a> {
-    /// Nodes have to publish or subscribe to the topic, and the transport has to tell them apart.
+    /// Nodes must publish or subscribe to the topic, and the transport must tell them apart.
     pub(super) fn between_nodes(&mut self, body: &'a OperationBody) {
         let Some(target) = &body.target else { return };
         let Some(topic) = self.names.get(target.topic.text.as_str()).copied() else { return };
@@ -35,7 +35,7 @@ impl<'a> Resolver<'a> {
         let title = format!("node `{}` does not {not} `{}`", node.declaration.name, target.topic.text);
         let diagnostic = Diagnostic::new(Code::WHICH_NODES, span, title)
             .label(format!("expected a node that {does} it"))
-            .also(node.declaration.span, "the node is declared here");
+            .secondary(node.declaration.span, "the node is declared here");
         self.report(diagnostic);
     }
 
@@ -46,11 +46,11 @@ impl<'a> Resolver<'a> {
             Some(Transport::Process(_)) => "process",
             None => return,
         };
-        let who = if from { "who publishes a message" } else { "who gets a message" };
-        let title = format!("simulator kind `{word}` cannot tell {who}");
+        let who = if from { "which node publishes a message" } else { "which node receives a message" };
+        let title = format!("simulator kind `{word}` does not report {who}");
         let diagnostic = Diagnostic::new(Code::WHICH_NODES, span, title)
-            .label("leave the nodes out: the operation disturbs every message of its topic")
-            .also(simulator.head.name.span, "the simulator is declared here");
+            .label("remove the nodes; the operation then applies to every message of its topic")
+            .secondary(simulator.head.name.span, "the simulator is declared here");
         self.report(diagnostic);
     }
 }

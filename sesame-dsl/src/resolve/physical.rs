@@ -8,8 +8,8 @@ use crate::model::physical::{Budget, Cost, Fit, Form, LabSetting, LabSimulator, 
 use crate::model::{Dimension, Id as _, MetricId};
 use crate::similar::most_similar;
 use crate::span::Span;
+use crate::syntax::ast::physical as written;
 use crate::syntax::ast::{self, Name, Quantity};
-use crate::syntax::physical as written;
 use crate::units::Unit;
 
 /// What a setting of a transport takes.
@@ -21,7 +21,7 @@ enum Takes {
     Text,
 }
 
-/// What a transport is told.
+/// What a transport takes.
 struct LabTransport {
     word: &'static str,
     /// How many texts it takes: at least, at most.
@@ -53,7 +53,7 @@ impl<'a> Resolver<'a> {
             None => Some(None),
         };
         let repeats = match self.single(&lab.repeats, "repeats") {
-            Some(repeats) => self.count(*repeats, 1, "a test is repeated"),
+            Some(repeats) => self.count(*repeats, 1, "the number of repetitions"),
             None => Some(1),
         };
         let cost = match self.single(&lab.costs, "cost") {
@@ -97,7 +97,7 @@ impl<'a> Resolver<'a> {
         })
     }
 
-    /// The names inside of a lab are its own, and each is there once.
+    /// The names inside a lab are local to it, and each is defined once.
     fn own_names(&mut self, lab: &'a written::Physical) {
         let mut first: BTreeMap<&str, Span> = BTreeMap::new();
         let simulators = lab.simulators.iter().map(|(_, simulator)| &simulator.head.name);
@@ -125,7 +125,7 @@ impl<'a> Resolver<'a> {
                 (1, 1) => "one text, its address".to_owned(),
                 _ => "a program and its arguments".to_owned(),
             };
-            let title = format!("`{word}` takes {expected}, not {given}");
+            let title = format!("`{word}` takes {expected}, but got {given}");
             self.report(Diagnostic::new(Code::BAD_LAB, transport.span, title).label(format!("expected {expected}")));
             complete = false;
         }
@@ -141,11 +141,11 @@ impl<'a> Resolver<'a> {
             let Some((_, takes)) = known.iter().find(|(word, _)| *word == name.text) else {
                 let known: Vec<&str> = known.iter().map(|(word, _)| *word).collect();
                 let title = format!("`{word}` has no setting `{}`", name.text);
-                let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("no such setting");
+                let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("unknown setting");
                 diagnostic = match most_similar(&name.text, known.iter().copied()) {
-                    Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
-                    None if known.is_empty() => diagnostic.note("it has none"),
-                    None => diagnostic.note(format!("its settings: {}", super::list(&known))),
+                    Some(similar) => diagnostic.did_you_mean(name.span, similar),
+                    None if known.is_empty() => diagnostic.note(format!("`{word}` has no settings")),
+                    None => diagnostic.note(format!("the settings of `{word}` are {}", super::list(&known))),
                 };
                 self.report(diagnostic);
                 complete = false;
@@ -185,9 +185,9 @@ impl<'a> Resolver<'a> {
                     )]
                     return Some(LabSetting::Count(value as u32));
                 }
-                "a whole number, 0 or more"
+                "a whole number from 0 to 4294967295"
             }
-            (Takes::Nothing, Some(_)) => "nothing after it",
+            (Takes::Nothing, Some(_)) => "no value",
             (Takes::Text, _) => "a text",
             (Takes::Time, _) => "a time such as `20ms`",
             (Takes::Count, _) => "a whole number",
@@ -217,7 +217,7 @@ impl<'a> Resolver<'a> {
         if cost.base + cost.per_operation > 0.0 {
             return Some(cost);
         }
-        let title = "tests that cost nothing need no budget";
+        let title = "the cost of a test must be greater than 0";
         self.report(Diagnostic::new(Code::OUT_OF_RANGE, base.span, title).label("expected more than 0"));
         None
     }
@@ -231,7 +231,7 @@ impl<'a> Resolver<'a> {
         found.collect::<Vec<_>>().into_iter().collect()
     }
 
-    /// Reports metrics that stand twice.
+    /// Reports names that are listed twice.
     pub(super) fn once(&mut self, names: impl Iterator<Item = &'a Name>) {
         let mut first: BTreeMap<&str, Span> = BTreeMap::new();
         for name in names {
@@ -243,29 +243,38 @@ impl<'a> Resolver<'a> {
     }
 
     fn budget(&mut self, budget: &'a written::Budget) -> Option<Budget> {
+        let mut complete = true;
         let limit = self.value(&budget.limit, None, "the budget");
         if limit.is_some_and(|limit| limit <= 0.0) {
-            let title = format!("a budget of `{}` buys nothing", self.text(budget.limit.span));
+            let title = "the budget must be greater than 0";
             self.report(Diagnostic::new(Code::OUT_OF_RANGE, budget.limit.span, title).label("expected more than 0"));
-            return None;
+            complete = false;
         }
         let lambda = self.value(&budget.lambda, None, "`lambda`");
         if lambda.is_some_and(|lambda| !(0.0..=1.0).contains(&lambda)) {
             let title = format!("`{}` is out of range for `lambda`", self.text(budget.lambda.span));
-            self.report(Diagnostic::new(Code::OUT_OF_RANGE, budget.lambda.span, title).label("permitted is 0 to 1"));
-            return None;
+            self.report(Diagnostic::new(Code::OUT_OF_RANGE, budget.lambda.span, title).label("expected 0 to 1"));
+            complete = false;
         }
         self.once(budget.over.iter());
         let over: Vec<_> = budget.over.iter().map(|name| self.dimension(name)).collect();
+        complete.then_some(())?;
         Some(Budget { limit: limit?, lambda: lambda?, over: over.into_iter().collect::<Option<_>>()? })
     }
 
+    /// A dimension of the reduced test space.
     pub(super) fn dimension(&mut self, name: &Name) -> Option<Dimension> {
         let found = Dimension::named(&name.text);
         if found.is_none() {
-            let title = format!("no dimension of the search space is named `{}`", name.text);
-            let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("no such dimension");
-            self.report(diagnostic.note(format!("there are {}", super::list(&Dimension::ALL.map(Dimension::name)))));
+            let title = format!("no dimension named `{}`", name.text);
+            let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("unknown dimension").note(
+                "the dimensions are `T1`, `T2`, `T3` (timing), `P1`, `P2` (parameters), `O0`, `O1`, `O2` and `O3` \
+                 (operations)",
+            );
+            self.report(match most_similar(&name.text, Dimension::ALL.map(Dimension::name)) {
+                Some(similar) => diagnostic.did_you_mean(name.span, similar),
+                None => diagnostic,
+            });
         }
         found
     }
@@ -304,12 +313,13 @@ impl<'a> Resolver<'a> {
         let metre = metre();
         let what = if positive { "an edge of a box" } else { "a coordinate" };
         let lengths = self.coordinates(point, Some(&metre), what)?;
+        let mut complete = true;
         if positive {
             for edge in &point.coordinates {
-                self.positive(edge, &metre, what)?;
+                complete &= self.positive(edge, &metre, what).is_some();
             }
         }
-        Some(lengths)
+        complete.then_some(lengths)
     }
 
     fn fit(&mut self, fit: &'a written::Fit) -> Option<Fit> {

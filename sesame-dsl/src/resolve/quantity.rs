@@ -1,4 +1,4 @@
-//! Numbers with units, in the unit that their place asks for.
+//! Numbers with units, converted to the unit that their place requires.
 
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
@@ -17,10 +17,10 @@ impl Resolver<'_> {
             UnitError::Unknown { symbol, similar } => {
                 let mut diagnostic =
                     Diagnostic::new(Code::UNKNOWN_UNIT, name.span, format!("no unit named `{symbol}`"))
-                        .label("not a unit");
+                        .label("unknown unit");
                 for meant in &similar {
                     let replacement = name.text.replace(&symbol, meant);
-                    diagnostic = diagnostic.suggest(format!("`{meant}` is"), name.span, replacement);
+                    diagnostic = diagnostic.suggest(format!("did you mean `{meant}`?"), name.span, replacement);
                 }
                 if similar.is_empty() {
                     diagnostic = diagnostic.note("`sesamec explain E0301` lists the units");
@@ -28,7 +28,7 @@ impl Resolver<'_> {
                 diagnostic
             }
             UnitError::TooLarge => {
-                let title = format!("`{}` is too large or too small a unit", name.text);
+                let title = format!("the unit `{}` is too large or too small", name.text);
                 Diagnostic::new(Code::UNKNOWN_UNIT, name.span, title).label("its scale cannot be represented")
             }
         };
@@ -36,7 +36,7 @@ impl Resolver<'_> {
         None
     }
 
-    /// A quantity as a number in a unit. `what` completes "… is": for example "the field `level`".
+    /// A quantity as a number in a unit. `what` is the subject of "… is a length": for example "the field `level`".
     pub(super) fn value(&mut self, quantity: &Quantity, unit: Option<&Unit>, what: &str) -> Option<f64> {
         let from = match &quantity.unit {
             Some(name) => Some(self.unit(name)?),
@@ -46,12 +46,15 @@ impl Resolver<'_> {
             return None;
         }
         let written = self.text(quantity.span);
-        // A plain number is no percentage: `0.4` and `40` would both be plausible.
+        // A plain number is not a percentage: `0.4` and `40` would both be plausible.
         if dimension(from.as_ref()) == dimension(unit) && (from.is_some() || unit.is_none()) {
             let value = convert(quantity.value, from.as_ref(), unit);
             if !value.is_finite() {
-                let title = format!("`{written}` is too large for a number in its unit");
-                self.report(Diagnostic::new(Code::BAD_NUMBER, quantity.span, title).label("beyond 1.8e308"));
+                let title = format!("`{written}` is too large");
+                self.report(
+                    Diagnostic::new(Code::BAD_NUMBER, quantity.span, title)
+                        .label("greater than 1.8e308 in the unit of this place"),
+                );
                 return None;
             }
             return Some(value);
@@ -59,15 +62,15 @@ impl Resolver<'_> {
         let diagnostic = match (from, unit) {
             (None, Some(unit)) => {
                 let is = wanted(unit);
-                Diagnostic::new(Code::WRONG_UNIT, quantity.span, format!("`{written}` lacks its unit"))
+                Diagnostic::new(Code::WRONG_UNIT, quantity.span, format!("`{written}` has no unit"))
                     .label(format!("{what} is {is}"))
-                    .suggest(format!("write it in `{}`", unit.text()), quantity.span.end(), unit.text())
+                    .suggest(format!("add the unit `{}`", unit.text()), quantity.span.end(), unit.text())
             }
             (Some(from), None) => {
                 let title = format!("`{written}` is {}, but {what} is a plain number", from.dimension().name());
                 let diagnostic = Diagnostic::new(Code::WRONG_UNIT, quantity.span, title).label("expected no unit");
                 let name = quantity.unit.as_ref().map_or(quantity.span, |name| name.span);
-                diagnostic.suggest("leave the unit out", name, "")
+                diagnostic.suggest("remove the unit", name, "")
             }
             (from, unit) => {
                 let is = unit.map_or("a plain number".to_owned(), wanted);
@@ -83,7 +86,7 @@ impl Resolver<'_> {
     /// A range in a unit, its ends in order.
     pub(super) fn range(&mut self, range: &ast::Range, unit: Option<&Unit>, what: &str) -> Option<Range> {
         if let (None, None, Some(unit)) = (&range.low.unit, &range.high.unit, unit) {
-            self.lacks_unit(range, unit, what);
+            self.without_units(range, unit, what);
             return None;
         }
         let low = self.value(&range.low, unit, what);
@@ -96,13 +99,13 @@ impl Resolver<'_> {
         None
     }
 
-    /// Both ends of a range lack their unit, which is one mistake.
-    fn lacks_unit(&mut self, range: &ast::Range, unit: &Unit, what: &str) {
-        let title = format!("`{}` lacks its units", self.text(range.span));
+    /// Reports a range whose ends both have no unit as one mistake.
+    fn without_units(&mut self, range: &ast::Range, unit: &Unit, what: &str) {
+        let title = format!("`{}` has no units", self.text(range.span));
         let mut diagnostic =
             Diagnostic::new(Code::WRONG_UNIT, range.span, title).label(format!("{what} is {}", wanted(unit)));
         diagnostic.suggestions.push(Suggestion {
-            message: format!("write it in `{}`", unit.text()),
+            message: format!("add the unit `{}`", unit.text()),
             edits: [&range.low, &range.high].map(|end| (end.span.end(), unit.text().to_owned())).into(),
         });
         self.report(diagnostic);
@@ -111,15 +114,16 @@ impl Resolver<'_> {
     pub(super) fn reversed(&mut self, range: &ast::Range, title: &str) {
         let code = if title.contains("window") { Code::BAD_WINDOW } else { Code::REVERSED_RANGE };
         let [low, high] = [&range.low, &range.high].map(|end| self.text(end.span));
-        let mut diagnostic = Diagnostic::new(code, range.span, title).label(format!("`{low}` is more than `{high}`"));
+        let mut diagnostic =
+            Diagnostic::new(code, range.span, title).label(format!("`{low}` is greater than `{high}`"));
         diagnostic.suggestions.push(Suggestion {
-            message: "swap its ends".to_owned(),
+            message: "swap the two ends".to_owned(),
             edits: vec![(range.low.span, high.to_owned()), (range.high.span, low.to_owned())],
         });
         self.report(diagnostic);
     }
 
-    /// Checks that a range lies inside another, in words of the source.
+    /// Checks that a range lies inside another; `permitted` is the other in words, after "expected".
     pub(super) fn inside(
         &mut self,
         inner: Range,
@@ -135,20 +139,20 @@ impl Resolver<'_> {
         let written = self.text(span);
         let mut diagnostic =
             Diagnostic::new(Code::OUT_OF_RANGE, span, format!("`{written}` is out of range for {what}"))
-                .label(format!("permitted is {permitted}"));
+                .label(format!("expected {permitted}"));
         if let Some(declared) = declared {
-            diagnostic = diagnostic.also(declared, "by this declaration");
+            diagnostic = diagnostic.secondary(declared, "the permitted range is declared here");
         }
         self.report(diagnostic);
         false
     }
 
-    /// Checks that a number of a field of whole numbers is whole.
+    /// Checks that a number is whole.
     pub(super) fn whole(&mut self, value: f64, span: Span, what: &str) -> bool {
-        // Beyond 2^53 not every whole number is represented, so a range there would not mean what it says.
+        // Beyond 2^53 not every whole number is a float, so a range there would not mean what it says.
         let exact = value.fract() == 0.0 && value.abs() <= (1u64 << 53) as f64;
         if !exact {
-            let title = format!("`{}` is not a whole number, but {what} takes whole numbers", self.text(span));
+            let title = format!("`{}` is not a whole number, but {what} needs one", self.text(span));
             let diagnostic = Diagnostic::new(Code::BAD_NUMBER, span, title);
             self.report(diagnostic.label("expected a whole number of at most 2^53"));
         }
@@ -165,10 +169,9 @@ impl Resolver<'_> {
         })
     }
 
-    /// A quantity that is this many per cent, as a probability: the number nearest to what is written.
+    /// A percentage as a probability: the float nearest to what is written.
     ///
-    /// A hundredth of the nearest number of per cent would be rounded twice, and a fifth of all probabilities could not
-    /// be written at all.
+    /// Dividing the nearest float by 100 would round twice, and a fifth of all probabilities could not be written at all.
     pub(super) fn probability(&self, quantity: &Quantity, percentage: f64) -> f64 {
         let exact = match &quantity.unit {
             Some(unit) if unit.text == "%" => hundredth(self.text(quantity.span).trim_end_matches('%').trim_end()),
@@ -177,11 +180,11 @@ impl Resolver<'_> {
         exact.unwrap_or_else(|| convert(percentage, Some(&percent()), None))
     }
 
-    /// A range of times, none negative, in seconds.
+    /// A range of times that are not negative, in seconds.
     pub(super) fn times(&mut self, range: &ast::Range, what: &str) -> Option<Range> {
         let found = self.range(range, Some(&Unit::seconds()), what)?;
         let all = Range { low: 0.0, high: f64::INFINITY };
-        self.inside(found, range.span, all, what, "0s and more", None).then_some(found)
+        self.inside(found, range.span, all, what, "0s or more", None).then_some(found)
     }
 }
 
@@ -199,8 +202,8 @@ pub(super) fn percent() -> Unit {
 
 fn wanted(unit: &Unit) -> String {
     if unit.text() == "%" {
-        "a percentage, in `%`".to_owned()
+        "a percentage in `%`".to_owned()
     } else {
-        format!("{}, in `{}`", unit.dimension().name(), unit.text())
+        format!("{} in `{}`", unit.dimension().name(), unit.text())
     }
 }

@@ -1,26 +1,27 @@
-//! Metrics that are the robustness of a temporal formula: its signals, their one unit, and how far its operators reach.
+//! Metrics that are the robustness of a temporal formula: its signals, their common unit, and the scope of its operators.
 
 use super::Resolver;
+use super::boolean::relation;
+use super::depth;
 use super::formula::{MAX_DEPTH, scaled};
-use super::truth::relation;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{Comparison, Expression, Input, Interval, Members, MetricSource, Robustness, Temporal};
 use crate::span::Span;
 use crate::syntax::ast::{self, ExpressionKind, Prefix, PrefixWord, Relation};
 use crate::units::{Unit, convert, dimension};
 
-/// By how much what is true is kept and what is false broken, beside numbers that are measured: more than any of them, so
-/// that a truth decides and never limits.
+/// The robustness of `true`, and negated of `false`, beside numbers that are measured: greater than any of them, so that a
+/// `bool` decides and never limits.
 const DECISIVE: f64 = 1e9;
 
-/// What a formula's comparisons are of.
+/// The signals that a formula compares.
 #[derive(Default)]
 struct Signals {
     inputs: Vec<Input>,
     computed: Vec<Expression>,
     /// The unit of all comparisons, and the first of them.
     unit: Option<(Option<Unit>, Span)>,
-    /// Positions of the signals that are true or false.
+    /// Positions of the `bool` signals.
     truths: Vec<usize>,
 }
 
@@ -52,17 +53,17 @@ impl<'a> Resolver<'a> {
             let twice = Expression::Product(vec![signals[at].clone(), Expression::Constant(2.0 * amount)]);
             signals[at] = Expression::Sum(vec![twice, Expression::Constant(-amount)]);
         }
-        if signals.iter().map(Expression::depth).max().max(Some(resolved.depth())) > Some(MAX_DEPTH) {
+        if signals.iter().map(depth::of_expression).max().max(Some(resolved.depth())) > Some(MAX_DEPTH) {
             self.too_deep(of.span);
             return None;
         }
         let mut each = inputs.iter().filter(|input| input.members == Members::Each).map(|input| input.field.topic);
         let first = each.next();
         if each.any(|topic| Some(topic) != first) {
-            let title = "`each of` is of two groups in this formula";
+            let title = "`each of` refers to two groups in one formula";
             let diagnostic = Diagnostic::new(Code::WRONG_TYPE, of.span, title)
-                .label("expected one group at most")
-                .note("the formula is that of each member of the group, and the least counts");
+                .label("expected at most one group")
+                .note("the formula is evaluated for each member of the group, and the smallest robustness counts");
             self.report(diagnostic);
             return None;
         }
@@ -72,35 +73,35 @@ impl<'a> Resolver<'a> {
         Some((MetricSource::Robustness(robustness), unit.and_then(|(unit, _)| unit)))
     }
 
-    /// A robustness depends on no messages but on what signals are over time.
+    /// Reports clauses about messages: a robustness depends on the values of signals over time only.
     fn no_clauses(&mut self, formula: &'a ast::Formula) {
         let clauses = [
             (
                 formula.when.first().map(|(word, when)| word.to(when.span)),
                 "when",
-                "`a implies b` asks for `b` while `a` holds",
+                "write `a implies b` to require `b` while `a` holds",
             ),
             (
                 formula.every.first().map(|(word, every)| word.to(every.span)),
                 "every",
-                "a value counts for the time it is held",
+                "a value counts for as long as it lasts, however often messages arrive",
             ),
             (
                 formula.per.first().map(|(word, per)| word.to(per.span)),
                 "per",
-                "`each of` tells the members of a group apart",
+                "use `each of` to distinguish the members of a group",
             ),
         ];
         for (span, word, note) in clauses {
             let Some(span) = span else { continue };
-            let title = format!("`{word}` does not go with `robustness(…)`");
-            self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("leave it out").note(note));
+            let title = format!("`{word}` cannot be combined with `robustness(…)`");
+            self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("remove this").note(note));
         }
     }
 
     fn too_deep(&mut self, span: Span) {
-        let title = format!("this formula is nested more than {MAX_DEPTH} deep");
-        self.report(Diagnostic::new(Code::TOO_LARGE, span, title).label("too deep"));
+        let title = format!("this formula is nested more than {MAX_DEPTH} levels deep");
+        self.report(Diagnostic::new(Code::TOO_LARGE, span, title).label("nested too deeply"));
     }
 
     fn temporal(&mut self, parts: &mut Signals, expression: &'a ast::Expression) -> Option<Temporal> {
@@ -136,7 +137,7 @@ impl<'a> Resolver<'a> {
                 Some(Temporal::Predicate(signal, Comparison::Above, 0.0))
             }
             _ => {
-                // It is a number; what is wrong with it is said as of any condition.
+                // It is a number; it is reported as in any condition.
                 self.condition(&mut parts.inputs, expression);
                 None
             }
@@ -155,31 +156,33 @@ impl<'a> Resolver<'a> {
 
     fn chain(&mut self, parts: &mut Signals, of: &[&'a ast::Expression]) -> Option<Vec<Temporal>> {
         let clear = self.reach(of);
-        // All are looked at, so that a mistake in one does not hide one in another.
+        // All are resolved, so that a mistake in one does not hide one in another.
         let resolved: Vec<_> = of.iter().map(|part| self.temporal(parts, part)).collect();
         resolved.into_iter().collect::<Option<Vec<_>>>().filter(|_| clear)
     }
 
-    /// Whether it is clear how far the temporal words reach in what is joined.
+    /// Whether the scopes of temporal operators are clear in the parts of `and`, `or`, `implies` or `until`.
     fn reach(&mut self, of: &[&'a ast::Expression]) -> bool {
-        let (last, before) = of.split_last().expect("what is joined has parts");
+        let (last, before) = of.split_last().expect("an operator has operands");
         let mut clear = true;
         for part in before {
             let Some((word, alone, start)) = open_end(part) else { continue };
             clear = false;
             let name = self.text(word);
-            let title = format!("how far does `{name}` reach?");
+            let title = format!("the scope of `{name}` is ambiguous");
             let mut diagnostic = Diagnostic::new(Code::TEMPORAL_REACH, word, title)
-                .label("parentheses say so")
-                .also(Span { lo: alone.hi, hi: last.span.hi, ..alone }, "up to here, or over this too?");
+                .label("add parentheses")
+                .secondary(Span { lo: alone.hi, hi: last.span.hi, ..alone }, "does the scope include this?");
             let parentheses =
                 |from: Span, to: Span| vec![(Span { hi: from.lo, ..from }, "(".to_owned()), (to.end(), ")".to_owned())];
-            diagnostic
-                .suggestions
-                .push(Suggestion { message: "over all of it".to_owned(), edits: parentheses(start, last.span) });
-            diagnostic
-                .suggestions
-                .push(Suggestion { message: "up to here".to_owned(), edits: parentheses(alone, alone) });
+            diagnostic.suggestions.push(Suggestion {
+                message: format!("apply `{name}` to all of it"),
+                edits: parentheses(start, last.span),
+            });
+            diagnostic.suggestions.push(Suggestion {
+                message: format!("apply `{name}` to the first part only"),
+                edits: parentheses(alone, alone),
+            });
             self.report(diagnostic);
         }
         clear
@@ -207,10 +210,10 @@ impl<'a> Resolver<'a> {
         let Some(range) = range else { return Some(Interval { from: 0.0, to: None }) };
         let seconds = self.range(range, Some(&Unit::seconds()), "an interval of time")?;
         if seconds.low < 0.0 {
-            let title = format!("`{}` begins in the past", self.text(range.span));
+            let title = "an interval cannot begin before 0s";
             let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, range.low.span, title)
                 .label("expected 0s or more")
-                .note("an interval counts from the moment at which the formula is evaluated, and formulas look ahead");
+                .note("an interval is relative to the moment of evaluation, and temporal operators only look ahead");
             self.report(diagnostic);
             return None;
         }
@@ -237,10 +240,10 @@ impl<'a> Resolver<'a> {
             _ => (left, None),
         };
         let (Some(equal), Some(value), true) = (equal, value, self.is_condition(of)) else {
-            let title = format!("`{}` has no robustness", self.text(whole.span));
+            let title = format!("the robustness of `{}` is not defined", self.text(whole.span));
             let diagnostic = Diagnostic::new(Code::WRONG_TYPE, whole.span, title)
-                .label("what is true or false is compared with `true` or `false` only")
-                .note("say when it holds: by `and`, `or`, `not` and `implies`");
+                .label("a `bool` can only be compared with `true` or `false`, by `==` or `!=`")
+                .note("combine `bool` values with `and`, `or`, `not` and `implies`");
             self.report(diagnostic);
             return None;
         };
@@ -273,8 +276,8 @@ impl<'a> Resolver<'a> {
         };
         let constant = constant * scale;
         if !constant.is_finite() {
-            let title = format!("`{}` has a number that is too large", self.text(whole.span));
-            self.report(Diagnostic::new(Code::BAD_NUMBER, whole.span, title).label("beyond 1.8e308"));
+            let title = format!("`{}` contains a number that is too large", self.text(whole.span));
+            self.report(Diagnostic::new(Code::BAD_NUMBER, whole.span, title).label("greater than 1.8e308"));
             return None;
         }
         Some(Temporal::Predicate(parts.signal(scaled(signal, scale)), by, constant))
@@ -291,7 +294,7 @@ impl<'a> Resolver<'a> {
             return Some(convert(1.0, unit.as_ref(), first.as_ref()));
         }
         let title = format!(
-            "`{}` compares {}, but `{}` {}",
+            "`{}` compares {}, but `{}` compares {}",
             self.text(span),
             found.name(),
             self.text(*first_span),
@@ -299,34 +302,34 @@ impl<'a> Resolver<'a> {
         );
         let diagnostic = Diagnostic::new(Code::WRONG_UNIT, span, title)
             .label(format!("expected {}", wanted.name()))
-            .also(*first_span, "the first comparison gives the unit")
-            .note("by how much a formula is kept is one number: divide both sides of each comparison by what counts as much, such as `zones.level / 300mm > 0`");
+            .secondary(*first_span, "the first comparison determines the unit")
+            .note("robustness is a single number: to combine different units, divide both sides of each comparison by a scale, such as `zones.level / 300mm > 0`");
         self.report(diagnostic);
         None
     }
 
     fn constant(&mut self, span: Span) {
-        let title = format!("`{}` is always the same", self.text(span));
+        let title = format!("`{}` is constant", self.text(span));
         let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, span, title);
-        self.report(diagnostic.label("expected a comparison of a topic, such as `link0 > 2.5rad`"));
+        self.report(diagnostic.label("expected a comparison that involves a topic, such as `link0 > 2.5rad`"));
     }
 
     fn equality(&mut self, span: Span, by: Comparison) {
-        let (sign, fate) = match by {
-            Comparison::Equal => ("==", "kept by more than 0"),
-            Comparison::NotEqual => ("!=", "broken by more than 0"),
+        let (word, sign) = match by {
+            Comparison::Equal => ("equality", "positive"),
+            Comparison::NotEqual => ("inequality", "negative"),
             _ => return,
         };
-        let title = format!("`{}` is never {fate}", self.text(span));
+        let title = format!("the robustness of `{}` is never {sign}", self.text(span));
         let diagnostic = Diagnostic::new(Code::EQUALITY_WITHOUT_ROOM, span, title)
-            .label(format!("`{sign}` has no room"))
-            .note("say how far apart the sides may be: `abs(a - b) < 0.1` for example");
+            .label(format!("{word} cannot have a {sign} robustness"))
+            .note("compare with a tolerance, for example `abs(a - b) < 0.1`");
         self.report(diagnostic);
     }
 }
 
-/// The temporal word that the end of an expression belongs to without parentheses: the word, all from it to that end, and
-/// where what follows it begins.
+/// The temporal operator whose scope the end of an expression belongs to without parentheses: the operator, everything
+/// from it to that end, and where its operand begins.
 fn open_end(expression: &ast::Expression) -> Option<(Span, Span, Span)> {
     if expression.parenthesised {
         return None;
@@ -344,13 +347,13 @@ fn open_end(expression: &ast::Expression) -> Option<(Span, Span, Span)> {
     }
 }
 
-/// Whether a number changes at all.
+/// Whether a number depends on an input.
 fn names_input(of: &Expression) -> bool {
     match of {
         Expression::Constant(_) => false,
-        Expression::Input(_) | Expression::Distance(..) => true,
+        Expression::Input(_) | Expression::Distance { .. } => true,
         Expression::Negate(of) | Expression::Absolute(of) => names_input(of),
-        Expression::Divide(value, by) => names_input(value) || names_input(by),
+        Expression::Divide { value, by } => names_input(value) || names_input(by),
         Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) | Expression::Max(of) => {
             of.iter().any(names_input)
         }

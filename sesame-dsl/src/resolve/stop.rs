@@ -1,4 +1,4 @@
-//! When a campaign's search stops before its tests are used up.
+//! When a campaign's search stops before it has made all its evaluations.
 
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
@@ -7,14 +7,14 @@ use crate::syntax::ast;
 use crate::units::Unit;
 
 impl<'a> Resolver<'a> {
-    /// The campaign's rules to stop by; `None` where they are not in order.
+    /// The campaign's stopping rules; `None` if they have mistakes.
     pub(super) fn stop(&mut self, campaign: &'a ast::Campaign) -> Option<Vec<StopRule>> {
         let spans: Vec<_> = campaign.stops.iter().map(|stop| stop.span).collect();
         self.at_most_one(&spans, "stop");
         let Some(written) = campaign.stops.first() else { return Some(vec![]) };
         let time = self.single(&written.times, "time").map(|quantity| self.wall_time(quantity));
         let stagnation = self.single(&written.stagnations, "stagnation").map(|(count, quantity)| {
-            let generations = self.count(*count, 1, "a search stagnates over");
+            let generations = self.count(*count, 1, "the number of generations");
             let below = self.share(quantity, "the growth of a stagnating search");
             Some(StopRule::Stagnation { generations: generations?, below: below? })
         });
@@ -29,17 +29,17 @@ impl<'a> Resolver<'a> {
         if let Some((span, word)) = by_cells
             && campaign.coverages.is_empty()
             && !campaign.searches.is_empty()
-            && !campaign.unread
+            && !campaign.inherited_errors
         {
-            let diagnostic = Diagnostic::new(Code::NOTHING_TO_EXPLORE, span, format!("`{word}` has no cells to go by"));
-            self.report(diagnostic.label("add a `coverage`"));
+            let diagnostic = Diagnostic::new(Code::NOTHING_TO_EXPLORE, span, format!("`{word}` needs a `coverage`"));
+            self.report(diagnostic.label("add a `coverage`, whose cells are counted"));
             return None;
         }
         let rules = [time, stagnation, discovery, completeness];
         let none = rules.iter().all(Option::is_none);
-        if none && !written.damaged {
-            let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, written.span, "this `stop` lacks a rule")
-                .label("say when the search is to stop")
+        if none && !written.has_errors {
+            let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, written.span, "`stop` needs at least one rule")
+                .label("add a rule that says when the search stops")
                 .note("for example `stop { time 2h  stagnation 10 generations below 1% }`");
             self.report(diagnostic);
             return None;
@@ -48,11 +48,11 @@ impl<'a> Resolver<'a> {
     }
 
     fn wall_time(&mut self, quantity: &ast::Quantity) -> Option<StopRule> {
-        let seconds = self.value(quantity, Some(&Unit::seconds()), "the time a search may take")?;
+        let seconds = self.value(quantity, Some(&Unit::seconds()), "the time limit of a search")?;
         if seconds > 0.0 {
             return Some(StopRule::WallTime { seconds });
         }
-        let title = format!("a search cannot stop after `{}`", self.text(quantity.span));
+        let title = "the time limit of a search must be greater than 0s";
         self.report(Diagnostic::new(Code::OUT_OF_RANGE, quantity.span, title).label("expected more than 0s"));
         None
     }

@@ -40,13 +40,13 @@ impl<'a> Resolver<'a> {
             ast::Transport::InProcess(in_process) => {
                 let path = self.rust_path(&in_process.path);
                 let folder = self.single(&in_process.crates, "crate");
-                let step_ns = self.step_of(name, &in_process.steps, in_process.damaged);
+                let step_ns = self.step_of(name, &in_process.steps, in_process.has_errors);
                 let crate_folder = folder.map(|folder| folder.text.clone());
                 Transport::InProcess { path: path?, crate_folder, step_ns: step_ns? }
             }
             ast::Transport::Process(process) => {
                 let program = self.program(&process.program);
-                let step_ns = self.step_of(name, &process.steps, process.damaged);
+                let step_ns = self.step_of(name, &process.steps, process.has_errors);
                 // Empty texts were reported where they were read.
                 let arguments = process.arguments.iter().map(|argument| argument.text.clone()).collect();
                 Transport::Process { program: program?, arguments, step_ns: step_ns? }
@@ -55,16 +55,16 @@ impl<'a> Resolver<'a> {
         Some(Simulator { declaration: self.declaration(&simulator.head), transport })
     }
 
-    fn step_of(&mut self, name: &Name, steps: &'a [(Span, ast::Quantity)], damaged: bool) -> Option<u64> {
+    fn step_of(&mut self, name: &Name, steps: &'a [(Span, ast::Quantity)], has_errors: bool) -> Option<u64> {
         let step = self.single(steps, "step");
-        if step.is_none() && !damaged {
-            self.missing(name, "the time of one step", "step 20ms");
+        if step.is_none() && !has_errors {
+            self.missing(name, "its step size", "step 20ms");
         }
         self.step(step?)
     }
 
-    /// A program is one text and each argument another. A path may hold spaces; with them it begins like `./my robots/`,
-    /// so that a whole command line in one text is found out.
+    /// The program and each argument are texts of their own. A path with spaces must begin like `./my robots/`, so that a
+    /// whole command line in one text is recognised.
     pub(super) fn program(&mut self, program: &ast::Text) -> Option<String> {
         if program.text.trim().is_empty() {
             return None;
@@ -74,10 +74,10 @@ impl<'a> Resolver<'a> {
             return Some(program.text.clone());
         }
         let parts: Vec<String> = program.text.split_whitespace().map(|part| format!("\"{part}\"")).collect();
-        let title = format!("`{}` is not the name of a program", program.text);
+        let title = format!("`{}` is not a program", program.text);
         let diagnostic = Diagnostic::new(Code::BAD_PATH, program.span, title)
-            .label("the program is one text, each argument another; no shell reads them")
-            .suggest("write them one by one", program.span, parts.join(" "));
+            .label("write the program and each argument as a text of its own; no shell splits them")
+            .suggest("split the command into a program and its arguments", program.span, parts.join(" "));
         self.report(diagnostic);
         None
     }
@@ -97,7 +97,7 @@ impl<'a> Resolver<'a> {
         }
         let title = format!("`{}` is not the path of a Rust type", path.text);
         let diagnostic = Diagnostic::new(Code::BAD_PATH, path.span, title)
-            .label("expected crate and type, for example `kuka_cell_sim::Cell`");
+            .label("expected a crate and a type, for example `kuka_cell_sim::Cell`");
         self.report(diagnostic);
         None
     }
@@ -105,10 +105,10 @@ impl<'a> Resolver<'a> {
     fn step(&mut self, step: &ast::Quantity) -> Option<u64> {
         let nanoseconds = Unit::parse("ns").expect("`ns` is in the table");
         let seconds = Unit::seconds();
-        self.value(step, Some(&seconds), "the time of one step")?;
+        self.value(step, Some(&seconds), "a step size")?;
         let unit = step.unit.as_ref().and_then(|unit| Unit::parse(&unit.text).ok())?;
         let value = unit.convert(step.value, &nanoseconds);
-        // What is a whole number of nanoseconds in decimals may miss it by a rounding error.
+        // A whole number of nanoseconds in decimals may differ from it by a rounding error.
         let rounded = value.round();
         if (1.0..=3.6e12).contains(&rounded) && (value - rounded).abs() <= rounded * 1e-12 {
             #[expect(
@@ -118,8 +118,8 @@ impl<'a> Resolver<'a> {
             )]
             return Some(rounded as u64);
         }
-        let title = format!("`{}` cannot be the time of one step", self.text(step.span));
-        let label = "expected a whole number of nanoseconds, more than 0s, at most 1h";
+        let title = format!("`{}` is not a valid step size", self.text(step.span));
+        let label = "expected a whole number of nanoseconds from 1ns to 1h";
         self.report(Diagnostic::new(Code::OUT_OF_RANGE, step.span, title).label(label));
         None
     }
@@ -133,7 +133,7 @@ impl<'a> Resolver<'a> {
         for (id, &index) in order.iter().enumerate() {
             self.system.message_ids[index] = MessageId::from_index(id);
         }
-        // Of each message by its id, how many values it holds.
+        // The number of values of each message, by its id.
         let mut values: Vec<u64> = Vec::new();
         for &index in &order {
             let message = self.message(messages[index]).filter(|_| !cyclic[index]);
@@ -147,7 +147,7 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    /// Says that a message is too large, unless one in it is, of which that was said.
+    /// Reports a message that is too large, unless a message in it is too large and was reported.
     fn too_many_values(
         &mut self,
         message: &ast::Message,
@@ -160,16 +160,16 @@ impl<'a> Resolver<'a> {
             return;
         }
         let name = &message.head.name;
-        let title = format!("message `{}` holds {count} values, more than {MAX_VALUES}", name.text);
+        let title = format!("message `{}` has {count} values, but the limit is {MAX_VALUES}", name.text);
         let mut diagnostic = Diagnostic::new(Code::LARGE_MESSAGE, name.span, title)
-            .label("counting those of the messages in it")
-            .note("a `list of` messages counts as one of them");
+            .label("including the values of the messages in it")
+            .note("a list counts as one of its elements");
         let largest = fields.iter().max_by_key(|field| values_in(&field.ty, values));
         if let Some(field) = largest
             && values_in(&field.ty, values) > 1
         {
             let of = values_in(&field.ty, values);
-            diagnostic = diagnostic.also(field.declaration.span, format!("this field alone holds {of}"));
+            diagnostic = diagnostic.secondary(field.declaration.span, format!("this field alone has {of} values"));
         }
         self.report(diagnostic);
     }
@@ -202,7 +202,7 @@ impl<'a> Resolver<'a> {
             if marks[root] != Mark::New {
                 continue;
             }
-            // A stack of our own: a chain of messages may be as long as the file.
+            // An explicit stack: a chain of messages may be as long as the file.
             marks[root] = Mark::Open;
             let mut stack = vec![(root, 0)];
             while let Some((message, next)) = stack.pop() {
@@ -238,19 +238,19 @@ impl<'a> Resolver<'a> {
         let title = if cycle.len() == 1 {
             format!("message `{}` contains itself", first.text)
         } else {
-            let names: Vec<String> = cycle.iter().skip(1).map(|&index| format!("`{}`", name(index).text)).collect();
-            format!("message `{}` contains itself by way of {}", first.text, names.join(", "))
+            let through: Vec<&str> = cycle.iter().skip(1).map(|&index| name(index).text.as_str()).collect();
+            format!("message `{}` contains itself through {}", first.text, super::list(&through))
         };
         let diagnostic = Diagnostic::new(Code::RECURSIVE_MESSAGE, mention, title)
-            .label("its values would have no end")
-            .also(first.span, "declared here");
+            .label("a value of this type would be infinite")
+            .secondary(first.span, "declared here");
         self.report(diagnostic);
     }
 
     fn message(&mut self, message: &'a ast::Message) -> Option<model::Message> {
         let mut first: BTreeMap<&str, Span> = BTreeMap::new();
         let mut fields = Vec::new();
-        let mut complete = !message.damaged;
+        let mut complete = !message.has_errors;
         for field in &message.fields {
             let name = &field.head.name;
             if let Some(&before) = first.get(name.text.as_str()) {
@@ -264,7 +264,7 @@ impl<'a> Resolver<'a> {
                 None => complete = false,
             }
         }
-        if message.fields.is_empty() && !message.damaged {
+        if message.fields.is_empty() && !message.has_errors {
             self.missing(&message.head.name, "a field", "level: real[mm]");
             complete = false;
         }
@@ -279,11 +279,11 @@ impl<'a> Resolver<'a> {
         let without_unit = |resolver: &mut Self, found: Type| match &ty.unit {
             None => Some(found),
             Some(unit) => {
-                let title = format!("`{}` takes no unit", resolver.text(ty.span));
+                let title = format!("`{}` cannot have a unit", resolver.text(ty.span));
                 let brackets = Span { lo: unit.span.lo - 1, hi: unit.span.hi + 1, ..unit.span };
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, unit.span, title)
-                    .label("only `int`, `real` and `point` have units")
-                    .suggest("leave the unit out", brackets, "");
+                    .label("only `int`, `real` and `point` can have a unit")
+                    .suggest("remove the unit", brackets, "");
                 resolver.report(diagnostic);
                 None
             }
@@ -330,10 +330,12 @@ impl<'a> Resolver<'a> {
             .map(|(_, meant)| *meant)
             .or_else(|| most_similar(&name.text, messages.iter().copied().chain(SCALARS)));
         let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, format!("no type named `{}`", name.text))
-            .label("neither a message of this space nor a type of the language");
+            .label("not a built-in type and not a message of this space");
         diagnostic = match similar {
-            Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
-            None => diagnostic.note("types are `bool`, `int`, `real`, `text`, `point`, `list of …`, and messages"),
+            Some(similar) => diagnostic.did_you_mean(name.span, similar),
+            None => diagnostic.note(
+                "the types are `bool`, `int`, `real`, `text`, `point`, `list of …` and the messages of this space",
+            ),
         };
         self.report(diagnostic);
         None
@@ -348,10 +350,13 @@ impl<'a> Resolver<'a> {
             let members = self.topic_paths(&topic.path);
             for member in members.iter().flatten() {
                 if let Some(&first) = paths.get(member) {
-                    let diagnostic =
-                        Diagnostic::new(Code::SAME_PATH, topic.path.span, format!("path `{member}` has two topics"))
-                            .label("again here")
-                            .also(first, "first here");
+                    let diagnostic = Diagnostic::new(
+                        Code::SAME_PATH,
+                        topic.path.span,
+                        format!("two topics have the path `{member}`"),
+                    )
+                    .label("used again here")
+                    .secondary(first, "first used here");
                     self.report(diagnostic);
                 } else {
                     paths.insert(member.clone(), topic.path.span);
@@ -402,7 +407,7 @@ impl<'a> Resolver<'a> {
 
     // ----- fields
 
-    /// What a path leads to: its topic, and the type at its end. `None` was reported, here or before.
+    /// What a path refers to: its topic, and the type at its end. `None` was reported, here or before.
     pub(super) fn field(&mut self, path: &'a ast::Path) -> Option<(model::FieldPath, Type)> {
         let index = self.find(&path.topic, Kind::Topic)?;
         let topic = self.system.topics[index].as_ref()?;
@@ -416,7 +421,7 @@ impl<'a> Resolver<'a> {
         Some((model::FieldPath { topic: TopicId::from_index(index), fields }, ty))
     }
 
-    /// The type of a field of what `holder` has, which is of this type.
+    /// The type of a field of a value of this type; `holder` is that value in words.
     pub(super) fn field_in(&mut self, ty: &Type, holder: &str, name: &'a Name) -> Option<Type> {
         let Type::Message(id) = ty else {
             let title = format!("{holder} has no fields");
@@ -432,11 +437,11 @@ impl<'a> Resolver<'a> {
                 name.span,
                 format!("message `{}` has no field named `{}`", message.declaration.name, name.text),
             )
-            .label("no such field")
-            .also(message.declaration.span, "the message is declared here");
+            .label("unknown field")
+            .secondary(message.declaration.span, "the message is declared here");
             if self.compared.more(known.len()) {
                 diagnostic = match most_similar(&name.text, known.iter().copied()) {
-                    Some(similar) => diagnostic.suggest(format!("`{similar}` is"), name.span, similar),
+                    Some(similar) => diagnostic.did_you_mean(name.span, similar),
                     None => diagnostic.note(format!("its fields are {}", super::list(&known))),
                 };
             }
@@ -457,20 +462,17 @@ impl<'a> Resolver<'a> {
             Type::Int(unit) => Some((found, unit, true)),
             Type::Real(unit) => Some((found, unit, false)),
             other => {
-                let title = format!("{user} needs a number, but `{}` is not one", self.text(path.span));
-                let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, path.span, title)
-                    .label(format!("it is {}", type_in_words(&other)));
+                let is = type_in_words(&other);
+                let title = format!("{user} needs a number, but `{}` is {is}", self.text(path.span));
+                let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, path.span, title).label("expected a number");
                 if let Type::Message(id) = other
                     && let Some(message) = self.system.messages[id.index()].as_ref()
                 {
                     let numbers = message.fields.iter().filter(|it| matches!(it.ty, Type::Int(_) | Type::Real(_)));
                     for field in numbers.take(3) {
                         let name = &field.declaration.name;
-                        diagnostic = diagnostic.suggest(
-                            format!("its field `{name}` is a number"),
-                            path.span.end(),
-                            format!(".{name}"),
-                        );
+                        diagnostic =
+                            diagnostic.suggest(format!("use its field `{name}`"), path.span.end(), format!(".{name}"));
                     }
                 }
                 self.report(diagnostic);
@@ -480,16 +482,16 @@ impl<'a> Resolver<'a> {
     }
 }
 
-/// The most values that a message may hold: a runner has each message as one value of Rust.
+/// The most values that a message may have: a runner represents each message as one Rust value.
 const MAX_VALUES: u64 = 10_000;
 
-/// How many values a type holds, given those of messages by their ids.
+/// The number of values of a type, given those of messages by their ids.
 fn values_in(ty: &Type, messages: &[u64]) -> u64 {
     match ty {
         Type::Bool | Type::Int(_) | Type::Real(_) | Type::Text => 1,
         Type::Point(_) => 3,
         Type::List(of) => values_in(of, messages),
-        // Those that contain themselves have no order, and were reported.
+        // Messages that contain themselves have no order, and were reported.
         Type::Message(id) => messages.get(id.index()).copied().unwrap_or(0),
     }
 }
@@ -509,42 +511,46 @@ pub(super) fn type_in_words(ty: &Type) -> String {
         _ => String::new(),
     };
     match ty {
-        Type::Bool => "true or false".to_owned(),
-        Type::Int(it) => format!("a whole number{}", unit(it)),
+        Type::Bool => "a `bool`".to_owned(),
+        Type::Int(it) => format!("an integer{}", unit(it)),
         Type::Real(it) => format!("a number{}", unit(it)),
-        Type::Text => "a text".to_owned(),
+        Type::Text => "a `text`".to_owned(),
         Type::Point(it) => format!("a point{}", unit(it)),
         Type::List(_) => "a list".to_owned(),
         Type::Message(_) => "a message".to_owned(),
     }
 }
 
-/// Writes out a path with at most one group, `zones/{A,B}/level`.
+/// Expands a path with at most one group, `zones/{A,B}/level`.
 fn expand_group(path: &str) -> Result<Vec<String>, String> {
     if let Some(c) = path.chars().find(|c| c.is_whitespace() || c.is_control()) {
-        return Err(format!("a path holds no {}", if c == ' ' { "spaces".to_owned() } else { format!("{c:?}") }));
+        return Err(format!("a path cannot contain {}", if c == ' ' { "spaces".to_owned() } else { format!("{c:?}") }));
     }
     let Some((before, rest)) = path.split_once('{') else {
-        return if path.contains('}') { Err("`}` closes no group".to_owned()) } else { Ok(vec![path.to_owned()]) };
+        return if path.contains('}') {
+            Err("`}` without a matching `{`".to_owned())
+        } else {
+            Ok(vec![path.to_owned()])
+        };
     };
     if before.contains('}') {
-        return Err("`}` closes no group".to_owned());
+        return Err("`}` without a matching `{`".to_owned());
     }
-    let Some((group, after)) = rest.split_once('}') else { return Err("its group is not closed".to_owned()) };
+    let Some((group, after)) = rest.split_once('}') else { return Err("the group is not closed".to_owned()) };
     if group.contains('{') || after.contains(['{', '}']) {
-        return Err("a path has at most one group, as in `zones/{Z1,Z2}`".to_owned());
+        return Err("a path can have at most one group, as in `zones/{Z1,Z2}`".to_owned());
     }
     let members: Vec<&str> = group.split(',').collect();
     if members.contains(&"") {
-        return Err("a member of its group is empty".to_owned());
+        return Err("the group has an empty member".to_owned());
     }
     if let Some(member) = first_twice(&members) {
-        return Err(format!("its group has `{member}` twice"));
+        return Err(format!("the group lists `{member}` twice"));
     }
     Ok(members.into_iter().map(|member| format!("{before}{member}{after}")).collect())
 }
 
-/// The first that stands a second time.
+/// The first member that occurs a second time.
 fn first_twice<T: Hash + Eq>(members: &[T]) -> Option<&T> {
     let mut known = HashSet::with_capacity(members.len());
     members.iter().find(|&member| !known.insert(member))

@@ -8,7 +8,7 @@ use pest::error::Error;
 use pest::iterators::Pairs;
 use sesame_grammar::{Rule, SesameParser};
 
-use super::token::text_end;
+use super::text::text_end;
 
 /// Largest file, in bytes: more than a hundred thousand lines.
 pub const MAX_BYTES: usize = 8 << 20;
@@ -47,7 +47,7 @@ pub(super) fn too_deep(text: &str) -> Option<(usize, String)> {
             b'(' => {
                 parentheses += 1;
                 if parentheses > MAX_PARENTHESES {
-                    return Some((at, format!("parentheses are nested more than {MAX_PARENTHESES} deep")));
+                    return Some((at, format!("parentheses are nested more than {MAX_PARENTHESES} levels deep")));
                 }
                 at += 1;
             }
@@ -59,7 +59,7 @@ pub(super) fn too_deep(text: &str) -> Option<(usize, String)> {
                 depth += 1;
                 parentheses = 0;
                 if depth > MAX_BRACES {
-                    return Some((at, format!("blocks are nested more than {MAX_BRACES} deep")));
+                    return Some((at, format!("blocks are nested more than {MAX_BRACES} levels deep")));
                 }
                 at += 1;
             }

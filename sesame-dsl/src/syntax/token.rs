@@ -3,6 +3,7 @@
 use sesame_grammar::Rule;
 
 use super::limits::parse_bounded;
+use super::text::text_end;
 
 /// The token at or after an offset, comments skipped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,21 +66,6 @@ pub(crate) fn token_at(text: &str, offset: usize) -> Token<'_> {
 
 fn is_doc(text: &str) -> bool {
     text.starts_with("///") && !text.starts_with("////")
-}
-
-/// One past the closing quote of the text that begins at an offset; `None` when it does not end on its line.
-pub(super) fn text_end(text: &str, open: usize) -> Option<usize> {
-    let mut escaped = false;
-    for (offset, c) in text[open + 1..].char_indices() {
-        match c {
-            '\n' | '\r' => return None,
-            _ if escaped => escaped = false,
-            '\\' => escaped = true,
-            '"' => return Some(open + 1 + offset + 1),
-            _ => {}
-        }
-    }
-    None
 }
 
 /// Whether a word is reserved.

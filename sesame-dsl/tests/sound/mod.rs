@@ -3,6 +3,7 @@
 
 use sesame_dsl::diagnostic::{Diagnostic, render};
 use sesame_dsl::format::format;
+use sesame_dsl::index::Index;
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::{FileId, Span};
 use sesame_dsl::{Analysis, analyse, load_imports};
@@ -41,6 +42,20 @@ pub(crate) fn has_a_sound_answer(text: &str) -> (FileId, Analysis) {
         let text = sources.file(span.file).text();
         assert!(text.get(span.range()).is_some(), "{span:?} is not in the file");
     }
+    let Index { definitions, references, unread } = &analysis.index;
+    for definition in definitions {
+        assert_eq!(sources.snippet(definition.span), definition.name);
+        let within = definition.full_span.range();
+        assert!(sources.file(definition.span.file).text().get(within).is_some(), "{definition:?}");
+    }
+    for reference in references {
+        assert!(reference.within.0 < definitions.len(), "{reference:?}");
+        match reference.target {
+            Some(target) => assert_eq!(sources.snippet(reference.span), analysis.index.definition(target).name),
+            None => assert!(analysis.has_errors(), "`{}` does not resolve", sources.snippet(reference.span)),
+        }
+    }
+    assert!(unread.is_empty() || analysis.has_errors());
     render::human(&analysis.diagnostics, &sources, true);
     assert_eq!(render::short(&analysis.diagnostics, &sources).lines().count(), analysis.diagnostics.len());
     assert_eq!(render::json(&analysis.diagnostics, &sources).lines().count(), analysis.diagnostics.len());

@@ -1,8 +1,8 @@
-//! For GitHub: commands that a workflow prints, and that become annotations at lines of a pull request.
+//! For GitHub: workflow commands, which become annotations in a pull request.
 
 use std::fmt::Write as _;
 
-use super::for_terminals;
+use super::terminal::for_terminals;
 use crate::diagnostic::{Diagnostic, Severity, visible};
 use crate::source::SourceMap;
 
@@ -18,7 +18,7 @@ pub fn github(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
         };
         write!(out, "::{severity} file={},line={},col={}", property(&visible(file.name())), start.line, start.column)
             .expect("a string takes everything");
-        // Columns say where a stretch ends only if it ends on its line; the last is inclusive.
+        // GitHub accepts columns only if the span ends on the line it begins on; the end column is inclusive.
         if start.line == end.line && start.column < end.column {
             write!(out, ",endColumn={}", end.column - 1).expect("a string takes everything");
         } else if start.line < end.line {
@@ -36,12 +36,12 @@ pub fn github(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
     out
 }
 
-/// Text that stays a command's message.
+/// A text escaped as the message of a command.
 fn message(text: &str) -> String {
     text.replace('%', "%25").replace('\r', "%0D").replace('\n', "%0A")
 }
 
-/// Text that stays a property of a command.
+/// A text escaped as a property of a command.
 fn property(text: &str) -> String {
     message(text).replace(':', "%3A").replace(',', "%2C")
 }

@@ -4,25 +4,25 @@ use std::ops::Range;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Patch, Renderer, Snippet};
 
-use super::for_terminals;
+use super::terminal::for_terminals;
 use crate::diagnostic::{Diagnostic, Severity, hidden, visible};
 use crate::source::{SourceFile, SourceMap};
 use crate::span::Span;
 
-/// The most bytes of lines that a suggestion is shown in; of longer ones its words have to do.
+/// The most bytes of source lines that a suggestion shows; a longer one is shown as its message only.
 const LONGEST_PATCH: usize = 4096;
 
-/// Diagnostics with the source lines they speak of, an empty line between two; ends with a newline if there is any.
+/// Diagnostics with the source lines they refer to, separated by empty lines; ends with a newline if there is any.
 pub fn human(diagnostics: &[Diagnostic], sources: &SourceMap, colour: bool) -> String {
     let renderer = if colour { Renderer::styled() } else { Renderer::plain() };
     let rendered: Vec<String> =
         diagnostics.iter().map(|diagnostic| one(&for_terminals(diagnostic), sources, &renderer)).collect();
-    // The renderer replaces most of what a terminal obeys in source lines, but not all. Colours are its own.
+    // The renderer replaces most control characters in source lines, but not all. Colours are its own.
     rendered.join("\n").chars().map(|c| if hidden(c) && !(colour && c == '\x1b') { '\u{fffd}' } else { c }).collect()
 }
 
-/// The lines of a file that hold some spans. The renderer looks at all that it is given, and there may be many
-/// diagnostics of a large file.
+/// The lines of a file that contain some spans. The renderer reads everything that it is given, and a large file may
+/// have many diagnostics.
 struct Excerpt<'a> {
     file: &'a SourceFile,
     lines: Range<usize>,

@@ -8,7 +8,7 @@ use crate::diagnostic::{Diagnostic, Severity, hidden};
 use crate::source::SourceMap;
 use crate::span::Span;
 
-/// Where something stands: bytes from 0, lines and columns (in characters) from 1; the end is exclusive.
+/// A place in a file: bytes from 0, lines and columns (in characters) from 1; the end is exclusive.
 #[derive(Serialize)]
 struct Place<'a> {
     file: &'a str,
@@ -87,7 +87,7 @@ pub fn json(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
                 })
                 .collect(),
         };
-        // JSON's own escapes leave some signs as they are that a terminal obeys. They are nowhere but in texts.
+        // JSON leaves some characters unescaped that a terminal interprets. They occur only in texts.
         for c in serde_json::to_string(&line).expect("strings and numbers serialise").chars() {
             if hidden(c) {
                 write!(out, "\\u{:04x}", u32::from(c)).expect("a string takes everything");

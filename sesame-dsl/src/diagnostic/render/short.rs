@@ -1,6 +1,6 @@
-//! For one-line tools: `file:line:column: error[E0203]: title: label`.
+//! For line-based tools: `file:line:column: error[E0203]: title: label`.
 
-use super::for_terminals;
+use super::terminal::for_terminals;
 use crate::diagnostic::{Diagnostic, Severity, visible};
 use crate::source::SourceMap;
 

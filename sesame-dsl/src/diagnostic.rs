@@ -1,0 +1,149 @@
+//! What is wrong with a file, as data; [`render`] turns it into text.
+//!
+//! A diagnostic stands for one mistake. Its title says which rule is broken, the primary label adds what the title cannot
+//! know (what was found, what was expected), and suggestions are patches that can be applied as they are.
+
+mod code;
+pub mod render;
+
+use std::borrow::Cow;
+
+pub use code::{CODES, Code, Severity, page};
+
+use crate::span::Span;
+
+/// One mistake, or one thing worth a warning.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// Which kind of mistake; decides the severity.
+    pub code: Code,
+    /// What is wrong: lower case, names in backquotes, no final dot.
+    pub title: String,
+    /// Where.
+    pub span: Span,
+    /// What was found or expected there; may be empty.
+    pub label: String,
+    /// Other places that matter, for example where a name was first defined.
+    pub secondary: Vec<(Span, String)>,
+    /// Further explanations.
+    pub notes: Vec<String>,
+    /// Possible fixes, best first.
+    pub suggestions: Vec<Suggestion>,
+}
+
+/// A possible fix: a message, and the edits that apply it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Suggestion {
+    /// What to do: an imperative or a question that makes sense without the diagnostic around it, because some renderers
+    /// print it alone.
+    pub message: String,
+    /// What to replace with what. Spans do not overlap.
+    pub edits: Vec<(Span, String)>,
+}
+
+impl Diagnostic {
+    /// A diagnostic without label, notes or suggestions.
+    pub fn new(code: Code, span: Span, title: impl Into<String>) -> Self {
+        Diagnostic {
+            code,
+            title: shortened(one_line(&title.into())),
+            span,
+            label: String::new(),
+            secondary: Vec::new(),
+            notes: Vec::new(),
+            suggestions: Vec::new(),
+        }
+    }
+
+    /// With this label at the primary span.
+    pub fn label(mut self, label: impl Into<String>) -> Self {
+        self.label = shortened(one_line(&label.into()));
+        self
+    }
+
+    /// With another place that is involved in the mistake.
+    pub fn secondary(mut self, span: Span, label: impl Into<String>) -> Self {
+        self.secondary.push((span, shortened(one_line(&label.into()))));
+        self
+    }
+
+    /// With a note.
+    pub fn note(mut self, note: impl Into<String>) -> Self {
+        self.notes.push(shortened(note.into()));
+        self
+    }
+
+    /// With a suggestion that replaces one span.
+    pub fn suggest(mut self, message: impl Into<String>, span: Span, replacement: impl Into<String>) -> Self {
+        self.suggestions
+            .push(Suggestion { message: shortened(message.into()), edits: vec![(span, replacement.into())] });
+        self
+    }
+
+    /// With the suggestion to write a name that looks like the one at `span`.
+    pub fn did_you_mean(self, span: Span, meant: impl Into<String>) -> Self {
+        let meant = meant.into();
+        self.suggest(format!("did you mean `{meant}`?"), span, meant)
+    }
+
+    /// Error or warning.
+    pub fn severity(&self) -> Severity {
+        self.code.severity()
+    }
+}
+
+/// A text that quotes source text may contain its line breaks; titles and labels are one line.
+fn one_line(text: &str) -> String {
+    if text.contains(['\n', '\r']) { text.split_whitespace().collect::<Vec<_>>().join(" ") } else { text.to_owned() }
+}
+
+/// The most characters of one sentence.
+const LONGEST: usize = 1000;
+
+/// A sentence short enough to read, even if it quotes a long text: of more than a thousand characters, the beginning and
+/// the end are kept.
+pub fn shortened(text: String) -> String {
+    if text.len() <= LONGEST {
+        return text;
+    }
+    let nth = |n| text.char_indices().nth(n).map_or(text.len(), |(at, _)| at);
+    let nth_last = |n| text.char_indices().rev().nth(n).map_or(0, |(at, _)| at);
+    let (from, to) = (nth(LONGEST * 2 / 3), nth_last(LONGEST / 3));
+    if from < to { format!("{} … {}", &text[..from], &text[to..]) } else { text }
+}
+
+/// A text without characters that a terminal interprets or that change the direction of the text after them: control
+/// characters other than line feeds and tabs, and direction marks. Each is replaced by U+FFFD.
+pub fn visible(text: &str) -> Cow<'_, str> {
+    if !text.contains(hidden) {
+        return Cow::Borrowed(text);
+    }
+    Cow::Owned(text.chars().map(|c| if hidden(c) { '\u{fffd}' } else { c }).collect())
+}
+
+/// Whether a terminal interprets a character, or it changes the direction of the text after it.
+fn hidden(c: char) -> bool {
+    (c.is_control() && !matches!(c, '\n' | '\t'))
+        || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sentence_that_quotes_a_megabyte_is_short_and_keeps_both_ends() {
+        let text = format!("`{}` is not a unit", "µ".repeat(1 << 20));
+        let short = shortened(text);
+        assert_eq!(short.chars().count(), 666 + 3 + 334);
+        assert!(short.starts_with("`µµ") && short.contains("µ … µ") && short.ends_with("µ` is not a unit"));
+        let long = "µ".repeat(600);
+        assert_eq!(shortened(long.clone()), long, "the limit counts characters, not bytes");
+    }
+
+    #[test]
+    fn what_commands_a_terminal_is_replaced_and_all_else_stays() {
+        assert_eq!(visible("a\x1b[31mb\r\u{9b}\u{7f}\u{0}\u{202e}c\n\td µ🤖"), "a�[31mb�����c\n\td µ🤖");
+        assert!(matches!(visible("space a\n"), Cow::Borrowed(_)));
+    }
+}

@@ -1,0 +1,505 @@
+//! From syntax to the index: first all definitions, then what mentions them.
+//!
+//! Files are taken apart field by field where they hold names, so that a new one cannot be forgotten.
+
+use std::collections::BTreeMap;
+
+use super::{Definition, DefinitionId, Index, Kind, Reference};
+use crate::import::Merged;
+use crate::span::{FileId, Span};
+use crate::syntax::ast::eddi::Eddi;
+use crate::syntax::ast::physical::Physical;
+use crate::syntax::ast::{
+    self, Activation, ActivationMode, Campaign, Contained, Expression, ExpressionKind, Formula, FormulaKind, Head,
+    Metric, MetricSource, Name, Operation, OperationBody, OperationKind, Path, Step, System, Test, TriggerEnd, Type,
+    TypeKind,
+};
+
+/// Makes the index of what was read.
+pub(crate) fn index(merged: &Merged) -> Index {
+    let ast::File {
+        spaces,
+        imports: _,
+        systems,
+        metrics,
+        requirements,
+        operations,
+        tests,
+        campaigns,
+        eddis,
+        physicals,
+        undeclared,
+        has_errors: _,
+        incomplete: _,
+    } = &merged.file;
+    let mut indexer = Indexer::default();
+    // Definitions come first: what is mentioned may be declared later.
+    for head in spaces {
+        indexer.declare(Kind::Space, head);
+    }
+    let systems: Vec<_> = systems.iter().map(|system| (system, indexer.declare_system(system))).collect();
+    let metrics: Vec<_> = metrics.iter().map(|it| (it, indexer.declare(Kind::Metric, &it.head))).collect();
+    let requirements: Vec<_> =
+        requirements.iter().map(|it| (it, indexer.declare(Kind::Requirement, &it.head))).collect();
+    let operations: Vec<_> = operations.iter().map(|it| (it, indexer.declare_operation(it))).collect();
+    let tests: Vec<_> = tests.iter().map(|it| (it, indexer.declare(Kind::Test, &it.head))).collect();
+    let campaigns: Vec<_> = campaigns.iter().map(|it| (it, indexer.declare(Kind::Campaign, &it.head))).collect();
+    let eddis: Vec<_> = eddis.iter().map(|it| (it, indexer.declare_eddi(it))).collect();
+    let physicals: Vec<_> = physicals.iter().map(|it| (it, indexer.declare_physical(it))).collect();
+    indexer.settle(&merged.ranks);
+
+    for (system, ids) in &systems {
+        indexer.system(system, ids);
+    }
+    for (metric, id) in metrics {
+        indexer.metric(metric, id);
+    }
+    for (requirement, id) in requirements {
+        indexer.mention(&requirement.metric, id);
+    }
+    for (operation, id) in operations {
+        indexer.operation(operation, id);
+    }
+    for (test, id) in tests {
+        indexer.test(test, id);
+    }
+    for (campaign, id) in campaigns {
+        indexer.campaign(campaign, id);
+    }
+    for (eddi, id) in eddis {
+        indexer.eddi(eddi, id);
+    }
+    for (physical, id) in physicals {
+        indexer.physical(physical, id);
+    }
+    let mut index = indexer.sorted(&merged.ranks);
+    index.unread = undeclared.iter().map(|name| (name.text.clone(), name.span)).collect();
+    index
+}
+
+/// The ids of what a system declares, in the order of its lists.
+struct SystemIds {
+    simulators: Vec<DefinitionId>,
+    messages: Vec<DefinitionId>,
+    topics: Vec<DefinitionId>,
+    nodes: Vec<DefinitionId>,
+}
+
+#[derive(Default)]
+struct Indexer<'a> {
+    index: Index,
+    /// The first definition of each name that the whole space knows.
+    names: BTreeMap<&'a str, DefinitionId>,
+    /// The names that are known inside of a definition only.
+    members: BTreeMap<(DefinitionId, &'a str), DefinitionId>,
+    /// The types of topics and fields.
+    types: BTreeMap<DefinitionId, &'a Type>,
+    /// The names of the space, which are not settled before all are there.
+    heads: Vec<(&'a Name, DefinitionId)>,
+}
+
+impl<'a> Indexer<'a> {
+    fn add(
+        &mut self,
+        kind: Kind,
+        name: &'a Name,
+        full_span: Span,
+        doc: &str,
+        owner: Option<DefinitionId>,
+    ) -> DefinitionId {
+        let id = DefinitionId(self.index.definitions.len());
+        self.index.definitions.push(Definition {
+            name: name.text.clone(),
+            kind,
+            span: name.span,
+            full_span,
+            doc: doc.to_owned(),
+            owner,
+        });
+        id
+    }
+
+    /// A name that the whole space knows.
+    fn declare(&mut self, kind: Kind, head: &'a Head) -> DefinitionId {
+        let id = self.add(kind, &head.name, head.full_span, &head.doc, None);
+        if kind != Kind::Space {
+            self.heads.push((&head.name, id));
+        }
+        id
+    }
+
+    /// A name that is known inside of its owner only.
+    fn declare_member(&mut self, kind: Kind, head: &'a Head, owner: DefinitionId) -> DefinitionId {
+        let id = self.add(kind, &head.name, head.full_span, &head.doc, Some(owner));
+        self.members.entry((owner, &head.name.text)).or_insert(id);
+        id
+    }
+
+    fn declare_system(&mut self, system: &'a System) -> SystemIds {
+        let System { simulators, messages, topics, nodes, .. } = system;
+        let simulators = simulators.iter().map(|it| self.declare(Kind::Simulator, &it.head)).collect();
+        let mut message_ids = Vec::new();
+        for message in messages {
+            let id = self.declare(Kind::Message, &message.head);
+            message_ids.push(id);
+            for field in &message.fields {
+                let field_id = self.declare_member(Kind::Field, &field.head, id);
+                self.types.insert(field_id, &field.ty);
+            }
+        }
+        let mut topic_ids = Vec::new();
+        for topic in topics {
+            let id = self.declare(Kind::Topic, &topic.head);
+            self.types.insert(id, &topic.ty);
+            topic_ids.push(id);
+        }
+        let nodes = nodes.iter().map(|it| self.declare(Kind::Node, &it.head)).collect();
+        SystemIds { simulators, messages: message_ids, topics: topic_ids, nodes }
+    }
+
+    fn declare_operation(&mut self, operation: &'a Operation) -> DefinitionId {
+        let id = self.declare(Kind::Operation, &operation.head);
+        if let Some(OperationKind::Custom(custom)) = operation.body.as_ref().map(|body| &body.kind) {
+            for parameter in &custom.parameters {
+                let full_span = parameter.name.span.to(parameter.span);
+                let parameter_id = self.add(Kind::Parameter, &parameter.name, full_span, &parameter.doc, Some(id));
+                self.members.entry((id, &parameter.name.text)).or_insert(parameter_id);
+            }
+        }
+        id
+    }
+
+    fn declare_eddi(&mut self, eddi: &'a Eddi) -> DefinitionId {
+        let Eddi { head, publishes: _, demands, evidence, guarantees, otherwise, has_errors: _ } = eddi;
+        let id = self.declare(Kind::Monitor, head);
+        let demands = demands.iter().map(|it| (Kind::Demand, &it.head));
+        let evidence = evidence.iter().map(|it| (Kind::Evidence, &it.head));
+        let guarantees = guarantees.iter().map(|it| (Kind::Guarantee, &it.head));
+        let otherwise = otherwise.iter().map(|(_, it)| (Kind::Guarantee, &it.head));
+        for (kind, head) in demands.chain(evidence).chain(guarantees).chain(otherwise) {
+            self.declare_member(kind, head, id);
+        }
+        id
+    }
+
+    fn declare_physical(&mut self, lab: &'a Physical) -> DefinitionId {
+        let id = self.declare(Kind::Lab, &lab.head);
+        for (_, simulator) in &lab.simulators {
+            self.declare_member(Kind::Simulator, &simulator.head, id);
+        }
+        for shape in &lab.shapes {
+            self.declare_member(Kind::Shape, &shape.head, id);
+        }
+        id
+    }
+
+    /// Of several definitions of one name the first counts, as in resolution.
+    fn settle(&mut self, ranks: &BTreeMap<FileId, usize>) {
+        let mut heads = std::mem::take(&mut self.heads);
+        heads.sort_by_key(|(name, _)| (ranks.get(&name.span.file).copied(), name.span));
+        for (name, id) in heads {
+            self.names.entry(&name.text).or_insert(id);
+        }
+    }
+
+    // ----- references
+
+    fn refer(&mut self, span: Span, target: Option<DefinitionId>, within: DefinitionId) {
+        self.index.references.push(Reference { span, target, within });
+    }
+
+    fn mention(&mut self, name: &'a Name, within: DefinitionId) -> Option<DefinitionId> {
+        let target = self.names.get(name.text.as_str()).copied();
+        self.refer(name.span, target, within);
+        target
+    }
+
+    fn mention_all(&mut self, lists: &'a [(Span, Vec<Name>)], within: DefinitionId) {
+        for name in lists.iter().flat_map(|(_, names)| names) {
+            self.mention(name, within);
+        }
+    }
+
+    /// A field of what a topic or field carries.
+    fn field(&mut self, of: Option<DefinitionId>, name: &'a Name, within: DefinitionId) -> Option<DefinitionId> {
+        let mut ty = self.types.get(&of?).copied();
+        while let Some(TypeKind::List(inner)) = ty.map(|ty| &ty.kind) {
+            ty = Some(inner);
+        }
+        let target = match &ty?.kind {
+            TypeKind::Message(message) => {
+                let message = self.names.get(message.text.as_str()).copied();
+                message.and_then(|message| self.members.get(&(message, name.text.as_str())).copied())
+            }
+            _ => None,
+        };
+        self.refer(name.span, target, within);
+        target
+    }
+
+    fn path(&mut self, path: &'a Path, within: DefinitionId) {
+        let mut target = self.mention(&path.topic, within);
+        for field in &path.fields {
+            target = self.field(target, field, within);
+        }
+    }
+
+    fn type_of(&mut self, ty: &'a Type, within: DefinitionId) {
+        let mut ty = ty;
+        while let TypeKind::List(inner) = &ty.kind {
+            ty = inner;
+        }
+        if let TypeKind::Message(name) = &ty.kind {
+            self.mention(name, within);
+        }
+    }
+
+    fn expression(&mut self, expression: &'a Expression, within: DefinitionId) {
+        match &expression.kind {
+            ExpressionKind::Number(_) | ExpressionKind::Truth(_) => {}
+            ExpressionKind::Field(path) if path.fields.is_empty() => {
+                // Inside of a monitor its own names come first.
+                let own = self.members.get(&(within, path.topic.text.as_str())).copied();
+                match own {
+                    Some(own) => self.refer(path.topic.span, Some(own), within),
+                    None => self.path(path, within),
+                }
+            }
+            ExpressionKind::Field(path) | ExpressionKind::Members(_, _, path) => self.path(path, within),
+            ExpressionKind::Negate(of) | ExpressionKind::Prefixed(_, of) => self.expression(of, within),
+            ExpressionKind::Sum(parts) | ExpressionKind::Product(parts) => {
+                for (_, part) in parts {
+                    self.expression(part, within);
+                }
+            }
+            ExpressionKind::All(parts) | ExpressionKind::Any(parts) | ExpressionKind::Call(_, parts) => {
+                for part in parts {
+                    self.expression(part, within);
+                }
+            }
+            ExpressionKind::Compare(left, _, right)
+            | ExpressionKind::Until(left, _, right)
+            | ExpressionKind::Implies(left, right) => {
+                self.expression(left, within);
+                self.expression(right, within);
+            }
+        }
+    }
+
+    fn system(&mut self, system: &'a System, ids: &SystemIds) {
+        let System {
+            span: _,
+            simulators: _,
+            messages,
+            topics,
+            nodes,
+            launches,
+            terminates: _,
+            relay_budgets: _,
+            has_errors: _,
+        } = system;
+        for (message, &id) in messages.iter().zip(&ids.messages) {
+            for field in &message.fields {
+                self.type_of(&field.ty, id);
+            }
+        }
+        for (topic, &id) in topics.iter().zip(&ids.topics) {
+            self.type_of(&topic.ty, id);
+        }
+        for (node, &id) in nodes.iter().zip(&ids.nodes) {
+            self.mention_all(&node.publishes, id);
+            self.mention_all(&node.subscribes, id);
+        }
+        for (_, ready) in launches.iter().flat_map(|(_, launch)| &launch.ready) {
+            // What is launched has no name of its own; it is the simulator's system.
+            let Some(&within) = ids.simulators.first() else { continue };
+            self.mention(&ready.topic, within);
+        }
+    }
+
+    fn metric(&mut self, metric: &'a Metric, id: DefinitionId) {
+        let Metric { head: _, ty, directions: _, defaults: _, initials: _, trends: _, accepts: _, source } = metric;
+        if let Some(ty) = ty {
+            self.type_of(ty, id);
+        }
+        match source {
+            MetricSource::Hook { hooks, has_errors: _ } => self.mention_all(hooks, id),
+            MetricSource::FuzzingTime => {}
+            MetricSource::Formula(formula) => {
+                let Formula { kind, when, every: _, per, outbound: _, whole: _ } = &**formula;
+                match kind {
+                    FormulaKind::WhenThen(condition, value) => {
+                        self.expression(condition, id);
+                        self.expression(value, id);
+                    }
+                    FormulaKind::Plain(expression) => self.expression(expression, id),
+                }
+                for (_, condition) in when {
+                    self.expression(condition, id);
+                }
+                for (_, path) in per {
+                    self.path(path, id);
+                }
+            }
+        }
+    }
+
+    fn operation(&mut self, operation: &'a Operation, id: DefinitionId) {
+        let Some(body) = &operation.body else { return };
+        let OperationBody { target, from, to, kind: _, within: _, priority: _, inclusion: _, untimed: _, contains } =
+            body;
+        for place in target.iter().flat_map(|target| &target.places) {
+            let mut target = self.mention(&place.topic, id);
+            for step in &place.steps {
+                if let Step::Field(name) = step {
+                    target = self.field(target, name, id);
+                }
+            }
+        }
+        for (_, names) in from.iter().chain(to) {
+            for name in names {
+                self.mention(name, id);
+            }
+        }
+        for contained in contains.iter().flat_map(|(_, contained)| contained) {
+            if let Contained::Variable(name) = contained {
+                self.mention(name, id);
+            }
+        }
+    }
+
+    fn test(&mut self, test: &'a Test, id: DefinitionId) {
+        let Test { head: _, operations, expectations, has_errors: _ } = test;
+        for used in operations {
+            let operation = self.mention(&used.operation, id);
+            for (name, _) in &used.choices {
+                // Parameters of other kinds of operations are words of the language.
+                let own = operation.and_then(|operation| self.members.get(&(operation, name.text.as_str())).copied());
+                if own.is_some() {
+                    self.refer(name.span, own, id);
+                }
+            }
+            if let Activation::Trigger(trigger) = &used.activation {
+                self.expression(&trigger.start, id);
+                if let TriggerEnd::Until(condition) = &trigger.end {
+                    self.expression(condition, id);
+                }
+            }
+        }
+        for expectation in expectations {
+            self.mention(&expectation.metric, id);
+        }
+    }
+
+    fn campaign(&mut self, campaign: &'a Campaign, id: DefinitionId) {
+        let Campaign {
+            head: _,
+            from,
+            inherited: _,
+            objectives,
+            observes,
+            operations,
+            activates,
+            searches: _,
+            // Dimensions are words of the language.
+            coverages: _,
+            explorations: _,
+            confirms: _,
+            stops: _,
+            repeats,
+            passives: _,
+            ends: _,
+            records: _,
+            has_errors: _,
+            inherited_errors: _,
+        } = campaign;
+        if let Some(name) = from {
+            self.mention(name, id);
+        }
+        self.mention_all(objectives, id);
+        self.mention_all(observes, id);
+        for name in operations.iter().flat_map(|clause| &clause.names) {
+            self.mention(name, id);
+        }
+        for (_, mode) in activates {
+            if let ActivationMode::Condition(condition) = mode {
+                for name in &condition.variables {
+                    self.mention(name, id);
+                }
+            }
+        }
+        for repeat in repeats {
+            self.mention(&repeat.test, id);
+        }
+    }
+
+    fn eddi(&mut self, eddi: &'a Eddi, id: DefinitionId) {
+        let Eddi { head: _, publishes, demands, evidence, guarantees, otherwise, has_errors: _ } = eddi;
+        self.mention(publishes, id);
+        for demand in demands {
+            // A demand has the name of a guarantee of the other monitor.
+            if let Some(other) = self.mention(&demand.eddi, id) {
+                let guarantee = self.members.get(&(other, demand.head.name.text.as_str())).copied();
+                self.refer(demand.head.name.span, guarantee, id);
+            }
+        }
+        for expression in evidence.iter().map(|it| &it.condition).chain(guarantees.iter().map(|it| &it.gate)) {
+            self.expression(expression, id);
+        }
+        for (path, _) in otherwise.iter().filter_map(|(_, it)| it.mitigation.as_ref()) {
+            self.path(path, id);
+        }
+    }
+
+    fn physical(&mut self, lab: &'a Physical, id: DefinitionId) {
+        let Physical {
+            head: _,
+            simulators: _,
+            repeats: _,
+            costs: _,
+            excludes,
+            ranks,
+            // Dimensions are words of the language.
+            budgets: _,
+            tolerances,
+            interlocks,
+            shapes: _,
+            fits: _,
+            has_errors: _,
+        } = lab;
+        let excluded = excludes.iter().map(|(name, _)| name);
+        let ranked = ranks.iter().flat_map(|(_, keys)| keys).map(|(name, _)| name);
+        let tolerated = tolerances.iter().flat_map(|(_, metrics)| metrics).map(|(name, _)| name);
+        for name in excluded.chain(ranked).chain(tolerated) {
+            self.mention(name, id);
+        }
+        self.mention_all(interlocks, id);
+    }
+
+    // ----- order
+
+    /// The index with its definitions in the order of declarations, and its references by place.
+    fn sorted(self, ranks: &BTreeMap<FileId, usize>) -> Index {
+        let Index { definitions, mut references, unread } = self.index;
+        let place = |span: Span| (ranks.get(&span.file).copied(), span);
+        let mut order: Vec<usize> = (0..definitions.len()).collect();
+        order.sort_by_key(|&at| place(definitions[at].span));
+        let mut now = vec![0; order.len()];
+        for (at, &before) in order.iter().enumerate() {
+            now[before] = at;
+        }
+        let moved = |id: DefinitionId| DefinitionId(now[id.0]);
+        for reference in &mut references {
+            reference.target = reference.target.map(moved);
+            reference.within = moved(reference.within);
+        }
+        references.sort_by_key(|reference| place(reference.span));
+        let mut sorted: Vec<(usize, Definition)> = now.iter().copied().zip(definitions).collect();
+        sorted.sort_by_key(|(at, _)| *at);
+        let definitions = sorted
+            .into_iter()
+            .map(|(_, definition)| Definition { owner: definition.owner.map(moved), ..definition })
+            .collect();
+        Index { definitions, references, unread }
+    }
+}

@@ -1,0 +1,154 @@
+//! Conditions in formulas: true or false at one moment.
+
+use std::cmp::Ordering;
+
+use super::{Kind, Resolver};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::model::{Comparison, Condition, Expression, Id as _, Input, Type};
+use crate::span::Span;
+use crate::syntax::ast::{self, ExpressionKind, Path, PrefixWord, Relation};
+
+impl<'a> Resolver<'a> {
+    pub(super) fn condition(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<Condition> {
+        match &expression.kind {
+            ExpressionKind::Truth(value) => Some(Condition::Constant(*value)),
+            ExpressionKind::All(parts) => self.conditions(inputs, parts).map(Condition::All),
+            ExpressionKind::Any(parts) => self.conditions(inputs, parts).map(Condition::Any),
+            ExpressionKind::Compare(left, comparison, right) => {
+                let comparison = relation(*comparison);
+                let equality = matches!(comparison, Comparison::Equal | Comparison::NotEqual);
+                if equality && self.is_condition(left) && self.is_condition(right) {
+                    let left = self.condition(inputs, left);
+                    let right = self.condition(inputs, right);
+                    let same = Condition::Same { left: Box::new(left?), right: Box::new(right?) };
+                    return Some(if comparison == Comparison::Equal { same } else { Condition::Not(Box::new(same)) });
+                }
+                let (sides, _) = self.common(inputs, &[left, right])?;
+                let [left, right] = <[Expression; 2]>::try_from(sides).expect("two parts give two numbers");
+                self.one_outcome(expression, &left, comparison, &right);
+                Some(Condition::Compare { left, by: comparison, right })
+            }
+            ExpressionKind::Field(_) | ExpressionKind::Members(..) if self.is_condition(expression) => {
+                self.truth(inputs, expression).map(Condition::Input)
+            }
+            ExpressionKind::Prefixed(prefixes, of) => {
+                if let Some(prefix) = prefixes.iter().find(|prefix| prefix.word != PrefixWord::Not) {
+                    self.of_one_moment(prefix.span);
+                    return None;
+                }
+                let of = self.condition(inputs, of)?;
+                Some(if prefixes.len() % 2 == 1 { Condition::Not(Box::new(of)) } else { of })
+            }
+            ExpressionKind::Implies(premise, conclusion) => {
+                let premise = self.condition(inputs, premise);
+                let conclusion = self.condition(inputs, conclusion);
+                Some(Condition::Any(vec![Condition::Not(Box::new(premise?)), conclusion?]))
+            }
+            ExpressionKind::Until(_, until, _) => {
+                self.of_one_moment(until.span);
+                None
+            }
+            _ => {
+                // Mistakes in the number itself come first.
+                let before = self.diagnostics.len();
+                self.number(inputs, expression);
+                if self.diagnostics.len() == before {
+                    let title = format!("`{}` is a number, but a condition is needed", self.text(expression.span));
+                    let diagnostic = Diagnostic::new(Code::WRONG_TYPE, expression.span, title);
+                    self.report(diagnostic.label("expected a comparison such as `link0 > 2.5rad`"));
+                }
+                None
+            }
+        }
+    }
+
+    /// Warns of a comparison whose outcome no message can change.
+    fn one_outcome(&mut self, whole: &ast::Expression, left: &Expression, by: Comparison, right: &Expression) {
+        let (order, why) = match (left, right) {
+            (Expression::Constant(left), Expression::Constant(right)) => (left.partial_cmp(right), "two constants"),
+            _ if left == right => (Some(Ordering::Equal), "a value with itself"),
+            _ => return,
+        };
+        let holds = order.is_some_and(|order| match by {
+            Comparison::AtMost => order.is_le(),
+            Comparison::Below => order.is_lt(),
+            Comparison::AtLeast => order.is_ge(),
+            Comparison::Above => order.is_gt(),
+            Comparison::Equal => order.is_eq(),
+            Comparison::NotEqual => order.is_ne(),
+        });
+        let title = format!("`{}` compares {why}", self.text(whole.span));
+        let label = if holds { "always true" } else { "always false" };
+        self.report(Diagnostic::new(Code::ONE_OUTCOME, whole.span, title).label(label));
+    }
+
+    fn of_one_moment(&mut self, word: Span) {
+        let word_text = self.text(word);
+        let title = format!("`{word_text}` is only allowed inside `robustness(…)`");
+        let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, word, title)
+            .label("temporal operator outside `robustness(…)`")
+            .note("for example `robustness(always zones.level > 0mm)`");
+        self.report(diagnostic);
+    }
+
+    /// The position of a `bool` input, which the expression is according to [`Self::is_condition`].
+    pub(super) fn truth(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<u32> {
+        let (path, members) = match &expression.kind {
+            ExpressionKind::Field(path) => (path, None),
+            ExpressionKind::Members(members, word, path) => (path, Some((*members, *word))),
+            _ => return None,
+        };
+        let (field, _) = self.field(path)?;
+        if matches!(members, Some((ast::Members::Sum, _))) {
+            let title = format!("`{}` is a `bool`, which cannot be summed", self.text(path.span));
+            let label = "expected a number after `sum of`";
+            self.report(Diagnostic::new(Code::WRONG_TYPE, expression.span, title).label(label));
+            return None;
+        }
+        self.input(inputs, path, field, members)
+    }
+
+    fn conditions(&mut self, inputs: &mut Vec<Input>, parts: &'a [ast::Expression]) -> Option<Vec<Condition>> {
+        let conditions: Vec<_> = parts.iter().map(|part| self.condition(inputs, part)).collect();
+        conditions.into_iter().collect()
+    }
+
+    /// Whether an expression is a condition rather than a number. Reports nothing.
+    pub(super) fn is_condition(&self, expression: &ast::Expression) -> bool {
+        match &expression.kind {
+            ExpressionKind::Truth(_)
+            | ExpressionKind::Compare(..)
+            | ExpressionKind::All(_)
+            | ExpressionKind::Any(_)
+            | ExpressionKind::Prefixed(..)
+            | ExpressionKind::Until(..)
+            | ExpressionKind::Implies(..) => true,
+            ExpressionKind::Field(path) | ExpressionKind::Members(_, _, path) => {
+                self.type_at(path).is_some_and(|ty| *ty == Type::Bool)
+            }
+            _ => false,
+        }
+    }
+
+    fn type_at(&self, path: &Path) -> Option<&Type> {
+        let definition = self.names.get(path.topic.text.as_str()).filter(|found| found.kind == Kind::Topic)?;
+        let topic = self.system.topics.get(definition.index)?.as_ref()?;
+        path.fields.iter().try_fold(&topic.ty, |ty, name| {
+            let Type::Message(id) = ty else { return None };
+            let message = self.system.messages.get(id.index())?.as_ref()?;
+            message.fields.iter().find(|field| field.declaration.name == name.text).map(|field| &field.ty)
+        })
+    }
+}
+
+/// How two numbers are compared.
+pub(super) fn relation(relation: Relation) -> Comparison {
+    match relation {
+        Relation::Comparison(ast::Comparison::AtMost) => Comparison::AtMost,
+        Relation::Comparison(ast::Comparison::Below) => Comparison::Below,
+        Relation::Comparison(ast::Comparison::AtLeast) => Comparison::AtLeast,
+        Relation::Comparison(ast::Comparison::Above) => Comparison::Above,
+        Relation::Comparison(ast::Comparison::Equal) => Comparison::Equal,
+        Relation::NotEqual => Comparison::NotEqual,
+    }
+}

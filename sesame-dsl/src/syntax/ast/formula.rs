@@ -1,0 +1,93 @@
+//! Formulas of metrics, and the conditions that switch operations.
+
+use super::words::{Comparison, Name, Path, Quantity, Range};
+use crate::span::Span;
+
+/// What a declarative metric is computed from, with its clauses as written.
+#[derive(Debug)]
+pub(crate) struct Formula {
+    pub(crate) kind: FormulaKind,
+    pub(crate) when: Vec<(Span, Expression)>,
+    pub(crate) every: Vec<(Span, Quantity)>,
+    pub(crate) per: Vec<(Span, Path)>,
+    pub(crate) outbound: Vec<Span>,
+    /// `whole windows`.
+    pub(crate) whole: Vec<Span>,
+}
+
+#[derive(Debug)]
+pub(crate) enum FormulaKind {
+    /// `when condition then value`.
+    WhenThen(Expression, Expression),
+    /// An aggregate, if it is in order.
+    Plain(Expression),
+}
+
+/// A number, a point or a condition: which, is for resolution to find out. Chains are flat, so that its depth is that of
+/// its parentheses.
+#[derive(Debug)]
+pub(crate) struct Expression {
+    pub(crate) kind: ExpressionKind,
+    pub(crate) span: Span,
+    /// Stands in parentheses, which are part of its span.
+    pub(crate) parenthesised: bool,
+}
+
+#[derive(Debug)]
+pub(crate) enum ExpressionKind {
+    Number(Quantity),
+    Truth(bool),
+    Field(Path),
+    /// `max of zones.level`; the span is that of the word.
+    Members(Members, Span, Path),
+    Negate(Box<Expression>),
+    /// Two terms or more; true for one that is subtracted.
+    Sum(Vec<(bool, Expression)>),
+    /// Two factors or more; true for one that divides.
+    Product(Vec<(bool, Expression)>),
+    Compare(Box<Expression>, Relation, Box<Expression>),
+    /// One word or more before it, the outermost first.
+    Prefixed(Vec<Prefix>, Box<Expression>),
+    Until(Box<Expression>, Until, Box<Expression>),
+    All(Vec<Expression>),
+    Any(Vec<Expression>),
+    Implies(Box<Expression>, Box<Expression>),
+    Call(Name, Vec<Expression>),
+}
+
+/// How two values of a formula compare: as those of a bound do, or by being different.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Relation {
+    Comparison(Comparison),
+    NotEqual,
+}
+
+/// A word before a condition.
+#[derive(Debug)]
+pub(crate) struct Prefix {
+    pub(crate) word: PrefixWord,
+    pub(crate) span: Span,
+    pub(crate) interval: Option<Range>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PrefixWord {
+    Not,
+    Always,
+    Eventually,
+}
+
+/// The word between two sides, and its interval.
+#[derive(Debug)]
+pub(crate) struct Until {
+    pub(crate) span: Span,
+    pub(crate) interval: Option<Range>,
+}
+
+/// What a group of topics is taken as, other than its minimum.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Members {
+    Max,
+    Sum,
+    Each,
+}

@@ -1,0 +1,222 @@
+//! Operations: what they disturb, and how.
+
+use super::words::{Count, Head, Name, Point, Quantity, Range, Text, UnitName};
+use crate::span::Span;
+
+#[derive(Debug)]
+pub(crate) struct Operation {
+    pub(crate) head: Head,
+    /// `None` for a kind that is not supported yet.
+    pub(crate) body: Option<OperationBody>,
+}
+
+#[derive(Debug)]
+pub(crate) struct OperationBody {
+    /// `None` for an operation on no topic.
+    pub(crate) target: Option<Target>,
+    pub(crate) from: Option<(Span, Vec<Name>)>,
+    pub(crate) to: Option<(Span, Vec<Name>)>,
+    pub(crate) kind: OperationKind,
+    pub(crate) within: Vec<(Span, Range)>,
+    pub(crate) priority: Vec<(Span, Quantity)>,
+    pub(crate) inclusion: Vec<(Span, Quantity)>,
+    pub(crate) untimed: Vec<Span>,
+    pub(crate) contains: Vec<(Span, Vec<Contained>)>,
+}
+
+/// What an operation disturbs.
+#[derive(Debug)]
+pub(crate) struct Target {
+    /// The topic of the first place.
+    pub(crate) topic: Name,
+    /// At least one.
+    pub(crate) places: Vec<Place>,
+    pub(crate) span: Span,
+}
+
+/// A place in the messages of a topic.
+#[derive(Debug)]
+pub(crate) struct Place {
+    pub(crate) topic: Name,
+    pub(crate) steps: Vec<Step>,
+    pub(crate) span: Span,
+}
+
+#[derive(Debug)]
+pub(crate) enum Step {
+    Field(Name),
+    /// `[3]`; the span includes the brackets.
+    Element(Count, Span),
+    /// `[*]`
+    Each(Span),
+}
+
+/// What the start condition of an operation has to contain.
+#[derive(Debug)]
+pub(crate) enum Contained {
+    Variable(Name),
+    /// A whole number; the span is that of all of it.
+    Integer(Span, Range),
+}
+
+#[derive(Debug)]
+pub(crate) enum OperationKind {
+    Random {
+        absolute: bool,
+        amounts: Amounts,
+    },
+    RandomText(Vec<Text>),
+    StuckAt(Stuck),
+    Bias(Amounts),
+    Drift(Amounts),
+    Noise(Range),
+    Scale(Range),
+    NotFinite(NotFinite),
+    Freeze,
+    Stale(Range),
+    ClockSkew(Range),
+    PacketLoss(Range),
+    /// The words `burst loss`, and the clauses as written.
+    BurstLoss {
+        span: Span,
+        enter: Vec<(Span, Range)>,
+        leave: Vec<(Span, Range)>,
+        loss: Vec<(Span, Range)>,
+    },
+    RateLimit(Range),
+    Latency {
+        range: Range,
+        distribution: Vec<(Span, Distribution)>,
+        drain: Vec<(Span, Drain)>,
+    },
+    Reorder {
+        range: Range,
+        drain: Vec<(Span, Drain)>,
+    },
+    Duplicate(Range),
+    Blackhole,
+    Custom(Custom),
+}
+
+impl OperationKind {
+    /// Where it is written what a parameter of a kind, other than a custom one, may be.
+    pub(crate) fn written(&self, parameter: &str) -> Option<Span> {
+        match self {
+            OperationKind::Random { amounts, .. } | OperationKind::Bias(amounts) | OperationKind::Drift(amounts) => {
+                Some(amounts.span())
+            }
+            OperationKind::StuckAt(Stuck::Amounts(amounts)) => Some(amounts.span()),
+            OperationKind::StuckAt(Stuck::Texts(texts)) => Some(texts.first()?.span.to(texts.last()?.span)),
+            OperationKind::Noise(range)
+            | OperationKind::Scale(range)
+            | OperationKind::Stale(range)
+            | OperationKind::ClockSkew(range)
+            | OperationKind::PacketLoss(range)
+            | OperationKind::RateLimit(range)
+            | OperationKind::Latency { range, .. }
+            | OperationKind::Reorder { range, .. }
+            | OperationKind::Duplicate(range) => Some(range.span),
+            OperationKind::BurstLoss { enter, leave, loss, .. } => {
+                let written = match parameter {
+                    "enter" => enter,
+                    "leave" => leave,
+                    _ => loss,
+                };
+                written.first().map(|(_, range)| range.span)
+            }
+            OperationKind::StuckAt(Stuck::Truth(..))
+            | OperationKind::RandomText(_)
+            | OperationKind::NotFinite(_)
+            | OperationKind::Freeze
+            | OperationKind::Blackhole
+            | OperationKind::Custom(_) => None,
+        }
+    }
+}
+
+/// Numbers of a range, or points of a box.
+#[derive(Debug)]
+pub(crate) enum Amounts {
+    Range(Range),
+    /// Two opposite corners; the span is that of all of it.
+    Corners(Box<[Point; 2]>, Span),
+}
+
+impl Amounts {
+    pub(crate) fn span(&self) -> Span {
+        match self {
+            Amounts::Range(range) => range.span,
+            Amounts::Corners(_, span) => *span,
+        }
+    }
+}
+
+/// What a value is stuck at.
+#[derive(Debug)]
+pub(crate) enum Stuck {
+    Amounts(Amounts),
+    Texts(Vec<Text>),
+    Truth(bool, Span),
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum NotFinite {
+    Nan,
+    Infinity,
+    MinusInfinity,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Distribution {
+    Fixed,
+    Uniform,
+    Normal,
+}
+
+/// The user's code.
+#[derive(Debug)]
+pub(crate) struct Custom {
+    /// The word `custom`.
+    pub(crate) span: Span,
+    pub(crate) moment: Option<(Span, Moment)>,
+    pub(crate) parameters: Vec<CustomParameter>,
+    pub(crate) has_errors: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Moment {
+    BeforeStart,
+    AfterEnd,
+}
+
+#[derive(Debug)]
+pub(crate) struct CustomParameter {
+    pub(crate) name: Name,
+    pub(crate) doc: String,
+    pub(crate) domain: Domain,
+    /// The domain as written.
+    pub(crate) span: Span,
+}
+
+#[derive(Debug)]
+pub(crate) enum Domain {
+    Number {
+        integer: bool,
+        unit: Option<UnitName>,
+        range: Range,
+    },
+    /// Two opposite corners.
+    Point {
+        unit: Option<UnitName>,
+        corners: Box<[Point; 2]>,
+    },
+    Texts(Vec<Text>),
+    Files(Vec<Text>),
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Drain {
+    Finish,
+    Flush,
+    Drop,
+}

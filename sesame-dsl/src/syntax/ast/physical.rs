@@ -1,0 +1,71 @@
+//! Physical labs, and how tests are chosen for them.
+
+use super::words::{Bound, Count, Head, Name, Point, Quantity, Range, Text};
+use crate::span::Span;
+
+/// A lab, and how tests are chosen for it.
+#[derive(Debug)]
+pub(crate) struct Physical {
+    pub(crate) head: Head,
+    pub(crate) simulators: Vec<(Span, LabSimulator)>,
+    pub(crate) repeats: Vec<(Span, Count)>,
+    /// What a test costs, and what each of its operations costs besides.
+    pub(crate) costs: Vec<(Span, (Quantity, Option<Quantity>))>,
+    pub(crate) excludes: Vec<(Name, Bound)>,
+    /// Metrics, with whether larger values come first.
+    pub(crate) ranks: Vec<(Span, Vec<(Name, bool)>)>,
+    pub(crate) budgets: Vec<(Span, Budget)>,
+    pub(crate) tolerances: Vec<(Span, Vec<(Name, Quantity)>)>,
+    pub(crate) interlocks: Vec<(Span, Vec<Name>)>,
+    pub(crate) shapes: Vec<Shape>,
+    pub(crate) fits: Vec<(Span, Vec<Fit>)>,
+    pub(crate) has_errors: bool,
+}
+
+/// How the lab is reached.
+#[derive(Debug)]
+pub(crate) struct LabSimulator {
+    pub(crate) head: Head,
+    pub(crate) transport: Name,
+    pub(crate) arguments: Vec<Text>,
+    pub(crate) settings: Vec<(Name, Option<Setting>)>,
+}
+
+#[derive(Debug)]
+pub(crate) enum Setting {
+    Quantity(Quantity),
+    Text(Text),
+}
+
+#[derive(Debug)]
+pub(crate) struct Budget {
+    pub(crate) limit: Quantity,
+    pub(crate) lambda: Quantity,
+    pub(crate) over: Vec<Name>,
+}
+
+#[derive(Debug)]
+pub(crate) struct Shape {
+    pub(crate) head: Head,
+    pub(crate) form: Form,
+    pub(crate) place: ShapePlace,
+    pub(crate) expand: Option<Quantity>,
+}
+
+#[derive(Debug)]
+pub(crate) enum Form {
+    Sphere(Quantity),
+    Box(Point),
+}
+
+#[derive(Debug)]
+pub(crate) enum ShapePlace {
+    Carried(Text),
+    Fixed(Point),
+}
+
+#[derive(Debug)]
+pub(crate) enum Fit {
+    Delay(Range),
+    Parameter(Text, Range),
+}

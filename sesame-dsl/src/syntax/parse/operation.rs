@@ -1,0 +1,240 @@
+//! Operations: what they disturb, and how.
+
+use sesame_grammar::Rule;
+
+use super::reader::{Pair, Reader, child, children, expect_child, first_of};
+use crate::span::Span;
+use crate::syntax::ast::{
+    Amounts, Contained, Custom, CustomParameter, Distribution, Domain, Drain, Moment, NotFinite, Operation,
+    OperationBody, OperationKind, Place, Range, Step, Stuck, Target, Text,
+};
+
+const KINDS: [Rule; 18] = [
+    Rule::random_value,
+    Rule::stuck_at,
+    Rule::bias,
+    Rule::drift,
+    Rule::noise,
+    Rule::scale,
+    Rule::not_finite,
+    Rule::freeze,
+    Rule::stale_value,
+    Rule::clock_skew,
+    Rule::packet_loss,
+    Rule::burst_loss,
+    Rule::rate_limit,
+    Rule::latency,
+    Rule::reorder,
+    Rule::duplicate,
+    Rule::blackhole,
+    Rule::custom,
+];
+
+impl Reader<'_> {
+    pub(super) fn operation(&mut self, pair: &Pair<'_>) -> Operation {
+        let head = self.head(pair);
+        let unsupported = first_of(pair, &[Rule::unsupported_operation, Rule::unsupported_kind]);
+        if let Some(unsupported) = unsupported {
+            self.unsupported(&unsupported);
+            return Operation { head, body: None };
+        }
+        let kind = self.operation_kind(pair);
+        let mut signed = |rule| {
+            let clauses = children(pair, rule);
+            clauses.map(|it| (self.keyword_span(&it), self.signed(&expect_child(&it, Rule::signed)))).collect()
+        };
+        let priority = signed(Rule::priority);
+        let inclusion = signed(Rule::inclusion);
+        let within = children(pair, Rule::within)
+            .map(|within| (self.keyword_span(&within), self.range(&expect_child(&within, Rule::range))))
+            .collect();
+        let contains = children(pair, Rule::start_contains)
+            .map(|clause| (self.keyword_span(&clause), self.contained(&clause)))
+            .collect();
+        let untimed = children(pair, Rule::untimed).map(|untimed| self.span(&untimed)).collect();
+        let mut nodes = |rule| child(pair, rule).map(|nodes| (self.keyword_span(&nodes), self.names(&nodes)));
+        let from = nodes(Rule::from_nodes);
+        let to = nodes(Rule::to_nodes);
+        let target = child(pair, Rule::targets).map(|targets| self.target(&targets));
+        Operation {
+            head,
+            body: Some(OperationBody { target, from, to, kind, within, priority, inclusion, untimed, contains }),
+        }
+    }
+
+    fn target(&mut self, pair: &Pair<'_>) -> Target {
+        let places: Vec<Place> = children(pair, Rule::target).map(|place| self.place(&place)).collect();
+        let topic = places.first().expect("an operation has a target").topic.clone();
+        Target { topic, places, span: self.span(pair) }
+    }
+
+    fn place(&mut self, pair: &Pair<'_>) -> Place {
+        let steps = pair.clone().into_inner().filter_map(|step| match step.as_rule() {
+            Rule::field_name => Some(Step::Field(self.field_name(&step))),
+            Rule::element => Some(match child(&step, Rule::number) {
+                Some(number) => Step::Element(self.count(&number), self.span(&step)),
+                None => Step::Each(self.span(&step)),
+            }),
+            _ => None,
+        });
+        let steps = steps.collect();
+        Place { topic: self.name(&expect_child(pair, Rule::name)), steps, span: self.span(pair) }
+    }
+
+    fn operation_kind(&mut self, pair: &Pair<'_>) -> OperationKind {
+        let kind = first_of(pair, &KINDS).expect("an operation has a kind");
+        match kind.as_rule() {
+            Rule::random_value => match child(&kind, Rule::value_mode) {
+                Some(mode) => OperationKind::Random {
+                    absolute: child(&mode, Rule::k_absolute).is_some(),
+                    amounts: self.amounts(&kind).expect("a random value says what is drawn from"),
+                },
+                None => OperationKind::RandomText(self.listed(&expect_child(&kind, Rule::text_domain))),
+            },
+            Rule::stuck_at => {
+                OperationKind::StuckAt(match (child(&kind, Rule::text_domain), child(&kind, Rule::truth)) {
+                    (Some(texts), _) => Stuck::Texts(self.listed(&texts)),
+                    (_, Some(truth)) => Stuck::Truth(child(&truth, Rule::k_true).is_some(), self.span(&truth)),
+                    _ => Stuck::Amounts(self.amounts(&kind).expect("a value is stuck at something")),
+                })
+            }
+            Rule::bias => OperationKind::Bias(self.amounts(&kind).expect("a bias has a range")),
+            Rule::drift => OperationKind::Drift(self.amounts(&kind).expect("a drift has a range")),
+            Rule::noise => OperationKind::Noise(self.only_range(&kind)),
+            Rule::scale => OperationKind::Scale(self.only_range(&kind)),
+            Rule::not_finite => {
+                OperationKind::NotFinite(match (child(&kind, Rule::k_nan), child(&kind, Rule::minus)) {
+                    (Some(_), _) => NotFinite::Nan,
+                    (None, None) => NotFinite::Infinity,
+                    (None, Some(_)) => NotFinite::MinusInfinity,
+                })
+            }
+            Rule::freeze => OperationKind::Freeze,
+            Rule::stale_value => OperationKind::Stale(self.only_range(&kind)),
+            Rule::clock_skew => OperationKind::ClockSkew(self.only_range(&kind)),
+            Rule::packet_loss => OperationKind::PacketLoss(self.only_range(&kind)),
+            Rule::burst_loss => OperationKind::BurstLoss {
+                span: self.keyword_span(&kind).to(self.span(&expect_child(&kind, Rule::k_loss))),
+                enter: self.ranges(&kind, Rule::burst_enter),
+                leave: self.ranges(&kind, Rule::burst_leave),
+                loss: self.ranges(&kind, Rule::burst_drops),
+            },
+            Rule::rate_limit => OperationKind::RateLimit(self.only_range(&kind)),
+            Rule::latency => OperationKind::Latency {
+                range: self.only_range(&kind),
+                distribution: children(&kind, Rule::distribution)
+                    .map(|written| {
+                        let word = first_of(&written, &[Rule::k_fixed, Rule::k_uniform, Rule::k_normal]);
+                        let distribution = match word.expect("a distribution has a name").as_rule() {
+                            Rule::k_fixed => Distribution::Fixed,
+                            Rule::k_uniform => Distribution::Uniform,
+                            _ => Distribution::Normal,
+                        };
+                        (self.span(&written), distribution)
+                    })
+                    .collect(),
+                drain: self.drains(&kind),
+            },
+            Rule::reorder => OperationKind::Reorder { range: self.only_range(&kind), drain: self.drains(&kind) },
+            Rule::duplicate => OperationKind::Duplicate(self.only_range(&kind)),
+            Rule::blackhole => OperationKind::Blackhole,
+            _ => OperationKind::Custom(self.custom(&kind)),
+        }
+    }
+
+    fn only_range(&mut self, pair: &Pair<'_>) -> Range {
+        self.range(&expect_child(pair, Rule::range))
+    }
+
+    fn ranges(&mut self, pair: &Pair<'_>, rule: Rule) -> Vec<(Span, Range)> {
+        children(pair, rule).map(|clause| (self.keyword_span(&clause), self.only_range(&clause))).collect()
+    }
+
+    fn amounts(&mut self, pair: &Pair<'_>) -> Option<Amounts> {
+        if let Some(range) = child(pair, Rule::range) {
+            return Some(Amounts::Range(self.range(&range)));
+        }
+        let corners = child(pair, Rule::corners)?;
+        let mut points = children(&corners, Rule::point).map(|point| self.point(&point));
+        let mut next = || points.next().expect("a box has two corners");
+        Some(Amounts::Corners(Box::new([next(), next()]), self.span(&corners)))
+    }
+
+    fn listed(&mut self, pair: &Pair<'_>) -> Vec<Text> {
+        children(&expect_child(pair, Rule::texts), Rule::text).map(|text| self.text_of(&text)).collect()
+    }
+
+    fn drains(&mut self, pair: &Pair<'_>) -> Vec<(Span, Drain)> {
+        let drains = children(pair, Rule::drain).map(|drain| {
+            let mode = match first_of(&drain, &[Rule::k_finish, Rule::k_flush, Rule::k_drop]) {
+                Some(mode) if mode.as_rule() == Rule::k_flush => Drain::Flush,
+                Some(mode) if mode.as_rule() == Rule::k_drop => Drain::Drop,
+                _ => Drain::Finish,
+            };
+            (self.keyword_span(&drain), mode)
+        });
+        drains.collect()
+    }
+
+    fn custom(&mut self, pair: &Pair<'_>) -> Custom {
+        let span = self.keyword_span(pair);
+        let moment = child(pair, Rule::moment).map(|moment| self.moment(&moment));
+        let mut custom = Custom { span, moment, parameters: vec![], has_errors: false };
+        let block = expect_child(pair, Rule::custom_parameters);
+        custom.has_errors = self.members(&block, |reader, member| {
+            let word = expect_child(&member, Rule::parameter_name);
+            let domains = [Rule::number_domain, Rule::point_domain, Rule::text_domain, Rule::file_domain];
+            let domain = first_of(&member, &domains).expect("a parameter has a domain");
+            custom.parameters.push(CustomParameter {
+                name: reader.name(&word),
+                doc: Self::doc(&member),
+                span: reader.span(&domain),
+                domain: reader.domain(&domain),
+            });
+        });
+        custom
+    }
+
+    pub(super) fn moment(&mut self, pair: &Pair<'_>) -> (Span, Moment) {
+        let moment = if child(pair, Rule::k_before).is_some() { Moment::BeforeStart } else { Moment::AfterEnd };
+        (self.span(pair), moment)
+    }
+
+    fn domain(&mut self, pair: &Pair<'_>) -> Domain {
+        let unit = child(pair, Rule::unit_in_brackets).map(|unit| self.unit(&expect_child(&unit, Rule::unit)));
+        match pair.as_rule() {
+            Rule::number_domain => Domain::Number {
+                integer: child(pair, Rule::k_int).is_some(),
+                unit,
+                range: self.range(&expect_child(pair, Rule::range)),
+            },
+            Rule::point_domain => {
+                let mut corners = children(pair, Rule::point).map(|point| self.point(&point)).collect::<Vec<_>>();
+                let high = corners.pop().expect("a box has two corners");
+                let low = corners.pop().expect("a box has two corners");
+                Domain::Point { unit, corners: Box::new([low, high]) }
+            }
+            rule => {
+                let texts = expect_child(pair, Rule::texts);
+                let texts = children(&texts, Rule::text).map(|text| self.text_of(&text)).collect();
+                if rule == Rule::file_domain { Domain::Files(texts) } else { Domain::Texts(texts) }
+            }
+        }
+    }
+
+    /// What stands in one `start contains`.
+    fn contained(&mut self, pair: &Pair<'_>) -> Vec<Contained> {
+        let mut found = Vec::new();
+        for item in pair.clone().into_inner() {
+            match item.as_rule() {
+                Rule::name => found.push(Contained::Variable(self.name(&item))),
+                Rule::contained_integer => {
+                    let range = self.range(&expect_child(&item, Rule::range));
+                    found.push(Contained::Integer(self.span(&item), range));
+                }
+                _ => {}
+            }
+        }
+        found
+    }
+}

@@ -1,0 +1,110 @@
+//! Physical labs.
+
+use sesame_grammar::Rule;
+
+use super::reader::{Pair, Reader, child, children, expect_child};
+use crate::syntax::ast::Name;
+use crate::syntax::ast::physical::{Budget, Fit, Form, LabSimulator, Physical, Setting, Shape, ShapePlace};
+
+impl Reader<'_> {
+    pub(super) fn physical(&mut self, pair: &Pair<'_>) -> Physical {
+        let mut lab = Physical {
+            head: self.head(pair),
+            simulators: vec![],
+            repeats: vec![],
+            costs: vec![],
+            excludes: vec![],
+            ranks: vec![],
+            budgets: vec![],
+            tolerances: vec![],
+            interlocks: vec![],
+            shapes: vec![],
+            fits: vec![],
+            has_errors: false,
+        };
+        lab.has_errors = self.members(pair, |reader, member| {
+            let span = reader.keyword_span(&member);
+            match member.as_rule() {
+                Rule::lab_simulator => lab.simulators.push((span, reader.lab_simulator(&member))),
+                Rule::repeats => lab.repeats.push((span, reader.count(&expect_child(&member, Rule::number)))),
+                Rule::cost => {
+                    let each = child(&member, Rule::per_operation)
+                        .map(|each| reader.signed(&expect_child(&each, Rule::signed)));
+                    lab.costs.push((span, (reader.signed(&expect_child(&member, Rule::signed)), each)));
+                }
+                Rule::exclude => {
+                    let metric = reader.name(&expect_child(&member, Rule::name));
+                    lab.excludes.push((metric, reader.bound(&expect_child(&member, Rule::bound))));
+                }
+                Rule::rank => {
+                    let keys = children(&member, Rule::rank_key).map(|key| {
+                        let descending = child(&key, Rule::k_descending).is_some();
+                        (reader.name(&expect_child(&key, Rule::name)), descending)
+                    });
+                    lab.ranks.push((span, keys.collect()));
+                }
+                Rule::budget => {
+                    let mut numbers = children(&member, Rule::signed).map(|number| reader.signed(&number));
+                    let limit = numbers.next().expect("a budget has a limit");
+                    let lambda = numbers.next().expect("a budget has a lambda");
+                    drop(numbers);
+                    lab.budgets.push((span, Budget { limit, lambda, over: reader.names(&member) }));
+                }
+                Rule::tolerance => {
+                    let tolerated = children(&member, Rule::tolerated).map(|one| {
+                        let metric = reader.name(&expect_child(&one, Rule::name));
+                        (metric, reader.signed(&expect_child(&one, Rule::signed)))
+                    });
+                    lab.tolerances.push((span, tolerated.collect()));
+                }
+                Rule::interlock => lab.interlocks.push((span, reader.names(&member))),
+                Rule::shape => lab.shapes.push(reader.shape(&member)),
+                _ => {
+                    let fitted = member.clone().into_inner().filter_map(|one| {
+                        let range = child(&one, Rule::range);
+                        match one.as_rule() {
+                            Rule::fit_delay => Some(Fit::Delay(reader.range(&range?))),
+                            Rule::fit_parameter => {
+                                let text = reader.text_of(&expect_child(&one, Rule::text));
+                                Some(Fit::Parameter(text, reader.range(&range?)))
+                            }
+                            _ => None,
+                        }
+                    });
+                    lab.fits.push((span, fitted.collect()));
+                }
+            }
+        });
+        lab
+    }
+
+    fn lab_simulator(&mut self, pair: &Pair<'_>) -> LabSimulator {
+        let word = expect_child(pair, Rule::lab_transport);
+        let transport = Name { text: word.as_str().to_owned(), span: self.span(&word) };
+        let arguments = children(pair, Rule::text).map(|text| self.text_of(&text)).collect();
+        let mut settings = Vec::new();
+        if let Some(block) = child(pair, Rule::lab_settings) {
+            self.members(&block, |reader, setting| {
+                let name = expect_child(&setting, Rule::lab_setting_name);
+                let name = Name { text: name.as_str().to_owned(), span: reader.span(&name) };
+                let number = child(&setting, Rule::signed).map(|number| Setting::Quantity(reader.signed(&number)));
+                let text = child(&setting, Rule::text).map(|text| Setting::Text(reader.text_of(&text)));
+                settings.push((name, number.or(text)));
+            });
+        }
+        LabSimulator { head: self.head(pair), transport, arguments, settings }
+    }
+
+    fn shape(&mut self, pair: &Pair<'_>) -> Shape {
+        let form = match child(pair, Rule::sphere) {
+            Some(sphere) => Form::Sphere(self.signed(&expect_child(&sphere, Rule::signed))),
+            None => Form::Box(self.point(&expect_child(&expect_child(pair, Rule::cuboid), Rule::point))),
+        };
+        let place = match child(pair, Rule::carried) {
+            Some(carried) => ShapePlace::Carried(self.text_of(&expect_child(&carried, Rule::text))),
+            None => ShapePlace::Fixed(self.point(&expect_child(&expect_child(pair, Rule::fixed), Rule::point))),
+        };
+        let expand = child(pair, Rule::expand).map(|expand| self.signed(&expect_child(&expand, Rule::signed)));
+        Shape { head: self.head(pair), form, place, expand }
+    }
+}

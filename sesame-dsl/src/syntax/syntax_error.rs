@@ -1,0 +1,353 @@
+//! What is wrong where the grammar gave up, in words.
+//!
+//! pest reports only the first failure of a parse and speaks in rule names. So each swallowed stretch is read once more,
+//! by the rule its first word asks for, or as the continuation of the construct before it; the furthest failure of that
+//! reading is the mistake, and the rules it names are what would fit.
+
+use pest::error::{ErrorVariant, InputLocation};
+use sesame_grammar::Rule;
+
+use super::blocks::{self, Block};
+use super::limits::parse_bounded;
+use super::token::{Token, TokenKind, is_keyword, token_at};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::span::{FileId, Span};
+use crate::units::Unit;
+
+/// The furthest failure of a reading: where, and which rules would have fitted.
+struct Failure {
+    at: usize,
+    expected: Vec<Rule>,
+}
+
+fn read(text: &str, lo: usize, hi: usize, rule: Rule) -> Option<Failure> {
+    let error = parse_bounded(rule, &text[lo..hi]).err()?;
+    let at = match error.location {
+        InputLocation::Pos(at) | InputLocation::Span((at, _)) => lo + at,
+    };
+    match error.variant {
+        ErrorVariant::ParsingError { positives, .. } => Some(Failure { at, expected: positives }),
+        ErrorVariant::CustomError { .. } => None,
+    }
+}
+
+/// Explains a swallowed stretch, given the good construct before it.
+pub(super) fn explain(file: FileId, text: &str, region: Span, block: &Block, previous: Option<Span>) -> Diagnostic {
+    let span_of = |token: Token<'_>| Span {
+        file,
+        lo: u32::try_from(token.lo).expect("files are small"),
+        hi: u32::try_from(token.hi()).expect("files are small"),
+    };
+    let [lo, hi] = [region.lo as usize, region.hi as usize];
+    let mut first = token_at(text, lo);
+    while first.kind == TokenKind::Doc && first.hi() < hi {
+        first = token_at(text, first.hi());
+    }
+    if first.kind == TokenKind::Doc || first.lo >= hi {
+        let doc = token_at(text, lo);
+        return Diagnostic::new(Code::SYNTAX, span_of(doc), "this doc comment documents nothing")
+            .label("expected a declaration after it")
+            .suggest("use a plain comment", Span { hi: region.lo + 3, ..region }, "//");
+    }
+    if first.text == "}" {
+        let title = "unmatched `}`";
+        return Diagnostic::new(Code::NOT_CLOSED, span_of(first), title).label("no block is open here");
+    }
+
+    let begins = block.begins_with(first.text) || block.begins_with_a_name();
+    let continued = previous
+        .and_then(|previous| read(text, previous.lo as usize, hi, block.one))
+        .filter(|failure| token_at(text, failure.at).lo >= first.lo);
+    let alone = || read(text, lo, hi, block.one).filter(|failure| failure.at >= lo);
+    // What no member begins with is not read on its own: it may be a setting of another block.
+    let failure = if begins { alone().or(continued) } else { continued };
+    let failure = failure.unwrap_or(Failure { at: first.lo, expected: vec![] });
+
+    let found = token_at(text, failure.at);
+    let span = span_of(found);
+    let wants_name = failure.expected.iter().any(|&rule| {
+        matches!(rule, Rule::name | Rule::names | Rule::path | Rule::target | Rule::targets | Rule::condition_variable)
+    });
+    let at_start = found.lo == first.lo;
+    let fitting = fitting(&failure.expected, block, at_start);
+    let expected = alternatives(&fitting);
+
+    let before = text[..found.lo].chars().next_back();
+    let after = text[found.hi()..].chars().next();
+    let joins = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
+    if found.text == "-" && joins(before) && joins(after) {
+        return Diagnostic::new(Code::NOT_A_NAME, span, "a name cannot contain `-`")
+            .label("names consist of letters, digits and `_`")
+            .suggest("use `_`", span, "_");
+    }
+    if found.kind == TokenKind::OpenText {
+        let title = "this text does not end on its line";
+        return Diagnostic::new(Code::BAD_TEXT, span, title).label("missing closing `\"`");
+    }
+    if found.kind == TokenKind::Doc {
+        return Diagnostic::new(Code::SYNTAX, span, "a doc comment is not allowed here")
+            .label(format!("expected {expected}"))
+            .note("`///` documents the declaration after it; use `//` for any other comment");
+    }
+    let next = token_at(text, found.hi());
+    // A keyword that begins the next declaration is in its place: what lacks is the name before it.
+    let [in_file, in_system] = [Rule::file, Rule::system].map(|rule| blocks::block(rule).begins_with(found.text));
+    let declares = (in_file || in_system) && (next.kind == TokenKind::Word || next.text == "{");
+    if wants_name && found.kind == TokenKind::Word && is_keyword(found.text) && !declares {
+        return Diagnostic::new(
+            Code::KEYWORD_AS_NAME,
+            span,
+            format!("`{}` is a keyword and cannot be a name", found.text),
+        )
+        .label("choose another name")
+        .suggest(format!("use `{}_1`", found.text), span, format!("{}_1", found.text));
+    }
+
+    let title = match found.kind {
+        TokenKind::End => "the file ends in the middle of a declaration".to_owned(),
+        TokenKind::Text => format!("unexpected text {}", found.text),
+        TokenKind::Number => format!("unexpected number `{}`", found.text),
+        _ => format!("unexpected `{}`", found.text),
+    };
+    let mut diagnostic = Diagnostic::new(Code::SYNTAX, span, title).label(format!("expected {expected}"));
+    if found.kind == TokenKind::Word {
+        let mut candidates: Vec<&'static str> = failure.expected.iter().filter_map(|&rule| keyword_of(rule)).collect();
+        candidates.extend(block.words().filter(|_| at_start));
+        let candidates = candidates.into_iter().chain(fitting.iter().filter_map(|phrase| first_word(phrase)));
+        // A word of the language is not a misspelling of another.
+        let known = Rule::all_rules().iter().any(|&rule| keyword_of(rule) == Some(found.text));
+        if let Some(similar) = crate::similar::most_similar(found.text, candidates).filter(|_| !known) {
+            diagnostic = diagnostic.did_you_mean(span, similar);
+        }
+        let number_before = before.is_some_and(char::is_whitespace)
+            && text[..found.lo].trim_end().ends_with(|c: char| c.is_ascii_digit());
+        if number_before && Unit::parse(found.text).is_ok() {
+            let gap = text[..found.lo].trim_end().len();
+            let gap = Span { lo: u32::try_from(gap).expect("files are small"), hi: span.lo, ..span };
+            diagnostic = diagnostic.suggest("remove the space before the unit", gap, "");
+        }
+        if block.rule == Rule::file && in_system {
+            diagnostic = diagnostic.note(format!("`{}` is declared inside `system {{ … }}`", found.text));
+        }
+    }
+    if found.kind == TokenKind::Sign && found.text == "=" && failure.expected.contains(&Rule::equal_to) {
+        diagnostic = diagnostic.suggest("use `==` to compare", span, "==");
+    }
+    diagnostic
+}
+
+/// What would fit, in phrases: those with words of the language first, otherwise in the order of the grammar.
+fn fitting(expected: &[Rule], block: &Block, at_start: bool) -> Vec<String> {
+    let mut phrases: Vec<String> = Vec::new();
+    let mut members = false;
+    for &rule in expected {
+        let begins_member = keyword_of(rule).is_some_and(|word| block.begins_with(word));
+        if rule == Rule::EOI || rule == block.one || (at_start && begins_member) {
+            members = true;
+            continue;
+        }
+        for phrase in phrases_of(rule) {
+            if !phrases.contains(&phrase) {
+                phrases.push(phrase);
+            }
+        }
+    }
+    let only_members = phrases.is_empty();
+    phrases.sort_by_key(|phrase| !phrase.starts_with('`'));
+    if only_members || (members && at_start) {
+        if block.rule == Rule::file {
+            phrases.push(if only_members {
+                format!("a declaration: {}", alternatives(&listed(block)))
+            } else {
+                "a declaration".to_owned()
+            });
+        } else {
+            phrases.extend(listed(block));
+        }
+    }
+    phrases
+}
+
+/// The members of a block, as a message lists them.
+fn listed(block: &Block) -> Vec<String> {
+    block.members.iter().map(blocks::Member::phrase).collect()
+}
+
+/// Phrases joined for a sentence.
+fn alternatives(phrases: &[String]) -> String {
+    match phrases {
+        [] => String::new(),
+        [only] => only.clone(),
+        [others @ .., last] => format!("{} or {last}", others.join(", ")),
+    }
+}
+
+/// The first word of a phrase that quotes words of the language.
+fn first_word(phrase: &str) -> Option<&str> {
+    let quoted = phrase.strip_prefix('`')?;
+    let end = quoted.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))?;
+    (end > 0).then(|| &quoted[..end])
+}
+
+/// The word a keyword rule stands for.
+fn keyword_of(rule: Rule) -> Option<&'static str> {
+    // Rule names are the words with a prefix.
+    rule_name(rule).strip_prefix("k_")
+}
+
+fn rule_name(rule: Rule) -> &'static str {
+    static NAMES: std::sync::LazyLock<Vec<(Rule, String)>> =
+        std::sync::LazyLock::new(|| Rule::all_rules().iter().map(|&rule| (rule, format!("{rule:?}"))).collect());
+    NAMES.iter().find(|(known, _)| *known == rule).map_or("", |(_, name)| name)
+}
+
+/// What a message calls a rule; nothing for what is not worth naming: recovery, comments, constructs of later versions.
+fn phrases_of(rule: Rule) -> Vec<String> {
+    let phrases: &[&str] = match rule {
+        Rule::equals => &["`=`"],
+        Rule::colon | Rule::metric_type => &["`:`"],
+        Rule::comma => &["`,`"],
+        Rule::dots => &["`..`"],
+        Rule::paren_open => &["`(`"],
+        Rule::paren_close | Rule::point_end => &["`)`"],
+        Rule::bracket_open => &["`[`"],
+        Rule::bracket_close => &["`]`"],
+        Rule::open => &["`{`"],
+        Rule::close => &["`}`"],
+        Rule::name
+        | Rule::names
+        | Rule::path
+        | Rule::target
+        | Rule::targets
+        | Rule::identifier
+        | Rule::condition_variable => &["a name"],
+        Rule::field_name => &["a field such as `level: real[mm]`"],
+        Rule::text | Rule::texts => &["a text in double quotes"],
+        Rule::number | Rule::count => &["a number"],
+        Rule::signed | Rule::quantity => &["a quantity such as `20ms`"],
+        Rule::range => &["a range such as `[0s, 65s]`"],
+        Rule::unit | Rule::unit_symbol => &["a unit"],
+        Rule::unit_in_brackets => &["a unit in brackets"],
+        Rule::type_of | Rule::scalar_type | Rule::message_type => &["a type such as `real[mm]`"],
+        Rule::bound => &["a bound such as `<= 0` or `in [1, 40]`"],
+        Rule::at_most => &["`<=`"],
+        Rule::at_least => &["`>=`"],
+        Rule::equal_to => &["`==`"],
+        Rule::not_equal => &["`!=`"],
+        Rule::below => &["`<`"],
+        Rule::above => &["`>`"],
+        Rule::bound_within => &["`in`"],
+        Rule::parameter_name | Rule::choice => &["a parameter such as `offset`, `value`, `loss` or `delay`"],
+        Rule::window | Rule::from_nodes | Rule::campaign_from => &["`from`"],
+        Rule::moment => &["`before start`"],
+        Rule::until_condition => &["`until`"],
+        Rule::for_length | Rule::for_lengths => &["`for`"],
+        Rule::at_most_times => &["`at most`"],
+        Rule::may_overlap => &["`may overlap`"],
+        Rule::at_most_once => &["`each at most once`"],
+        Rule::by_condition => &["`condition`"],
+        Rule::start_contains => &["`start contains`"],
+        Rule::contained_integer => &["`integer`"],
+        Rule::initial_value => &["`initial`"],
+        Rule::trend => &["`rising`", "`falling`"],
+        Rule::accepts => &["`accepts non_finite`"],
+        Rule::custom => &["`custom`"],
+        Rule::domain | Rule::number_domain | Rule::point_domain | Rule::text_domain | Rule::file_domain => {
+            &["the permitted values, such as `int [3, 20]`"]
+        }
+        Rule::point => &["a point such as `(1, 0, -0.5)m`"],
+        Rule::coordinate => &["a number without a unit"],
+        Rule::draw_seed => &["`seed`"],
+        Rule::dimension => &["a dimension such as `T1 [0, 1] cells 6`"],
+        Rule::within => &["`within`"],
+        Rule::priority => &["`priority`"],
+        Rule::inclusion => &["`inclusion`"],
+        Rule::untimed => &["`untimed`"],
+        Rule::to_nodes => &["`to`"],
+        Rule::held => &["`held`"],
+        Rule::stale => &["`stale after`"],
+        Rule::mitigation => &["`mitigate with`"],
+        Rule::lab_transport => &["a simulator kind such as `simlog`"],
+        Rule::lab_setting_name => &["a setting such as `step 20ms`"],
+        Rule::rank_key | Rule::tolerated => &["a metric"],
+        Rule::per_operation => &["`, plus … per operation`"],
+        Rule::sphere => &["`sphere`"],
+        Rule::cuboid => &["`box`"],
+        Rule::carried => &["`on pose`"],
+        Rule::fixed => &["`at`"],
+        Rule::expand => &["`expand`"],
+        Rule::fit_delay => &["`relay delay`"],
+        Rule::fit_parameter => &["`parameter`"],
+        Rule::drain => &["`drain`"],
+        Rule::direction => &["`maximise`", "`minimise`"],
+        Rule::default_value => &["`default`"],
+        Rule::value_mode => &["`offset`", "`absolute`"],
+        Rule::in_process => &["`in_process`"],
+        Rule::process => &["`process`"],
+        Rule::random_value => &["`random`"],
+        Rule::packet_loss | Rule::k_packet => &["`packet loss`"],
+        Rule::stuck_at | Rule::k_stuck => &["`stuck at`"],
+        Rule::bias => &["`bias`"],
+        Rule::drift => &["`drift`"],
+        Rule::noise => &["`noise`"],
+        Rule::scale => &["`scale`"],
+        Rule::not_finite => &["`nan`", "`infinity`"],
+        Rule::freeze => &["`freeze`"],
+        Rule::stale_value => &["`stale`"],
+        Rule::clock_skew | Rule::k_clock => &["`clock skew`"],
+        Rule::burst_loss | Rule::k_burst => &["`burst loss`"],
+        Rule::burst_enter => &["`enter`"],
+        Rule::burst_leave => &["`leave`"],
+        Rule::burst_drops => &["`loss`"],
+        Rule::rate_limit | Rule::k_rate => &["`rate limit`"],
+        Rule::reorder => &["`reorder`"],
+        Rule::duplicate => &["`duplicate`"],
+        Rule::distribution => &["`fixed`", "`uniform`", "`normal`"],
+        Rule::k_one => &["`one of`"],
+        Rule::corners => &["a box such as `[(0, 0, 0)m, (1, 1, 1)m]`"],
+        Rule::latency => &["`latency`"],
+        Rule::blackhole => &["`blackhole`"],
+        Rule::formula => &["a formula such as `last(cycle)`"],
+        Rule::expression
+        | Rule::switch
+        | Rule::switch_conjunction
+        | Rule::disjunction
+        | Rule::conjunction
+        | Rule::passage
+        | Rule::relation
+        | Rule::prefix
+        | Rule::sum
+        | Rule::product
+        | Rule::factor
+        | Rule::call
+        | Rule::function
+        | Rule::members
+        | Rule::truth => &["a value such as `link0 - 2.5rad`"],
+        Rule::plus => &["`+`"],
+        Rule::times | Rule::each_element => &["`*`"],
+        Rule::over => &["`/`"],
+        Rule::trigger | Rule::when_then | Rule::formula_when => &["`when`"],
+        Rule::formula_every => &["`every`"],
+        Rule::formula_per => &["`per`"],
+        Rule::formula_outbound => &["`outbound`"],
+        Rule::formula_whole => &["`whole windows`"],
+        Rule::fuzzing_time => &["`fuzzing_time()`"],
+        Rule::minus
+        | Rule::k_not
+        | Rule::k_always
+        | Rule::k_eventually
+        | Rule::k_implies
+        | Rule::k_node
+        | Rule::k_parameter
+        | Rule::element => &[],
+        _ => {
+            let members: Vec<String> = blocks::members(rule).map(blocks::Member::phrase).collect();
+            if !members.is_empty() {
+                return members;
+            }
+            let block = blocks::find(rule).map(|_| "`{`".to_owned());
+            return block.or_else(|| keyword_of(rule).map(|word| format!("`{word}`"))).into_iter().collect();
+        }
+    };
+    phrases.iter().map(|&phrase| phrase.to_owned()).collect()
+}

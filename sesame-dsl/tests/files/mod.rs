@@ -1,0 +1,30 @@
+//! Files of the corpus, for the tests that go over them.
+
+use std::path::{Path, PathBuf};
+
+use sesame_dsl::source::SourceMap;
+use sesame_dsl::{Analysis, analyse};
+
+/// The files of a folder of the corpus: names without `.sesame`, and texts.
+#[expect(clippy::disallowed_methods, reason = "the crate is pure; its tests read their corpus")]
+pub(crate) fn corpus(folder: &str) -> Vec<(String, String)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests").join(folder);
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
+        .expect("the corpus is beside this file")
+        .map(|entry| entry.expect("the corpus can be listed").path())
+        .collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "sesame"));
+    files.sort();
+    assert!(!files.is_empty());
+    let name =
+        |file: &PathBuf| file.file_stem().and_then(|stem| stem.to_str()).expect("corpus names are plain").to_owned();
+    files.iter().map(|file| (name(file), std::fs::read_to_string(file).expect("the corpus is text"))).collect()
+}
+
+/// A text, analysed as the file of a name.
+pub(crate) fn analyse_text(name: &str, text: &str) -> (SourceMap, Analysis) {
+    let mut sources = SourceMap::new();
+    let file = sources.add(format!("{name}.sesame"), text);
+    let analysis = analyse(&sources, file);
+    (sources, analysis)
+}

@@ -1,0 +1,119 @@
+//! The index of definitions and references, above all of files with errors.
+
+use sesame_dsl::index::{DefinitionId, Index, Kind};
+use sesame_dsl::source::SourceMap;
+use sesame_dsl::{analyse, load_imports};
+
+fn index(text: &str) -> (SourceMap, Index, bool) {
+    let mut sources = SourceMap::new();
+    let root = sources.add("a.sesame", text);
+    let analysis = analyse(&sources, root);
+    let has_errors = analysis.has_errors();
+    (sources, analysis.index, has_errors)
+}
+
+fn only(index: &Index, name: &str) -> DefinitionId {
+    let found = index.find(name);
+    assert_eq!(found.len(), 1, "{name}: {found:?}");
+    found[0]
+}
+
+/// Who mentions a name, and in which line.
+fn uses(sources: &SourceMap, index: &Index, name: &str) -> Vec<(String, u32)> {
+    let uses = index.uses(only(index, name));
+    uses.map(|used| (index.full_name(used.within), sources.position(used.span).line)).collect()
+}
+
+const BROKEN: &str = "space broken
+system {
+  message Zone { /// How deep.
+                 level: real[mm]  name: text }
+  topic zones = \"z/{a,b}\" : Zone
+  topic gone
+  node plc { publishes zones }
+}
+metric depth minimise = max(zones.level)
+metric never minimise = last(nowhere.level
+requirement R1 \"safe\" = deth <= 3mm
+operation cut on zones.level = blackhole
+operation other on zones.level, missing = bias [1mm, 2mm]
+campaign c { objectives depth  oops  operations cut 1 per test  end after 3s }
+campaign d from c { end after 4s }
+";
+
+#[test]
+fn a_file_with_errors_has_its_definitions_and_their_uses() {
+    let (sources, index, has_errors) = index(BROKEN);
+    assert!(has_errors);
+    let at = |name: &str, line: u32| (name.to_owned(), line);
+    let of_zones = [at("plc", 7), at("depth", 9), at("cut", 12), at("other", 13)];
+    assert_eq!(uses(&sources, &index, "zones"), of_zones);
+    assert_eq!(uses(&sources, &index, "Zone"), [at("zones", 5)]);
+    assert_eq!(uses(&sources, &index, "Zone.level"), [at("depth", 9), at("cut", 12), at("other", 13)]);
+    assert_eq!(uses(&sources, &index, "depth"), [at("c", 14)]);
+    assert_eq!(uses(&sources, &index, "c"), [at("d", 15)]);
+    assert_eq!(uses(&sources, &index, "d"), []);
+}
+
+#[test]
+fn names_that_do_not_resolve_are_references_too() {
+    let (sources, index, _) = index(BROKEN);
+    let unresolved = index.references.iter().filter(|reference| reference.target.is_none());
+    let unresolved: Vec<&str> = unresolved.map(|reference| sources.snippet(reference.span)).collect();
+    assert_eq!(unresolved, ["deth", "missing"]);
+    let unread: Vec<&str> = index.unread.iter().map(|(name, _)| name.as_str()).collect();
+    assert!(unread.contains(&"gone") && unread.contains(&"never"), "{unread:?}");
+    assert_eq!(index.find("never"), []);
+    assert_eq!(index.most_similar("deth").as_deref(), Some("depth"));
+    assert_eq!(index.most_similar("Zone.levl").as_deref(), Some("Zone.level"));
+}
+
+#[test]
+fn a_definition_has_all_of_its_declaration_and_what_it_belongs_to() {
+    let (sources, index, _) = index(BROKEN);
+    let level = index.definition(only(&index, "zones.level"));
+    assert_eq!((level.kind, level.doc.as_str()), (Kind::Field, "How deep."));
+    assert_eq!(sources.snippet(level.full_span), "level: real[mm]");
+    assert_eq!(level.owner, Some(only(&index, "Zone")));
+    let campaign = index.definition(only(&index, "d"));
+    assert_eq!(sources.snippet(campaign.full_span), "campaign d from c { end after 4s }");
+}
+
+#[test]
+fn a_name_alone_is_a_declaration_before_it_is_a_member_of_one() {
+    let text =
+        "space s system { message A { level: real } message B { level: real  zones: A } topic zones = \"z\" : B }";
+    let (_, index, _) = index(text);
+    let level: Vec<String> = index.find("level").into_iter().map(|id| index.full_name(id)).collect();
+    assert_eq!(level, ["A.level", "B.level"]);
+    assert_eq!(index.definition(only(&index, "zones")).kind, Kind::Topic);
+    assert_eq!(index.full_name(only(&index, "zones.zones")), "B.zones");
+    assert_eq!(index.full_name(only(&index, "zones.zones.level")), "A.level");
+    assert_eq!(index.find("zones.nothing"), []);
+}
+
+#[test]
+fn the_first_of_several_definitions_is_meant_and_imported_ones_are_first() {
+    let mut sources = SourceMap::new();
+    let root = sources.add(
+        "a.sesame",
+        "space a import \"b.sesame\" metric speed minimise { hook on x } requirement R \"r\" = speed <= 1",
+    );
+    load_imports(&mut sources, root, |_| Ok("metric speed minimise { hook on y }".to_owned()));
+    let index = analyse(&sources, root).index;
+    let found = index.find("speed");
+    assert_eq!(found.len(), 2);
+    assert_eq!(sources.file(index.definition(found[0]).span.file).name(), "b.sesame");
+    assert_eq!([index.uses(found[0]).count(), index.uses(found[1]).count()], [1, 0]);
+}
+
+#[test]
+fn what_is_known_inside_of_a_monitor_is_meant_there() {
+    let text = include_str!("good/blocks.sesame");
+    let (sources, index, _) = index(text);
+    let at = |name: &str, line: u32| (name.to_owned(), line);
+    assert_eq!(uses(&sources, &index, "transport.conveyor_stops"), [at("transport", 37), at("transport", 38)]);
+    assert_eq!(uses(&sources, &index, "conveyor.conveyor_stops"), [at("transport", 34)], "the demand");
+    assert_eq!(uses(&sources, &index, "conveyor"), [at("transport", 34)]);
+    assert_eq!(uses(&sources, &index, "known"), [at("again", 73)]);
+}
