@@ -144,7 +144,7 @@ impl Selection {
                 operation: self.operation(it.operation),
                 activation: self.activation(&it.activation, within.end),
                 parameters: it.choices.clone(),
-                draw_seed: it.draw_seed,
+                operation_seed: it.draw_seed,
             }
         });
         let expectations = test
@@ -164,23 +164,25 @@ impl Selection {
         let failsafe = campaign.coverage.as_ref().and_then(|coverage| coverage.failsafe);
         let limit = |evaluations: u32| failsafe.unwrap_or(evaluations);
         let (search, (operations, count)) = match &campaign.search {
-            model::Search::Nsga2 { template, population, evaluations } => {
-                (plan::Search::Nsga2 { population: *population, evaluations: limit(*evaluations) }, held(template))
-            }
-            model::Search::MapElites { template, population, evaluations } => {
-                (plan::Search::MapElites { population: *population, evaluations: limit(*evaluations) }, held(template))
-            }
+            model::Search::Nsga2 { template, population, evaluations } => (
+                plan::Search::new(plan::Strategy::Nsga2 { population: *population }, limit(*evaluations)),
+                held(template),
+            ),
+            model::Search::MapElites { template, population, evaluations } => (
+                plan::Search::new(plan::Strategy::MapElites { population: *population }, limit(*evaluations)),
+                held(template),
+            ),
             model::Search::Random { template, evaluations } => {
-                (plan::Search::Random { evaluations: limit(*evaluations) }, held(template))
+                (plan::Search::new(plan::Strategy::Random, limit(*evaluations)), held(template))
             }
             model::Search::LatinHypercube { template, evaluations } => {
-                (plan::Search::LatinHypercube { evaluations: limit(*evaluations) }, held(template))
+                (plan::Search::new(plan::Strategy::LatinHypercube, limit(*evaluations)), held(template))
             }
             model::Search::Sobol { template, evaluations } => {
-                (plan::Search::Sobol { evaluations: limit(*evaluations) }, held(template))
+                (plan::Search::new(plan::Strategy::Sobol, limit(*evaluations)), held(template))
             }
             model::Search::Falsification { template, population, evaluations } => (
-                plan::Search::Falsification { population: *population, evaluations: limit(*evaluations) },
+                plan::Search::new(plan::Strategy::Falsification { population: *population }, limit(*evaluations)),
                 held(template),
             ),
             model::Search::Repeat { test, times } => {
@@ -500,7 +502,7 @@ mod tests {
         let axis = |dimension, low, high, cells| plan::GridAxis { dimension, low, high, cells };
         let axes = vec![axis(plan::Dimension::T1, 0.0, 1.0, 6), axis(plan::Dimension::O0, 0.5, 3.5, 3)];
         assert_eq!(campaign.coverage, Some(plan::CoverageGoal { axes, hits: 2, stop_at: Some(0.5) }));
-        assert_eq!(campaign.search, plan::Search::Nsga2 { population: 4, evaluations: 30 });
+        assert_eq!(campaign.search, plan::Search::new(plan::Strategy::Nsga2 { population: 4 }, 30));
         assert_eq!(lowered("look").plan.campaign.coverage, None);
     }
 

@@ -31,8 +31,8 @@ use std::collections::BTreeMap;
 pub use sesame_plan::stl::Interval;
 pub use sesame_plan::{
     Aggregate, BoostedChildren, Bound, Choice, Comparison, Condition, Confirmation, Copies, Dimension, Direction,
-    Distribution, Drain, Exploration, Expression, Members, Moment, NotFinite, OperationKind, Recorded, Shape, Step,
-    StopRule, Statistic, Trend, ValueMode,
+    Distribution, Drain, Exploration, Expression, Members, Moment, NotFinite, OperationKind, Recorded, Shape,
+    Statistic, Step, StopRule, Trend, ValueMode,
 };
 
 use crate::span::FileId;

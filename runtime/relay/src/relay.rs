@@ -127,7 +127,7 @@ struct Stage {
     activity: Activity,
     /// When it last went on.
     since: SimTime,
-    draw_seed: u64,
+    operation_seed: u64,
     /// Whether it counts in `fuzzing_time()`.
     timed: bool,
     /// Since when it holds messages back without being active.
@@ -181,7 +181,7 @@ impl<'a> Relay<'a> {
                 disturbance,
                 activity: Activity::new(&choice.activation, operation.within),
                 since: SimTime::ZERO,
-                draw_seed: choice.draw_seed,
+                operation_seed: choice.operation_seed,
                 timed: operation.timed,
                 tail_since: None,
                 tails: Vec::new(),
@@ -471,7 +471,7 @@ impl<'a> Relay<'a> {
                 return self.pass_custom(now, at, member, message, deliveries);
             }
             let fate = if active {
-                let draws = Draws::new(stage.draw_seed, member, message.index);
+                let draws = Draws::new(stage.operation_seed, member, message.index);
                 let encounter = Encounter { now, active: now - stage.since, member, draws };
                 stage.disturbance.apply(encounter, &mut message.value)
             } else {
@@ -539,7 +539,7 @@ impl Relay<'_> {
             if custom.moment != moment {
                 continue;
             }
-            let mut ctx = RunContext::new(files, Draws::new(stage.draw_seed, 0, 0));
+            let mut ctx = RunContext::new(files, Draws::new(stage.operation_seed, 0, 0));
             custom.hook.beside_run(&mut ctx);
             stage.counters.side_effects += ctx.side_effects;
             if let Some(failure) = ctx.failure {
@@ -556,7 +556,7 @@ impl Relay<'_> {
         let Disturbance::Custom(custom) = &mut stage.disturbance else {
             unreachable!("only custom operations come here")
         };
-        let draws = Draws::new(stage.draw_seed, member, message.index);
+        let draws = Draws::new(stage.operation_seed, member, message.index);
         let call = custom.on_message(now, self.wires.path(message.wire), draws, &mut message.value);
         stage.count(heard, now, call.injected.len() as u64, |counters| &mut counters.injected);
         stage.count(heard, now, u64::from(call.changed && !call.dropped), |counters| &mut counters.changed);

@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 
 use sesame_optimise::dominance::lexicographic;
 use sesame_optimise::front::{Front, FrontMember};
-use sesame_plan::{CampaignPlan, Dimension, GridAxis, MetricId, Search};
+use sesame_plan::{CampaignPlan, Dimension, GridAxis, MetricId};
 use sesame_search::coverage::{Coverage, CurvePoint, Feasible, Grid, curve};
 use sesame_search::in_unit;
 use sesame_search::sspr::Convention;
@@ -69,7 +69,7 @@ pub fn campaigns(repositories: &[Repository]) -> Result<Dataset, RecordError> {
             Datum::Text(repository.path().display().to_string()),
             Datum::Text(plan.space.clone()),
             Datum::Text(plan.campaign.name.clone()),
-            Datum::Text(search_word(&plan.campaign.search).to_owned()),
+            Datum::Text(facts.task.keyword(plan).to_owned()),
             Datum::Text(facts.seed.to_string()),
             Datum::count(repository.evaluated()?),
             sets.last().map_or(Datum::Missing, |(_, size)| Datum::count(*size)),
@@ -79,20 +79,6 @@ pub fn campaigns(repositories: &[Repository]) -> Result<Dataset, RecordError> {
         ]);
     }
     Ok(dataset)
-}
-
-fn search_word(search: &Search) -> &'static str {
-    match search {
-        Search::Nsga2 { .. } => "nsga2",
-        Search::MapElites { .. } => "map_elites",
-        Search::LatinHypercube { .. } => "latin_hypercube",
-        Search::Sobol { .. } => "sobol",
-        Search::Falsification { .. } => "falsification",
-        Search::Random { .. } => "random",
-        Search::Repeat { .. } => "repeat",
-        Search::Known { .. } => "regression tests",
-        Search::Shrink { .. } => "shrink",
-    }
 }
 
 /// All tests but the reference runs: where each comes from, how it ended, and the value of each metric; of imported ones

@@ -9,6 +9,7 @@
 
 mod difference;
 mod digest;
+mod earlier_plans;
 mod error;
 mod folder;
 mod fresh;
@@ -35,7 +36,7 @@ pub use error::RecordError;
 pub use folder::{Claim, DATABASE, LOCK, TRACES, claim_folder, latest_folder, latest_unfinished, trace_file};
 pub use fresh::{Standing, Tally};
 pub use recorder::Recorder;
-pub use repetitions::{Judge, confirmed_fitness, confirmed_margins};
+pub use repetitions::{Judge, confirmed_fitness, confirming_runs};
 pub use repository::{CampaignFacts, Repository};
 pub use scan::{ScannedOperation, ScannedTest};
 pub use schema::SCHEMA;

@@ -125,7 +125,7 @@ pub fn aggregate(runs: &[Fitness], by: Statistic) -> Fitness {
 
 /// One margin for several runs of a test: as [`typical`] has it of an objective that is minimised, so a quantile is the
 /// margin that this share of the runs reach or go below. It counts as a violation if such a run violates.
-pub fn aggregate_margin(runs: &[Margin], by: Statistic) -> Margin {
+pub(crate) fn aggregate_margin(runs: &[Margin], by: Statistic) -> Margin {
     let value = |run: &Margin| run.value.map_or(Fitness::Unfit(Unfit::Unmeasured), |it| Fitness::Measured(vec![it]));
     let values: Vec<Fitness> = runs.iter().map(value).collect();
     let value = aggregate(&values, by).objectives().map(|values| values[0]);

@@ -14,10 +14,11 @@ mod vectors;
 use vectors::Vectors;
 
 use sesame_optimise::falsify::{Falsifier, SearchDomain, Settings, UnitBox};
-use sesame_plan::{Activation, Choice, Test};
+use sesame_plan::{Activation, CampaignPlan, Choice, Test};
 use sesame_rng::Stream;
 
 use crate::evolve::variation::{Rates, crossover, mutate};
+use crate::margin::{confirmed_margins, margins};
 use crate::sample::sampled_search::Sampling;
 use crate::sample::sobol::Sobol;
 use crate::space::initial::fresh_test;
@@ -35,6 +36,7 @@ const APART: f64 = 8.0;
 /// A focused falsification of the requirements of a campaign by time.
 #[derive(Debug, Clone)]
 pub(crate) struct Falsification {
+    plan: CampaignPlan,
     search: Inner,
     generation: u32,
     /// How many tests were asked for.
@@ -51,7 +53,7 @@ enum Inner {
 impl Falsification {
     /// A search before its first test. `settings` say how many requirements there are: what
     /// [`margins`](crate::margins) are told of.
-    pub(crate) fn new(test_space: TestSpace, settings: Settings) -> Self {
+    pub(crate) fn new(plan: &CampaignPlan, test_space: TestSpace, settings: Settings) -> Self {
         let search = if let Some(vectors) = Vectors::from_space(&test_space, settings.seed) {
             let search = Falsifier::new(UnitBox::new(vectors.variables(), settings.seed), settings);
             Inner::Vectors { search: Box::new(search), vectors, asked: Vec::new() }
@@ -60,7 +62,7 @@ impl Falsification {
             let search = Falsifier::new(TestDomain { test_space, spread }, settings);
             Inner::Tests { search: Box::new(search), asked: Vec::new() }
         };
-        Falsification { search, generation: 0, number: 0 }
+        Falsification { plan: plan.clone(), search, generation: 0, number: 0 }
     }
 }
 
@@ -86,20 +88,27 @@ impl Strategy for Falsification {
     }
 
     fn tell(&mut self, results: &[Evaluated]) {
+        let plan = &self.plan;
+        let margins = |result: &Evaluated| match plan.campaign.confirm {
+            Some(confirmation) if !result.fresh_runs.is_empty() => {
+                confirmed_margins(plan, confirmation.by, &result.fresh_runs)
+            }
+            _ => margins(plan, &result.run),
+        };
         let told = "exactly the generation asked last is told";
         match &mut self.search {
             Inner::Tests { search, asked } => {
                 assert!(results.len() == asked.len(), "{told}");
                 let embedded = std::mem::take(asked).into_iter().zip(results).map(|(mut embedded, result)| {
                     embedded.number = Some(result.number);
-                    (embedded, result.margins.clone())
+                    (embedded, margins(result))
                 });
                 search.tell(embedded.collect());
             }
             Inner::Vectors { search, asked, .. } => {
                 assert!(results.len() == asked.len(), "{told}");
                 let embedded = std::mem::take(asked).into_iter().zip(results);
-                search.tell(embedded.map(|(vector, result)| (vector, result.margins.clone())).collect());
+                search.tell(embedded.map(|(vector, result)| (vector, margins(result))).collect());
             }
         }
     }
@@ -264,7 +273,7 @@ fn overlap(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_plan::Search;
+    use sesame_plan::{Search, Strategy};
 
     use super::*;
     use crate::space::test_space::tests::{any_timed_plan, broken_rule};
@@ -304,13 +313,13 @@ mod tests {
         let mut plan = robot.plan(search);
         plan.requirements.push(SyntheticRobot::fewer_hits_than(hits));
         let run = robot.campaign_of(&plan, crate::strategy(&plan, seed).unwrap().as_mut());
-        run.tests.iter().position(|result| result.margins[0].violated).map_or(usize::MAX, |at| at + 1)
+        run.tests.iter().position(|result| margins(&plan, &result.run)[0].violated).map_or(usize::MAX, |at| at + 1)
     }
 
     #[test]
     fn the_seed_decides_and_results_told_again_bring_a_search_back_to_where_it_was() {
         let robot = &SYNTHETIC_ROBOTS[1];
-        let mut plan = robot.plan(Search::Falsification { population: 3, evaluations: 26 });
+        let mut plan = robot.plan(Search::new(Strategy::Falsification { population: 3 }, 26));
         plan.requirements.push(SyntheticRobot::fewer_hits_than(20.0));
         let start = |seed| crate::strategy(&plan, seed).unwrap();
         let whole = robot.campaign_of(&plan, start(8).as_mut()).tests;
@@ -337,9 +346,9 @@ mod tests {
     #[ignore = "long: 240 searches of up to 80 tests"]
     fn strategies_on_made_up_robots() {
         let searches = [
-            ("falsification", Search::Falsification { population: 1, evaluations: 80 }),
-            ("nsga2", Search::Nsga2 { population: 10, evaluations: 80 }),
-            ("random", Search::Random { evaluations: 80 }),
+            ("falsification", Search::new(Strategy::Falsification { population: 1 }, 80)),
+            ("nsga2", Search::new(Strategy::Nsga2 { population: 10 }, 80)),
+            ("random", Search::new(Strategy::Random, 80)),
         ];
         println!("| strategy | {} |", SYNTHETIC_ROBOTS.each_ref().map(|robot| robot.name).join(" | "));
         for (name, search) in searches {
@@ -359,8 +368,8 @@ mod tests {
             tests.sort_unstable();
             tests[2]
         };
-        let found = median(Search::Falsification { population: 1, evaluations: 60 });
-        let drawn = median(Search::Random { evaluations: 1_000 });
+        let found = median(Search::new(Strategy::Falsification { population: 1 }, 60));
+        let drawn = median(Search::new(Strategy::Random, 1_000));
         assert!(found <= 60 && found < drawn, "{found} tests, and {drawn} by chance");
     }
 }

@@ -2,9 +2,11 @@
 
 use sesame_base::observation::Observation;
 use sesame_base::verdict::{Verdict, verdict};
-use sesame_plan::{Bound, CampaignPlan, Requirement};
+use sesame_plan::{Bound, CampaignPlan, Requirement, Statistic};
 
-pub(crate) use sesame_optimise::falsify::Margin;
+use crate::confirmed_front::aggregate_margin;
+
+use sesame_optimise::falsify::Margin;
 
 /// The margin to a bound of which a metric has this value, which is not NaN.
 pub fn margin_to(bound: Bound, value: f64) -> Margin {
@@ -33,6 +35,17 @@ pub fn margins(plan: &CampaignPlan, observation: &Observation) -> Vec<Margin> {
     plan.requirements.iter().map(margin).collect()
 }
 
+/// The margin of each requirement over the fresh runs that confirm a test, aggregated as its campaign says. The margin of a
+/// requirement is unknown if too few runs are conclusive.
+pub fn confirmed_margins(plan: &CampaignPlan, by: Statistic, fresh_runs: &[Observation]) -> Vec<Margin> {
+    let runs: Vec<Vec<Margin>> = fresh_runs.iter().map(|run| margins(plan, run)).collect();
+    let of = |requirement: usize| {
+        let margins: Vec<Margin> = runs.iter().map(|run| run[requirement]).collect();
+        aggregate_margin(&margins, by)
+    };
+    (0..plan.requirements.len()).map(of).collect()
+}
+
 /// How far a value is from breaking a bound.
 fn to_bound(bound: Bound, x: f64) -> f64 {
     // Infinite values at infinite bounds are as far as can be.
@@ -50,13 +63,13 @@ mod tests {
     use proptest::prelude::*;
 
     use sesame_base::observation::{MetricObservation, Outcome, Reach, WallTime};
-    use sesame_plan::{MetricId, Search};
+    use sesame_plan::{MetricId, Search, Strategy};
 
     use super::*;
     use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     fn margin(outcome: Outcome, shown: MetricObservation) -> Margin {
-        let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
+        let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
         plan.requirements = vec![Requirement {
             name: "in_time".to_owned(),
             text: String::new(),

@@ -95,7 +95,7 @@ mod tests {
     use proptest::prelude::*;
 
     use sesame_optimise::dominance::Unfit;
-    use sesame_plan::Search;
+    use sesame_plan::{Search, Strategy};
 
     use super::*;
     use crate::strategy;
@@ -104,7 +104,7 @@ mod tests {
     /// Random tests of a landscape with their points, in generations.
     fn results(count: u32) -> (CampaignPlan, Vec<Evaluated>) {
         let landscape = &SYNTHETIC_ROBOTS[0];
-        let mut plan = landscape.plan(Search::Random { evaluations: count });
+        let mut plan = landscape.plan(Search::new(Strategy::Random, count));
         plan.campaign.neighbours = Some(3);
         let run = landscape.campaign(strategy(&plan, 5).unwrap().as_mut());
         (plan, run.tests)

@@ -19,7 +19,9 @@ use std::collections::BTreeMap;
 use reduce::{Oracle, Pending, Reduced, reduce};
 use space::ShrinkSpace;
 
-use sesame_plan::{CampaignPlan, Search, Test};
+use sesame_base::observation::Observation;
+use sesame_base::verdict::fails;
+use sesame_plan::{CampaignPlan, Failing, Shrinking, Test};
 use sesame_rng::derive_seed;
 
 use crate::{Candidate, Evaluated, Strategy};
@@ -72,10 +74,12 @@ pub struct Tried {
     pub number: u32,
 }
 
-/// Makes a test smaller, by ask and tell of which candidates [fail](Evaluated::failing).
+/// Shrinks a test, by ask and tell of which candidates fail as it does.
 #[derive(Debug, Clone)]
 pub struct Shrink {
     space: ShrinkSpace,
+    plan: CampaignPlan,
+    failing: Failing,
     test: Test,
     simulator_seed: u64,
     runs: u32,
@@ -93,29 +97,18 @@ pub struct Shrink {
 }
 
 impl Shrink {
-    /// Makes this test smaller, for one that fails by saying so, in so many runs each and so many runs in total.
-    pub fn new(plan: &CampaignPlan, test: Test, simulator_seed: u64, runs: u32, evaluations: u32) -> Shrink {
-        Shrink::with_resolution(plan, test, simulator_seed, (runs, evaluations), RESOLUTION)
+    /// Shrinks this test of a plan.
+    pub fn new(plan: &CampaignPlan, shrinking: Shrinking) -> Shrink {
+        Shrink::with_resolution(plan, shrinking, RESOLUTION)
     }
 
-    /// The strategy of a plan whose search this is; `None` for another.
-    pub fn of(plan: &CampaignPlan) -> Option<Shrink> {
-        let &Search::Shrink { test, simulator_seed, runs, evaluations, failing: _ } = &plan.campaign.search else {
-            return None;
-        };
-        Some(Shrink::new(plan, plan.test(test).test.clone(), simulator_seed, runs, evaluations))
-    }
-
-    fn with_resolution(
-        plan: &CampaignPlan,
-        test: Test,
-        simulator_seed: u64,
-        (runs, evaluations): (u32, u32),
-        resolution: f64,
-    ) -> Shrink {
+    fn with_resolution(plan: &CampaignPlan, shrinking: Shrinking, resolution: f64) -> Shrink {
+        let Shrinking { test, failing, simulator_seed, runs, evaluations, name: _ } = shrinking;
         let runs = runs.max(1);
         Shrink {
             space: ShrinkSpace::from_plan(plan, resolution),
+            plan: plan.clone(),
+            failing,
             test,
             simulator_seed,
             runs,
@@ -127,6 +120,18 @@ impl Shrink {
             awaited: 0,
             reduced: None,
         }
+    }
+
+    /// Takes of each run of the generation asked last its number, and whether it failed as the test did.
+    pub fn learn(&mut self, results: &[(u32, bool)]) {
+        assert!(results.len() == self.awaited, "exactly the generation asked last is told");
+        self.awaited = 0;
+        for (tried, runs) in self.tried[self.asked..].iter_mut().zip(results.chunks(self.runs as usize)) {
+            let failed = runs.iter().filter(|(_, failed)| *failed).count();
+            tried.failed = Some(u32::try_from(failed).unwrap_or(u32::MAX));
+            tried.number = runs[0].0;
+        }
+        self.generation += 1;
     }
 
     /// All tests that were tried, in the order in which they were asked for.
@@ -204,14 +209,9 @@ impl Strategy for Shrink {
     }
 
     fn tell(&mut self, results: &[Evaluated]) {
-        assert!(results.len() == self.awaited, "exactly the generation asked last is told");
-        self.awaited = 0;
-        for (tried, runs) in self.tried[self.asked..].iter_mut().zip(results.chunks(self.runs as usize)) {
-            let failed = runs.iter().filter(|run| run.failing).count();
-            tried.failed = Some(u32::try_from(failed).unwrap_or(u32::MAX));
-            tried.number = runs[0].number;
-        }
-        self.generation += 1;
+        let failed = |run: &Observation| fails(&self.plan, &self.failing, &run.outcome, |id| run.value(id));
+        let results: Vec<(u32, bool)> = results.iter().map(|result| (result.number, failed(&result.run))).collect();
+        self.learn(&results);
     }
 
     fn ended(&self) -> Option<String> {

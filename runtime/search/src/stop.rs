@@ -22,7 +22,7 @@ use std::time::Duration;
 use sesame_optimise::dominance::Fitness;
 use sesame_optimise::front::Front;
 use sesame_optimise::hypervolume::{self, Growth};
-use sesame_plan::{CampaignPlan, Search, StopRule};
+use sesame_plan::{CampaignPlan, StopRule};
 
 use crate::Evaluated;
 use crate::coverage::{Coverage, Feasible, Grid};
@@ -59,13 +59,15 @@ impl StopRules {
     pub fn from_plan(plan: &CampaignPlan) -> StopRules {
         // A plan whose cells are no grid is refused before.
         let cells = plan.campaign.coverage.as_ref().and_then(|goal| Grid::new(goal.axes.clone()).ok());
-        // Making a test smaller is not what the campaign's rules are about.
-        let shrinks = matches!(plan.campaign.search, Search::Shrink { .. });
         let asks = plan.campaign.stop.iter().any(|rule| matches!(rule, StopRule::Completeness { .. }));
         StopRules {
             feasible: cells.as_ref().filter(|_| asks).map(|grid| Feasible::from_plan(plan, grid)),
-            rules: if shrinks { Vec::new() } else { plan.campaign.stop.clone() },
-            independent: matches!(plan.campaign.search, Search::Random { .. }),
+            rules: plan.campaign.stop.clone(),
+            independent: plan
+                .campaign
+                .search
+                .strategy()
+                .is_some_and(|strategy| strategy.kind().properties().independent),
             cells: cells.map(|grid| Coverage::new(grid, 1)),
             tests: 0,
             once: 0,
@@ -236,6 +238,8 @@ mod tests {
     use sesame_plan::CoverageGoal;
     use sesame_rng::Stream;
 
+    use sesame_plan::{Search, Strategy};
+
     use super::*;
     use crate::strategy;
     use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
@@ -264,7 +268,7 @@ mod tests {
     }
 
     fn random(evaluations: u32, rule: StopRule) -> CampaignPlan {
-        plan(Search::Random { evaluations }, &[rule])
+        plan(Search::new(Strategy::Random, evaluations), &[rule])
     }
 
     /// Chances of cells, each with a name.
@@ -384,7 +388,7 @@ mod tests {
         let mut rows = Vec::new();
         for landscape in SYNTHETIC_ROBOTS.iter().take(robots) {
             let tests = |evaluations: u32, seed: u64| {
-                let plan = landscape.plan(Search::Random { evaluations });
+                let plan = landscape.plan(Search::new(Strategy::Random, evaluations));
                 landscape.campaign(strategy(&plan, seed).unwrap().as_mut()).tests
             };
             let mut chances = vec![0.0; grid.len()];
@@ -397,7 +401,7 @@ mod tests {
             for seed in 1..=seeds {
                 let run = tests(LONGEST, seed);
                 for (&rule, (good, stops)) in rules.iter().zip(&mut found) {
-                    let mut plan = landscape.plan(Search::Random { evaluations: LONGEST });
+                    let mut plan = landscape.plan(Search::new(Strategy::Random, LONGEST));
                     plan.campaign.coverage = Some(CoverageGoal { axes: grid.axes().to_vec(), hits: 1, stop_at: None });
                     plan.campaign.stop = vec![rule];
                     let mut rules = StopRules::from_plan(&plan);
@@ -454,7 +458,7 @@ mod tests {
 
     #[test]
     fn cells_that_can_be_reached_are_enough_to_know_and_say_so_without_bias() {
-        let search = Search::Nsga2 { population: 10, evaluations: 600 };
+        let search = Search::new(Strategy::Nsga2 { population: 10 }, 600);
         let mut plan = plan(search, &[StopRule::Completeness { share: 0.4 }]);
         plan.campaign.exploration = Some(sesame_plan::Exploration::Construct { share: 1.0, until: None });
         let (done, why) = stopped(&plan, 1).unwrap();
@@ -467,7 +471,7 @@ mod tests {
 
     #[test]
     fn a_search_that_learns_is_told_that_its_bounds_are_biased() {
-        let search = Search::Nsga2 { population: 10, evaluations: 3_000 };
+        let search = Search::new(Strategy::Nsga2 { population: 10 }, 3_000);
         let (done, why) = stopped(&plan(search.clone(), &[StopRule::Discovery { below: 0.1 }]), 1).unwrap();
         assert!(done < 3_000 && why.contains("biased"), "{why}");
         // Where nobody knows which cells can be reached, as where conditions switch.
@@ -485,7 +489,7 @@ mod tests {
 
     #[test]
     fn a_search_stops_where_its_front_no_longer_grows_and_the_first_rule_that_holds_counts() {
-        let search = Search::Nsga2 { population: 10, evaluations: 400 };
+        let search = Search::new(Strategy::Nsga2 { population: 10 }, 400);
         let slow = StopRule::Stagnation { generations: 5, below: 0.02 };
         let (done, why) = stopped(&plan(search.clone(), &[slow]), 2).unwrap();
         assert!(why.starts_with("its hypervolume grew by") && done >= 60, "{done}: {why}");
@@ -503,32 +507,33 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn growth_is_what_two_fronts_measured_from_one_place_differ_by(seed: u64, generations in 1usize..4) {
-            let plan = random(10, StopRule::Stagnation { generations: 6, below: 0.1 });
-            let mut rules = StopRules::from_plan(&plan);
-            let mut stream = Stream::derive(seed, "test", &[]);
-            let mut all: Vec<Evaluated> = Vec::new();
-            for number in 0..6u32 {
-                let fitness = Fitness::Measured(vec![stream.unit(), stream.unit()]);
-                let result = Evaluated { number, test: sesame_plan::Test::default(), fitness, point: None, trajectories: None, margins: Vec::new(), failing: false };
-                rules.tell(std::slice::from_ref(&result));
-                all.push(result);
-            }
-            let worst = |at: usize| all.iter().map(|it| match &it.fitness {
-                Fitness::Measured(objectives) => objectives[at],
-                _ => unreachable!("all are measured"),
-            }).fold(f64::NEG_INFINITY, f64::max);
-            let reference = [worst(0), worst(1)];
-            let volume = |tests: &[Evaluated]| {
-                let front = Front::from_tests(tests.iter().map(|it| (it.number, &it.fitness)));
-                let points: Vec<&[f64]> = front.members().iter().map(|it| it.objectives.as_slice()).collect();
-                hypervolume::hypervolume(&points, &reference)
-            };
-            let (now, then) = (volume(&all), volume(&all[..6 - generations]));
-            let expected = if now > 0.0 { (now - then) / now } else { 0.0 };
-            prop_assert!((rules.growth(generations).unwrap().share - expected).abs() < 1e-12);
-            prop_assert_eq!(rules.growth(6), None);
-        }
-    }
+           #[test]
+           fn growth_is_what_two_fronts_measured_from_one_place_differ_by(seed: u64, generations in 1usize..4) {
+               let plan = random(10, StopRule::Stagnation { generations: 6, below: 0.1 });
+               let mut rules = StopRules::from_plan(&plan);
+               let mut stream = Stream::derive(seed, "test", &[]);
+               let mut all: Vec<Evaluated> = Vec::new();
+               for number in 0..6u32 {
+                   let fitness = Fitness::Measured(vec![stream.unit(), stream.unit()]);
+                   let result = Evaluated { number, test: sesame_plan::Test::default(), fitness, point: None, run: crate::testing::no_run(),
+    fresh_runs: Vec::new() };
+                   rules.tell(std::slice::from_ref(&result));
+                   all.push(result);
+               }
+               let worst = |at: usize| all.iter().map(|it| match &it.fitness {
+                   Fitness::Measured(objectives) => objectives[at],
+                   _ => unreachable!("all are measured"),
+               }).fold(f64::NEG_INFINITY, f64::max);
+               let reference = [worst(0), worst(1)];
+               let volume = |tests: &[Evaluated]| {
+                   let front = Front::from_tests(tests.iter().map(|it| (it.number, &it.fitness)));
+                   let points: Vec<&[f64]> = front.members().iter().map(|it| it.objectives.as_slice()).collect();
+                   hypervolume::hypervolume(&points, &reference)
+               };
+               let (now, then) = (volume(&all), volume(&all[..6 - generations]));
+               let expected = if now > 0.0 { (now - then) / now } else { 0.0 };
+               prop_assert!((rules.growth(generations).unwrap().share - expected).abs() < 1e-12);
+               prop_assert_eq!(rules.growth(6), None);
+           }
+       }
 }

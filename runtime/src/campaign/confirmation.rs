@@ -9,7 +9,7 @@ use sesame_optimise::front::Front;
 use sesame_plan::{CampaignPlan, Confirmation, Test};
 use sesame_results::record::{self, Event, EventKind, Recorder, Repetition, TestRecord};
 use sesame_rng::derive_seed;
-use sesame_search::{self as search, ConfirmedFront, Evaluated, GenerationTest};
+use sesame_search::{ConfirmedFront, Evaluated, GenerationTest};
 
 use crate::campaign::error::{CampaignError, Halt};
 use crate::campaign::evaluator::Evaluator;
@@ -63,7 +63,7 @@ impl ConfirmedSearch {
     }
 
     /// Confirms the tests of a generation that would be on the front, or violate a requirement, until all tests on the front
-    /// are confirmed; then gives tests their confirmed fitness and margins. `each` sees the number of runs and the front.
+    /// are confirmed; then gives tests their confirmed fitness and fresh runs. `each` sees the number of runs and the front.
     pub(super) fn confirm(
         &mut self,
         plan: &CampaignPlan,
@@ -95,9 +95,7 @@ impl ConfirmedSearch {
         for (test, fitness) in tests.iter_mut().zip(self.front.fitness()) {
             test.fitness = fitness.clone();
             let runs = evaluator.repetitions_of(numbering.stands_for(test.number));
-            if let Some(confirmed) = record::confirmed_margins(plan, runs).filter(|_| search::needs_margins(plan)) {
-                test.margins = confirmed;
-            }
+            test.fresh_runs = record::confirming_runs(plan, runs).unwrap_or_default();
         }
         Ok(())
     }

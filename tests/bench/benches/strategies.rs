@@ -8,7 +8,7 @@ use sesame_optimise::front::Front;
 use sesame_plan::condition::{ConditionEnd, ConditionSpace, Integers, Variable};
 use sesame_plan::{
     Activation, ActivationMode, BoostedChildren, Bound, CampaignPlan, CoverageGoal, Dimension, Exploration, MetricId,
-    Requirement, Search, Span, StopRule,
+    Requirement, Search, Span, StopRule, Strategy,
 };
 use sesame_rng::Stream;
 use sesame_search as search;
@@ -27,7 +27,7 @@ const LINEAR: Exploration = Exploration::Boost {
 type Searched = fn(u32) -> Search;
 
 fn nsga2(evaluations: u32) -> Search {
-    Search::Nsga2 { population: 10, evaluations }
+    Search::new(Strategy::Nsga2 { population: 10 }, evaluations)
 }
 
 /// The space of the benchmarks with the paper's cells, and a rule that looks at the front after each generation.
@@ -153,12 +153,12 @@ fn main() {
         ("`boost linear`", nsga2, Some(LINEAR)),
         ("`construct`", nsga2, Some(Exploration::Construct { share: 0.5, until: None })),
         ("`predict`", nsga2, Some(Exploration::Predict { candidates: 20 })),
-        ("`map_elites`", |evaluations| Search::MapElites { population: 10, evaluations }, None),
-        ("`random`", |evaluations| Search::Random { evaluations }, None),
-        ("`latin_hypercube`", |evaluations| Search::LatinHypercube { evaluations }, None),
-        ("`sobol`", |evaluations| Search::Sobol { evaluations }, None),
+        ("`map_elites`", |evaluations| Search::new(Strategy::MapElites { population: 10 }, evaluations), None),
+        ("`random`", |evaluations| Search::new(Strategy::Random, evaluations), None),
+        ("`latin_hypercube`", |evaluations| Search::new(Strategy::LatinHypercube, evaluations), None),
+        ("`sobol`", |evaluations| Search::new(Strategy::Sobol, evaluations), None),
         ("`novelty`", nsga2, Some(Exploration::Novelty { neighbours: 10, over: Dimension::ALL.to_vec() })),
-        ("`falsification`", |evaluations| Search::Falsification { population: 1, evaluations }, None),
+        ("`falsification`", |evaluations| Search::new(Strategy::Falsification { population: 1 }, evaluations), None),
     ];
     println!("| strategy | {} |", counts.iter().map(u32::to_string).collect::<Vec<_>>().join(" | "));
     println!("|---|{}", "---:|".repeat(counts.len()));

@@ -14,7 +14,7 @@ use crate::record::{RecordError, Repository, schema};
 const CONTENT: &[(&str, &str)] = &[
     (
         "campaign",
-        "SELECT space, name, source, generator, runtime, seed, evaluations, end_after_s, plan, stop FROM campaign",
+        "SELECT space, name, source, generator, runtime, seed, evaluations, end_after_s, plan, stop, task FROM campaign",
     ),
     ("metrics", "SELECT id, name, unit, direction, objective, default_value FROM metrics ORDER BY id"),
     (

@@ -6,10 +6,9 @@ use rusqlite::params;
 
 use sesame_base::observation::{MetricObservation, Observation, Outcome, WallTime};
 use sesame_optimise::dominance::Fitness;
-use sesame_optimise::falsify::Margin;
 use sesame_plan::{CampaignPlan, Requirement};
 use sesame_search as search;
-use sesame_search::{aggregate, aggregate_margin};
+use sesame_search::aggregate;
 
 use crate::record::recorder::write_event;
 use crate::record::schema::index;
@@ -28,17 +27,9 @@ pub fn confirmed_fitness(plan: &CampaignPlan, repetitions: &[Repetition]) -> Opt
     Some(aggregate(&runs, confirmation.by))
 }
 
-/// How far the repetitions of a test are from violating each requirement, by the campaign's way to sum them up; `None` as
-/// for [`confirmed_fitness`]. The margin of a requirement is unknown where too few repetitions say something about it.
-pub fn confirmed_margins(plan: &CampaignPlan, repetitions: &[Repetition]) -> Option<Vec<Margin>> {
-    let confirmation = plan.campaign.confirm?;
-    let runs: Vec<Vec<Margin>> =
-        own(plan, repetitions)?.iter().map(|run| search::margins(plan, &run.observation())).collect();
-    let of = |requirement: usize| {
-        let margins: Vec<Margin> = runs.iter().map(|run| run[requirement]).collect();
-        aggregate_margin(&margins, confirmation.by)
-    };
-    Some((0..plan.requirements.len()).map(of).collect())
+/// The runs by which a campaign confirmed a test, without their series; `None` as for [`confirmed_fitness`].
+pub fn confirming_runs(plan: &CampaignPlan, repetitions: &[Repetition]) -> Option<Vec<Observation>> {
+    Some(own(plan, repetitions)?.iter().map(Repetition::observation).collect())
 }
 
 /// The repetitions by which a campaign confirms a test of its own accord, if it does and all are there.
@@ -230,6 +221,7 @@ impl Repository {
 mod tests {
     use proptest::prelude::*;
 
+    use sesame_optimise::falsify::Margin;
     use sesame_plan::{Confirmation, Statistic};
 
     use super::*;
@@ -357,16 +349,19 @@ mod tests {
         let mut plan = sample::plan();
         let completed = |position, collisions| repetition(3, position, Outcome::Completed, Some(collisions));
         let runs = [completed(1, 2.0), completed(2, 4.0), completed(3, 90.0)];
-        assert_eq!(confirmed_margins(&plan, &runs), None, "it does not confirm");
+        assert_eq!(confirming_runs(&plan, &runs), None, "it does not confirm");
         plan.campaign.confirm = Some(Confirmation { times: 2, by: Statistic::Mean, violations: false });
+        let margins = |runs: &[Repetition]| {
+            confirming_runs(&plan, runs).map(|runs| search::confirmed_margins(&plan, Statistic::Mean, &runs))
+        };
         // R1: at most 0 collisions. R4 bounds a metric without value here.
-        let margins = confirmed_margins(&plan, &runs).unwrap();
-        assert_eq!(margins[0], Margin { value: Some(-3.0), violated: true });
-        assert_eq!(margins[3], Margin { value: None, violated: false });
+        let confirmed = margins(&runs).unwrap();
+        assert_eq!(confirmed[0], Margin { value: Some(-3.0), violated: true });
+        assert_eq!(confirmed[3], Margin { value: None, violated: false });
         let crash = Outcome::Crash { message: "gone".to_owned() };
         let one_crash = [repetition(3, 1, crash, Some(0.0)), completed(2, 4.0)];
-        assert_eq!(confirmed_margins(&plan, &one_crash).unwrap()[0], Margin { value: None, violated: false });
-        assert_eq!(confirmed_margins(&plan, &runs[1..]), None, "one of its own is missing");
+        assert_eq!(margins(&one_crash).unwrap()[0], Margin { value: None, violated: false });
+        assert_eq!(margins(&runs[1..]), None, "one of its own is missing");
     }
     /// A run: how it ended, and whether it shows a collision; `None` where it has no value.
     fn run() -> impl Strategy<Value = (Outcome, Option<bool>)> {

@@ -10,7 +10,7 @@ use rusqlite::{Connection, Row, params};
 
 use sesame_base::condition;
 use sesame_base::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, Reach, WallTime};
-use sesame_plan::{Activation, CampaignPlan, Choice, KnownTestId, OperationId, Span, Test, TestOperation};
+use sesame_plan::{Activation, CampaignPlan, Choice, KnownTestId, OperationId, Span, Task, Test, TestOperation};
 use sesame_search::indicators::GenerationIndicators;
 
 use crate::record::folder::{DATABASE, trace_file};
@@ -18,7 +18,7 @@ use crate::record::scan::Cursor;
 use crate::record::schema::STANDARD_WORDS_SINCE;
 use crate::record::{
     Event, EventKind, GenerationCoverage, MetricValue, Origin, RecordError, ResultSet, Session, Status, TestRecord,
-    TestRow, digest, recognise, schema,
+    TestRow, digest, earlier_plans, recognise, schema,
 };
 
 /// The results of one campaign run, to be read.
@@ -36,6 +36,8 @@ pub struct Repository {
 pub struct CampaignFacts {
     /// Everything the runner knew of the campaign.
     pub plan: CampaignPlan,
+    /// What the run does with the plan.
+    pub task: Task,
     /// The one seed that decided everything.
     pub seed: u64,
     /// Version of the runtime that ran it.
@@ -76,20 +78,22 @@ impl Repository {
             .map_err(|e| RecordError::database("read the campaign", &path, e))?;
         // Before anything is asked of it: what has the name of a table may be something else that never comes to an end.
         recognise::tables(&connection, &path, schema)?;
-        let row: Result<(String, String, String, Option<String>), _> =
-            connection.query_row("SELECT plan, seed, runtime, stop FROM campaign", [], |row| {
-                Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))
+        let sql = schema::query("SELECT plan, seed, runtime, stop, task FROM campaign", schema);
+        let row: Result<(String, String, String, Option<String>, Option<String>), _> =
+            connection.query_row(&sql, [], |row| {
+                let task = if schema >= schema::TASK_SINCE { row.get(4)? } else { None };
+                Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, task))
             });
-        let (plan, seed, runtime, stop) = row.map_err(|source| match source {
+        let (plan, seed, runtime, stop, task) = row.map_err(|source| match source {
             rusqlite::Error::QueryReturnedNoRows => RecordError::damaged(&path, "there is no campaign in it"),
             _ => RecordError::database("read the campaign", &path, source),
         })?;
-        let plan = serde_json::from_str(&plan)
-            .map_err(|e| RecordError::damaged(&path, format!("its plan cannot be read: {e}")))?;
+        let (plan, task) =
+            earlier_plans::read(&plan, task.as_deref()).map_err(|reason| RecordError::damaged(&path, reason))?;
         recognise::views(&connection, &path, &plan)?;
         let seed = seed.parse().map_err(|_| RecordError::damaged(&path, format!("`{seed}` is no seed")))?;
         connection.set_prepared_statement_cache_capacity(STATEMENTS);
-        Ok(Repository { connection, path, schema, facts: CampaignFacts { plan, seed, runtime, stop } })
+        Ok(Repository { connection, path, schema, facts: CampaignFacts { plan, task, seed, runtime, stop } })
     }
 
     /// The database's file.
@@ -122,6 +126,11 @@ impl Repository {
     /// Everything the runner knew of the campaign.
     pub fn plan(&self) -> &CampaignPlan {
         &self.facts.plan
+    }
+
+    /// What the run does with the plan.
+    pub fn task(&self) -> &Task {
+        &self.facts.task
     }
 
     /// Hash of the canonical content, see [`digest()`].
@@ -451,7 +460,7 @@ impl Repository {
                     operation,
                     activation: self.activation(number, operation, window, conditions)?,
                     parameters,
-                    draw_seed: self.seed(&operation_seed)?,
+                    operation_seed: self.seed(&operation_seed)?,
                 });
             }
             if !chosen.is_empty() {

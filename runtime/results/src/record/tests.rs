@@ -306,7 +306,7 @@ fn a_folder_that_a_run_left_without_results_is_taken_by_the_next_one_unless_it_i
         let other = claim_folder(results.path(), "42").unwrap();
         assert_eq!(other.folder, results.path().join("42-2"), "{left:?}: the first is claimed");
         drop(other);
-        let recorder = Recorder::create_in(claim, &sample::plan(), 42, 1).unwrap();
+        let recorder = Recorder::create_in(claim, &sample::plan(), &sesame_plan::Task::Campaign, 42, 1).unwrap();
         assert_eq!(claim_folder(results.path(), "42").unwrap().folder, results.path().join("42-2"));
         recorder.finish("done").unwrap();
         std::fs::remove_dir_all(&run).unwrap();
@@ -604,7 +604,7 @@ fn change(record: &mut TestRecord, kind: usize) {
         23 => next_up(observation.metrics[4].reach.high.as_mut().expect("it has a value")),
         24 => observation.metrics[4].not_finite = Some(1.5),
         12 => drop(observation.metrics[2].series.pop()),
-        13 => record.test.operations[0].draw_seed ^= 1,
+        13 => record.test.operations[0].operation_seed ^= 1,
         14 => observation.operations[0].counters.seen += 1,
         15 => observation.operations[0].counters.side_effects += 1,
         16 => next_up(&mut observation.operations[0].intervals[0].end),
@@ -756,7 +756,7 @@ fn an_activation_that_does_not_fit_its_operation_is_damage() {
         operation: OperationId(4),
         activation: Activation::Offline,
         parameters: vec![Choice::Text { text: "hot".to_owned() }],
-        draw_seed: 1,
+        operation_seed: 1,
     };
     let mut test = sample::conditional_test();
     test.operations.push(offline);

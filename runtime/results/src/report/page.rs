@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use sesame_base::observation::Outcome;
-use sesame_plan::{CampaignPlan, Search};
+use sesame_plan::{CampaignPlan, Search, Task};
 
 use crate::record::{MetricValue, Origin, RecordError, Repository, TestRow, Verdict, trace_file};
 use crate::report::chart::evenly;
@@ -169,24 +169,14 @@ fn header(body: &mut Markup, repository: &Repository, summary: &Summary, digest:
     }
     body.element("p", &[("class", "headline")], &format!("{}.", headline(summary)));
     body.element("p", &[], &format!("{}.", counts_sentence(summary)));
-    let search = match &plan.campaign.search {
-        Search::Nsga2 { population, evaluations } => {
-            format!("NSGA-II, population {population}, {evaluations} evaluations")
-        }
-        Search::MapElites { population, evaluations } => {
-            format!("MAP-Elites, {population} tests per generation, {evaluations} evaluations")
-        }
-        Search::LatinHypercube { evaluations } => format!("Latin hypercube, {evaluations} evaluations"),
-        Search::Sobol { evaluations } => format!("Sobol points, {evaluations} evaluations"),
-        Search::Falsification { population: 1, evaluations } => format!("falsification, {evaluations} evaluations"),
-        Search::Falsification { population, evaluations } => {
-            format!("falsification, {population} tests at a time, {evaluations} evaluations")
-        }
-        Search::Random { evaluations } => format!("random, {evaluations} evaluations"),
-        Search::Repeat { test, times } => format!("{} repeated {times} times", plan.test(*test).name),
-        Search::Known { tests } => plural(tests.len(), "regression test", "regression tests"),
-        Search::Shrink { test, evaluations, .. } => {
-            format!("{} shrunk, {evaluations} evaluations at most", plan.test(*test).name)
+    let budget = |what: &str| format!("{what}, {} evaluations", facts.task.evaluations(plan));
+    let search = match (&facts.task, &plan.campaign.search) {
+        (Task::Campaign, Search::Strategy { strategy, .. }) => budget(&strategy.title()),
+        (Task::Known { tests }, _) => plural(tests.len(), "regression test", "regression tests"),
+        (Task::Shrink(shrinking), _) => format!("{} at most", budget(&format!("{} shrunk", shrinking.name))),
+        (Task::Campaign, Search::Repeat { .. }) | (Task::Repeat { .. }, _) => {
+            let repeated = facts.task.repeated(plan);
+            repeated.map_or_else(String::new, |it| format!("{} repeated {} times", it.name, it.times))
         }
     };
     let search = match plan.campaign.coverage.as_ref().and_then(|goal| goal.stop_at) {

@@ -143,7 +143,7 @@ impl Archive {
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_plan::{Exploration, Search, Span};
+    use sesame_plan::{Exploration, Search, Span, Strategy};
 
     use super::*;
     use crate::coverage::Grid;
@@ -202,7 +202,7 @@ mod tests {
         let grid = Grid::parse("T1:0:1:6,T2:0:0.5:6,P1:0:1:3").unwrap();
         let landscape = &SYNTHETIC_ROBOTS[0];
         let ran = |exploration: Option<Exploration>| {
-            let mut plan = landscape.plan(Search::Nsga2 { population: 10, evaluations: 210 });
+            let mut plan = landscape.plan(Search::new(Strategy::Nsga2 { population: 10 }, 210));
             plan.campaign.exploration = exploration;
             let (mut covered, mut volume) = (0, 0.0);
             for seed in 1..=8 {

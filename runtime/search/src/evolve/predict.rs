@@ -31,7 +31,7 @@ const REMEMBERED: usize = 200;
 
 /// How the condition variables of a plan went in one run, looked at in even steps.
 #[derive(Debug, Clone, PartialEq)]
-pub struct VariableTrajectories {
+pub(crate) struct VariableTrajectories {
     variables: Vec<MetricId>,
     /// Per moment the values of the variables, each as of its last change; `None` where there was none yet.
     values: Vec<Vec<Option<f64>>>,
@@ -39,7 +39,7 @@ pub struct VariableTrajectories {
 
 impl VariableTrajectories {
     /// The trajectories of the variables in an observed run; `None` for a campaign by time, which has none.
-    pub fn from_observation(plan: &CampaignPlan, observation: &Observation) -> Option<VariableTrajectories> {
+    pub(crate) fn from_observation(plan: &CampaignPlan, observation: &Observation) -> Option<VariableTrajectories> {
         let ActivationMode::Condition { space } = &plan.campaign.activation else { return None };
         let variables: Vec<MetricId> = space.variables.iter().map(|variable| variable.metric).collect();
         let values = (0..MOMENTS)
@@ -57,7 +57,7 @@ impl VariableTrajectories {
     }
 
     /// Where a test would lie if the variables went this way; `None` if no operation would be active.
-    pub fn predicted(&self, plan: &CampaignPlan, test: &Test) -> Option<Point> {
+    pub(crate) fn predicted(&self, plan: &CampaignPlan, test: &Test) -> Option<Point> {
         let operations = test.operations.iter();
         let disturbances: Vec<_> =
             operations.map(|it| disturbance(plan, it.operation, &it.parameters, self.intervals(plan, it))).collect();
@@ -240,8 +240,12 @@ impl Variation for PredictingVariation {
 }
 
 impl Learning for PredictingVariation {
-    fn reference(&mut self, trajectories: VariableTrajectories) {
-        self.reference = Some(trajectories);
+    fn begin(&mut self, reference: &Observation) {
+        self.reference = VariableTrajectories::from_observation(self.cells.plan(), reference);
+    }
+
+    fn reads_series(&self) -> bool {
+        true
     }
 
     fn learn(&mut self, results: &[Evaluated]) {
@@ -251,8 +255,8 @@ impl Learning for PredictingVariation {
             for cell in prediction.from_parents {
                 self.parents_credibility.learn(cell == hit);
             }
-            if let Some(trajectories) = &result.trajectories {
-                self.remembered.push_back((result.test.clone(), trajectories.clone()));
+            if let Some(trajectories) = VariableTrajectories::from_observation(self.cells.plan(), &result.run) {
+                self.remembered.push_back((result.test.clone(), trajectories));
             }
         }
         while self.remembered.len() > REMEMBERED {
@@ -265,14 +269,16 @@ impl Learning for PredictingVariation {
 #[cfg(test)]
 mod tests {
     use sesame_plan::condition::ConditionEnd;
-    use sesame_plan::{CoverageGoal, Exploration, Search};
+    use sesame_plan::{CoverageGoal, Exploration, Search, Strategy};
 
     use super::*;
     use crate::coverage::{Coverage, Grid};
     use crate::strategy;
     use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
-    const NSGA2: Search = Search::Nsga2 { population: 10, evaluations: 80 };
+    fn nsga2() -> Search {
+        Search::new(Strategy::Nsga2 { population: 10 }, 80)
+    }
     const PREDICT: Exploration = Exploration::Predict { candidates: 8 };
 
     fn grid() -> Grid {
@@ -280,7 +286,7 @@ mod tests {
     }
 
     fn plan(end: ConditionEnd, exploration: Option<Exploration>) -> CampaignPlan {
-        let mut plan = SYNTHETIC_ROBOTS[0].plan_by_condition(NSGA2, end);
+        let mut plan = SYNTHETIC_ROBOTS[0].plan_by_condition(nsga2(), end);
         plan.campaign.coverage = Some(CoverageGoal { axes: grid().axes().to_vec(), hits: 1, stop_at: None });
         plan.campaign.exploration = exploration;
         plan
@@ -344,7 +350,7 @@ mod tests {
         assert_eq!(whole, run(4));
         assert_ne!(whole, run(5));
         let mut resumed = strategy(&plan, 4).unwrap();
-        resumed.reference(whole[0].trajectories.clone().unwrap());
+        resumed.begin(&crate::testing::synthetic_robots::SyntheticRobot::undisturbed(&plan));
         for stored in whole.chunks(10).take(5) {
             let asked: Vec<Test> = resumed.ask().into_iter().map(|candidate| candidate.test).collect();
             assert_eq!(asked, stored.iter().map(|result| result.test.clone()).collect::<Vec<_>>());

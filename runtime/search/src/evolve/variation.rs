@@ -333,7 +333,7 @@ fn mutate_operation(
             } else {
                 parameter_space.near(choice, rates.steps, stream)
             };
-            operation.draw_seed = stream.bits();
+            operation.operation_seed = stream.bits();
         }
     }
 }
@@ -368,7 +368,7 @@ fn change_somehow(operation: &mut TestOperation, test_space: &TestSpace, rates: 
     for (choice, parameter_space) in operation.parameters.iter_mut().zip(&kind.parameters) {
         if !parameter_space.is_fixed() {
             *choice = parameter_space.near(choice, rates.steps, stream);
-            operation.draw_seed = stream.bits();
+            operation.operation_seed = stream.bits();
         }
     }
 }
@@ -396,7 +396,7 @@ fn change_activation(operation: &mut TestOperation, test_space: &TestSpace, rate
         }
         (activation, activation_space) => unreachable!("{activation_space:?} gives no {activation:?}"),
     }
-    operation.draw_seed = stream.bits();
+    operation.operation_seed = stream.bits();
 }
 
 fn change_start_or_length(
@@ -427,7 +427,7 @@ fn kind_of<'a>(operation: &TestOperation, test_space: &'a TestSpace) -> &'a Oper
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_plan::{CampaignPlan, Copies, Search};
+    use sesame_plan::{CampaignPlan, Copies, Search, Strategy};
 
     use super::*;
     use crate::space::test_space::tests::{any_plan, broken_rule};
@@ -449,7 +449,7 @@ mod tests {
     };
 
     fn seeds(test: &Test) -> BTreeSet<u64> {
-        test.operations.iter().map(|operation| operation.draw_seed).collect()
+        test.operations.iter().map(|operation| operation.operation_seed).collect()
     }
 
     proptest! {
@@ -494,7 +494,7 @@ mod tests {
             let rates = Rates { steps: StepSizes { finest: 0.01, boldest: 0.02 }, ..Rates::default() };
             mutate(&mut after, &test_space, &rates, &mut stream);
             for operation in &after.operations {
-                match before.operations.iter().find(|old| old.draw_seed == operation.draw_seed) {
+                match before.operations.iter().find(|old| old.operation_seed == operation.operation_seed) {
                     // Only a window that gives way to another copy's changes alone.
                     Some(old) => {
                         let copies = after.operations.iter().filter(|it| it.operation == operation.operation).count();
@@ -517,7 +517,7 @@ mod tests {
 
     #[test]
     fn an_operation_that_a_child_gets_twice_from_one_ancestor_draws_for_itself_the_second_time() {
-        let plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
+        let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
         let test_space = TestSpace::from_plan(&plan).unwrap();
         let mut met = 0;
         for seed in 0..200 {
@@ -536,7 +536,7 @@ mod tests {
 
     /// Offspring of two tests by condition when only this is varied.
     fn offspring_of(rates: Rates, end: ConditionEnd, seed: u64) -> ([Test; 2], [Child<Test>; 2]) {
-        let plan = SYNTHETIC_ROBOTS[2].plan_by_condition(Search::Random { evaluations: 1 }, end);
+        let plan = SYNTHETIC_ROBOTS[2].plan_by_condition(Search::new(Strategy::Random, 1), end);
         let mut variation = TestVariation::new(TestSpace::from_plan(&plan).unwrap(), rates, seed);
         let tests = [variation.initial(0), variation.initial(1)];
         let children = variation.offspring([&tests[0], &tests[1]], 1, 0);
@@ -553,7 +553,7 @@ mod tests {
             let operations = |tests: [&Test; 2]| {
                 let all = tests.into_iter().flat_map(|test| &test.operations);
                 let mut all: Vec<_> =
-                    all.map(|it| (it.draw_seed, it.operation, format!("{:?}", it.parameters))).collect();
+                    all.map(|it| (it.operation_seed, it.operation, format!("{:?}", it.parameters))).collect();
                 all.sort();
                 all
             };
@@ -576,7 +576,7 @@ mod tests {
             let (parents, children) = offspring_of(only, ConditionEnd::Length { low: 1.0, high: 15.0 }, seed);
             for (parent, child) in parents.iter().zip(&children) {
                 for (old, new) in parent.operations.iter().zip(&child.genome.operations) {
-                    assert!(old.parameters == new.parameters && old.draw_seed != new.draw_seed);
+                    assert!(old.parameters == new.parameters && old.operation_seed != new.operation_seed);
                     match (&old.activation, &new.activation) {
                         (
                             Activation::ConditionFor { start: a, length: n, .. },
@@ -598,7 +598,7 @@ mod tests {
     fn tests_that_differ_in_their_conditions_are_different_tests() {
         let (tests, _) = offspring_of(IDLE, ConditionEnd::Condition, 1);
         let mut other = tests[0].clone();
-        other.operations[0].draw_seed += 1;
+        other.operations[0].operation_seed += 1;
         assert_eq!(identity(&other), identity(&tests[0]));
         assert_eq!(key(&other), key(&tests[0]));
         let Activation::Condition { start, end, .. } = &mut other.operations[0].activation else { panic!("{other:?}") };
@@ -609,7 +609,7 @@ mod tests {
 
     #[test]
     fn each_way_of_mutation_does_what_its_name_says() {
-        let plan = SYNTHETIC_ROBOTS[2].plan(Search::Random { evaluations: 1 });
+        let plan = SYNTHETIC_ROBOTS[2].plan(Search::new(Strategy::Random, 1));
         let test_space = TestSpace::from_plan(&plan).unwrap();
         let before = (0..100)
             .map(|i| fresh_test(&test_space, &mut Stream::derive(1, "test", &[i])))

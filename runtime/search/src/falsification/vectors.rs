@@ -69,7 +69,7 @@ impl Vectors {
                 operation: kind.operation,
                 activation: Activation::Offline,
                 parameters: kind.parameters.iter().map(choice).collect(),
-                draw_seed: derive_seed(self.seed, "vector", &[number, at]),
+                operation_seed: derive_seed(self.seed, "vector", &[number, at]),
             });
         }
         Test { operations }
@@ -130,7 +130,8 @@ mod tests {
     #[test]
     fn tests_that_differ_in_windows_or_in_what_they_hold_are_no_vectors() {
         let plan = || {
-            crate::testing::synthetic_robots::SYNTHETIC_ROBOTS[0].plan(sesame_plan::Search::Random { evaluations: 1 })
+            crate::testing::synthetic_robots::SYNTHETIC_ROBOTS[0]
+                .plan(sesame_plan::Search::new(sesame_plan::Strategy::Random, 1))
         };
         assert!(Vectors::from_space(&TestSpace::from_plan(&plan()).unwrap(), 1).is_none(), "windows");
         let fixed = all_before_the_start(plan());

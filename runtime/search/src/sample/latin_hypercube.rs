@@ -57,7 +57,7 @@ mod tests {
 
     #[test]
     fn each_choice_has_one_test_in_each_of_its_equal_parts() {
-        let plan = SYNTHETIC_ROBOTS[0].plan(sesame_plan::Search::Random { evaluations: 1 });
+        let plan = SYNTHETIC_ROBOTS[0].plan(sesame_plan::Search::new(sesame_plan::Strategy::Random, 1));
         let mut search = LatinHypercube::new(TestSpace::from_plan(&plan).unwrap(), 40, 3);
         for choice in 0..8 {
             let mut strata: Vec<usize> = (0..40).map(|index| place(search.value(choice, index), 40)).collect();

@@ -41,7 +41,7 @@ mod tests {
 
     #[test]
     fn every_beginning_has_tests_of_all_lengths_alike() {
-        let plan = SYNTHETIC_ROBOTS[0].plan(sesame_plan::Search::Random { evaluations: 1 });
+        let plan = SYNTHETIC_ROBOTS[0].plan(sesame_plan::Search::new(sesame_plan::Strategy::Random, 1));
         let mut search = Sobol::new(TestSpace::from_plan(&plan).unwrap(), 3);
         let mut lengths = [0; 6];
         (0..64).for_each(|index| lengths[search.test(index).operations.len()] += 1);

@@ -87,7 +87,7 @@ pub(crate) fn place(value: f64, parts: usize) -> usize {
 pub(crate) fn fresh_operation(kind: &OperationSpace, stream: &mut Stream) -> TestOperation {
     let activation = fresh_activation(&kind.activation, stream);
     let parameters = kind.parameters.iter().map(|parameter_space| parameter_space.fresh(stream)).collect();
-    TestOperation { operation: kind.operation, activation, parameters, draw_seed: stream.bits() }
+    TestOperation { operation: kind.operation, activation, parameters, operation_seed: stream.bits() }
 }
 
 /// A fresh window, or fresh conditions; of an offline operation there is nothing to choose.
@@ -119,14 +119,14 @@ fn fresh_activation(activation: &ActivationSpace, stream: &mut Stream) -> Activa
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_plan::{Count, OperationId, Search};
+    use sesame_plan::{Count, OperationId, Search, Strategy};
 
     use super::*;
     use crate::space::test_space::tests::{any_plan, broken_rule};
     use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     fn fresh_tests(inclusion: &[f64], count: Count) -> Vec<Vec<u32>> {
-        let mut plan = SYNTHETIC_ROBOTS[2].plan(Search::Random { evaluations: 1 });
+        let mut plan = SYNTHETIC_ROBOTS[2].plan(Search::new(Strategy::Random, 1));
         plan.campaign.count = count;
         plan.campaign.operations = (0u32..).map(OperationId).take(inclusion.len()).collect();
         plan.operations.iter_mut().zip(inclusion).for_each(|(op, &p)| op.inclusion = p);

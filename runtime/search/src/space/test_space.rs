@@ -156,7 +156,7 @@ impl TestSpace {
     /// Whether the copies of each operation in a test of this campaign are permitted.
     pub fn permits_copies(&self, test: &Test) -> bool {
         let mut draws = BTreeSet::new();
-        let drawn_alone = test.operations.iter().all(|it| draws.insert((it.operation, it.draw_seed)));
+        let drawn_alone = test.operations.iter().all(|it| draws.insert((it.operation, it.operation_seed)));
         drawn_alone
             && self.operations.iter().all(|kind| {
                 let copies = places_of(test, kind.operation);
@@ -193,8 +193,8 @@ impl TestSpace {
         self.settle_windows(test, apart::nearest);
         let mut draws = BTreeSet::new();
         for operation in &mut test.operations {
-            while !draws.insert((operation.operation, operation.draw_seed)) {
-                operation.draw_seed = stream.bits();
+            while !draws.insert((operation.operation, operation.operation_seed)) {
+                operation.operation_seed = stream.bits();
             }
         }
     }
@@ -330,7 +330,8 @@ pub(crate) mod tests {
         let copies = prop_oneof![Just(Copies::Apart), Just(Copies::MayOverlap), Just(Copies::Once)];
         let plans = (proptest::collection::vec(operation, 1..6), 1u32..4, 0u32..6, 0.5..120.0f64, copies).prop_map(
             |(operations, min, more, end_after, copies)| {
-                let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::Nsga2 { population: 7, evaluations: 40 });
+                let mut plan =
+                    SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Nsga2 { population: 7 }, 40));
                 plan.campaign.operations = (0u32..).map(OperationId).take(operations.len()).collect();
                 plan.campaign.count = Count { min, max: min + more };
                 plan.campaign.end_after = end_after;
@@ -401,7 +402,7 @@ pub(crate) mod tests {
                     Copies::MayOverlap => false,
                     Copies::Once => true,
                 };
-                if wrong || first.draw_seed == second.draw_seed {
+                if wrong || first.operation_seed == second.operation_seed {
                     return Some(format!("{first:?} and {second:?}"));
                 }
             }
@@ -475,7 +476,7 @@ pub(crate) mod tests {
 
     #[test]
     fn what_cannot_be_searched_is_refused_with_its_reason() {
-        let plan = || SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 10 });
+        let plan = || SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 10));
         let refusal = |plan: &CampaignPlan| TestSpace::from_plan(plan).map_err(|e| e.to_string()).unwrap_err();
 
         let mut ends_early = plan();
@@ -491,8 +492,8 @@ pub(crate) mod tests {
         offset.domain = Domain::Number { low: 0.2, high: 0.8, shape: Shape::Range, integer: true };
         assert!(refusal(&no_number).contains("the range of `offset` in operation `jitter1` contains no whole number"));
 
-        let mut unreachable =
-            SYNTHETIC_ROBOTS[0].plan_by_condition(Search::Random { evaluations: 10 }, ConditionEnd::Condition);
+        let mut unreachable = SYNTHETIC_ROBOTS[0]
+            .plan_by_condition(Search::new(sesame_plan::Strategy::Random, 10), ConditionEnd::Condition);
         let bounds = Integers { lowest: 30, highest: 40 };
         unreachable.operations[1].constraints = vec![Constraint::Integer { bounds }];
         assert!(refusal(&unreachable).contains("no start condition of operation `jitter1`"));
@@ -500,7 +501,7 @@ pub(crate) mod tests {
 
     #[test]
     fn operations_that_begin_after_the_campaign_are_left_out_and_others_are_clipped() {
-        let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 10 });
+        let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 10));
         plan.operations[0].within = Span { start: 70.0, end: 80.0 };
         plan.operations[1].within = Span { start: 60.0, end: 90.0 };
         let test_space = TestSpace::from_plan(&plan).unwrap();

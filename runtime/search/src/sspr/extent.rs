@@ -112,8 +112,8 @@ mod tests {
 
     #[test]
     fn the_cells_of_the_papers_table_have_the_ends_that_table_gives_them() {
-        let plan =
-            crate::testing::synthetic_robots::SYNTHETIC_ROBOTS[0].plan(sesame_plan::Search::Random { evaluations: 1 });
+        let plan = crate::testing::synthetic_robots::SYNTHETIC_ROBOTS[0]
+            .plan(sesame_plan::Search::new(sesame_plan::Strategy::Random, 1));
         let test_space = TestSpace::from_plan(&plan).unwrap();
         let of = |dimension| extent(&plan, &test_space, dimension).unwrap();
         assert_eq!(of(Dimension::P1), (0.0, 1.0));

@@ -120,7 +120,7 @@ fn a_planned_window_is_cut_at_the_end_of_the_campaign() {
             operation: sesame_plan::OperationId(0),
             activation: Activation::Time { start, end },
             parameters: Vec::new(),
-            draw_seed: 0,
+            operation_seed: 0,
         }],
     };
     let cut = planned(&plan, &test(6.0, 9.0)).unwrap();

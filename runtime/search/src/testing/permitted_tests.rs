@@ -1,7 +1,7 @@
 //! What all strategies draw: permitted tests, and the same ones.
 
 use sesame_plan::condition::ConditionEnd;
-use sesame_plan::{CampaignPlan, Copies, Count, CoverageGoal, Dimension, Exploration, Search, Test};
+use sesame_plan::{CampaignPlan, Copies, Count, CoverageGoal, Dimension, Exploration, Search, Strategy, Test};
 
 use crate::coverage::Grid;
 use crate::space::test_space::TestSpace;
@@ -22,18 +22,18 @@ fn by_time(copies: Copies, evaluations: u32) -> Vec<CampaignPlan> {
         plan.requirements = vec![SyntheticRobot::fewer_hits_than(20.0)];
         plan
     };
-    let nsga2 = Search::Nsga2 { population: 10, evaluations };
+    let nsga2 = Search::new(Strategy::Nsga2 { population: 10 }, evaluations);
     let children = sesame_plan::BoostedChildren::Every { iterations: 1 };
     vec![
-        plan(Search::Random { evaluations }, None),
-        plan(Search::Sobol { evaluations }, None),
-        plan(Search::LatinHypercube { evaluations }, None),
+        plan(Search::new(Strategy::Random, evaluations), None),
+        plan(Search::new(Strategy::Sobol, evaluations), None),
+        plan(Search::new(Strategy::LatinHypercube, evaluations), None),
         plan(nsga2.clone(), None),
         plan(nsga2.clone(), Some(Exploration::Boost { every_generations: 1, children, tries: 5 })),
         plan(nsga2.clone(), Some(Exploration::Construct { share: 0.5, until: None })),
         plan(nsga2, Some(Exploration::Novelty { neighbours: 5, over: vec![Dimension::T1, Dimension::P1] })),
-        plan(Search::MapElites { population: 10, evaluations }, None),
-        plan(Search::Falsification { population: 10, evaluations: evaluations.min(60) }, None),
+        plan(Search::new(Strategy::MapElites { population: 10 }, evaluations), None),
+        plan(Search::new(Strategy::Falsification { population: 10 }, evaluations.min(60)), None),
     ]
 }
 
@@ -68,7 +68,7 @@ fn every_strategy_draws_permitted_tests_only() {
 #[test]
 fn four_thousand_tests_of_an_evolution_are_permitted() {
     for copies in ALL {
-        let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::Nsga2 { population: 20, evaluations: 4_000 });
+        let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Nsga2 { population: 20 }, 4_000));
         plan.campaign.copies = copies;
         let tests = tests_of(&plan, 3);
         assert_permitted(&plan, &tests);
@@ -82,10 +82,13 @@ fn strategies_by_condition_draw_permitted_tests_only() {
     let evaluations = 200;
     for copies in ALL {
         for (search, exploration) in [
-            (Search::Random { evaluations }, None),
-            (Search::Nsga2 { population: 10, evaluations }, None),
-            (Search::Nsga2 { population: 10, evaluations }, Some(Exploration::Predict { candidates: 4 })),
-            (Search::MapElites { population: 10, evaluations }, None),
+            (Search::new(Strategy::Random, evaluations), None),
+            (Search::new(Strategy::Nsga2 { population: 10 }, evaluations), None),
+            (
+                Search::new(Strategy::Nsga2 { population: 10 }, evaluations),
+                Some(Exploration::Predict { candidates: 4 }),
+            ),
+            (Search::new(Strategy::MapElites { population: 10 }, evaluations), None),
         ] {
             let mut plan = SYNTHETIC_ROBOTS[0].plan_by_condition(search, ConditionEnd::Length { low: 1.0, high: 9.0 });
             let grid = Grid::parse("T1:0:1:6,T2:0:0.5:6").unwrap();
@@ -107,11 +110,11 @@ fn fresh_tests_hold_copies_as_often_whatever_draws_them() {
     let evaluations = 2_000;
     for copies in [Copies::Apart, Copies::MayOverlap] {
         let shares = [
-            Search::Random { evaluations },
-            Search::Sobol { evaluations },
-            Search::LatinHypercube { evaluations },
+            Search::new(Strategy::Random, evaluations),
+            Search::new(Strategy::Sobol, evaluations),
+            Search::new(Strategy::LatinHypercube, evaluations),
             // Its first generation alone.
-            Search::Nsga2 { population: evaluations, evaluations },
+            Search::new(Strategy::Nsga2 { population: evaluations }, evaluations),
         ]
         .map(|search| {
             let mut plan = SYNTHETIC_ROBOTS[2].plan(search);
@@ -127,9 +130,8 @@ fn fresh_tests_hold_copies_as_often_whatever_draws_them() {
                     test: it.test,
                     fitness: sesame_optimise::dominance::Fitness::Unfit(sesame_optimise::dominance::Unfit::Void),
                     point: None,
-                    trajectories: None,
-                    margins: Vec::new(),
-                    failing: false,
+                    run: crate::testing::no_run(),
+                    fresh_runs: Vec::new(),
                 });
                 strategy.tell(&results.collect::<Vec<_>>());
             }

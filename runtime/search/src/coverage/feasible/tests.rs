@@ -185,7 +185,7 @@ fn table_3() -> Grid {
 
 #[test]
 fn of_the_papers_108_cells_96_can_be_reached() {
-    let plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
+    let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 1));
     // Tests end after the windows do, or the last midpoints could not be reached.
     assert!(plan.campaign.end_after >= 65.0);
     let feasible = Feasible::from_plan(&plan, &table_3());
@@ -198,7 +198,7 @@ fn of_the_papers_108_cells_96_can_be_reached() {
 
 #[test]
 fn a_campaign_that_ends_early_reaches_less() {
-    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 1));
     plan.campaign.end_after = 32.5;
     let feasible = Feasible::from_plan(&plan, &Grid::parse("T1:0:1:4,O0:0.5:6.5:6").unwrap());
     let reached: Vec<usize> = (0..24).filter(|&cell| feasible.reaches(cell)).collect();
@@ -209,7 +209,7 @@ fn a_campaign_that_ends_early_reaches_less() {
 #[test]
 fn one_operation_has_no_spread_and_five_have_some() {
     let grid = Grid::parse("T3:0:0.5:5,P2:0:0.5:5,O0:0.5:5.5:5").unwrap();
-    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 1));
     let feasible = Feasible::from_plan(&plan, &grid);
     let alone: Vec<Vec<u32>> = (0..grid.len()).filter(|&c| feasible.reaches(c)).map(|c| grid.place(c)).collect();
     assert!(alone.iter().filter(|place| place[2] == 0).eq([&vec![0, 0, 0]]));
@@ -222,7 +222,7 @@ fn one_operation_has_no_spread_and_five_have_some() {
 
 #[test]
 fn whole_numbers_reach_the_values_they_have() {
-    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 1));
     for operation in &mut plan.operations {
         let parameter = &mut operation.parameters[0];
         parameter.domain = Domain::Number { low: 0.0, high: 2.0, shape: Shape::Value, integer: true };
@@ -245,7 +245,7 @@ fn very_many_kinds_of_operations_make_no_cell_infeasible() {
 
 #[test]
 fn windows_of_copies_that_lie_apart_are_as_long_together_as_one() {
-    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 1));
     let grid = Grid::parse("T2:0:1:10,O0:0.5:5.5:5").unwrap();
     let longest = |plan: &CampaignPlan, count: usize| {
         let feasible = Feasible::from_plan(plan, &grid);

@@ -138,7 +138,7 @@ impl CellPlacer {
         for (at, operation) in built.operations.iter_mut().enumerate() {
             let changed = origin.operations.get(at).is_none_or(|before| before != operation);
             if changed {
-                operation.draw_seed = stream.bits();
+                operation.operation_seed = stream.bits();
             }
         }
         self.test_space.settle(&mut built, stream);

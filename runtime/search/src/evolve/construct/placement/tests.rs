@@ -1,6 +1,6 @@
 use proptest::prelude::*;
 
-use sesame_plan::{Count, Distribution, Drain, GridAxis, OperationKind, Search};
+use sesame_plan::{Count, Distribution, Drain, GridAxis, OperationKind, Search, Strategy};
 
 use super::*;
 use crate::coverage::Feasible;
@@ -49,7 +49,7 @@ fn overlaps(test: &Test) -> bool {
 
 /// Twelve operations of all classes, in windows of their own, some with whole numbers and some without a number.
 fn twelve_operations() -> CampaignPlan {
-    let mut plan = SYNTHETIC_ROBOTS[2].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[2].plan(Search::new(Strategy::Random, 1));
     plan.operations = (0..12usize)
         .map(|at| {
             let mut operation = plan.operations[at % plan.operations.len()].clone();
@@ -171,7 +171,7 @@ fn of_all_cells_of_five_dimensions_that_a_million_tests_reach_99_of_100_are_buil
 
 #[test]
 fn copies_of_one_operation_are_built_apart_or_not_at_all() {
-    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     plan.campaign.operations.truncate(1);
     plan.campaign.count = Count { min: 1, max: 4 };
     plan.campaign.copies = Copies::Apart;
@@ -193,7 +193,7 @@ fn copies_of_one_operation_are_built_apart_or_not_at_all() {
 
 #[test]
 fn every_feasible_cell_of_the_papers_grid_is_reached_from_any_test() {
-    let plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
+    let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     for seed in 0..5 {
         assert_eq!(not_reached(&plan, &table_3(), seed), (Vec::new(), 96));
     }
@@ -201,7 +201,7 @@ fn every_feasible_cell_of_the_papers_grid_is_reached_from_any_test() {
 
 #[test]
 fn numbers_of_operations_spreads_and_whole_numbers_are_reached_together() {
-    let mut plan = SYNTHETIC_ROBOTS[2].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[2].plan(Search::new(Strategy::Random, 1));
     plan.campaign.count = Count { min: 1, max: 4 };
     plan.operations[0].kind = OperationKind::PacketLoss;
     plan.operations[1].kind = OperationKind::Latency { distribution: Distribution::Uniform, drain: Drain::Finish };
@@ -225,7 +225,7 @@ fn numbers_of_operations_spreads_and_whole_numbers_are_reached_together() {
 
 #[test]
 fn a_test_that_lies_in_the_cell_stays_nearly_as_it_is_and_of_others_middles_and_numbers_stay() {
-    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     // Copies that keep apart leave less room, and some may have to go.
     plan.campaign.copies = Copies::MayOverlap;
     let (grid, test_space) = (table_3(), TestSpace::from_plan(&plan).unwrap());
