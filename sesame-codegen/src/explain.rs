@@ -53,22 +53,10 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
     let seed = campaign.seed;
     let neighbours = campaign.neighbours.map_or(String::new(), |count| format!("  neighbours {count}"));
     let searches = match &campaign.search {
-        Search::Nsga2 { population, evaluations } => {
-            format!("nsga2 {{ population {population}  evaluations {evaluations}  seed {seed}{neighbours} }}")
+        Search::Strategy { strategy, evaluations } => {
+            let (keyword, settings) = (strategy.kind().properties().keyword, strategy.settings());
+            format!("{keyword} {{ {settings}evaluations {evaluations}  seed {seed}{neighbours} }}")
         }
-        Search::MapElites { population, evaluations } => {
-            format!("map_elites {{ population {population}  evaluations {evaluations}  seed {seed}{neighbours} }}")
-        }
-        Search::LatinHypercube { evaluations } => {
-            format!("latin_hypercube {{ evaluations {evaluations}  seed {seed} }}")
-        }
-        Search::Sobol { evaluations } => format!("sobol {{ evaluations {evaluations}  seed {seed} }}"),
-        Search::Falsification { population, evaluations } => {
-            format!("falsification {{ population {population}  evaluations {evaluations}  seed {seed} }}")
-        }
-        Search::Random { evaluations } => format!("random {{ evaluations {evaluations}  seed {seed} }}"),
-        // Only a runner's command line makes one, and no `.sesame` text does.
-        Search::Known { .. } | Search::Shrink { .. } => return clauses,
         Search::Repeat { test, times } => {
             let test = &plan.tests[test.index()];
             // Only a campaign that observes has a test without operations.

@@ -72,12 +72,7 @@ struct Selection {
 impl Selection {
     fn of(space: &Space, campaign: &model::Campaign) -> Self {
         let mut operations: Vec<model::OperationId> = match &campaign.search {
-            model::Search::Nsga2 { template, .. }
-            | model::Search::MapElites { template, .. }
-            | model::Search::LatinHypercube { template, .. }
-            | model::Search::Sobol { template, .. }
-            | model::Search::Falsification { template, .. }
-            | model::Search::Random { template, .. } => template.operations.clone(),
+            model::Search::Strategy { template, .. } => template.operations.clone(),
             model::Search::Repeat { test, .. } => {
                 space.tests[*test].operations.iter().map(|operation| operation.operation).collect()
             }
@@ -162,29 +157,10 @@ impl Selection {
     fn campaign(&self, space: &Space, campaign: &model::Campaign) -> plan::Campaign {
         // A search that is to stop at a coverage goes on until then or until its failsafe.
         let failsafe = campaign.coverage.as_ref().and_then(|coverage| coverage.failsafe);
-        let limit = |evaluations: u32| failsafe.unwrap_or(evaluations);
         let (search, (operations, count)) = match &campaign.search {
-            model::Search::Nsga2 { template, population, evaluations } => (
-                plan::Search::new(plan::Strategy::Nsga2 { population: *population }, limit(*evaluations)),
-                held(template),
-            ),
-            model::Search::MapElites { template, population, evaluations } => (
-                plan::Search::new(plan::Strategy::MapElites { population: *population }, limit(*evaluations)),
-                held(template),
-            ),
-            model::Search::Random { template, evaluations } => {
-                (plan::Search::new(plan::Strategy::Random, limit(*evaluations)), held(template))
+            model::Search::Strategy { template, strategy, evaluations } => {
+                (plan::Search::new(*strategy, failsafe.unwrap_or(*evaluations)), held(template))
             }
-            model::Search::LatinHypercube { template, evaluations } => {
-                (plan::Search::new(plan::Strategy::LatinHypercube, limit(*evaluations)), held(template))
-            }
-            model::Search::Sobol { template, evaluations } => {
-                (plan::Search::new(plan::Strategy::Sobol, limit(*evaluations)), held(template))
-            }
-            model::Search::Falsification { template, population, evaluations } => (
-                plan::Search::new(plan::Strategy::Falsification { population: *population }, limit(*evaluations)),
-                held(template),
-            ),
             model::Search::Repeat { test, times } => {
                 let held = space.tests[*test].operations.len();
                 let held = u32::try_from(held).expect("a file holds fewer than 2^32 operations");

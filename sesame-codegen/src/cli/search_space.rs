@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace};
-use sesame_plan::{CampaignPlan, Confirmation, Copies, Dimension, Search, Shape};
+use sesame_plan::{CampaignPlan, Confirmation, Copies, Dimension, Shape};
 use sesame_search::coverage::{Feasible, Grid};
 use sesame_search::space::ParameterSpace;
 use sesame_search::space::TestSpace;
@@ -18,24 +18,13 @@ const REFERENCE_RUNS: u64 = 2;
 /// The space that a campaign searches, and its cost in simulated time, as comments of a `.sesame` file.
 pub(super) fn described(plan: &CampaignPlan) -> String {
     let mut lines = Vec::new();
-    let runs = match plan.campaign.search {
-        Search::Nsga2 { evaluations, .. }
-        | Search::MapElites { evaluations, .. }
-        | Search::Random { evaluations }
-        | Search::Sobol { evaluations }
-        | Search::Falsification { evaluations, .. }
-        | Search::LatinHypercube { evaluations } => {
-            match TestSpace::from_plan(plan) {
-                Ok(permitted) => space(plan, &permitted, &mut lines),
-                Err(error) => lines.push(("tests", error.to_string())),
-            }
-            u64::from(evaluations)
+    if plan.campaign.search.strategy().is_some() {
+        match TestSpace::from_plan(plan) {
+            Ok(test_space) => space(plan, &test_space, &mut lines),
+            Err(error) => lines.push(("tests", error.to_string())),
         }
-        Search::Repeat { times, .. } => u64::from(times),
-        Search::Known { ref tests } => tests.len() as u64,
-        Search::Shrink { evaluations, .. } => u64::from(evaluations),
-    };
-    let runs = runs + REFERENCE_RUNS;
+    }
+    let runs = u64::from(plan.campaign.search.evaluations()) + REFERENCE_RUNS;
     let end = plan.campaign.end_after;
     lines.push((
         "cost",

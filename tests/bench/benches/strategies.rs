@@ -1,6 +1,7 @@
 //! What strategies cost beside the simulations: seconds spent in whole campaigns of 100, 1,000 and 10,000 tests in which
 //! nothing is simulated, and how they grow. With each test come its point, the front, the cells, and the rules that stop.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use sesame_base::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
@@ -13,7 +14,7 @@ use sesame_plan::{
 use sesame_rng::Stream;
 use sesame_search as search;
 use sesame_search::coverage::{Coverage, Grid};
-use sesame_search::{Candidate, Evaluated, StopRules, VariableTrajectories, sspr};
+use sesame_search::{Candidate, Evaluated, StopRules, sspr};
 
 const FIXED: Exploration =
     Exploration::Boost { every_generations: 2, children: BoostedChildren::Every { iterations: 2 }, tries: 10 };
@@ -97,12 +98,8 @@ fn spent(plan: &CampaignPlan) -> Duration {
     let mut spent = Duration::ZERO;
     let begun = Instant::now();
     let mut strategy = search::strategy(plan, 1).expect("the campaign can be searched");
-    let (trajectories, margins) = (search::needs_trajectories(plan), search::needs_margins(plan));
-    if let Some(trajectories) =
-        VariableTrajectories::from_observation(plan, &observe(plan, 0, &[])).filter(|_| trajectories)
-    {
-        strategy.reference(trajectories);
-    }
+    strategy.begin(&observe(plan, 0, &[]));
+    let series = strategy.reads_series();
     let goal = plan.campaign.coverage.as_ref().expect("the campaign counts cells");
     let mut coverage = Coverage::new(Grid::new(goal.axes.clone()).expect("it is a grid"), goal.hits);
     let mut front = Front::default();
@@ -127,10 +124,8 @@ fn spent(plan: &CampaignPlan) -> Duration {
             if let Some(point) = &point {
                 coverage.add(point);
             }
-            let trajectories =
-                if trajectories { VariableTrajectories::from_observation(plan, &observation) } else { None };
-            let margins = if margins { search::margins(plan, &observation) } else { Vec::new() };
-            told.push(Evaluated { number, test, fitness, point, trajectories, margins, failing: false });
+            let run = Arc::new(if series { observation } else { observation.without_series() });
+            told.push(Evaluated { number, test, fitness, point, run, fresh_runs: Vec::new() });
             spent += begun.elapsed();
         }
         let begun = Instant::now();
