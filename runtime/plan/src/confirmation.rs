@@ -1,4 +1,4 @@
-//! How a campaign makes sure of what it finds where a simulator does not always do the same.
+//! How a campaign confirms what it finds with a simulator that is not deterministic.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +15,7 @@ pub struct Confirmation {
     pub violations: bool,
 }
 
-/// How the values of an objective in several runs become one. The run that selected a test is none of them.
+/// How the values of an objective in several runs become one. The run that selected the test is not among them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Statistic {

@@ -572,7 +572,7 @@ pub struct Campaign {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Recorded {
-    /// Of those that violate a requirement, crash or time out, and of the undisturbed runs to compare them with.
+    /// Of those that violate a requirement, crash or time out, and of the reference runs to compare them with.
     Failing,
     /// Of all.
     All,

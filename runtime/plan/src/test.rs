@@ -8,7 +8,7 @@ use crate::{Bound, MetricId, OperationId};
 /// One test configuration: what a search evolves and a run applies. An empty list disturbs nothing.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Test {
-    /// Its operations. Order is no priority; an operation of the space may occur more than once.
+    /// Its operations. Their order is not a priority; an operation of the space may occur more than once.
     pub operations: Vec<TestOperation>,
 }
 

@@ -1,4 +1,4 @@
-//! Small plans for the runtime's own tests.
+//! Small plans for tests of the runtime.
 
 use crate::{
     Activation, ActivationMode, Campaign, CampaignPlan, Choice, Count, Distribution, Domain, Drain, Field, FieldRef,

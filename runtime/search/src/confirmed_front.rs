@@ -123,7 +123,7 @@ pub fn aggregate(runs: &[Fitness], by: Statistic) -> Fitness {
     values.map_or_else(unfit, Fitness::Measured)
 }
 
-/// One margin for several runs of a test: as [`typical`] has it of an objective that is minimised, so a quantile is the
+/// One margin for several runs of a test: aggregated like an objective that is minimised, so a quantile is the
 /// margin that this share of the runs reach or go below. It counts as a violation if such a run violates.
 pub(crate) fn aggregate_margin(runs: &[Margin], by: Statistic) -> Margin {
     let value = |run: &Margin| run.value.map_or(Fitness::Unfit(Unfit::Unmeasured), |it| Fitness::Measured(vec![it]));
@@ -136,7 +136,7 @@ pub(crate) fn aggregate_margin(runs: &[Margin], by: Statistic) -> Margin {
 
 /// The least number of runs that are at least this share of all; 1 or more.
 fn reached_by(share: f64, runs: usize) -> usize {
-    // A share such as 0.55 is no binary fraction: 55 of 100 are 55 %.
+    // A share such as 0.55 is not a binary fraction: 55 of 100 are 55 %.
     const SLACK: f64 = 1e-9;
     (1..runs).find(|&count| count as f64 >= share * runs as f64 - SLACK).unwrap_or(runs)
 }

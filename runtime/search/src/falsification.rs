@@ -1,6 +1,6 @@
 //! Focused falsification of a campaign: [`falsify`](sesame_optimise::falsify) over its tests.
 //!
-//! TestDomain differ in what they hold, so they are no vectors. How far one is from another is measured operation by operation: each
+//! Tests contain different operations, so they are not vectors. Their distance is measured operation by operation: each
 //! kind of operation that the campaign permits is a component of its own, in which a test is the sum of a bump per operation
 //! of that kind, over where its window lies, how long it is, and its parameters. So a test is near another when it disturbs
 //! the same at about the same time about as strongly, and adding, dropping or exchanging an operation is a step of a certain
@@ -340,11 +340,11 @@ mod tests {
         assert_eq!(resumed.ask(), []);
     }
 
-    /// Prints how many of 20 searches find 40 hits within 80 tests on each of the made-up robots; nothing is asserted, as
+    /// Prints how many of 20 searches find 40 hits within 80 tests on each of the synthetic robots; nothing is asserted, as
     /// twenty are few.
     #[test]
     #[ignore = "long: 240 searches of up to 80 tests"]
-    fn strategies_on_made_up_robots() {
+    fn strategies_on_synthetic_robots() {
         let searches = [
             ("falsification", Search::new(Strategy::Falsification { population: 1 }, 80)),
             ("nsga2", Search::new(Strategy::Nsga2 { population: 10 }, 80)),

@@ -1,7 +1,7 @@
 //! Indicators of a search: after each generation, how good its front is and what its tests came to.
 //!
-//! While a campaign runs nobody knows how far its front will get, so hypervolumes are measured from a point that is fixed
-//! early and never moved: of each objective the worst value of the undisturbed run and of the tests up to and including
+//! While a campaign runs, it is not known how far its front will get, so hypervolumes are measured from a point that is fixed
+//! early and never moved: of each objective the worst value of the reference run and of the tests up to and including
 //! the first generation with a measured one, and half of the range of these values beyond it. Only finite values
 //! count. It follows from results alone, so a resumed campaign has the same one.
 
@@ -57,7 +57,7 @@ pub struct Indicators {
 }
 
 impl Indicators {
-    /// Before the first generation, after the undisturbed run, of which an import has none.
+    /// Before the first generation, after the reference run, of which an import has none.
     pub fn new(undisturbed: Option<&Fitness>) -> Indicators {
         let early = undisturbed.and_then(Fitness::objectives).map(<[f64]>::to_vec).into_iter().collect();
         Indicators { early, ..Indicators::default() }

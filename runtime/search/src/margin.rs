@@ -16,8 +16,8 @@ pub fn margin_to(bound: Bound, value: f64) -> Margin {
 /// The margin of each requirement of the plan, in its order. One is violated exactly where the requirement's [`verdict`] is.
 ///
 /// A margin is in the unit of the requirement's metric: how far the metric may still move before it breaks the bound, and
-/// negative by how far it has moved beyond. Where the verdict is unsaid there is none. Of a run that broke off, a violation is
-/// as large as it is at least, whatever the rest of the run had brought.
+/// negative by how far it has moved beyond. If the verdict is inconclusive, there is none. If a run broke off,
+/// a violation has the least size that it could have had at the end of the run.
 pub fn margins(plan: &CampaignPlan, observation: &Observation) -> Vec<Margin> {
     let margin = |requirement: &Requirement| {
         let shown = observation.value(requirement.metric);

@@ -3,8 +3,8 @@
 //!
 //! Tests that lie near each other disturb alike, so their runs are near to repetitions. What the search is told of a test
 //! is the mean, objective by objective, over the test and those of all tests evaluated by the end of its generation that
-//! are nearest to it by the distance of the reduced parameter space (the paper's equation 1). It is told once: later
-//! neighbours change nothing that was told. What is recorded, the front and the rules to stop go by each test's own values.
+//! are nearest to it by the distance of the reduced parameter space [SESAME 2023, equation 1]. It is told once: later
+//! neighbours change nothing that was told. The record, the front and the rules to stop use each test's own values.
 //!
 //! All of it depends on results of whole generations, by number, and of neighbours equally far the one with the smaller
 //! number is nearer; so it is the same with any number of workers.

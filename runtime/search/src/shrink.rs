@@ -1,12 +1,12 @@
-//! Making a failing test smaller: fewest operations, then shortest windows, then simplest conditions, then mildest
-//! parameters, as long as it fails as it did.
+//! Shrinking a failing test: the fewest operations, then the shortest windows, then the simplest conditions, then the mildest
+//! parameters with which it still fails in the same way.
 //!
-//! It guarantees: what comes out fails, or is the test that was given; it is permitted where that one is; it keeps the
-//! draw seeds, so that what is left of a disturbance is what it was; nothing in it can be made smaller by one step alone,
-//! unless the evaluations were used up; and no test is run for it twice. A step is one operation, one side of an `and` or
-//! `or` of a condition, one activation by condition, or [`RESOLUTION`] of what is permitted of a time or a parameter.
+//! Guarantees: the result fails, or is the original test; it is permitted if the original is; it keeps the operation seeds, so
+//! that the rest of a disturbance is what it was; no single step can shrink it further, unless the evaluations were used up;
+//! and no test is run twice for it. A step is one operation, one side of an `and` or `or` of a condition, one activation by
+//! condition, or [`RESOLUTION`] of the permitted range of a time or a parameter.
 //!
-//! Like every [`Strategy`] it is a function of what it was told, so a run that was stopped is taken up again.
+//! Like every [`Strategy`] it is a function of what it was told, so an interrupted run can be resumed.
 
 mod axis;
 mod reduce;
@@ -28,10 +28,10 @@ use crate::{Candidate, Evaluated, Strategy};
 
 pub use space::{RESOLUTION, strength};
 
-/// What a test is tried for.
+/// What is being shrunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// It is the test that was given.
+    /// The original test.
     Original,
     /// Operations are left out.
     Operations,
@@ -41,7 +41,7 @@ pub enum Phase {
     Conditions,
     /// Parameters are milder.
     Parameters,
-    /// Whatever can be made smaller is, by one step.
+    /// Every single step that is left is tried, so that none is.
     LocalMinimality,
 }
 
@@ -148,7 +148,7 @@ impl Shrink {
         reduced.map_or_else(Vec::new, |reduced| reduced.accepted)
     }
 
-    /// Whether nothing of the smallest test can be made smaller by one step alone: all of that was run.
+    /// Whether no single step can shrink the smallest test: all of them were run.
     pub fn is_minimal(&self) -> bool {
         self.reduced.as_ref().is_some_and(|reduced| reduced.minimal)
     }

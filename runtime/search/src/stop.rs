@@ -1,6 +1,6 @@
 //! Whether a search has gone on for long enough.
 //!
-//! Two of the rules say something about cells that no test has hit yet. They go by an upper bound, not by an estimate:
+//! Two of the rules are about cells that no test has hit yet. They use an upper bound, not an estimate:
 //!
 //! - Good and Turing (1953): of n tests, f₁ fell into cells that no other fell into; the next test falls into a new cell
 //!   with a probability M of about f₁ / n. How far n M is from f₁ has a variance of about n M + 2 f₂ (Esty 1983), with f₂
@@ -57,7 +57,7 @@ pub struct StopRules {
 impl StopRules {
     /// The rules of a plan's campaign, before its first generation.
     pub fn from_plan(plan: &CampaignPlan) -> StopRules {
-        // A plan whose cells are no grid is refused before.
+        // A plan whose cells do not form a grid was refused before.
         let cells = plan.campaign.coverage.as_ref().and_then(|goal| Grid::new(goal.axes.clone()).ok());
         let asks = plan.campaign.stop.iter().any(|rule| matches!(rule, StopRule::Completeness { .. }));
         StopRules {
@@ -90,7 +90,7 @@ impl StopRules {
             self.front.add(result.number, &result.fitness);
             self.worst.resize(objectives.len(), f64::NEG_INFINITY);
             for (worst, value) in self.worst.iter_mut().zip(objectives) {
-                // What has no end is no place to measure from.
+                // A hypervolume cannot be measured from infinity.
                 if value.is_finite() {
                     *worst = worst.max(*value);
                 }

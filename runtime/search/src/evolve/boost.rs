@@ -1,12 +1,11 @@
-//! Coverage boosting (section 4.2.2 of the methodology's paper): some children are mutated until they lie in a cell that
-//! wants tests.
+//! Coverage boosting [SESAME 2023, section 4.2.2]: some children are mutated until they lie in a cell that needs tests.
 //!
-//! A boosted child is made like every other. If it is not planned to fall into a cell that too few tests have hit, it is
-//! mutated again, and again, up to a number of tries; the first that does is taken. If none does, the child stays as it
-//! first was. The paper does not say what then becomes of it; the original platform keeps what the last try left, which
-//! costs fitness and gains nothing.
+//! A boosted child is made like every other. If it is not planned to fall into a cell with too few hits, it is mutated again,
+//! up to a number of tries; the first result that falls into such a cell is taken. If there is none, the child stays as it
+//! first was. The publication does not say what happens then; the original platform keeps the last try, which costs fitness
+//! and gains nothing.
 //!
-//! A cell that an earlier child of the same generation is planned to fall into counts as hit already.
+//! A cell into which an earlier child of the same generation is planned to fall counts as hit already.
 
 use sesame_optimise::nsga2::{Child, Variation};
 use sesame_plan::{BoostedChildren, Test};
@@ -19,7 +18,7 @@ use crate::{Evaluated, TestVariation};
 /// When and how children are boosted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Boosting {
-    /// Only in every so-manieth generation; at least 1. Generation 0 has no children.
+    /// Only in every n-th generation; at least 1. Generation 0 has no children.
     pub(crate) every_generations: u32,
     /// Which children of such a generation.
     pub(crate) children: BoostedChildren,

@@ -1,4 +1,4 @@
-//! Which cells want tests: as far as results tell, and as the tests asked since promise.
+//! Which cells need tests, by the results so far and by the tests that were asked for since.
 
 use sesame_plan::{CampaignPlan, CoverageGoal, Test};
 
@@ -6,8 +6,8 @@ use crate::Evaluated;
 use crate::coverage::{Coverage, Feasible, Grid, GridError};
 use crate::sspr::{Convention, Point, planned};
 
-/// The cells of a campaign while it is searched. A test that is asked promises to fall where it is planned to, so that
-/// two tests of a generation do not go for one place; results take the place of promises.
+/// The cells of a campaign while it is searched. A test that is asked for reserves the cell into which it is planned to
+/// fall, so that two tests of a generation do not target the same cell; results replace reservations.
 #[derive(Debug, Clone)]
 pub(crate) struct Cells {
     plan: CampaignPlan,
@@ -42,7 +42,7 @@ impl Cells {
         self.grid().cell_of(&self.point_of(test)?)
     }
 
-    /// Whether a cell is underserved: too few tests have hit it or promise to.
+    /// Whether a cell is underserved: too few tests have hit it or have reserved it.
     pub(crate) fn needs_tests(&self, cell: usize) -> bool {
         self.coverage.hits()[cell].saturating_add(self.reserved[cell]) < self.coverage.needed()
     }
@@ -57,13 +57,13 @@ impl Cells {
         &self.feasible
     }
 
-    /// The share of all cells that are covered if all promises are kept, in `0..=1`.
+    /// The share of all cells that are covered if all reserved cells are hit, in `0..=1`.
     pub(crate) fn expected_share(&self) -> f64 {
         let served = (0..self.grid().len()).filter(|&cell| !self.needs_tests(cell)).count();
         served as f64 / self.grid().len() as f64
     }
 
-    /// Notes that a test asked for is planned to fall into a cell.
+    /// Reserves a cell for a test that is asked for and planned to fall into it.
     pub(crate) fn reserve(&mut self, cell: usize) {
         self.reserved[cell] += 1;
     }

@@ -1,14 +1,13 @@
-//! Evolution that constructs tests for cells that want them.
+//! Evolution that constructs tests for cells that need them.
 //!
-//! A share of each generation's tests, those of the first included, are changed as little as may be so that they lie in a
-//! feasible cell that too few tests have hit. They are first made like every other test, by selection, crossover and
-//! mutation: so what is constructed descends from good parents and keeps of them what the cell leaves open, and coverage
-//! is not paid for with fitness alone. Of the cells that want tests the nearest is chosen, so that little is changed.
+//! A share of each generation's tests, including the first, are changed as little as possible so that they lie in a feasible
+//! cell with too few hits. They are first made like every other test, by selection, crossover and mutation, so a constructed
+//! test descends from good parents and keeps of them what the cell leaves open. Of the cells that need tests the nearest is
+//! chosen, so that little is changed.
 //!
-//! Two things can fail, and are told apart. A constructed test may miss its cell when it runs (no effect, or a run that
-//! broke off); and no test may be built at all. A cell with failures comes after those with fewer; after three misses, or
-//! five attempts to build without success, each from another test, it is given up. What was given up and why is said in
-//! the end.
+//! Two things can fail: a constructed test may miss its cell when it runs (no effect, or a run that broke off), or no test
+//! can be built. Cells with fewer failures come first. After three misses, or five attempts to build without success, each
+//! from another test, a cell is given up. The end of the search reports what was given up and why.
 
 pub(crate) mod placement;
 
@@ -168,7 +167,7 @@ impl Learning for ConstructingVariation {
 
     fn given_up(&self) -> Vec<String> {
         let grid = self.cells.grid();
-        // A cell that was hit after all, by whatever test, is not given up.
+        // A cell that any test has hit after all is not given up.
         let cells = |why: &dyn Fn(usize) -> bool| -> Vec<usize> {
             (0..grid.len()).filter(|&cell| self.cells.needs_tests(cell) && why(cell)).collect()
         };

@@ -1,6 +1,6 @@
 //! Novelty as one objective more (Lehman and Stanley 2011; as a second objective, Mouret 2011).
 //!
-//! How novel a test is, is the mean distance (the paper's equation 1) of its point to those of its nearest neighbours among all
+//! How novel a test is, is the mean distance [SESAME 2023, equation 1] of its point to those of its nearest neighbours among all
 //! tests so far. NSGA-II chooses its survivors by the campaign's objectives and by novelty together, so that tests unlike the
 //! others stay and breed. Nothing else knows of it: fronts, hypervolumes and results are those of the campaign's objectives.
 //!

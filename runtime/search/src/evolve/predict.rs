@@ -1,12 +1,12 @@
 //! Coverage by condition, by prediction.
 //!
-//! Where conditions switch operations, only a run tells when they are active, so a test cannot be put into a cell. But most
-//! of what conditions compare goes its own way, disturbed or not: so a test's conditions are weighed on what was recorded
-//! in earlier runs, and the intervals that come out say where the test would lie. Of several candidates for a place in a
-//! generation the one is taken that would most probably fall into a cell that wants tests.
+//! Where conditions switch operations, only a run shows when they are active, so a test cannot be placed in a cell. But most
+//! variables of conditions behave the same whether messages are disturbed or not. So a test's conditions are evaluated on the
+//! recorded values of earlier runs, which gives the intervals, and thus the cell, of the test. Of several candidates for a
+//! place in a generation the one that most probably falls into a cell that needs tests is taken.
 //!
-//! Each candidate is predicted from the undisturbed run and from the runs of its parents. How far each of these two kinds
-//! of source is to be believed is learned from outcomes: as often as its predictions came true, beginning at one of two.
+//! Each candidate is predicted from the reference run and from the runs of its parents. The credibility of these two sources
+//! is learned: the share of their predictions that came true, beginning at one half.
 
 use std::collections::VecDeque;
 
@@ -24,12 +24,12 @@ use crate::sspr::{Convention, Point, disturbance};
 use crate::strategy::Learning;
 use crate::{Evaluated, TestVariation};
 
-/// Moments at which a recorded run is looked at: more than enough to tell cells apart.
+/// Moments at which a recorded run is evaluated: more than enough to tell cells apart.
 const MOMENTS: u32 = 350;
-/// Runs remembered at most, the latest.
+/// How many of the latest runs are remembered.
 const REMEMBERED: usize = 200;
 
-/// How the condition variables of a plan went in one run, looked at in even steps.
+/// The values of a plan's condition variables in one run, in even steps.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct VariableTrajectories {
     variables: Vec<MetricId>,
@@ -56,7 +56,7 @@ impl VariableTrajectories {
         Some(VariableTrajectories { variables, values })
     }
 
-    /// Where a test would lie if the variables went this way; `None` if no operation would be active.
+    /// Where a test would lie with these values; `None` if no operation would be active.
     pub(crate) fn predicted(&self, plan: &CampaignPlan, test: &Test) -> Option<Point> {
         let operations = test.operations.iter();
         let disturbances: Vec<_> =
@@ -113,14 +113,14 @@ impl Credibility {
     }
 }
 
-/// What was predicted of a test that was asked.
+/// What was predicted of a test that was asked for.
 #[derive(Debug, Clone)]
 struct Prediction {
     from_reference: Option<usize>,
     from_parents: Vec<Option<usize>>,
 }
 
-/// Variation of tests by condition that prefers those which would fall into cells that want tests.
+/// Variation of tests by condition that prefers tests predicted to fall into cells that need tests.
 #[derive(Debug, Clone)]
 pub(crate) struct PredictingVariation {
     tests: TestVariation,
@@ -163,7 +163,7 @@ impl PredictingVariation {
         }
     }
 
-    /// The share of belief that a test falls into a cell that wants tests, and into any cell at all.
+    /// The credence that a test falls into a cell that needs tests, and that it falls into any cell.
     fn credence_of(&self, prediction: &Prediction) -> (f64, f64) {
         let of_parents = self.parents_credibility.share() / prediction.from_parents.len().max(1) as f64;
         let sources = [(self.reference_credibility.share(), prediction.from_reference)].into_iter();
@@ -359,12 +359,12 @@ mod tests {
     }
 
     #[test]
-    fn trust_grows_with_what_came_true() {
-        let mut trust = Credibility::NEW;
-        assert_eq!(trust.share(), 0.5);
-        trust.learn(true);
-        trust.learn(true);
-        trust.learn(false);
-        assert_eq!(trust.share(), 0.6);
+    fn credibility_is_the_share_that_came_true() {
+        let mut credibility = Credibility::NEW;
+        assert_eq!(credibility.share(), 0.5);
+        credibility.learn(true);
+        credibility.learn(true);
+        credibility.learn(false);
+        assert_eq!(credibility.share(), 0.6);
     }
 }

@@ -3,7 +3,7 @@
 //! A mutated operation draws with a new seed; one that a child has from a parent with that parent's, also if its window had
 //! to give way to another copy. Of copies that come to one child with equal seeds, the later gets a new one: two copies never
 //! draw alike. A child is never one of the tests
-//! asked before in the same campaign (draw seeds aside), unless [`Rates::tries`] attempts to change it all fail.
+//! asked before in the same campaign (apart from operation seeds), unless [`Rates::tries`] attempts to change it all fail.
 //!
 //! # Rates
 //!
@@ -180,7 +180,7 @@ fn key(test: &Test) -> [u64; 2] {
     ["one half of a key", "the other half"].map(|half| derive_seed(0, half, &numbers))
 }
 
-/// What tells two tests apart: their operations in any order, without draw seeds.
+/// What tells two tests apart: their operations in any order, without operation seeds.
 fn identity(test: &Test) -> Vec<Vec<u64>> {
     let mut operations: Vec<Vec<u64>> = test
         .operations
@@ -258,7 +258,7 @@ fn exchange_conditions(
     let mut changed = crossed.is_some();
     let [mut a, mut b] = crossed.unwrap_or_else(|| parents.map(Clone::clone));
     for (a, b) in a.operations.iter_mut().zip(&mut b.operations) {
-        // Both are decided by draws of their own, whatever becomes of them.
+        // Both draws are made in any case, so that later ones do not depend on them.
         let [starts, ends] = [(); 2].map(|()| stream.chance(rates.exchange));
         let [of_a, of_b] = [&*a, &*b].map(|operation| kind_of(operation, test_space).activation.constraints());
         match (&mut a.activation, &mut b.activation) {

@@ -1,7 +1,7 @@
-//! The numbers of a test that can be made smaller, step by step.
+//! The numbers of a test that can be shrunk, step by step.
 //!
-//! Every axis turns one way only: a window gets shorter, a range narrower or nearer to its neutral end, never the reverse.
-//! So whatever order axes are shrunk in, an end is reached.
+//! Along an axis a test only shrinks: a window gets shorter, a range narrower or nearer to its neutral value, never the
+//! reverse. So shrinking ends, in any order of axes.
 
 use sesame_plan::{Activation, Choice, Test};
 
@@ -208,7 +208,7 @@ impl ShrinkAxis {
     }
 }
 
-/// Steps of a bounds, the last one perhaps shorter. What is but rounding is no step of its own.
+/// The number of steps, the last one perhaps shorter. A rest that is only rounding is not a step.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small count, clamped")]
 fn count(steps: f64) -> u32 {
     libm::ceil(steps - ROUNDING).clamp(1.0, f64::from(u32::MAX)) as u32

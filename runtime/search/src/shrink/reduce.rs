@@ -1,8 +1,8 @@
-//! The way from a test to a smaller one, as a function of what is known of the tests on it.
+//! The reduction of a test, as a function of which tests are known to fail.
 //!
-//! The walk is written as if every question had its answer at once. Where one is missing it breaks off and says which
-//! tests have to be run; with their oracle it is walked again from its beginning, to the same place and on. So there is
-//! no state to be kept between two questions, and a walk taken up again is the same reduction.
+//! It is written as if an oracle knew every answer. If an answer is missing, the reduction stops and returns the tests that
+//! have to be run; with their results it starts again from the beginning, and gets further. So it has no state between two
+//! questions, and a resumed reduction is the same reduction.
 
 use sesame_plan::Test;
 
@@ -10,13 +10,13 @@ use crate::shrink::Phase;
 use crate::shrink::axis::{self, ShrinkAxis};
 use crate::shrink::space::ShrinkSpace;
 
-/// What is known of tests.
+/// Which tests are known to fail.
 pub(super) trait Oracle {
     /// The index of a test that was asked for, and whether it fails.
     fn find(&self, test: &Test) -> Option<(usize, bool)>;
 }
 
-/// Tests that have to be run before the walk goes on; none of them is known, none is there twice.
+/// Tests that have to be run before the reduction can go on; all are different, and none is known.
 #[derive(Debug)]
 pub(super) struct Pending {
     pub(super) phase: Phase,
@@ -25,17 +25,17 @@ pub(super) struct Pending {
     pub(super) base: Option<usize>,
 }
 
-/// Where a walk ended.
+/// The result of a reduction.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Reduced {
-    /// Indices of the tests that were gone to, in their order; the last one is the smallest. None where the test that
-    /// the walk begins with does not fail.
+    /// Indices of the tests that were accepted, in their order; the last one is the smallest. Empty if the original test
+    /// does not fail.
     pub(super) accepted: Vec<usize>,
     /// Whether every smaller test that is one step away was run and does not fail.
     pub(super) minimal: bool,
 }
 
-/// A walk on its way.
+/// A reduction in progress.
 struct Reduction<'a, A> {
     space: &'a ShrinkSpace,
     oracle: &'a A,
@@ -47,7 +47,7 @@ struct Reduction<'a, A> {
     accepted: Vec<usize>,
 }
 
-/// Walks as far as what is known leads.
+/// Reduces a test as far as the answers are known.
 pub(super) fn reduce<A: Oracle>(
     space: &ShrinkSpace,
     original: &Test,
@@ -215,8 +215,8 @@ impl<A: Oracle> Reduction<'_, A> {
         tests.collect()
     }
 
-    /// Tries everything that is one step smaller. Where something of it fails, goes there and on, and says so; where
-    /// nothing does, no single step is left.
+    /// Tries every single step. If one of these tests fails, it is accepted, and the result is true; if none does, the test
+    /// is minimal.
     fn single_steps(&mut self) -> Result<bool, Pending> {
         let mut tests = Vec::new();
         if self.test.operations.len() > self.space.fewest {

@@ -1,4 +1,4 @@
-//! What is smaller: the shortest windows, the neutral end of each parameter, and how far one step goes.
+//! What smaller means: the shortest windows, the neutral end of each parameter, and how far one step goes.
 
 use sesame_plan::condition::{Condition, ConditionEnd, ConditionSpace};
 use sesame_plan::{
@@ -14,7 +14,7 @@ use crate::space::range::Range;
 /// the nearest whole number of this size, and by 1 at least.
 pub const RESOLUTION: f64 = 0.01;
 
-/// In what the tests of a campaign can be made smaller.
+/// In what ways the tests of a campaign can be shrunk.
 #[derive(Debug, Clone)]
 pub(super) struct ShrinkSpace {
     /// Operations that a test holds at least.

@@ -83,7 +83,7 @@ pub(crate) fn place(value: f64, parts: usize) -> usize {
     place.min(parts - 1)
 }
 
-/// A fresh instance of an operation, with a draw seed of its own.
+/// A fresh instance of an operation, with an operation seed of its own.
 pub(crate) fn fresh_operation(kind: &OperationSpace, stream: &mut Stream) -> TestOperation {
     let activation = fresh_activation(&kind.activation, stream);
     let parameters = kind.parameters.iter().map(|parameter_space| parameter_space.fresh(stream)).collect();

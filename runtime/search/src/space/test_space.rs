@@ -1,10 +1,10 @@
-//! What a campaign permits its tests: which operations, how many, when, and how strong.
+//! The space of a campaign's tests: which operations, how many, when, and how strong.
 //!
 //! Every strategy draws from these tests and from no others. Single operations are made of what [`OperationSpace`]
 //! says; what holds of several copies of one operation, [`TestSpace::settle`] brings about in a test that was put together,
 //! and [`TestSpace::permits_copies`] tells:
 //!
-//! - no two copies have the same draw seed, so that each draws for itself;
+//! - no two copies have the same operation seed, so that each has random draws of its own;
 //! - [`Copies::Apart`], by time: their windows are disjoint;
 //! - [`Copies::Apart`], by condition: nothing, as the relay makes a copy wait while another is active;
 //! - [`Copies::Apart`], before the start or after the end: there is one, as all would act at the same moment;
@@ -174,7 +174,7 @@ impl TestSpace {
 
     /// Makes the copies of each operation in a test what they have to be, and changes nothing else: too many copies leave
     /// the test, each as likely as the others, and where too few operations remain fresh ones of other kinds come in;
-    /// windows are moved apart to the [nearest](apart::nearest) ones; a copy that draws like an earlier one gets a draw seed
+    /// windows are moved apart to the [nearest](apart::nearest) ones; a copy that draws like an earlier one gets an operation seed
     /// of its own. A test that is permitted already stays as it is and takes nothing from the stream.
     pub fn settle(&self, test: &mut Test, stream: &mut Stream) {
         for kind in &self.operations {

@@ -1,4 +1,4 @@
-//! Strategies that go for cells, on robots that cost nothing to evaluate.
+//! Strategies that target cells, on synthetic robots.
 
 use sesame_optimise::dominance::{Fitness, Unfit};
 use sesame_plan::{BoostedChildren, CampaignPlan, CoverageGoal, Exploration, Search, Strategy, Test};
@@ -19,7 +19,7 @@ const LINEAR: Exploration = Exploration::Boost {
 };
 const CONSTRUCT: Exploration = Exploration::Construct { share: 1.0, until: Some(0.5) };
 
-/// A campaign with the cells of the paper's Table 3.
+/// A campaign with the cells of [SESAME 2023, Table 3].
 fn plan(landscape: &SyntheticRobot, search: Search, exploration: Option<Exploration>) -> CampaignPlan {
     let mut plan = landscape.plan(search);
     plan.campaign.coverage = Some(goal());
