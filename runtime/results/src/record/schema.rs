@@ -39,7 +39,11 @@ pub(super) fn query(sql: &str, schema: i64) -> Cow<'_, str> {
     if schema >= STANDARD_WORDS_SINCE {
         return Cow::Borrowed(sql);
     }
-    let sql = if schema < TASK_SINCE { sql.replace(", task FROM", " FROM") } else { sql.to_owned() };
+    let sql = if schema < TASK_SINCE {
+        sql.replace(", task FROM", " FROM").replace("coalesce(plan || task, plan)", "plan")
+    } else {
+        sql.to_owned()
+    };
     Cow::Owned(RENAMED.iter().fold(sql, |sql, (now, before)| sql.replace(now, before)))
 }
 
