@@ -32,7 +32,7 @@ pub use catalogue::{strategy, strategy_of_task};
 pub use confirmed_front::{ConfirmedFront, GenerationTest, aggregate};
 pub use error::SearchError;
 pub use evolve::variation::{Rates, TestVariation};
-pub use margin::{confirmed_margins, margin_to, margins};
+pub use margin::{confirmed_margins, margins};
 pub use neighbours::Neighbours;
 pub use objective::{fitness, fitness_of, in_unit};
 pub use stop::StopRules;

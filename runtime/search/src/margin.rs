@@ -2,16 +2,10 @@
 
 use sesame_base::observation::Observation;
 use sesame_base::verdict::{Verdict, verdict};
+use sesame_optimise::falsify::Margin;
 use sesame_plan::{Bound, CampaignPlan, Requirement, Statistic};
 
 use crate::confirmed_front::aggregate_margin;
-
-use sesame_optimise::falsify::Margin;
-
-/// The margin to a bound of which a metric has this value, which is not NaN.
-pub fn margin_to(bound: Bound, value: f64) -> Margin {
-    Margin { value: Some(to_bound(bound, value)), violated: !bound.holds(value) }
-}
 
 /// The margin of each requirement of the plan, in its order. One is violated exactly where the requirement's [`verdict`] is.
 ///

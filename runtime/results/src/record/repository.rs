@@ -49,6 +49,9 @@ pub struct CampaignFacts {
 /// How many statements are kept ready: more than reading and writing a test take together.
 const STATEMENTS: usize = 64;
 
+/// The recorded campaign: plan, seed, version of the runtime, why it ended, task.
+type CampaignColumns = (String, String, String, Option<String>, Option<String>);
+
 /// A recorded operation: position, name, seed of its draws, window and conditions.
 type OperationColumns = (usize, String, String, Window, Conditions);
 
@@ -79,11 +82,10 @@ impl Repository {
         // Before anything is asked of it: what has the name of a table may be something else that never comes to an end.
         recognise::tables(&connection, &path, schema)?;
         let sql = schema::query("SELECT plan, seed, runtime, stop, task FROM campaign", schema);
-        let row: Result<(String, String, String, Option<String>, Option<String>), _> =
-            connection.query_row(&sql, [], |row| {
-                let task = if schema >= schema::TASK_SINCE { row.get(4)? } else { None };
-                Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, task))
-            });
+        let row: rusqlite::Result<CampaignColumns> = connection.query_row(&sql, [], |row| {
+            let task = if schema >= schema::TASK_SINCE { row.get(4)? } else { None };
+            Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, task))
+        });
         let (plan, seed, runtime, stop, task) = row.map_err(|source| match source {
             rusqlite::Error::QueryReturnedNoRows => RecordError::damaged(&path, "there is no campaign in it"),
             _ => RecordError::database("read the campaign", &path, source),
