@@ -1,6 +1,7 @@
 //! Search on vectors, and what measures it: no plan, no robots, usable as it is.
 //!
 //! - [`nsga2`], with its parts: [`dominance`], [`sorting`], [`crowding`], [`selection`].
+//! - [`nsga3`]: survival by reference points, for three and more objectives.
 //! - [`front`]: the non-dominated solutions of all that were evaluated.
 //! - [`hypervolume`] and [`igd`]: how good a front is.
 //! - [`sobol`]: low-discrepancy points.
@@ -17,6 +18,7 @@ pub mod front;
 pub mod hypervolume;
 pub mod igd;
 pub mod nsga2;
+pub mod nsga3;
 pub mod problems;
 pub mod selection;
 pub mod sobol;

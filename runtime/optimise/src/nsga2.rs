@@ -7,6 +7,7 @@
 use sesame_rng::Stream;
 
 use crate::dominance::Fitness;
+use crate::nsga3::ReferencePoints;
 use crate::selection::{Rank, distinct_survivors, parents, survivors};
 
 /// How genomes of a kind are made and changed. Randomness comes from streams of the given coordinates only.
@@ -63,6 +64,8 @@ pub enum Survival {
     /// Of solutions with equal objective values only one, as long as there are others. The crowded comparison would fill the
     /// population with equal solutions where there are many.
     Distinct,
+    /// By reference points, as in NSGA-III: for three and more objectives.
+    ReferencePoints,
 }
 
 /// A genome to be evaluated.
@@ -98,13 +101,24 @@ pub struct Nsga2<V: Variation> {
     awaited: usize,
     population: Vec<Told<V::Genome>>,
     ranks: Vec<Rank>,
+    /// What [`Survival::ReferencePoints`] has seen.
+    reference_points: ReferencePoints,
 }
 
 impl<V: Variation> Nsga2<V> {
     /// A run before its first generation.
     pub fn new(settings: Settings, variation: V) -> Self {
         assert!(settings.population > 0, "a population has at least one member");
-        Nsga2 { settings, variation, generation: 0, asked: 0, awaited: 0, population: Vec::new(), ranks: Vec::new() }
+        Nsga2 {
+            settings,
+            variation,
+            generation: 0,
+            asked: 0,
+            awaited: 0,
+            population: Vec::new(),
+            ranks: Vec::new(),
+            reference_points: ReferencePoints::default(),
+        }
     }
 
     /// The generation that [`Nsga2::ask`] gives next, from 0.
@@ -158,9 +172,14 @@ impl<V: Variation> Nsga2<V> {
         assert!(self.population.len() - before == self.awaited, "exactly the generation asked last is told");
         self.awaited = 0;
         let size = self.settings.population as usize;
+        let fitness: Vec<&Fitness> = self.population.iter().map(|member| &member.fitness).collect();
         let survivors = match self.settings.survival {
-            Survival::Crowded => survivors(&self.fitness(), size),
-            Survival::Distinct => distinct_survivors(&self.fitness(), size),
+            Survival::Crowded => survivors(&fitness, size),
+            Survival::Distinct => distinct_survivors(&fitness, size),
+            Survival::ReferencePoints => {
+                let mut stream = Stream::derive(self.settings.seed, "niching", &[u64::from(self.generation)]);
+                self.reference_points.survivors(&fitness, size, &mut stream)
+            }
         };
         let mut chosen = survivors.iter().map(|(position, _)| *position).peekable();
         let mut position = 0;
@@ -191,9 +210,5 @@ impl<V: Variation> Nsga2<V> {
         }
         batch.truncate(size as usize);
         batch
-    }
-
-    fn fitness(&self) -> Vec<&Fitness> {
-        self.population.iter().map(|member| &member.fitness).collect()
     }
 }

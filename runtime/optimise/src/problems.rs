@@ -7,5 +7,5 @@ mod real_variation;
 mod transmission;
 
 pub use falsification::FalsificationProblem;
-pub use multi_objective::{Problem, approximate};
+pub use multi_objective::{Problem, approximate, approximate_dtlz2, dtlz2};
 pub use real_variation::{RealVariation, binary_crossover, polynomial_mutation};

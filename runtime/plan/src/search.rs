@@ -69,6 +69,11 @@ pub enum Strategy {
         /// Tests per generation; at least 1.
         population: u32,
     },
+    /// The genetic algorithm NSGA-III, for three and more objectives.
+    Nsga3 {
+        /// Tests per generation; at least 1.
+        population: u32,
+    },
     /// MAP-Elites over the cells of the campaign's coverage.
     MapElites {
         /// Tests per generation; at least 1.
@@ -92,6 +97,7 @@ impl Strategy {
     pub fn kind(self) -> StrategyKind {
         match self {
             Strategy::Nsga2 { .. } => StrategyKind::Nsga2,
+            Strategy::Nsga3 { .. } => StrategyKind::Nsga3,
             Strategy::MapElites { .. } => StrategyKind::MapElites,
             Strategy::Random => StrategyKind::Random,
             Strategy::LatinHypercube => StrategyKind::LatinHypercube,
@@ -104,6 +110,7 @@ impl Strategy {
     pub fn population(self) -> Option<u32> {
         match self {
             Strategy::Nsga2 { population }
+            | Strategy::Nsga3 { population }
             | Strategy::MapElites { population }
             | Strategy::Falsification { population } => Some(population),
             Strategy::Random | Strategy::LatinHypercube | Strategy::Sobol => None,
@@ -131,6 +138,8 @@ impl Strategy {
 pub enum StrategyKind {
     /// See [`Strategy::Nsga2`].
     Nsga2,
+    /// See [`Strategy::Nsga3`].
+    Nsga3,
     /// See [`Strategy::MapElites`].
     MapElites,
     /// See [`Strategy::Random`].
@@ -167,6 +176,7 @@ pub enum Averaging {
 
 /// What is fixed for a strategy: the one table of names, settings and requirements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "a row of a table, most columns of which are yes or no")]
 pub struct StrategyProperties {
     /// Its word in the language, and in tables.
     pub keyword: &'static str,
@@ -192,8 +202,9 @@ pub struct StrategyProperties {
 
 impl StrategyKind {
     /// All of them.
-    pub const ALL: [StrategyKind; 6] = [
+    pub const ALL: [StrategyKind; 7] = [
         StrategyKind::Nsga2,
+        StrategyKind::Nsga3,
         StrategyKind::MapElites,
         StrategyKind::Random,
         StrategyKind::LatinHypercube,
@@ -210,6 +221,7 @@ impl StrategyKind {
     pub fn with_settings(self, population: u32) -> Strategy {
         match self {
             StrategyKind::Nsga2 => Strategy::Nsga2 { population },
+            StrategyKind::Nsga3 => Strategy::Nsga3 { population },
             StrategyKind::MapElites => Strategy::MapElites { population },
             StrategyKind::Random => Strategy::Random,
             StrategyKind::LatinHypercube => Strategy::LatinHypercube,
@@ -226,6 +238,11 @@ impl StrategyKind {
                 averaging: Averaging::Possible,
                 explores: true,
                 ..properties("nsga2", "NSGA-II", "NSGA-II search")
+            },
+            StrategyKind::Nsga3 => StrategyProperties {
+                population: Population::Bred,
+                averaging: Averaging::Possible,
+                ..properties("nsga3", "NSGA-III", "NSGA-III search")
             },
             StrategyKind::MapElites => StrategyProperties {
                 population: Population::Bred,

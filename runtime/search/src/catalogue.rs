@@ -39,9 +39,9 @@ pub fn strategy_of_task(plan: &CampaignPlan, task: &Task, seed: u64) -> Result<B
 
 /// How the tests of a plan's campaign are found. `seed` is that of the run, which may be another than the plan's.
 pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, SearchError> {
-    let (strategy, evaluations) = match &plan.campaign.search {
-        &Search::Strategy { strategy, evaluations } => (strategy, evaluations),
-        &Search::Repeat { test, times } => {
+    let (strategy, evaluations) = match plan.campaign.search {
+        Search::Strategy { strategy, evaluations } => (strategy, evaluations),
+        Search::Repeat { test, times } => {
             return Ok(Box::new(FixedTests::repeated(&plan.test(test).test, times, seed)));
         }
     };
@@ -51,6 +51,10 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
         plan::Strategy::Nsga2 { population } => {
             let settings = nsga2::Settings { population, evaluations, seed, survival: survival(plan) };
             nsga2(plan, settings, space)?
+        }
+        plan::Strategy::Nsga3 { population } => {
+            let settings = nsga2::Settings { population, evaluations, seed, survival: Survival::ReferencePoints };
+            Box::new(Nsga2::new(settings, variation(plan, space, seed)))
         }
         plan::Strategy::MapElites { population } => {
             let settings = nsga2::Settings { population, evaluations, seed, survival: Survival::Crowded };

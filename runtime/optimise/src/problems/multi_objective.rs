@@ -69,14 +69,23 @@ impl Problem {
             Problem::Zdt1 => zdt(|_, ratio| 1.0 - libm::sqrt(ratio)),
             Problem::Zdt2 => zdt(|_, ratio| 1.0 - ratio * ratio),
             Problem::Zdt3 => zdt(|first, ratio| 1.0 - libm::sqrt(ratio) - ratio * libm::sin(10.0 * PI * first)),
-            Problem::Dtlz2 => {
-                let g: f64 = x[2..].iter().map(|x| (x - 0.5) * (x - 0.5)).sum();
-                let (a, b) = (x[0] * PI / 2.0, x[1] * PI / 2.0);
-                let radius = 1.0 + g;
-                vec![radius * libm::cos(a) * libm::cos(b), radius * libm::cos(a) * libm::sin(b), radius * libm::sin(a)]
-            }
+            Problem::Dtlz2 => dtlz2(x, 3),
         }
     }
+}
+
+/// DTLZ2 with any number of objectives, at least 2, of more variables than that: the front is the part of the unit sphere
+/// in which all objectives are positive.
+pub fn dtlz2(x: &[f64], objectives: usize) -> Vec<f64> {
+    let (angles, others) = x.split_at(objectives - 1);
+    let radius = 1.0 + others.iter().map(|x| (x - 0.5) * (x - 0.5)).sum::<f64>();
+    (0..objectives)
+        .map(|at| {
+            let cosines = &angles[..objectives - 1 - at];
+            let product = cosines.iter().fold(radius, |product, x| product * libm::cos(x * PI / 2.0));
+            if at == 0 { product } else { product * libm::sin(angles[objectives - 1 - at] * PI / 2.0) }
+        })
+        .collect()
 }
 
 /// The exact volume of ZDT3 by a fine sum: its front is the part of a known curve that nothing on it dominates.
@@ -94,7 +103,18 @@ fn zdt3_exact() -> f64 {
 /// The objectives of the final population of a run of NSGA-II with the usual operators ([`RealVariation::usual`]).
 pub fn approximate(problem: Problem, population: u32, evaluations: u32, seed: u64) -> Vec<Vec<f64>> {
     let settings = Settings { population, evaluations, seed, survival: Survival::Crowded };
-    let mut search = Nsga2::new(settings, RealVariation::usual(problem.variables(), seed));
+    evolve(settings, problem.variables(), |x| problem.evaluate(x))
+}
+
+/// The objectives of the final population of a run of NSGA-III on [`dtlz2`] with the usual operators and nine variables more
+/// than objectives, as it is usually posed.
+pub fn approximate_dtlz2(objectives: usize, population: u32, evaluations: u32, seed: u64) -> Vec<Vec<f64>> {
+    let settings = Settings { population, evaluations, seed, survival: Survival::ReferencePoints };
+    evolve(settings, objectives + 9, |x| dtlz2(x, objectives))
+}
+
+fn evolve(settings: Settings, variables: usize, evaluate: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Vec<f64>> {
+    let mut search = Nsga2::new(settings, RealVariation::usual(variables, settings.seed));
     let mut number = 0;
     loop {
         let batch = search.ask();
@@ -103,7 +123,7 @@ pub fn approximate(problem: Problem, population: u32, evaluations: u32, seed: u6
         }
         search.tell(batch.into_iter().map(|asked| {
             number += 1;
-            let fitness = Fitness::Measured(problem.evaluate(&asked.genome));
+            let fitness = Fitness::Measured(evaluate(&asked.genome));
             Told { number, genome: asked.genome, fitness }
         }));
     }
@@ -125,6 +145,8 @@ mod tests {
         let sphere = Problem::Dtlz2.evaluate(&[0.3, 0.7, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5]);
         assert!((sphere.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-12);
         assert_eq!(Problem::Dtlz2.evaluate(&[0.0; 12])[2], 0.0);
+        let five = dtlz2(&[0.3, 0.7, 0.1, 0.9, 0.5, 0.5], 5);
+        assert!(five.len() == 5 && (five.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -32,6 +32,7 @@ fn by_time(copies: Copies, evaluations: u32) -> Vec<CampaignPlan> {
         plan(nsga2.clone(), Some(Exploration::Boost { every_generations: 1, children, tries: 5 })),
         plan(nsga2.clone(), Some(Exploration::Construct { share: 0.5, until: None })),
         plan(nsga2, Some(Exploration::Novelty { neighbours: 5, over: vec![Dimension::T1, Dimension::P1] })),
+        plan(Search::new(Strategy::Nsga3 { population: 10 }, evaluations), None),
         plan(Search::new(Strategy::MapElites { population: 10 }, evaluations), None),
         plan(Search::new(Strategy::Falsification { population: 10 }, evaluations.min(60)), None),
     ]
