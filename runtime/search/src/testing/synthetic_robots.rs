@@ -482,9 +482,9 @@ mod tests {
     }
 
     #[test]
-    fn a_population_of_nobody_is_refused() {
+    fn a_population_of_0_is_refused() {
         let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Nsga2 { population: 0 }, 10));
         let Err(refusal) = strategy(&plan, 1) else { panic!("a population of 0 was accepted") };
-        assert_eq!(refusal.to_string(), "campaign `three phases` has a population of 0; give it at least 1");
+        assert_eq!(refusal.to_string(), "campaign `three phases` has a population of 0; it must be at least 1");
     }
 }
