@@ -163,12 +163,12 @@ fn dispatch(runner: &Runner) -> Result<ExitCode, Failure> {
     }
 }
 
-/// What commands ask of recorded results beside what reports do: whether a gate closes, how a test is
-/// shrunk, and how long it may take when it is run again.
+/// What commands ask of recorded results beside what reports do: whether a gate closes, how a test is shrunk, and
+/// how long it may take when it is run again.
 #[cfg(test)]
 pub(crate) fn asked_beside_reports(repository: &sesame_results::record::Repository, test: &str) -> Result<(), String> {
     let words = |error: sesame_results::record::RecordError| error.to_string();
-    drop(gate::every_objection(&sesame_results::report::summary(repository).map_err(words)?, repository.plan()));
+    drop(gate::every_objection(&sesame_results::report::summary(repository).map_err(words)?, repository));
     let record = repository.find(test).and_then(|number| repository.test(number)).map_err(words)?;
     replay::limit(&record);
     drop(shrink::failing(repository, &record, &[]).map_err(|Failure(words)| words)?);

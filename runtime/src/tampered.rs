@@ -20,7 +20,7 @@ use sesame_plan::condition::{ConditionEnd, ConditionSpace};
 use sesame_plan::{
     Activation, ActivationMode, BoostedChildren, Bound, CampaignPlan, Confirmation, CoverageGoal, Dimension, Domain,
     Expectation, Exploration, Failing, Field, GridAxis, KnownTestId, MessageId, MessageType, MetricId, MetricSource,
-    OperationId, RequirementId, Search, StopRule, TopicId, Type, Typical,
+    OperationId, RequirementId, Search, Shrinking, Statistic, StopRule, Strategy, Task, TopicId, Type,
 };
 use sesame_results::analysis::{
     self, Run, Selection, compare, coverage, front, indicators, regions, sspr, tests as tests_of,
@@ -67,7 +67,7 @@ fn rich() -> CampaignPlan {
     plan.campaign.coverage = Some(CoverageGoal { axes, hits: 1, stop_at: Some(0.9) });
     let children = BoostedChildren::Falling { first: 9, last: 2, drop: 1 };
     plan.campaign.exploration = Some(Exploration::Boost { every_generations: 2, children, tries: 5 });
-    plan.campaign.confirm = Some(Confirmation { times: 3, by: Typical::Quantile { share: 0.5 }, violations: true });
+    plan.campaign.confirm = Some(Confirmation { times: 3, by: Statistic::Quantile { share: 0.5 }, violations: true });
     plan.campaign.stop =
         vec![StopRule::Stagnation { generations: 3, below: 0.01 }, StopRule::Completeness { share: 0.9 }];
     let bound = plan.requirements[0].bound;
@@ -126,17 +126,18 @@ fn wholes() -> Vec<Whole> {
     {
         let folder = tempfile::tempdir().unwrap();
         let mut plan = sample::plan();
-        plan.campaign.search = Search::Shrink {
-            test: KnownTestId(0),
+        let task = Task::Shrink(Shrinking {
+            name: "known_jitter".to_owned(),
+            test: plan.tests[0].test.clone(),
             failing: Failing::Violation { requirements: vec![RequirementId(0)] },
             simulator_seed: u64::MAX,
             runs: 1,
             evaluations: 12,
-        };
-        plan.campaign.objectives.clear();
-        let mut recorder = Recorder::create(folder.path(), &plan, 1, 0).unwrap();
+        });
+        plan = task.plan(&plan);
+        let mut recorder = Recorder::create_for(folder.path(), &plan, &task, 1, 0).unwrap();
         recorder.commit(&sample::record(&plan, 0, Origin::Reference, sesame_plan::Test::default())).unwrap();
-        let mut search = search::strategy(&plan, 1).unwrap();
+        let mut search = search::strategy_of_task(&plan, &task, 1).unwrap();
         let (mut number, mut asked) = (1, search.ask());
         while !asked.is_empty() && number < 12 {
             let mut told = Vec::new();
@@ -148,9 +149,8 @@ fn wholes() -> Vec<Whole> {
                     test: candidate.test,
                     fitness: search::fitness(&plan, &record.observation),
                     point: None,
-                    course: None,
-                    margins: Vec::new(),
-                    failing: record.observation.value(MetricId(0)).value > Some(0.0),
+                    run: std::sync::Arc::new(record.observation),
+                    fresh_runs: Vec::new(),
                 });
                 number += 1;
             }
@@ -571,7 +571,7 @@ type Altered = (fn(&mut CampaignPlan), &'static str);
 #[test]
 fn each_thing_that_later_code_relies_on_is_asked_for() {
     let by_time: &[Altered] = &[
-        (|plan| plan.schema += 1, "schema: is 2, this release knows 1"),
+        (|plan| plan.schema += 1, "schema: is 3, this release knows 2"),
         (
             |plan| plan.campaign.objectives[0] = MetricId(40),
             "campaign.objectives[0]: there is no metric 40, there are 5",
@@ -585,12 +585,12 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
         (|plan| plan.campaign.count.min = 6, "campaign.count: runs from 6 to 5"),
         (|plan| plan.campaign.end_after = 0.0, "campaign.end_after: 0 is not above 0"),
         (
-            |plan| plan.campaign.search = Search::Nsga2 { population: 0, evaluations: 1 },
-            "campaign.search.population: must be at least 1",
+            |plan| plan.campaign.search = Search::new(Strategy::Nsga2 { population: 0 }, 1),
+            "campaign.search.strategy.population: must be at least 1",
         ),
         (
-            |plan| plan.campaign.search = Search::Known { tests: vec![KnownTestId(0), KnownTestId(1)] },
-            "campaign.search.tests[1]: there is no test 1",
+            |plan| plan.campaign.search = Search::Repeat { test: KnownTestId(1), times: 1 },
+            "campaign.search.test: there is no test 1",
         ),
         (|plan| plan.campaign.neighbours = Some(0), "campaign.neighbours: must be at least 1"),
         (|plan| plan.campaign.confirm.as_mut().unwrap().times = 0, "campaign.confirm.times: must be at least 1"),

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Constraint, Integers, Variable};
 use sesame_plan::{
     ActivationMode, BoostedChildren, CampaignPlan, Confirmation, Copies, CoverageGoal, Distribution, Domain, Drain,
-    Exploration, MetricSource, Operation, OperationKind, Parameter, Recorded, Search, StopRule, Typical,
+    Exploration, MetricSource, Operation, OperationKind, Parameter, Recorded, Search, Statistic, StopRule,
     place_in_words,
 };
 
@@ -53,22 +53,10 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
     let seed = campaign.seed;
     let neighbours = campaign.neighbours.map_or(String::new(), |count| format!("  neighbours {count}"));
     let searches = match &campaign.search {
-        Search::Nsga2 { population, evaluations } => {
-            format!("nsga2 {{ population {population}  evaluations {evaluations}  seed {seed}{neighbours} }}")
+        Search::Strategy { strategy, evaluations } => {
+            let (keyword, settings) = (strategy.kind().properties().keyword, strategy.settings());
+            format!("{keyword} {{ {settings}evaluations {evaluations}  seed {seed}{neighbours} }}")
         }
-        Search::MapElites { population, evaluations } => {
-            format!("map_elites {{ population {population}  evaluations {evaluations}  seed {seed}{neighbours} }}")
-        }
-        Search::LatinHypercube { evaluations } => {
-            format!("latin_hypercube {{ evaluations {evaluations}  seed {seed} }}")
-        }
-        Search::Sobol { evaluations } => format!("sobol {{ evaluations {evaluations}  seed {seed} }}"),
-        Search::Falsification { population, evaluations } => {
-            format!("falsification {{ population {population}  evaluations {evaluations}  seed {seed} }}")
-        }
-        Search::Random { evaluations } => format!("random {{ evaluations {evaluations}  seed {seed} }}"),
-        // Only a runner's command line makes one, and no `.sesame` text does.
-        Search::Known { .. } | Search::Shrink { .. } => return clauses,
         Search::Repeat { test, times } => {
             let test = &plan.tests[test.index()];
             // Only a campaign that observes has a test without operations.
@@ -101,9 +89,9 @@ fn clauses(plan: &CampaignPlan) -> Vec<(&'static str, String)> {
     }
     if let Some(Confirmation { times, by, violations }) = campaign.confirm {
         let by = match by {
-            Typical::Mean => "mean".to_owned(),
-            Typical::Median => "median".to_owned(),
-            Typical::Quantile { share } => format!("quantile {}%", percent(share)),
+            Statistic::Mean => "mean".to_owned(),
+            Statistic::Median => "median".to_owned(),
+            Statistic::Quantile { share } => format!("quantile {}%", percent(share)),
         };
         let violations = if violations { "  violations" } else { "" };
         clauses.push(("confirm", format!("{times} times {{ by {by}{violations} }}")));

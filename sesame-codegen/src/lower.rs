@@ -74,12 +74,7 @@ struct Selection {
 impl Selection {
     fn of(space: &Space, campaign: &model::Campaign) -> Self {
         let mut operations: Vec<model::OperationId> = match &campaign.search {
-            model::Search::Nsga2 { template, .. }
-            | model::Search::MapElites { template, .. }
-            | model::Search::LatinHypercube { template, .. }
-            | model::Search::Sobol { template, .. }
-            | model::Search::Falsification { template, .. }
-            | model::Search::Random { template, .. } => template.operations.clone(),
+            model::Search::Strategy { template, .. } => template.operations.clone(),
             model::Search::Repeat { test, .. } => {
                 space.tests[*test].operations.iter().map(|operation| operation.operation).collect()
             }
@@ -146,7 +141,7 @@ impl Selection {
                 operation: self.operation(it.operation),
                 activation: self.activation(&it.activation, within.end),
                 parameters: it.choices.clone(),
-                draw_seed: it.draw_seed,
+                operation_seed: it.draw_seed,
             }
         });
         let expectations = test
@@ -164,27 +159,10 @@ impl Selection {
     fn campaign(&self, space: &Space, campaign: &model::Campaign) -> plan::Campaign {
         // A search that is to stop at a coverage goes on until then or until its failsafe.
         let failsafe = campaign.coverage.as_ref().and_then(|coverage| coverage.failsafe);
-        let limit = |evaluations: u32| failsafe.unwrap_or(evaluations);
         let (search, (operations, count)) = match &campaign.search {
-            model::Search::Nsga2 { template, population, evaluations } => {
-                (plan::Search::Nsga2 { population: *population, evaluations: limit(*evaluations) }, held(template))
+            model::Search::Strategy { template, strategy, evaluations } => {
+                (plan::Search::new(*strategy, failsafe.unwrap_or(*evaluations)), held(template))
             }
-            model::Search::MapElites { template, population, evaluations } => {
-                (plan::Search::MapElites { population: *population, evaluations: limit(*evaluations) }, held(template))
-            }
-            model::Search::Random { template, evaluations } => {
-                (plan::Search::Random { evaluations: limit(*evaluations) }, held(template))
-            }
-            model::Search::LatinHypercube { template, evaluations } => {
-                (plan::Search::LatinHypercube { evaluations: limit(*evaluations) }, held(template))
-            }
-            model::Search::Sobol { template, evaluations } => {
-                (plan::Search::Sobol { evaluations: limit(*evaluations) }, held(template))
-            }
-            model::Search::Falsification { template, population, evaluations } => (
-                plan::Search::Falsification { population: *population, evaluations: limit(*evaluations) },
-                held(template),
-            ),
             model::Search::Repeat { test, times } => {
                 let held = space.tests[*test].operations.len();
                 let held = u32::try_from(held).expect("a file holds fewer than 2^32 operations");
@@ -495,7 +473,7 @@ mod tests {
         let axis = |dimension, low, high, cells| plan::GridAxis { dimension, low, high, cells };
         let axes = vec![axis(plan::Dimension::T1, 0.0, 1.0, 6), axis(plan::Dimension::O0, 0.5, 3.5, 3)];
         assert_eq!(campaign.coverage, Some(plan::CoverageGoal { axes, hits: 2, stop_at: Some(0.5) }));
-        assert_eq!(campaign.search, plan::Search::Nsga2 { population: 4, evaluations: 30 });
+        assert_eq!(campaign.search, plan::Search::new(plan::Strategy::Nsga2 { population: 4 }, 30));
         assert_eq!(lowered("look").plan.campaign.coverage, None);
     }
 

@@ -30,9 +30,9 @@ use std::collections::BTreeMap;
 // What holds no names and no units is the same here and in a plan.
 pub use sesame_plan::stl::Interval;
 pub use sesame_plan::{
-    Aggregate, BoostedChildren, Bound, Choice, Comparison, Condition, Confirmation, Copies, Dimension, Direction,
-    Distribution, Drain, Exploration, Expression, Members, Moment, NotFinite, OperationKind, Recorded, Shape, Step,
-    StopRule, Trend, Typical, ValueMode,
+    Aggregate, Averaging, BoostedChildren, Bound, Choice, Comparison, Condition, Confirmation, Copies, Dimension,
+    Direction, Distribution, Drain, Exploration, Expression, Members, Moment, NotFinite, OperationKind, Population,
+    Recorded, Shape, Statistic, Step, StopRule, Strategy, StrategyKind, StrategyProperties, Trend, ValueMode,
 };
 
 use crate::span::FileId;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use sesame_dsl::diagnostic::render;
-use sesame_dsl::model::{ActivationMode, Exploration, Recorded, Search, Space};
+use sesame_dsl::model::{ActivationMode, Exploration, Recorded, Search, Space, Strategy};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::{Analysis, analyse, load_imports};
 
@@ -147,7 +147,9 @@ fn a_clause_replaces_the_inherited_one_whole_and_all_others_stay() {
     assert_eq!((&second.objectives, second.end_after), (&first.objectives, 70.0));
     assert_eq!(second.observed, first.observed);
     assert_eq!(second.from, space.campaign("c"));
-    let Search::Random { evaluations, template } = second.search else { panic!("{second:?}") };
+    let Search::Strategy { evaluations, template, strategy: Strategy::Random } = second.search else {
+        panic!("{second:?}")
+    };
     assert_eq!((evaluations, template.operations.len()), (20, 1));
     assert_eq!((first.seed, second.seed), (3, 1), "the inherited seed went with its search");
 }
@@ -228,7 +230,9 @@ fn conditions_traces_and_custom_operations_come_from_imports_and_other_campaigns
     let space = space(&files);
     let campaign = |name| &space.campaigns[space.campaign(name).unwrap()];
     let variables = |name| {
-        let Search::Random { template, .. } = &campaign(name).search else { panic!("{name} searches") };
+        let Search::Strategy { template, strategy: Strategy::Random, .. } = &campaign(name).search else {
+            panic!("{name} searches")
+        };
         let ActivationMode::Condition(grown) = &template.activation else { panic!("{name} grows conditions") };
         let names = grown.variables.iter().map(|it| space.metrics[it.metric].declaration.name.as_str());
         names.collect::<Vec<_>>()

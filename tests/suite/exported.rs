@@ -135,7 +135,7 @@ fn every_test_that_a_search_finds_reads_back_as_it_was() {
             let mut strategy = search::strategy(&plan, seed).unwrap();
             let asked = strategy.ask();
             assert!(asked.len() >= 50);
-            let values = asked.iter().map(|candidate| candidate.test.operations[0].draw_seed as f64 / 1e13);
+            let values = asked.iter().map(|candidate| candidate.test.operations[0].operation_seed as f64 / 1e13);
             check(&plan, &asked.iter().map(|candidate| candidate.test.clone()).zip(values).collect::<Vec<_>>());
         }
     }
@@ -173,7 +173,7 @@ fn the_ends_of_what_is_permitted_read_back_as_they_are() {
                     }
                 })
                 .collect(),
-            draw_seed: if share == 0.0 { 0 } else { u64::MAX },
+            operation_seed: if share == 0.0 { 0 } else { u64::MAX },
         });
         Test { operations: operations.collect() }
     };
@@ -195,12 +195,12 @@ proptest! {
             let position = plan.operations.iter().position(|operation| operation.name == name).unwrap();
             OperationId(u32::try_from(position).unwrap())
         };
-        let tests = rows.into_iter().map(|(loss, delay, draw_seed, value, start)| {
+        let tests = rows.into_iter().map(|(loss, delay, operation_seed, value, start)| {
             let operation = |name: &str, choice: f64| TestOperation {
                 operation: id(name),
                 activation: Activation::Time { start, end: start.next_up() },
                 parameters: vec![Choice::Value { value: choice }],
-                draw_seed,
+                operation_seed,
             };
             // SQLite keeps no sign of zero, and the language has none either.
             (Test { operations: vec![operation("lose", loss), operation("lag", delay)] }, value + 0.0)

@@ -2,20 +2,21 @@
 //! figures.
 
 use std::fmt::Write as _;
+use std::sync::Arc;
 
+use sesame_base::observation::{MetricObservation, Observation, Outcome};
 use sesame_dsl::analyse;
 use sesame_dsl::source::SourceMap;
 use sesame_optimise::dominance::Fitness;
-use sesame_optimise::falsify::{Falsifier, Settings as FalsifierSettings, UnitBox};
+use sesame_optimise::falsify::{Falsifier, Margin, Settings as FalsifierSettings, UnitBox};
 use sesame_optimise::nsga2::{Nsga2, Settings, Survival, Told};
-use sesame_optimise::published::FalsificationProblem;
-use sesame_optimise::real::RealVariation;
+use sesame_optimise::problems::FalsificationProblem;
+use sesame_optimise::problems::RealVariation;
 use sesame_optimise::sobol::SobolPoints;
 use sesame_plan::{Activation, CampaignPlan, Choice, Test, TestOperation};
 use sesame_results::record::Repository;
 use sesame_rng::{Stream, keyed_unit};
-use sesame_search::margin::margin_to;
-use sesame_search::{Evaluated, Margin};
+use sesame_search::Evaluated;
 use sesame_tests::Project;
 
 const BUDGET: u32 = 80;
@@ -297,29 +298,25 @@ fn tests_until_violated(problem: FalsificationProblem, plan: &CampaignPlan, seed
         for candidate in batch {
             number += 1;
             let (active, margins) = run(problem, plan, &candidate.test);
-            let value = |metric| match plan.metric(metric).name.as_str() {
+            let value = |name: &str| match name {
                 "m1" => margins[0],
                 "m2" => margins[1],
                 "m3" => margins[2],
                 _ => active,
             };
-            let margins: Vec<Margin> = plan
-                .requirements
-                .iter()
-                .map(|requirement| margin_to(requirement.bound, value(requirement.metric)))
-                .collect();
-            if margins.iter().any(|margin| margin.violated) {
+            let mut run = Observation::without_run(Outcome::Completed);
+            let metrics = plan.metrics.iter().map(|metric| Some(value(&metric.name)));
+            run.metrics = metrics.map(|value| MetricObservation::whole(value, true, Vec::new())).collect();
+            if sesame_search::margins(plan, &run).iter().any(|margin| margin.violated) {
                 return Some(number);
             }
-            let objectives = plan.campaign.objectives.iter().map(|&metric| value(metric)).collect();
             results.push(Evaluated {
                 number: u32::try_from(number).unwrap(),
                 test: candidate.test,
-                fitness: Fitness::Measured(objectives),
+                fitness: sesame_search::fitness(plan, &run),
                 point: None,
-                course: None,
-                margins,
-                failing: false,
+                run: Arc::new(run),
+                fresh_runs: Vec::new(),
             });
         }
         strategy.tell(&results);

@@ -19,8 +19,9 @@ use sesame_rng::Stream;
 use sesame_search as search;
 use sesame_search::coverage::{Coverage, Grid};
 use sesame_search::indicators::Indicators;
-use sesame_search::space::initial::fresh_test;
-use sesame_search::{Permitted, sspr};
+use sesame_search::space::TestSpace;
+use sesame_search::space::fresh_test;
+use sesame_search::sspr;
 use sesame_tests::{command, fresh_folder, optimised_sesamec};
 
 const TESTS: u32 = 100_000;
@@ -85,7 +86,7 @@ fn length_of([x, y, z]: [f64; 3]) -> f64 {
     (x * x + y * y + z * z).sqrt()
 }
 
-fn record(plan: &CampaignPlan, permitted: &Permitted, number: u32) -> TestRecord {
+fn record(plan: &CampaignPlan, permitted: &TestSpace, number: u32) -> TestRecord {
     let mut stream = Stream::derive(1, "large", &[u64::from(number)]);
     let test = fresh_test(permitted, &mut stream);
     let effect = |activation: &Activation| {
@@ -122,7 +123,7 @@ fn record(plan: &CampaignPlan, permitted: &Permitted, number: u32) -> TestRecord
 
 /// Records a campaign as a runner does, generation by generation.
 fn generate(folder: &Path, plan: &CampaignPlan, tests: u32) -> usize {
-    let permitted = Permitted::of(plan).unwrap();
+    let permitted = TestSpace::from_plan(plan).unwrap();
     let goal = plan.campaign.coverage.as_ref().unwrap();
     let mut coverage = Coverage::new(Grid::new(goal.axes.clone()).unwrap(), goal.hits);
     let mut recorder = Recorder::create(folder, plan, 1, 1).unwrap();
@@ -141,7 +142,7 @@ fn generate(folder: &Path, plan: &CampaignPlan, tests: u32) -> usize {
             coverage.add(&point);
         }
         if number % POPULATION == 0 {
-            front = Front::of(standing.iter().map(|(number, fitness)| (*number, fitness)));
+            front = Front::from_tests(standing.iter().map(|(number, fitness)| (*number, fitness)));
             let members = front.numbers();
             standing.retain(|(number, _)| members.binary_search(number).is_ok());
             let generation = number / POPULATION - 1;

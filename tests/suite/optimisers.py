@@ -40,6 +40,28 @@ def pymoo_run(problem, population, evaluations, seed):
     return seconds, result.pop.get("F")
 
 
+def pymoo_nsga3_run(problem, population, evaluations, seed):
+    from pymoo.algorithms.moo.nsga3 import NSGA3
+    from pymoo.operators.crossover.sbx import SBX
+    from pymoo.operators.mutation.pm import PM
+    from pymoo.optimize import minimize
+    from pymoo.problems import get_problem
+    from pymoo.util.ref_dirs import get_reference_directions
+
+    # dtlz2_5 has 5 objectives and 14 variables. The spread of reference directions is the finest that the population serves.
+    objectives = int(problem.rsplit("_", 1)[1])
+    partitions = {3: 12, 5: 6}[objectives]
+    directions = get_reference_directions("das-dennis", objectives, n_partitions=partitions)
+    posed = get_problem("dtlz2", n_var=objectives + 9, n_obj=objectives)
+    algorithm = NSGA3(
+        pop_size=population, ref_dirs=directions, crossover=SBX(prob=0.9, eta=15), mutation=PM(eta=20)
+    )
+    start = time.perf_counter()
+    result = minimize(posed, algorithm, ("n_eval", evaluations), seed=seed)
+    seconds = time.perf_counter() - start
+    return seconds, result.pop.get("F")
+
+
 def sort(points):
     from pymoo.operators.survival.rank_and_crowding.metrics import calc_crowding_distance, get_crowding_function
     from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
@@ -67,6 +89,6 @@ for line in sys.stdin:
         fronts, crowding = sort(request["points"])
         print(json.dumps({"fronts": fronts, "crowding": crowding}), flush=True)
     else:
-        run = {"pygmo": pygmo_run, "pymoo": pymoo_run}[request["library"]]
+        run = {"pygmo": pygmo_run, "pymoo": pymoo_run, "pymoo nsga3": pymoo_nsga3_run}[request["library"]]
         seconds, front = run(request["problem"], request["population"], request["evaluations"], request["seed"])
         print(json.dumps({"seconds": seconds, "front": np.asarray(front).tolist()}), flush=True)

@@ -8,7 +8,7 @@ use sesame_optimise::crowding::distances;
 use sesame_optimise::dominance::Fitness;
 use sesame_optimise::hypervolume::hypervolume;
 use sesame_optimise::igd::igd_plus;
-use sesame_optimise::problems::{Problem, approximate};
+use sesame_optimise::problems::{Problem, approximate, approximate_dtlz2};
 use sesame_optimise::sorting::fronts;
 use sesame_tests::optimisers::{Distance, Distant, PYTHON, Ran, Run, Sort, Sorted, ask};
 
@@ -57,6 +57,43 @@ fn hypervolumes_of_published_problems_are_within_the_bands_of_pygmo_and_pymoo() 
         if problem == Problem::Zdt1 {
             assert!(middle >= 0.869, "{ours:?}");
         }
+    }
+}
+
+/// The mean distance of a population to the unit sphere, which is the front of DTLZ2, and its hypervolume.
+fn nsga3_quality(population: &[Vec<f64>]) -> (f64, f64) {
+    let points: Vec<&[f64]> = population.iter().map(Vec::as_slice).collect();
+    let distance = |point: &Vec<f64>| (point.iter().map(|x| x * x).sum::<f64>().sqrt() - 1.0).abs();
+    let distances = population.iter().map(distance).sum::<f64>() / population.len() as f64;
+    (distances, hypervolume(&points, &vec![1.1; population[0].len()]))
+}
+
+#[test]
+#[ignore = "long: needs Python's pymoo"]
+fn nsga3_reaches_on_dtlz2_with_three_and_five_objectives_what_that_of_pymoo_reaches() {
+    for (problem, objectives, population, evaluations) in [("dtlz2_3", 3, 92, 23_000), ("dtlz2_5", 5, 212, 42_400)] {
+        let requests: Vec<Run> =
+            SEEDS.map(|seed| Run { library: "pymoo nsga3", problem, population, evaluations, seed }).collect();
+        let Some(theirs) = ask::<Run, Ran>(&requests) else {
+            println!("skipped: {PYTHON} names no Python with pymoo");
+            assert!(std::env::var_os("CI").is_none(), "CI has Python, so it has it");
+            return;
+        };
+        let theirs: Vec<(f64, f64)> = theirs.iter().map(|ran| nsga3_quality(&ran.front)).collect();
+        let ours: Vec<(f64, f64)> =
+            SEEDS.map(|seed| nsga3_quality(&approximate_dtlz2(objectives, population, evaluations, seed))).collect();
+        let volumes = |of: &[(f64, f64)]| of.iter().map(|(_, volume)| *volume).collect::<Vec<_>>();
+        let (low, high) = band(&volumes(&theirs));
+        let distances = |of: &[(f64, f64)]| median(of.iter().map(|(distance, _)| *distance).collect());
+        println!(
+            "{problem}: ours {:?} at {:.4}, theirs {low:.4} to {high:.4} at {:.4}",
+            band(&volumes(&ours)),
+            distances(&ours),
+            distances(&theirs)
+        );
+        let margin = (high - low).max(0.005);
+        assert!(median(volumes(&ours)) >= low - margin, "{ours:?} beside {theirs:?}");
+        assert!(distances(&ours) <= 2.0 * distances(&theirs) + 0.002, "{ours:?} beside {theirs:?}");
     }
 }
 

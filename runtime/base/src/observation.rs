@@ -255,6 +255,24 @@ impl Observation {
         }
     }
 
+    /// The same run without the series of its metrics, which are most of it.
+    #[must_use]
+    pub fn without_series(&self) -> Self {
+        let metric = |&MetricObservation { value, set, reach, not_finite, series: _ }: &MetricObservation| {
+            MetricObservation { value, set, reach, not_finite, series: Vec::new() }
+        };
+        Observation {
+            outcome: self.outcome.clone(),
+            end: self.end,
+            operations: self.operations.clone(),
+            unheard: self.unheard.clone(),
+            metrics: self.metrics.iter().map(metric).collect(),
+            messages: self.messages,
+            warnings: self.warnings.clone(),
+            wall: self.wall,
+        }
+    }
+
     /// The value of the plan's metric at this position; unmeasured when the run reported none.
     pub fn value(&self, metric: sesame_plan::MetricId) -> MetricValue {
         self.metrics.get(metric.index()).map(MetricValue::from).unwrap_or_default()

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-/// What the search knows of an evaluated solution. Built from a run by [`sesame_search::fitness`].
+/// What the search knows of an evaluated solution. Smaller is better.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fitness {
     /// Its objective values, each oriented so that smaller is better, in the order of the problem's objectives; never

@@ -22,7 +22,7 @@ pub struct FrontMember {
 impl Front {
     /// The front of these tests. Of two or three objectives any number of tests is sorted out about as fast as it is
     /// sorted; of more, the time grows with the number of tests times that of the front.
-    pub fn of<'a>(tests: impl IntoIterator<Item = (u32, &'a Fitness)>) -> Self {
+    pub fn from_tests<'a>(tests: impl IntoIterator<Item = (u32, &'a Fitness)>) -> Self {
         let mut measured: Vec<(u32, &[f64])> =
             tests.into_iter().filter_map(|(number, fitness)| Some((number, fitness.objectives()?))).collect();
         // A test never comes after one that it dominates, nor an equal one with a smaller number after it.
@@ -129,14 +129,14 @@ mod tests {
                 .collect();
             let numbered: Vec<(u32, &Fitness)> = (0u32..).zip(&population).collect();
             let order = sesame_rng::Stream::derive(seed, "test", &[]).permutation(population.len());
-            prop_assert_eq!(Front::of(numbered.iter().copied()).numbers(), naive.clone());
+            prop_assert_eq!(Front::from_tests(numbered.iter().copied()).numbers(), naive.clone());
             let shuffled: Vec<(u32, &Fitness)> = order.into_iter().map(|i| numbered[i]).collect();
-            prop_assert_eq!(Front::of(shuffled.iter().copied()).numbers(), naive.clone());
+            prop_assert_eq!(Front::from_tests(shuffled.iter().copied()).numbers(), naive.clone());
             let mut one_by_one = Front::default();
             for (number, fitness) in shuffled {
                 one_by_one.add(number, fitness);
             }
-            prop_assert_eq!(&one_by_one, &Front::of(numbered));
+            prop_assert_eq!(&one_by_one, &Front::from_tests(numbered));
             prop_assert_eq!(one_by_one.numbers(), naive);
         }
     }

@@ -1,11 +1,12 @@
 //! Search on vectors, and what measures it: no plan, no robots, usable as it is.
 //!
 //! - [`nsga2`], with its parts: [`dominance`], [`sorting`], [`crowding`], [`selection`].
+//! - [`nsga3`]: survival by reference points, for three and more objectives.
 //! - [`front`]: the non-dominated solutions of all that were evaluated.
 //! - [`hypervolume`] and [`igd`]: how good a front is.
 //! - [`sobol`]: low-discrepancy points.
 //! - [`falsify`]: looking for a violation where evaluations are expensive, by a Gaussian process.
-//! - [`problems`] and [`published`]: functions with known answers, for tests and benchmarks.
+//! - [`problems`]: functions with known answers, for tests and benchmarks.
 //!
 //! All objectives are minimised. Everything is a function of its arguments and a seed; equal seeds give equal results
 //! on every machine.
@@ -17,9 +18,8 @@ pub mod front;
 pub mod hypervolume;
 pub mod igd;
 pub mod nsga2;
+pub mod nsga3;
 pub mod problems;
-pub mod published;
-pub mod real;
 pub mod selection;
 pub mod sobol;
 pub mod sorting;

@@ -1,13 +1,14 @@
-//! NSGA-II (Deb et al. 2002) by ask and tell, over any genome.
+//! NSGA-II [Deb et al. 2002] by ask and tell, over any genome.
 //!
 //! Generation 0 is fresh; each later one is as large as the population, bred from it by binary tournaments and the
 //! genome's own [`Variation`], and the best of both together survive. What is asked depends on the seed and on what
-//! was told, never on how long an evaluation took or in which order the evaluations of a generation were done.
+//! was told, never on the duration or the order of evaluations.
 
 use sesame_rng::Stream;
 
 use crate::dominance::Fitness;
-use crate::selection::{Standing, distinct_survivors, parents, survivors};
+use crate::nsga3::ReferencePoints;
+use crate::selection::{Rank, distinct_survivors, parents, survivors};
 
 /// How genomes of a kind are made and changed. Randomness comes from streams of the given coordinates only.
 pub trait Variation {
@@ -42,7 +43,7 @@ pub enum Heritage {
     Both,
 }
 
-/// The sizes of a run, and what decides in it.
+/// The sizes of a run, its seed, and who survives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
     /// Members of the population, and of each generation; at least 1.
@@ -60,9 +61,11 @@ pub struct Settings {
 pub enum Survival {
     /// The best by the crowded comparison, as in the paper.
     Crowded,
-    /// Of equal objective values one, as long as there are others: where many solutions come to the same, the paper's way
-    /// fills the population with them.
+    /// Of solutions with equal objective values only one, as long as there are others. The crowded comparison would fill the
+    /// population with equal solutions where there are many.
     Distinct,
+    /// By reference points, as in NSGA-III: for three and more objectives.
+    ReferencePoints,
 }
 
 /// A genome to be evaluated.
@@ -81,7 +84,7 @@ pub struct Told<G> {
     pub number: u32,
     /// The genome, as asked.
     pub genome: G,
-    /// What came out.
+    /// Its fitness.
     pub fitness: Fitness,
 }
 
@@ -97,7 +100,9 @@ pub struct Nsga2<V: Variation> {
     /// How many of them still have to be told.
     awaited: usize,
     population: Vec<Told<V::Genome>>,
-    standings: Vec<Standing>,
+    ranks: Vec<Rank>,
+    /// What [`Survival::ReferencePoints`] has seen.
+    reference_points: ReferencePoints,
 }
 
 impl<V: Variation> Nsga2<V> {
@@ -111,7 +116,8 @@ impl<V: Variation> Nsga2<V> {
             asked: 0,
             awaited: 0,
             population: Vec::new(),
-            standings: Vec::new(),
+            ranks: Vec::new(),
+            reference_points: ReferencePoints::default(),
         }
     }
 
@@ -125,7 +131,7 @@ impl<V: Variation> Nsga2<V> {
         &self.variation
     }
 
-    /// How its genomes are varied, to be told what else came of them.
+    /// How its genomes are varied, for variation that learns from results.
     pub fn variation_mut(&mut self) -> &mut V {
         &mut self.variation
     }
@@ -135,9 +141,9 @@ impl<V: Variation> Nsga2<V> {
         &self.population
     }
 
-    /// Judges the surviving genomes anew, for fitness that depends on what else was found. They are ranked again when the
-    /// next generation is told.
-    pub fn reappraise(&mut self, mut fitness: impl FnMut(&Told<V::Genome>) -> Fitness) {
+    /// Updates the fitness of the surviving genomes, for fitness that depends on other genomes. They are ranked again when
+    /// the next generation is told.
+    pub fn update_fitness(&mut self, mut fitness: impl FnMut(&Told<V::Genome>) -> Fitness) {
         for member in &mut self.population {
             member.fitness = fitness(member);
         }
@@ -166,9 +172,14 @@ impl<V: Variation> Nsga2<V> {
         assert!(self.population.len() - before == self.awaited, "exactly the generation asked last is told");
         self.awaited = 0;
         let size = self.settings.population as usize;
+        let fitness: Vec<&Fitness> = self.population.iter().map(|member| &member.fitness).collect();
         let survivors = match self.settings.survival {
-            Survival::Crowded => survivors(&self.fitness(), size),
-            Survival::Distinct => distinct_survivors(&self.fitness(), size),
+            Survival::Crowded => survivors(&fitness, size),
+            Survival::Distinct => distinct_survivors(&fitness, size),
+            Survival::ReferencePoints => {
+                let mut stream = Stream::derive(self.settings.seed, "niching", &[u64::from(self.generation)]);
+                self.reference_points.survivors(&fitness, size, &mut stream)
+            }
         };
         let mut chosen = survivors.iter().map(|(position, _)| *position).peekable();
         let mut position = 0;
@@ -176,14 +187,14 @@ impl<V: Variation> Nsga2<V> {
             position += 1;
             chosen.next_if_eq(&(position - 1)).is_some()
         });
-        self.standings = survivors.into_iter().map(|(_, standing)| standing).collect();
+        self.ranks = survivors.into_iter().map(|(_, rank_of)| rank_of).collect();
     }
 
     fn breed(&mut self, size: u32) -> Vec<Asked<V::Genome>> {
         let generation = u64::from(self.generation);
         let pairs = size.div_ceil(2);
         let mut stream = Stream::derive(self.settings.seed, "mating", &[generation]);
-        let mating = parents(&self.standings, 2 * pairs as usize, &mut stream);
+        let mating = parents(&self.ranks, 2 * pairs as usize, &mut stream);
         let mut batch = Vec::with_capacity(size as usize + 1);
         for (pair, couple) in (0u64..).zip(mating.chunks_exact(2)) {
             let [first, second] = [&self.population[couple[0]], &self.population[couple[1]]];
@@ -199,9 +210,5 @@ impl<V: Variation> Nsga2<V> {
         }
         batch.truncate(size as usize);
         batch
-    }
-
-    fn fitness(&self) -> Vec<&Fitness> {
-        self.population.iter().map(|member| &member.fitness).collect()
     }
 }

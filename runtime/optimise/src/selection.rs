@@ -8,54 +8,54 @@ use crate::crowding::distances;
 use crate::dominance::{Fitness, lexicographic};
 use crate::sorting::fronts;
 
-/// Where a solution stands in its population.
+/// The rank of a solution in its population: what the crowded comparison compares.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Standing {
+pub struct Rank {
     /// Its front, from 0 for the best.
     pub front: usize,
     /// Its crowding distance on that front.
     pub crowding: f64,
 }
 
-impl Standing {
+impl Rank {
     /// The crowded comparison: `Less` is better. An earlier front wins, then the larger crowding distance.
-    pub fn compare(self, other: Standing) -> Ordering {
+    pub fn compare(self, other: Rank) -> Ordering {
         self.front.cmp(&other.front).then_with(|| other.crowding.total_cmp(&self.crowding))
     }
 }
 
-/// The standing of each solution, in their order.
-pub fn standings(fitness: &[&Fitness]) -> Vec<Standing> {
-    let mut standings = vec![Standing { front: 0, crowding: 0.0 }; fitness.len()];
+/// The rank of each solution, in their order.
+pub fn ranks(fitness: &[&Fitness]) -> Vec<Rank> {
+    let mut ranks = vec![Rank { front: 0, crowding: 0.0 }; fitness.len()];
     for (rank, front) in fronts(fitness).iter().enumerate() {
         for (&position, crowding) in front.iter().zip(distances(fitness, front)) {
-            standings[position] = Standing { front: rank, crowding };
+            ranks[position] = Rank { front: rank, crowding };
         }
     }
-    standings
+    ranks
 }
 
 /// `n` parents, by binary tournaments. Contestants come from shuffled copies of the population, so that within
 /// `population / 2` tournaments each solution competes once, and neighbours in the result are different solutions
 /// (save where one copy ends and the next begins). Equal contestants: the first drawn wins, which is either at random.
-pub fn parents(standings: &[Standing], n: usize, stream: &mut Stream) -> Vec<usize> {
-    assert!(!standings.is_empty(), "parents come from a population");
-    let mut contestants = Vec::with_capacity(2 * n + standings.len());
+pub fn parents(ranks: &[Rank], n: usize, stream: &mut Stream) -> Vec<usize> {
+    assert!(!ranks.is_empty(), "parents come from a population");
+    let mut contestants = Vec::with_capacity(2 * n + ranks.len());
     while contestants.len() < 2 * n {
-        contestants.extend(stream.permutation(standings.len()));
+        contestants.extend(stream.permutation(ranks.len()));
     }
     let winner = |pair: &[usize]| {
-        if standings[pair[1]].compare(standings[pair[0]]).is_lt() { pair[1] } else { pair[0] }
+        if ranks[pair[1]].compare(ranks[pair[0]]).is_lt() { pair[1] } else { pair[0] }
     };
     contestants.chunks_exact(2).take(n).map(winner).collect()
 }
 
-/// The `n` best solutions (all when there are no more), as positions in ascending order with their standings among each
+/// The `n` best solutions (all when there are no more), as positions in ascending order with their ranks among each
 /// other: whole fronts while they fit, of the next one those with the largest crowding distances, of equal ones the
 /// earlier.
-pub fn survivors(fitness: &[&Fitness], n: usize) -> Vec<(usize, Standing)> {
-    let mut chosen: Vec<(usize, Standing)> = Vec::with_capacity(n.min(fitness.len()));
-    // What is dominated by nobody but members of earlier fronts stays on its front, since those are there as a whole.
+pub fn survivors(fitness: &[&Fitness], n: usize) -> Vec<(usize, Rank)> {
+    let mut chosen: Vec<(usize, Rank)> = Vec::with_capacity(n.min(fitness.len()));
+    // Earlier fronts survive as a whole, so the survivors of a front stay on the same front.
     for (rank, mut front) in fronts(fitness).into_iter().enumerate() {
         let room = n - chosen.len();
         let mut crowding = distances(fitness, &front);
@@ -67,7 +67,7 @@ pub fn survivors(fitness: &[&Fitness], n: usize) -> Vec<(usize, Standing)> {
             front = order.iter().map(|&k| front[k]).collect();
             crowding = distances(fitness, &front);
         }
-        chosen.extend(front.into_iter().zip(crowding).map(|(at, crowding)| (at, Standing { front: rank, crowding })));
+        chosen.extend(front.into_iter().zip(crowding).map(|(at, crowding)| (at, Rank { front: rank, crowding })));
         if chosen.len() == n {
             break;
         }
@@ -76,10 +76,10 @@ pub fn survivors(fitness: &[&Fitness], n: usize) -> Vec<(usize, Standing)> {
     chosen
 }
 
-/// As [`survivors`], but a measured solution whose objective values an earlier one has comes after all that bring values
-/// of their own, however good these are, and before what is not measured. It tells the search nothing new, where a worse
-/// one may be on a way to something.
-pub fn distinct_survivors(fitness: &[&Fitness], n: usize) -> Vec<(usize, Standing)> {
+/// As [`survivors`], but measured solutions with the objective values of an earlier one come after all solutions with
+/// values of their own, however good they are, and before those that are not measured. They add no information, while a
+/// worse solution with other values may lead to better ones.
+pub fn distinct_survivors(fitness: &[&Fitness], n: usize) -> Vec<(usize, Rank)> {
     let mut measured: Vec<(&[f64], usize)> = Vec::with_capacity(fitness.len());
     let mut others = Vec::new();
     for (position, solution) in fitness.iter().enumerate() {
@@ -104,8 +104,8 @@ pub fn distinct_survivors(fitness: &[&Fitness], n: usize) -> Vec<(usize, Standin
     }
     chosen.sort_unstable();
     // Those of each group were ranked by themselves.
-    let standings = standings(&chosen.iter().map(|&position| fitness[position]).collect::<Vec<_>>());
-    chosen.into_iter().zip(standings).collect()
+    let ranks = ranks(&chosen.iter().map(|&position| fitness[position]).collect::<Vec<_>>());
+    chosen.into_iter().zip(ranks).collect()
 }
 
 #[cfg(test)]
@@ -120,15 +120,15 @@ mod tests {
         #[test]
         fn survivors_are_the_best_by_the_crowded_comparison(population in any_population(), n in 0usize..40) {
             let all: Vec<&Fitness> = population.iter().collect();
-            let standings = standings(&all);
+            let ranks = ranks(&all);
             let mut order: Vec<usize> = (0..all.len()).collect();
-            order.sort_by(|&a, &b| standings[a].compare(standings[b]).then(a.cmp(&b)));
+            order.sort_by(|&a, &b| ranks[a].compare(ranks[b]).then(a.cmp(&b)));
             order.truncate(n);
             order.sort_unstable();
-            let (positions, among_each_other): (Vec<usize>, Vec<Standing>) = survivors(&all, n).into_iter().unzip();
+            let (positions, among_each_other): (Vec<usize>, Vec<Rank>) = survivors(&all, n).into_iter().unzip();
             prop_assert_eq!(&positions, &order);
             let chosen: Vec<&Fitness> = order.iter().map(|&at| all[at]).collect();
-            prop_assert_eq!(among_each_other, super::standings(&chosen));
+            prop_assert_eq!(among_each_other, super::ranks(&chosen));
         }
 
         #[test]
@@ -142,26 +142,26 @@ mod tests {
             let mut expected = Vec::new();
             for wanted in 0..3 {
                 let members: Vec<usize> = (0..all.len()).filter(|&i| group(i) == wanted).collect();
-                let standings = standings(&members.iter().map(|&i| all[i]).collect::<Vec<_>>());
+                let ranks = ranks(&members.iter().map(|&i| all[i]).collect::<Vec<_>>());
                 let mut order: Vec<usize> = (0..members.len()).collect();
-                order.sort_by(|&a, &b| standings[a].compare(standings[b]).then(a.cmp(&b)));
+                order.sort_by(|&a, &b| ranks[a].compare(ranks[b]).then(a.cmp(&b)));
                 expected.extend(order.into_iter().map(|k| members[k]));
             }
             expected.truncate(n);
             expected.sort_unstable();
-            let (positions, among_each_other): (Vec<usize>, Vec<Standing>) =
+            let (positions, among_each_other): (Vec<usize>, Vec<Rank>) =
                 distinct_survivors(&all, n).into_iter().unzip();
             prop_assert_eq!(&positions, &expected);
             let chosen: Vec<&Fitness> = expected.iter().map(|&at| all[at]).collect();
-            prop_assert_eq!(among_each_other, super::standings(&chosen));
+            prop_assert_eq!(among_each_other, super::ranks(&chosen));
         }
 
         #[test]
         fn a_tournament_is_never_won_by_the_dominated(population in any_population(), n in 0usize..50, seed: u64) {
             prop_assume!(!population.is_empty());
             let all: Vec<&Fitness> = population.iter().collect();
-            let standings = standings(&all);
-            let parents = parents(&standings, n, &mut Stream::derive(seed, "test", &[]));
+            let ranks = ranks(&all);
+            let parents = parents(&ranks, n, &mut Stream::derive(seed, "test", &[]));
             prop_assert_eq!(parents.len(), n);
             // Replays the contests: the same stream shuffles the same contestants.
             let mut stream = Stream::derive(seed, "test", &[]);
@@ -174,7 +174,7 @@ mod tests {
                 let loser = if pair[0] == winner { pair[1] } else { pair[0] };
                 prop_assert!(pair.contains(&winner));
                 prop_assert!(!dominates(all[loser], all[winner]));
-                prop_assert!(standings[winner].compare(standings[loser]).is_le());
+                prop_assert!(ranks[winner].compare(ranks[loser]).is_le());
             }
         }
     }
@@ -183,8 +183,8 @@ mod tests {
     fn everyone_competes_equally_often_and_the_worst_never_wins() {
         let population: Vec<Fitness> = (0..9).map(|i| Fitness::Measured(vec![f64::from(i)])).collect();
         let population = [population, vec![Fitness::Unfit(Unfit::Crash)]].concat();
-        let standings = standings(&population.iter().collect::<Vec<_>>());
-        let parents = parents(&standings, 5_000, &mut Stream::derive(3, "test", &[]));
+        let ranks = ranks(&population.iter().collect::<Vec<_>>());
+        let parents = parents(&ranks, 5_000, &mut Stream::derive(3, "test", &[]));
         let mut wins = [0u32; 10];
         for winner in parents {
             wins[winner] += 1;

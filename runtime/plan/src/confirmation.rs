@@ -1,4 +1,4 @@
-//! How a campaign makes sure of what it finds where a simulator does not always do the same.
+//! How a campaign confirms what it finds with a simulator that is not deterministic.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,16 +9,16 @@ pub struct Confirmation {
     /// How often each is run again; at least 1.
     pub times: u32,
     /// How the values of these runs become one.
-    pub by: Typical,
+    pub by: Statistic,
     /// Whether each test that violates a requirement is confirmed too, wherever it lies.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub violations: bool,
 }
 
-/// How the values of an objective in several runs become one. The run that selected a test is none of them.
+/// How the values of an objective in several runs become one. The run that selected the test is not among them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Typical {
+pub enum Statistic {
     /// Their mean.
     Mean,
     /// Their median; the mean of the two in the middle of an even number.

@@ -1,4 +1,4 @@
-//! How an evolution is made to look where it has not been.
+//! How an evolutionary search is directed to where no test has been.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,17 +9,17 @@ use crate::Dimension;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Exploration {
-    /// Coverage boosting (section 4.2.2 of the methodology's paper): some children are mutated again until they lie in a
-    /// cell that wants tests. For campaigns by time.
+    /// Coverage boosting [SESAME 2023, section 4.2.2]: some children are mutated again until they lie in a
+    /// cell that needs tests. For campaigns by time.
     Boost {
-        /// Only in every so-manieth generation; at least 1.
+        /// Only in every n-th generation; at least 1.
         every_generations: u32,
         /// Which children of such a generation.
         children: BoostedChildren,
         /// How often a child is mutated again at most.
         tries: u32,
     },
-    /// Construction: some tests are changed as little as may be so that they lie in a feasible cell that wants tests. For
+    /// Construction: some tests are changed as little as may be so that they lie in a feasible cell that needs tests. For
     /// campaigns by time.
     Construct {
         /// The share of the tests of each generation, in `0..=1`.
@@ -34,7 +34,7 @@ pub enum Exploration {
         /// The dimensions of distances; at least one.
         over: Vec<Dimension>,
     },
-    /// Prediction: of several candidates for each test the one that would probably fall into a cell that wants tests. For
+    /// Prediction: of several candidates for each test the one that would probably fall into a cell that needs tests. For
     /// campaigns by condition.
     Predict {
         /// How many candidates; at least 1.
@@ -46,7 +46,7 @@ pub enum Exploration {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum BoostedChildren {
-    /// Every so-manieth, beginning with the first.
+    /// Every n-th, beginning with the first.
     Every {
         /// At least 1.
         iterations: u32,

@@ -38,7 +38,7 @@ pub enum OperationKind {
     Noise,
     /// Multiplies. One parameter `factor`: a number.
     Scale,
-    /// Replaces reals, and all coordinates of points, by what is no finite number. No parameters.
+    /// Replaces reals, and all coordinates of points, by a value that is not a finite number. No parameters.
     NotFinite {
         /// By what.
         number: NotFinite,
@@ -83,7 +83,7 @@ pub enum OperationKind {
     },
 }
 
-/// What is no finite number.
+/// A value that is not a finite number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NotFinite {

@@ -15,8 +15,10 @@ mod exploration;
 mod formula;
 mod kind;
 mod model;
+mod search;
 pub mod stl;
 mod stop;
+mod task;
 mod test;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
@@ -28,9 +30,11 @@ pub use exploration::*;
 pub use formula::*;
 pub use kind::*;
 pub use model::*;
+pub use search::*;
 pub use stop::*;
+pub use task::*;
 pub use test::*;
 pub use validate::PlanError;
 
 /// The version of this schema. A runner refuses a plan of another version: both come from one release.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::condition::{ConditionSpace, Constraint};
-use crate::{Confirmation, CoverageGoal, Exploration, Formula, KnownTest, OperationKind, StopRule};
+use crate::{Confirmation, CoverageGoal, Exploration, Formula, KnownTest, OperationKind, Search, StopRule};
 
 macro_rules! id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -50,7 +50,9 @@ id!(
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(remote = "Self")]
 pub struct CampaignPlan {
-    /// [`crate::SCHEMA`] of the generator that wrote the plan.
+    /// [`crate::SCHEMA`] of the generator that wrote the plan. It comes first, so that a plan of another schema is refused
+    /// for that reason.
+    #[serde(deserialize_with = "crate::validate::this_schema")]
     pub schema: u32,
     /// Name and version of the generator, for example `sesamec 0.1.0`.
     pub generator: String,
@@ -572,7 +574,7 @@ pub struct Campaign {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Recorded {
-    /// Of those that violate a requirement, crash or time out, and of the undisturbed runs to compare them with.
+    /// Of those that violate a requirement, crash or time out, and of the reference runs to compare them with.
     Failing,
     /// Of all.
     All,
@@ -619,107 +621,4 @@ pub enum ActivationMode {
         /// What they are made of.
         space: ConditionSpace,
     },
-}
-
-/// How the tests of a campaign are found.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Search {
-    /// NSGA-II (Deb 2002).
-    Nsga2 {
-        /// Tests per generation.
-        population: u32,
-        /// Tests in total.
-        evaluations: u32,
-    },
-    /// Independent random tests.
-    Random {
-        /// Tests in total.
-        evaluations: u32,
-    },
-    /// MAP-Elites over the cells of the campaign's coverage.
-    MapElites {
-        /// Tests per generation.
-        population: u32,
-        /// Tests in total.
-        evaluations: u32,
-    },
-    /// Latin hypercube sampling: tests spread evenly over each of their choices.
-    LatinHypercube {
-        /// Tests in total.
-        evaluations: u32,
-    },
-    /// Sobol' sampling: tests spread evenly over their choices, every beginning of them too.
-    Sobol {
-        /// Tests in total.
-        evaluations: u32,
-    },
-    /// Focused falsification: the tests that most probably violate a requirement. For campaigns by time of spaces with
-    /// requirements.
-    Falsification {
-        /// Tests at a time, after the first ones; at least 1.
-        population: u32,
-        /// Tests in total.
-        evaluations: u32,
-    },
-    /// One known test again and again.
-    Repeat {
-        /// Which.
-        test: KnownTestId,
-        /// How often.
-        times: u32,
-    },
-    /// Known tests, each once. No campaign of a `.sesame` file does this: the runner's `known` puts it in the
-    /// campaign's place.
-    Known {
-        /// Which.
-        tests: Vec<KnownTestId>,
-    },
-    /// A test made smaller for as long as it fails as it did. No campaign of a `.sesame` file does this: the runner's
-    /// `shrink` puts it in the campaign's place.
-    Shrink {
-        /// Which.
-        test: KnownTestId,
-        /// How it fails.
-        failing: Failing,
-        /// The simulator's seed with which it failed.
-        simulator_seed: u64,
-        /// In how many runs a smaller test has to fail, from 1; the first has the simulator's seed of the test, the others
-        /// seeds of their own.
-        runs: u32,
-        /// Runs at most.
-        evaluations: u32,
-    },
-}
-
-/// How a test fails that is made smaller.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Failing {
-    /// It violates each of these requirements; at least one.
-    Violation {
-        /// Which.
-        requirements: Vec<RequirementId>,
-    },
-    /// Its run crashes.
-    Crash,
-    /// Its run times out.
-    Timeout,
-}
-
-impl Search {
-    /// How many tests the campaign evaluates.
-    pub fn evaluations(&self) -> u32 {
-        match self {
-            Search::Nsga2 { evaluations, .. }
-            | Search::MapElites { evaluations, .. }
-            | Search::Random { evaluations }
-            | Search::Sobol { evaluations }
-            | Search::Falsification { evaluations, .. }
-            | Search::LatinHypercube { evaluations }
-            | Search::Shrink { evaluations, .. } => *evaluations,
-            Search::Repeat { times, .. } => *times,
-            Search::Known { tests } => u32::try_from(tests.len()).unwrap_or(u32::MAX),
-        }
-    }
 }

@@ -2,13 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A reason for a search to stop after a generation. Of several the first that holds stops it.
+/// A reason for a search to stop after a generation. If there are several, the first that holds stops it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum StopRule {
-    /// It has gone on for so long. The only rule by which results depend on how fast the machine is.
+    /// It has run for this long. The only rule by which results depend on how fast the machine is.
     WallTime {
-        /// Seconds of wall time since it was started or taken up again; positive.
+        /// Seconds of wall time since it was started or resumed; positive.
         seconds: f64,
     },
     /// The hypervolume of its front has hardly grown.

@@ -8,7 +8,7 @@ use crate::{Bound, MetricId, OperationId};
 /// One test configuration: what a search evolves and a run applies. An empty list disturbs nothing.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Test {
-    /// Its operations. Order is no priority; an operation of the space may occur more than once.
+    /// Its operations. Their order is not a priority; an operation of the space may occur more than once.
     pub operations: Vec<TestOperation>,
 }
 
@@ -22,7 +22,7 @@ pub struct TestOperation {
     /// A choice for each parameter of the operation, in the operation's order.
     pub parameters: Vec<Choice>,
     /// Seed of its draws, which are keyed by message index: repeating a test repeats its disturbance exactly.
-    pub draw_seed: u64,
+    pub operation_seed: u64,
 }
 
 /// When an operation of a test is active. [`Activation::Offline`] is that of the operations that are

@@ -1,9 +1,9 @@
-//! Small plans for the runtime's own tests.
+//! Small plans for tests of the runtime.
 
 use crate::{
     Activation, ActivationMode, Campaign, CampaignPlan, Choice, Count, Distribution, Domain, Drain, Field, FieldRef,
     MessageId, MessageType, Metric, MetricSource, Operation, OperationId, OperationKind, Parameter, SCHEMA, Search,
-    Shape, Simulator, Span, Step, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode,
+    Shape, Simulator, Span, Step, Strategy, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode,
 };
 
 /// Topic `command` of reals, topic `zones` with two members of `Zone { level: real, count: int }`.
@@ -63,7 +63,7 @@ pub fn plan(operations: Vec<Operation>) -> CampaignPlan {
             count: Count { min: 1, max: 5 },
             copies: crate::Copies::default(),
             activation: ActivationMode::Time,
-            search: Search::Random { evaluations: 1 },
+            search: Search::new(Strategy::Random, 1),
             coverage: None,
             exploration: None,
             confirm: None,
@@ -148,12 +148,12 @@ pub fn latency(distribution: Distribution, drain: Drain) -> OperationKind {
 }
 
 /// A use of an operation between two times.
-pub fn use_of(operation: u32, start: f64, end: f64, parameters: Vec<Choice>, draw_seed: u64) -> TestOperation {
+pub fn use_of(operation: u32, start: f64, end: f64, parameters: Vec<Choice>, operation_seed: u64) -> TestOperation {
     TestOperation {
         operation: OperationId(operation),
         activation: Activation::Time { start, end },
         parameters,
-        draw_seed,
+        operation_seed,
     }
 }
 

@@ -18,8 +18,8 @@ use crate::stl::{self, Robustness};
 use crate::{
     Activation, ActivationMode, Aggregate, BoostedChildren, Bound, Campaign, CampaignPlan, Choice, Confirmation,
     CoverageGoal, Domain, Exploration, Expression, Failing, FieldRef, Formula, KnownTest, KnownTestId, MessageId,
-    Metric, MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA, Search, Span,
-    StopRule, Test, TopicId, Transport, Type, Typical,
+    Metric, MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA, Search, Shrinking,
+    Span, Statistic, StopRule, Task, Test, TopicId, Transport, Type,
 };
 
 /// What is wrong with a plan, and where in it.
@@ -41,6 +41,21 @@ impl fmt::Display for PlanError {
 impl std::error::Error for PlanError {}
 
 type Checked = Result<(), PlanError>;
+
+/// Reads the schema of a plan, and refuses another than this release's before anything else is read.
+pub(crate) fn this_schema<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    let schema = u32::deserialize(deserializer)?;
+    at("schema", known_schema(schema)).map_err(D::Error::custom)?;
+    Ok(schema)
+}
+
+fn known_schema(schema: u32) -> Checked {
+    require(schema == SCHEMA, || {
+        format!(
+            "is {schema}, this release knows {SCHEMA}; run `sesamec generate` again to write a plan of this release"
+        )
+    })
+}
 
 fn wrong(problem: impl Into<String>) -> Checked {
     Err(PlanError { place: String::new(), problem: problem.into() })
@@ -156,7 +171,7 @@ impl Serialize for CampaignPlan {
 impl CampaignPlan {
     /// Makes sure of what the fields promise. A plan that was deserialized has passed.
     pub fn validate(&self) -> Result<(), PlanError> {
-        at("schema", require(self.schema == SCHEMA, || format!("is {}, this release knows {SCHEMA}", self.schema)))?;
+        at("schema", known_schema(self.schema))?;
         at("space", name(&self.space))?;
         at("simulator.name", name(&self.simulator.name))?;
         let step_ns = match self.simulator.transport {
@@ -407,14 +422,22 @@ impl CampaignPlan {
 
     fn sound_search(&self, search: &Search) -> Checked {
         match search {
-            Search::Nsga2 { population, .. }
-            | Search::MapElites { population, .. }
-            | Search::Falsification { population, .. } => at("population", at_least_one(*population)),
-            Search::Random { .. } | Search::LatinHypercube { .. } | Search::Sobol { .. } => Ok(()),
+            Search::Strategy { strategy, evaluations: _ } => at(
+                "strategy",
+                strategy.population().map_or(Ok(()), |population| at("population", at_least_one(population))),
+            ),
             Search::Repeat { test, times: _ } => at("test", self.has_test(*test)),
-            Search::Known { tests } => each("tests", tests, |&id| self.has_test(id)),
-            Search::Shrink { test, failing, runs, simulator_seed: _, evaluations: _ } => {
-                at("test", self.has_test(*test))?;
+        }
+    }
+
+    /// Checks that a task can be done with this plan: its tests, and what they refer to, are in the plan.
+    pub fn validate_task(&self, task: &Task) -> Result<(), PlanError> {
+        match task {
+            Task::Campaign => Ok(()),
+            Task::Known { tests } => each("tests", tests, |&id| self.has_test(id)),
+            Task::Repeat { test, .. } => at("test", self.validate_test(test)),
+            Task::Shrink(Shrinking { test, failing, runs, .. }) => {
+                at("test", self.validate_test(test))?;
                 if let Failing::Violation { requirements } = failing {
                     at("failing.requirements", filled(requirements))?;
                     each("failing.requirements", requirements, |&id| self.has_requirement(id))?;
@@ -574,8 +597,8 @@ fn exploration(exploration: &Exploration) -> Checked {
 fn confirmation(confirmation: &Confirmation) -> Checked {
     at("times", at_least_one(confirmation.times))?;
     match confirmation.by {
-        Typical::Mean | Typical::Median => Ok(()),
-        Typical::Quantile { share } => at("by.share", positive_share(share)),
+        Statistic::Mean | Statistic::Median => Ok(()),
+        Statistic::Quantile { share } => at("by.share", positive_share(share)),
     }
 }
 

@@ -136,7 +136,7 @@ struct Stage {
     activity: Activity,
     /// When it last became active.
     since: SimTime,
-    draw_seed: u64,
+    operation_seed: u64,
     /// Whether it counts in `fuzzing_time()`.
     timed: bool,
     /// Since when it holds messages back without being active.
@@ -190,7 +190,7 @@ impl<'a> Relay<'a> {
                 disturbance,
                 activity: Activity::new(&choice.activation, operation.within),
                 since: SimTime::ZERO,
-                draw_seed: choice.draw_seed,
+                operation_seed: choice.operation_seed,
                 timed: operation.timed,
                 tail_since: None,
                 tails: Vec::new(),
@@ -493,7 +493,7 @@ impl<'a> Relay<'a> {
                 return self.pass_custom(now, at, member, message, deliveries);
             }
             let action = if active {
-                let draws = KeyedRng::new(stage.draw_seed, member, message.index);
+                let draws = KeyedRng::new(stage.operation_seed, member, message.index);
                 let context = MessageContext { now, active: now - stage.since, member, draws };
                 stage.disturbance.apply(context, &mut message.value)
             } else {
@@ -561,7 +561,7 @@ impl Relay<'_> {
             if custom.moment != moment {
                 continue;
             }
-            let mut ctx = RunContext::new(files, KeyedRng::new(stage.draw_seed, 0, 0));
+            let mut ctx = RunContext::new(files, KeyedRng::new(stage.operation_seed, 0, 0));
             custom.hook.before_or_after_run(&mut ctx);
             stage.counters.side_effects += ctx.side_effects;
             if let Some(failure) = ctx.failure {
@@ -578,7 +578,7 @@ impl Relay<'_> {
         let Disturbance::Custom(custom) = &mut stage.disturbance else {
             unreachable!("only custom operations come here")
         };
-        let draws = KeyedRng::new(stage.draw_seed, member, message.index);
+        let draws = KeyedRng::new(stage.operation_seed, member, message.index);
         let call = custom.on_message(now, self.wires.path(message.wire), draws, &mut message.value);
         stage.count(heard, now, call.injected.len() as u64, |counters| &mut counters.injected);
         stage.count(heard, now, u64::from(call.changed && !call.dropped), |counters| &mut counters.changed);

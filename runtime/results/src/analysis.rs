@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 
 use sesame_optimise::dominance::lexicographic;
 use sesame_optimise::front::{Front, FrontMember};
-use sesame_plan::{CampaignPlan, Dimension, GridAxis, MetricId, Search};
+use sesame_plan::{CampaignPlan, Dimension, GridAxis, MetricId};
 use sesame_search::coverage::{Coverage, CurvePoint, Feasible, Grid, curve};
 use sesame_search::in_unit;
 use sesame_search::sspr::Convention;
@@ -70,7 +70,7 @@ pub fn campaigns(repositories: &[Repository]) -> Result<Table, RecordError> {
             Datum::Text(repository.path().display().to_string()),
             Datum::Text(plan.space.clone()),
             Datum::Text(plan.campaign.name.clone()),
-            Datum::Text(search_word(&plan.campaign.search).to_owned()),
+            Datum::Text(facts.task.keyword(plan).to_owned()),
             Datum::Text(facts.seed.to_string()),
             Datum::count(repository.evaluated()?),
             sets.last().map_or(Datum::Missing, |(_, size)| Datum::count(*size)),
@@ -80,20 +80,6 @@ pub fn campaigns(repositories: &[Repository]) -> Result<Table, RecordError> {
         ]);
     }
     Ok(dataset)
-}
-
-fn search_word(search: &Search) -> &'static str {
-    match search {
-        Search::Nsga2 { .. } => "nsga2",
-        Search::MapElites { .. } => "map_elites",
-        Search::LatinHypercube { .. } => "latin_hypercube",
-        Search::Sobol { .. } => "sobol",
-        Search::Falsification { .. } => "falsification",
-        Search::Random { .. } => "random",
-        Search::Repeat { .. } => "repeat",
-        Search::Known { .. } => "regression tests",
-        Search::Shrink { .. } => "shrink",
-    }
 }
 
 /// All tests but the reference runs: where each comes from, how it ended, and the value of each metric; of imported ones
@@ -164,7 +150,7 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Table, Re
     if objectives.is_empty() {
         return Ok(dataset);
     }
-    let front = Front::of(judged.iter().map(|(number, fitness)| (*number, fitness)));
+    let front = Front::from_tests(judged.iter().map(|(number, fitness)| (*number, fitness)));
     let mut members: Vec<&FrontMember> = front.members().iter().collect();
     members.sort_by(|a, b| lexicographic(&a.objectives, &b.objectives));
     for (number, fitness) in &judged {
@@ -231,7 +217,7 @@ pub fn coverage(
     convention: Convention,
 ) -> Result<CoverageAnalysis, RecordError> {
     let plan = repository.plan();
-    let feasible = Feasible::of(plan, &grid);
+    let feasible = Feasible::from_plan(plan, &grid);
     let mut coverage = Coverage::new(grid, hits);
     let mut points = Vec::new();
     repository.scan(&mut |test| {

@@ -3,7 +3,7 @@
 //! A [`Grid`] divides some dimensions into cells of equal width. [`Coverage`] counts the tests that fall into each; it
 //! is the same whether it is fed while a campaign runs or from its results afterwards. Some cells no test can reach (a
 //! long interval has its midpoint in the middle of the window): [`Feasible`] says which can be, so that coverage is told
-//! both over all cells, as the paper has it, and over those.
+//! both over all cells, as in [SESAME 2023], and over those.
 
 mod curve;
 mod feasible;
@@ -114,7 +114,7 @@ mod tests {
             intervals: vec![Span { start: t1 - t2 / 2.0, end: t1 + t2 / 2.0 }],
             parameters: vec![Intensity { permitted: (0.0, 1.0), chosen: (p1, p1), shape: Shape::Value }],
         };
-        Point::of(&[disturbance], Convention::Ours).unwrap()
+        Point::from_disturbances(&[disturbance], Convention::Ours).unwrap()
     }
 
     fn grid(cells: [u32; 3]) -> Grid {

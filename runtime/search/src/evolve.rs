@@ -1,10 +1,9 @@
 //! Evolution of tests: how children are made, and what steers them towards cells that have few tests.
 
-pub mod boost;
-pub mod cells;
-pub mod construct;
-pub mod constructing;
-pub mod map_elites;
-pub mod novelty;
-pub mod predict;
-pub mod variation;
+pub(crate) mod boost;
+pub(crate) mod cells;
+pub(crate) mod construct;
+pub(crate) mod map_elites;
+pub(crate) mod novelty;
+pub(crate) mod predict;
+pub(crate) mod variation;

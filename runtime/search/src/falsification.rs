@@ -1,6 +1,6 @@
 //! Focused falsification of a campaign: [`falsify`](sesame_optimise::falsify) over its tests.
 //!
-//! Tests differ in what they hold, so they are no vectors. How far one is from another is measured operation by operation: each
+//! Tests contain different operations, so they are not vectors. Their distance is measured operation by operation: each
 //! kind of operation that the campaign permits is a component of its own, in which a test is the sum of a bump per operation
 //! of that kind, over where its window lies, how long it is, and its parameters. So a test is near another when it disturbs
 //! the same at about the same time about as strongly, and adding, dropping or exchanging an operation is a step of a certain
@@ -13,18 +13,20 @@ mod vectors;
 
 use vectors::Vectors;
 
-use sesame_optimise::falsify::{Falsifier, Ground, Settings, UnitBox};
-use sesame_plan::{Activation, Choice, Test};
+use sesame_optimise::falsify::{Falsifier, SearchDomain, Settings, UnitBox};
+use sesame_plan::{Activation, CampaignPlan, Choice, Test};
 use sesame_rng::Stream;
 
 use crate::evolve::variation::{Rates, crossover, mutate};
-use crate::sample::in_turn::Sampling;
+use crate::margin::{confirmed_margins, margins};
+use crate::sample::sampled_search::Sampling;
 use crate::sample::sobol::Sobol;
-use crate::space::choice::PermittedChoice;
 use crate::space::initial::fresh_test;
-use crate::space::permitted::PermittedActivation;
+use crate::space::parameter_space::ParameterSpace;
 use crate::space::range::{Range, StepSizes};
-use crate::{Candidate, Evaluated, Permitted, Strategy};
+use crate::space::test_space::ActivationSpace;
+use crate::space::test_space::TestSpace;
+use crate::{Candidate, Evaluated, Strategy};
 
 /// Width of the bump of an operation, as a share of what is permitted; times the root of how many coordinates it has.
 const WIDTH: f64 = 0.3;
@@ -33,8 +35,9 @@ const APART: f64 = 8.0;
 
 /// A focused falsification of the requirements of a campaign by time.
 #[derive(Debug, Clone)]
-pub struct Falsification {
-    over: Over,
+pub(crate) struct Falsification {
+    plan: CampaignPlan,
+    search: Inner,
     generation: u32,
     /// How many tests were asked for.
     number: u64,
@@ -42,24 +45,24 @@ pub struct Falsification {
 
 /// What is searched.
 #[derive(Debug, Clone)]
-enum Over {
-    Tests { search: Box<Falsifier<Tests>>, asked: Vec<Placed> },
+enum Inner {
+    Tests { search: Box<Falsifier<TestDomain>>, asked: Vec<EmbeddedTest> },
     Vectors { search: Box<Falsifier<UnitBox>>, vectors: Vectors, asked: Vec<Vec<f64>> },
 }
 
 impl Falsification {
     /// A search before its first test. `settings` say how many requirements there are: what
     /// [`margins`](crate::margins) are told of.
-    pub fn new(permitted: Permitted, settings: Settings) -> Self {
-        let over = if let Some(vectors) = Vectors::of(&permitted, settings.seed) {
+    pub(crate) fn new(plan: &CampaignPlan, test_space: TestSpace, settings: Settings) -> Self {
+        let search = if let Some(vectors) = Vectors::from_space(&test_space, settings.seed) {
             let search = Falsifier::new(UnitBox::new(vectors.variables(), settings.seed), settings);
-            Over::Vectors { search: Box::new(search), vectors, asked: Vec::new() }
+            Inner::Vectors { search: Box::new(search), vectors, asked: Vec::new() }
         } else {
-            let spread = Sobol::new(permitted.clone(), settings.seed);
-            let search = Falsifier::new(Tests { permitted, spread }, settings);
-            Over::Tests { search: Box::new(search), asked: Vec::new() }
+            let spread = Sobol::new(test_space.clone(), settings.seed);
+            let search = Falsifier::new(TestDomain { test_space, spread }, settings);
+            Inner::Tests { search: Box::new(search), asked: Vec::new() }
         };
-        Falsification { over, generation: 0, number: 0 }
+        Falsification { plan: plan.clone(), search, generation: 0, number: 0 }
     }
 }
 
@@ -69,12 +72,12 @@ impl Strategy for Falsification {
         self.generation += 1;
         let candidate =
             |test: Test, parents| Candidate { test, parents, generation, known: None, simulator_seed: None };
-        match &mut self.over {
-            Over::Tests { search, asked } => {
+        match &mut self.search {
+            Inner::Tests { search, asked } => {
                 *asked = search.ask();
-                asked.iter().map(|placed| candidate(placed.test.clone(), placed.parents.clone())).collect()
+                asked.iter().map(|embedded| candidate(embedded.test.clone(), embedded.parents.clone())).collect()
             }
-            Over::Vectors { search, vectors, asked } => {
+            Inner::Vectors { search, vectors, asked } => {
                 *asked = search.ask();
                 let tests = (self.number..).zip(&*asked).map(|(number, vector)| vectors.test(vector, number));
                 let candidates: Vec<Candidate> = tests.map(|test| candidate(test, Vec::new())).collect();
@@ -85,20 +88,27 @@ impl Strategy for Falsification {
     }
 
     fn tell(&mut self, results: &[Evaluated]) {
-        let told = "exactly the generation asked last is told";
-        match &mut self.over {
-            Over::Tests { search, asked } => {
-                assert!(results.len() == asked.len(), "{told}");
-                let placed = std::mem::take(asked).into_iter().zip(results).map(|(mut placed, result)| {
-                    placed.number = Some(result.number);
-                    (placed, result.margins.clone())
-                });
-                search.tell(placed.collect());
+        let plan = &self.plan;
+        let margins = |result: &Evaluated| match plan.campaign.confirm {
+            Some(confirmation) if !result.fresh_runs.is_empty() => {
+                confirmed_margins(plan, confirmation.by, &result.fresh_runs)
             }
-            Over::Vectors { search, asked, .. } => {
+            _ => margins(plan, &result.run),
+        };
+        let told = "exactly the generation asked last is told";
+        match &mut self.search {
+            Inner::Tests { search, asked } => {
                 assert!(results.len() == asked.len(), "{told}");
-                let placed = std::mem::take(asked).into_iter().zip(results);
-                search.tell(placed.map(|(vector, result)| (vector, result.margins.clone())).collect());
+                let embedded = std::mem::take(asked).into_iter().zip(results).map(|(mut embedded, result)| {
+                    embedded.number = Some(result.number);
+                    (embedded, margins(result))
+                });
+                search.tell(embedded.collect());
+            }
+            Inner::Vectors { search, asked, .. } => {
+                assert!(results.len() == asked.len(), "{told}");
+                let embedded = std::mem::take(asked).into_iter().zip(results);
+                search.tell(embedded.map(|(vector, result)| (vector, margins(result))).collect());
             }
         }
     }
@@ -106,14 +116,14 @@ impl Strategy for Falsification {
 
 /// The tests of a campaign by time.
 #[derive(Debug, Clone)]
-struct Tests {
-    permitted: Permitted,
+struct TestDomain {
+    test_space: TestSpace,
     spread: Sobol,
 }
 
 /// A test among the others.
 #[derive(Debug, Clone)]
-struct Placed {
+struct EmbeddedTest {
     test: Test,
     /// Of each operation, its kind's place in the campaign, and its coordinates in shares of what is permitted.
     operations: Vec<(usize, Vec<f64>)>,
@@ -125,21 +135,21 @@ struct Placed {
     parents: Vec<u32>,
 }
 
-impl Tests {
-    fn placed(&self, test: Test, parents: Vec<u32>) -> Placed {
-        let kinds = self.permitted.operations();
+impl TestDomain {
+    fn embedded(&self, test: Test, parents: Vec<u32>) -> EmbeddedTest {
+        let kinds = self.test_space.operations();
         let mut operations = Vec::with_capacity(test.operations.len());
         for operation in &test.operations {
             let kind = kinds.iter().position(|kind| kind.operation == operation.operation);
             let kind = kind.expect("a test holds what the campaign permits");
             let mut coordinates = Vec::new();
-            if let (&Activation::Time { start, end }, PermittedActivation::Time(window)) =
+            if let (&Activation::Time { start, end }, ActivationSpace::Time(window)) =
                 (&operation.activation, &kinds[kind].activation)
             {
                 interval(*window, start, end, &mut coordinates);
             }
-            for (choice, permitted) in operation.parameters.iter().zip(&kinds[kind].parameters) {
-                chosen(choice, permitted, &mut coordinates);
+            for (choice, parameter_space) in operation.parameters.iter().zip(&kinds[kind].parameters) {
+                chosen(choice, parameter_space, &mut coordinates);
             }
             operations.push((kind, coordinates));
         }
@@ -148,66 +158,66 @@ impl Tests {
             let alike = operations.iter().filter(|(other, _)| other == kind).map(|(_, b)| overlap(a, b));
             squares[*kind] += alike.sum::<f64>();
         }
-        Placed { test, operations, squares, number: None, parents }
+        EmbeddedTest { test, operations, squares, number: None, parents }
     }
 }
 
-impl Ground for Tests {
-    type Place = Placed;
+impl SearchDomain for TestDomain {
+    type Point = EmbeddedTest;
 
-    fn spread(&mut self, index: u32) -> Placed {
+    fn quasi_random(&mut self, index: u32) -> EmbeddedTest {
         let test = self.spread.test(index);
-        self.placed(test, Vec::new())
+        self.embedded(test, Vec::new())
     }
 
-    fn anywhere(&self, stream: &mut Stream) -> Placed {
-        self.placed(fresh_test(&self.permitted, stream), Vec::new())
+    fn random(&self, stream: &mut Stream) -> EmbeddedTest {
+        self.embedded(fresh_test(&self.test_space, stream), Vec::new())
     }
 
-    fn near(&self, place: &Placed, reach: f64, stream: &mut Stream) -> Placed {
+    fn perturb(&self, place: &EmbeddedTest, step: f64, stream: &mut Stream) -> EmbeddedTest {
         // What a test holds changes seldom, and hardly ever where only small steps are wanted.
-        let structure = (0.5 * reach).min(0.15);
+        let structure = (0.5 * step).min(0.15);
         let rates = Rates {
             window: 0.5,
             parameter: 0.5,
-            fresh: 0.2 * reach,
+            fresh: 0.2 * step,
             retarget: structure,
             add: structure,
             duplicate: structure,
             drop: structure,
-            steps: StepSizes { finest: 0.5 * reach, boldest: reach },
+            steps: StepSizes { finest: 0.5 * step, boldest: step },
             ..Rates::default()
         };
         let mut test = place.test.clone();
-        mutate(&mut test, &self.permitted, &rates, stream);
-        self.placed(test, place.number.map_or_else(|| place.parents.clone(), |number| vec![number]))
+        mutate(&mut test, &self.test_space, &rates, stream);
+        self.embedded(test, place.number.map_or_else(|| place.parents.clone(), |number| vec![number]))
     }
 
     /// Half of the tests are not left to expectations: hits and misses of operations make plateaus and jumps that a smooth
     /// process does not foresee. In turn there are fresh tests, and children of the best as an evolution breeds them.
-    fn otherwise(&self, turn: u32, best: &[&Placed], stream: &mut Stream) -> Option<Placed> {
+    fn explore(&self, turn: u32, best: &[&EmbeddedTest], stream: &mut Stream) -> Option<EmbeddedTest> {
         if turn.is_multiple_of(2) {
-            return Some(self.anywhere(stream));
+            return Some(self.random(stream));
         }
         let [first, second] = [(); 2].map(|()| best[stream.below(best.len())]);
         let rates = Rates::default();
         let crossed = stream
             .chance(rates.crossover)
-            .then(|| crossover([&first.test, &second.test], &self.permitted, stream).map(|[child, _]| child));
+            .then(|| crossover([&first.test, &second.test], &self.test_space, stream).map(|[child, _]| child));
         let crossed = crossed.flatten();
         let parents = if crossed.is_some() { vec![first.number, second.number] } else { vec![first.number] };
         let mut test = crossed.unwrap_or_else(|| first.test.clone());
-        mutate(&mut test, &self.permitted, &rates, stream);
+        mutate(&mut test, &self.test_space, &rates, stream);
         let mut parents: Vec<u32> = parents.into_iter().flatten().collect();
         parents.dedup();
-        Some(self.placed(test, parents))
+        Some(self.embedded(test, parents))
     }
 
     fn components(&self) -> usize {
-        self.permitted.operations().len()
+        self.test_space.operations().len()
     }
 
-    fn separation(&self, a: &Placed, b: &Placed, squares: &mut Vec<f64>) {
+    fn squared_distances(&self, a: &EmbeddedTest, b: &EmbeddedTest, squares: &mut Vec<f64>) {
         let begin = squares.len();
         squares.extend(a.squares.iter().zip(&b.squares).map(|(a, b)| a + b));
         for (kind, at) in &a.operations {
@@ -230,20 +240,20 @@ fn interval(range: Range, low: f64, high: f64, coordinates: &mut Vec<f64>) {
 }
 
 /// The coordinates of a choice.
-fn chosen(choice: &Choice, permitted: &PermittedChoice, coordinates: &mut Vec<f64>) {
+fn chosen(choice: &Choice, parameter_space: &ParameterSpace, coordinates: &mut Vec<f64>) {
     let mut number = |range: &Range, value: f64| {
         let width = range.high - range.low;
         if width > 0.0 {
             coordinates.push((value - range.low) / width);
         }
     };
-    match (choice, permitted) {
-        (Choice::Value { value }, PermittedChoice::Number(range, _)) => number(range, *value),
-        (&Choice::Range { low, high }, PermittedChoice::Number(range, _)) => interval(*range, low, high, coordinates),
-        (Choice::Point { point }, PermittedChoice::Point(axes)) => {
+    match (choice, parameter_space) {
+        (Choice::Value { value }, ParameterSpace::Number(range, _)) => number(range, *value),
+        (&Choice::Range { low, high }, ParameterSpace::Number(range, _)) => interval(*range, low, high, coordinates),
+        (Choice::Point { point }, ParameterSpace::Point(axes)) => {
             point.iter().zip(axes).for_each(|(value, range)| number(range, *value));
         }
-        (Choice::Text { text }, PermittedChoice::Items(items)) => {
+        (Choice::Text { text }, ParameterSpace::Items(items)) => {
             let place = items.iter().position(|item| item == text).unwrap_or(items.len());
             coordinates.push(APART * place as f64);
         }
@@ -263,26 +273,26 @@ fn overlap(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_plan::Search;
+    use sesame_plan::{Search, Strategy};
 
     use super::*;
-    use crate::space::permitted::tests::{any_timed_plan, broken_rule};
-    use crate::testing::landscape::{LANDSCAPES, Landscape};
+    use crate::space::test_space::tests::{any_timed_plan, broken_rule};
+    use crate::testing::synthetic_robots::{SYNTHETIC_ROBOTS, SyntheticRobot};
 
     proptest! {
         #[test]
         fn tests_are_permitted_and_separations_are_squared_distances(plan in any_timed_plan(), seed: u64) {
-            let permitted = Permitted::of(&plan).unwrap();
-            let mut ground = Tests { spread: Sobol::new(permitted.clone(), seed), permitted };
+            let test_space = TestSpace::from_plan(&plan).unwrap();
+            let mut domain = TestDomain { spread: Sobol::new(test_space.clone(), seed), test_space };
             let mut stream = Stream::derive(seed, "test", &[]);
-            let mut places = vec![ground.spread(0), ground.spread(1), ground.anywhere(&mut stream)];
-            for reach in [0.01, 0.1, 0.5] {
+            let mut places = vec![domain.quasi_random(0), domain.quasi_random(1), domain.random(&mut stream)];
+            for step in [0.01, 0.1, 0.5] {
                 let from = places[stream.below(places.len())].clone();
-                places.push(ground.near(&from, reach, &mut stream));
+                places.push(domain.perturb(&from, step, &mut stream));
             }
             let between = |a: usize, b: usize| {
                 let mut squares = Vec::new();
-                ground.separation(&places[a], &places[b], &mut squares);
+                domain.squared_distances(&places[a], &places[b], &mut squares);
                 libm::sqrt(squares.iter().sum::<f64>())
             };
             for a in 0..places.len() {
@@ -299,18 +309,18 @@ mod tests {
     }
 
     /// Fewer hits being required: how many tests the first violation takes.
-    fn tests_until_violated(robot: &Landscape, hits: f64, search: Search, seed: u64) -> usize {
+    fn tests_until_violated(robot: &SyntheticRobot, hits: f64, search: Search, seed: u64) -> usize {
         let mut plan = robot.plan(search);
-        plan.requirements.push(Landscape::fewer_hits_than(hits));
+        plan.requirements.push(SyntheticRobot::fewer_hits_than(hits));
         let run = robot.campaign_of(&plan, crate::strategy(&plan, seed).unwrap().as_mut());
-        run.tests.iter().position(|result| result.margins[0].violated).map_or(usize::MAX, |at| at + 1)
+        run.tests.iter().position(|result| margins(&plan, &result.run)[0].violated).map_or(usize::MAX, |at| at + 1)
     }
 
     #[test]
     fn the_seed_decides_and_results_told_again_bring_a_search_back_to_where_it_was() {
-        let robot = &LANDSCAPES[1];
-        let mut plan = robot.plan(Search::Falsification { population: 3, evaluations: 26 });
-        plan.requirements.push(Landscape::fewer_hits_than(20.0));
+        let robot = &SYNTHETIC_ROBOTS[1];
+        let mut plan = robot.plan(Search::new(Strategy::Falsification { population: 3 }, 26));
+        plan.requirements.push(SyntheticRobot::fewer_hits_than(20.0));
         let start = |seed| crate::strategy(&plan, seed).unwrap();
         let whole = robot.campaign_of(&plan, start(8).as_mut()).tests;
         assert_eq!(whole.len(), 26);
@@ -330,19 +340,19 @@ mod tests {
         assert_eq!(resumed.ask(), []);
     }
 
-    /// Prints how many of 20 searches find 40 hits within 80 tests on each of the made-up robots; nothing is asserted, as
+    /// Prints how many of 20 searches find 40 hits within 80 tests on each of the synthetic robots; nothing is asserted, as
     /// twenty are few.
     #[test]
     #[ignore = "long: 240 searches of up to 80 tests"]
-    fn strategies_on_made_up_robots() {
+    fn strategies_on_synthetic_robots() {
         let searches = [
-            ("falsification", Search::Falsification { population: 1, evaluations: 80 }),
-            ("nsga2", Search::Nsga2 { population: 10, evaluations: 80 }),
-            ("random", Search::Random { evaluations: 80 }),
+            ("falsification", Search::new(Strategy::Falsification { population: 1 }, 80)),
+            ("nsga2", Search::new(Strategy::Nsga2 { population: 10 }, 80)),
+            ("random", Search::new(Strategy::Random, 80)),
         ];
-        println!("| strategy | {} |", LANDSCAPES.each_ref().map(|robot| robot.name).join(" | "));
+        println!("| strategy | {} |", SYNTHETIC_ROBOTS.each_ref().map(|robot| robot.name).join(" | "));
         for (name, search) in searches {
-            let found = LANDSCAPES.each_ref().map(|robot| {
+            let found = SYNTHETIC_ROBOTS.each_ref().map(|robot| {
                 let found = (1..=20).filter(|&seed| tests_until_violated(robot, 40.0, search.clone(), seed) <= 80);
                 found.count().to_string()
             });
@@ -354,12 +364,12 @@ mod tests {
     fn a_requirement_that_chance_rarely_violates_falls_within_a_few_dozen_tests() {
         let median = |search: Search| {
             let mut tests: Vec<usize> =
-                (1..=5).map(|seed| tests_until_violated(&LANDSCAPES[1], 20.0, search.clone(), seed)).collect();
+                (1..=5).map(|seed| tests_until_violated(&SYNTHETIC_ROBOTS[1], 20.0, search.clone(), seed)).collect();
             tests.sort_unstable();
             tests[2]
         };
-        let found = median(Search::Falsification { population: 1, evaluations: 60 });
-        let drawn = median(Search::Random { evaluations: 1_000 });
+        let found = median(Search::new(Strategy::Falsification { population: 1 }, 60));
+        let drawn = median(Search::new(Strategy::Random, 1_000));
         assert!(found <= 60 && found < drawn, "{found} tests, and {drawn} by chance");
     }
 }

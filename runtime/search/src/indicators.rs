@@ -1,7 +1,7 @@
 //! Indicators of a search: after each generation, how good its front is and what its tests came to.
 //!
-//! While a campaign runs nobody knows how far its front will get, so hypervolumes are measured from a point that is fixed
-//! early and never moved: of each objective the worst value of the undisturbed run and of the tests up to and including
+//! While a campaign runs, it is not known how far its front will get, so hypervolumes are measured from a point that is fixed
+//! early and never moved: of each objective the worst value of the reference run and of the tests up to and including
 //! the first generation with a measured one, and half of the range of these values beyond it. Only finite values
 //! count. It follows from results alone, so a resumed campaign has the same one.
 
@@ -57,7 +57,7 @@ pub struct Indicators {
 }
 
 impl Indicators {
-    /// Before the first generation, after the undisturbed run, of which an import has none.
+    /// Before the first generation, after the reference run, of which an import has none.
     pub fn new(undisturbed: Option<&Fitness>) -> Indicators {
         let early = undisturbed.and_then(Fitness::objectives).map(<[f64]>::to_vec).into_iter().collect();
         Indicators { early, ..Indicators::default() }
@@ -142,7 +142,7 @@ mod tests {
         let mut indicators = Indicators::new(Some(&measured([0.0, 0.0])));
         let crash = Outcome::Crash { message: "gone".to_owned() };
         let mut front = Front::default();
-        indicators.add(&crash, false, &Fitness::Unfit(crate::Unfit::Crash));
+        indicators.add(&crash, false, &Fitness::Unfit(sesame_optimise::dominance::Unfit::Crash));
         let nothing = indicators.after(0, &front);
         assert_eq!((nothing.crashes, nothing.evaluations, nothing.hypervolume), (1, 1, None));
         for (number, values) in [(2, [10.0, -3.0]), (3, [4.0, f64::NEG_INFINITY]), (4, [20.0, -5.0])] {
@@ -171,7 +171,7 @@ mod tests {
         assert_eq!(indicators.after(0, &front).hypervolume, None);
         assert!(indicators.reference().is_some());
         let mut indicators = Indicators::new(None);
-        let front = Front::of([(1, &Fitness::Measured(Vec::new()))]);
+        let front = Front::from_tests([(1, &Fitness::Measured(Vec::new()))]);
         indicators.add(&Outcome::Completed, false, &Fitness::Measured(Vec::new()));
         assert_eq!(indicators.after(0, &front).hypervolume, None);
     }
@@ -185,7 +185,7 @@ mod tests {
         for point in &points {
             indicators.add(&Outcome::Completed, false, point);
         }
-        let front = Front::of((0u32..).zip(&points));
+        let front = Front::from_tests((0u32..).zip(&points));
         let after = indicators.after(0, &front);
         let (volume, error) = (after.hypervolume.unwrap(), after.standard_error.unwrap());
         assert!(error > 0.0 && error < 0.05 * volume, "{volume} and {error}");

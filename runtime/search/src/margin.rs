@@ -2,20 +2,16 @@
 
 use sesame_base::observation::Observation;
 use sesame_base::verdict::{Verdict, verdict};
-use sesame_plan::{Bound, CampaignPlan, Requirement};
+use sesame_optimise::falsify::Margin;
+use sesame_plan::{Bound, CampaignPlan, Requirement, Statistic};
 
-pub use sesame_optimise::falsify::Margin;
-
-/// The margin to a bound of which a metric has this value, which is not NaN.
-pub fn margin_to(bound: Bound, value: f64) -> Margin {
-    Margin { value: Some(to_bound(bound, value)), violated: !bound.holds(value) }
-}
+use crate::confirmed_front::aggregate_margin;
 
 /// The margin of each requirement of the plan, in its order. One is violated exactly where the requirement's [`verdict`] is.
 ///
 /// A margin is in the unit of the requirement's metric: how far the metric may still move before it breaks the bound, and
-/// negative by how far it has moved beyond. Where the verdict is unsaid there is none. Of a run that broke off, a violation is
-/// as large as it is at least, whatever the rest of the run had brought.
+/// negative by how far it has moved beyond. If the verdict is inconclusive, there is none. If a run broke off,
+/// a violation has the least size that it could have had at the end of the run.
 pub fn margins(plan: &CampaignPlan, observation: &Observation) -> Vec<Margin> {
     let margin = |requirement: &Requirement| {
         let shown = observation.value(requirement.metric);
@@ -31,6 +27,17 @@ pub fn margins(plan: &CampaignPlan, observation: &Observation) -> Vec<Margin> {
         Margin { value, violated: verdict == Verdict::Violated }
     };
     plan.requirements.iter().map(margin).collect()
+}
+
+/// The margin of each requirement over the fresh runs that confirm a test, aggregated as its campaign says. The margin of a
+/// requirement is unknown if too few runs are conclusive.
+pub fn confirmed_margins(plan: &CampaignPlan, by: Statistic, fresh_runs: &[Observation]) -> Vec<Margin> {
+    let runs: Vec<Vec<Margin>> = fresh_runs.iter().map(|run| margins(plan, run)).collect();
+    let of = |requirement: usize| {
+        let margins: Vec<Margin> = runs.iter().map(|run| run[requirement]).collect();
+        aggregate_margin(&margins, by)
+    };
+    (0..plan.requirements.len()).map(of).collect()
 }
 
 /// How far a value is from breaking a bound.
@@ -50,13 +57,13 @@ mod tests {
     use proptest::prelude::*;
 
     use sesame_base::observation::{MetricObservation, Outcome, Reach, WallTime};
-    use sesame_plan::{MetricId, Search};
+    use sesame_plan::{MetricId, Search, Strategy};
 
     use super::*;
-    use crate::testing::landscape::LANDSCAPES;
+    use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     fn margin(outcome: Outcome, shown: MetricObservation) -> Margin {
-        let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+        let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
         plan.requirements = vec![Requirement {
             name: "in_time".to_owned(),
             text: String::new(),

@@ -3,8 +3,8 @@
 //!
 //! Tests that lie near each other disturb alike, so their runs are near to repetitions. What the search is told of a test
 //! is the mean, objective by objective, over the test and those of all tests evaluated by the end of its generation that
-//! are nearest to it by the distance of the reduced parameter space (the paper's equation 1). It is told once: later
-//! neighbours change nothing that was told. What is recorded, the front and the rules to stop go by each test's own values.
+//! are nearest to it by the distance of the reduced parameter space [SESAME 2023, equation 1]. It is told once: later
+//! neighbours change nothing that was told. The record, the front and the rules to stop use each test's own values.
 //!
 //! All of it depends on results of whole generations, by number, and of neighbours equally far the one with the smaller
 //! number is nearer; so it is the same with any number of workers.
@@ -40,7 +40,7 @@ pub struct Neighbours {
 
 impl Neighbours {
     /// Before a campaign's first generation; `None` where it does not average.
-    pub fn of(plan: &CampaignPlan) -> Option<Neighbours> {
+    pub fn from_plan(plan: &CampaignPlan) -> Option<Neighbours> {
         let count = plan.campaign.neighbours? as usize;
         let largest_count = f64::from(plan.campaign.count.max);
         Some(Neighbours { count, largest_count, tests: BTreeMap::new() })
@@ -95,16 +95,16 @@ mod tests {
     use proptest::prelude::*;
 
     use sesame_optimise::dominance::Unfit;
-    use sesame_plan::Search;
+    use sesame_plan::{Search, Strategy};
 
     use super::*;
     use crate::strategy;
-    use crate::testing::landscape::LANDSCAPES;
+    use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     /// Random tests of a landscape with their points, in generations.
     fn results(count: u32) -> (CampaignPlan, Vec<Evaluated>) {
-        let landscape = &LANDSCAPES[0];
-        let mut plan = landscape.plan(Search::Random { evaluations: count });
+        let landscape = &SYNTHETIC_ROBOTS[0];
+        let mut plan = landscape.plan(Search::new(Strategy::Random, count));
         plan.campaign.neighbours = Some(3);
         let run = landscape.campaign(strategy(&plan, 5).unwrap().as_mut());
         (plan, run.tests)
@@ -147,7 +147,7 @@ mod tests {
         fn what_is_told_is_the_mean_with_the_nearest_tests_so_far(count in 1u32..6, size in 1usize..30) {
             let (mut plan, tests) = results(60);
             plan.campaign.neighbours = Some(count);
-            let mut neighbours = Neighbours::of(&plan).unwrap();
+            let mut neighbours = Neighbours::from_plan(&plan).unwrap();
             let mut seen = 0;
             for generation in tests.chunks(size) {
                 let mut told = generation.to_vec();
@@ -164,7 +164,7 @@ mod tests {
     #[test]
     fn a_duplicate_is_told_what_its_original_is_and_is_nobodys_neighbour() {
         let (plan, tests) = results(20);
-        let mut neighbours = Neighbours::of(&plan).unwrap();
+        let mut neighbours = Neighbours::from_plan(&plan).unwrap();
         let mut told = tests.clone();
         let mut again = tests.iter().find(|test| test.point.is_some()).unwrap().clone();
         let original = again.number;
@@ -172,7 +172,7 @@ mod tests {
         told.push(again);
         neighbours.average(&mut told, |number| if number == 99 { original } else { number });
         let mut without = tests.clone();
-        Neighbours::of(&plan).unwrap().average(&mut without, |number| number);
+        Neighbours::from_plan(&plan).unwrap().average(&mut without, |number| number);
         assert_eq!(told[..20], without[..]);
         let first = without.iter().find(|test| test.number == original).unwrap();
         assert_eq!(told[20].fitness, first.fitness);
@@ -185,7 +185,7 @@ mod tests {
         told[0].fitness = Fitness::Unfit(Unfit::Crash);
         told[1].point = None;
         let before = told.clone();
-        Neighbours::of(&plan).unwrap().average(&mut told, |number| number);
+        Neighbours::from_plan(&plan).unwrap().average(&mut told, |number| number);
         assert_eq!(told, before, "the third has no neighbour that says anything");
     }
 }

@@ -38,10 +38,10 @@ pub fn in_unit(plan: &CampaignPlan, objective: MetricId, oriented: f64) -> f64 {
 mod tests {
     use sesame_base::observation::{MetricObservation, WallTime};
 
-    use sesame_plan::Search;
+    use sesame_plan::{Search, Strategy};
 
     use super::*;
-    use crate::testing::landscape;
+    use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     fn observed(outcome: Outcome, values: &[Option<f64>]) -> Observation {
         let metric = |&value: &Option<f64>| MetricObservation::whole(value, value.is_some(), Vec::new());
@@ -59,7 +59,7 @@ mod tests {
 
     #[test]
     fn fitness_orients_objectives_in_the_order_of_the_campaign() {
-        let mut plan = landscape::LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+        let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
         let completed = observed(Outcome::Completed, &[Some(12.5), Some(3.0)]);
         assert_eq!(fitness(&plan, &completed), Fitness::Measured(vec![12.5, -3.0]));
         plan.campaign.objectives.reverse();
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn only_completed_runs_with_all_objectives_have_a_fitness() {
-        let plan = landscape::LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+        let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
         let values = [Some(12.5), Some(3.0)];
         let unfit = |outcome, values: &[Option<f64>]| match fitness(&plan, &observed(outcome, values)) {
             Fitness::Unfit(why) => why,

@@ -1,7 +1,8 @@
 //! Strategies that learn nothing from results: tests are drawn, one after the other.
 
-pub mod decoded;
-pub mod in_turn;
-pub mod latin_hypercube;
-pub mod random;
-pub mod sobol;
+pub(crate) mod decode;
+
+pub(crate) mod latin_hypercube;
+pub(crate) mod random;
+pub(crate) mod sampled_search;
+pub(crate) mod sobol;

@@ -1,35 +1,37 @@
-//! Making a failing test smaller: fewest operations, then shortest windows, then simplest conditions, then mildest
-//! parameters, as long as it fails as it did.
+//! Shrinking a failing test: the fewest operations, then the shortest windows, then the simplest conditions, then the mildest
+//! parameters with which it still fails in the same way.
 //!
-//! It guarantees: what comes out fails, or is the test that was given; it is permitted where that one is; it keeps the
-//! draw seeds, so that what is left of a disturbance is what it was; nothing in it can be made smaller by one step alone,
-//! unless the evaluations were used up; and no test is run for it twice. A step is one operation, one side of an `and` or
-//! `or` of a condition, one activation by condition, or [`RESOLUTION`] of what is permitted of a time or a parameter.
+//! Guarantees: the result fails, or is the original test; it is permitted if the original is; it keeps the operation seeds, so
+//! that the rest of a disturbance is what it was; no single step can shrink it further, unless the evaluations were used up;
+//! and no test is run twice for it. A step is one operation, one side of an `and` or `or` of a condition, one activation by
+//! condition, or [`RESOLUTION`] of the permitted range of a time or a parameter.
 //!
-//! Like every [`Strategy`] it is a function of what it was told, so a run that was stopped is taken up again.
+//! Like every [`Strategy`] it is a function of what it was told, so an interrupted run can be resumed.
 
-mod dial;
+mod axis;
+mod reduce;
 mod space;
 #[cfg(test)]
 mod tests;
-mod walk;
 
 use std::collections::BTreeMap;
 
-use space::Space;
-use walk::{Answers, Arrived, Asked, walk};
+use reduce::{Oracle, Pending, Reduced, reduce};
+use space::ShrinkSpace;
 
-use sesame_plan::{CampaignPlan, Search, Test};
+use sesame_base::observation::Observation;
+use sesame_base::verdict::fails;
+use sesame_plan::{CampaignPlan, Failing, Shrinking, Test};
 use sesame_rng::derive_seed;
 
 use crate::{Candidate, Evaluated, Strategy};
 
 pub use space::{RESOLUTION, strength};
 
-/// What a test is tried for.
+/// What is being shrunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// It is the test that was given.
+    /// The original test.
     Original,
     /// Operations are left out.
     Operations,
@@ -39,8 +41,8 @@ pub enum Phase {
     Conditions,
     /// Parameters are milder.
     Parameters,
-    /// Whatever can be made smaller is, by one step.
-    LastSteps,
+    /// Every single step that is left is tried, so that none is.
+    LocalMinimality,
 }
 
 impl Phase {
@@ -52,7 +54,7 @@ impl Phase {
             Phase::Windows => "windows",
             Phase::Conditions => "conditions",
             Phase::Parameters => "parameters",
-            Phase::LastSteps => "last steps",
+            Phase::LocalMinimality => "last steps",
         }
     }
 }
@@ -72,10 +74,12 @@ pub struct Tried {
     pub number: u32,
 }
 
-/// Makes a test smaller, by ask and tell of which candidates [fail](Evaluated::failing).
+/// Shrinks a test, by ask and tell of which candidates fail as it does.
 #[derive(Debug, Clone)]
 pub struct Shrink {
-    space: Space,
+    space: ShrinkSpace,
+    plan: CampaignPlan,
+    failing: Failing,
     test: Test,
     simulator_seed: u64,
     runs: u32,
@@ -89,33 +93,22 @@ pub struct Shrink {
     generation: u32,
     /// How many runs of that generation are to be told.
     awaited: usize,
-    arrived: Option<Arrived>,
+    reduced: Option<Reduced>,
 }
 
 impl Shrink {
-    /// Makes this test smaller, for one that fails by saying so, in so many runs each and so many runs in total.
-    pub fn new(plan: &CampaignPlan, test: Test, simulator_seed: u64, runs: u32, evaluations: u32) -> Shrink {
-        Shrink::with_resolution(plan, test, simulator_seed, (runs, evaluations), RESOLUTION)
+    /// Shrinks this test of a plan.
+    pub fn new(plan: &CampaignPlan, shrinking: Shrinking) -> Shrink {
+        Shrink::with_resolution(plan, shrinking, RESOLUTION)
     }
 
-    /// The strategy of a plan whose search this is; `None` for another.
-    pub fn of(plan: &CampaignPlan) -> Option<Shrink> {
-        let &Search::Shrink { test, simulator_seed, runs, evaluations, failing: _ } = &plan.campaign.search else {
-            return None;
-        };
-        Some(Shrink::new(plan, plan.test(test).test.clone(), simulator_seed, runs, evaluations))
-    }
-
-    fn with_resolution(
-        plan: &CampaignPlan,
-        test: Test,
-        simulator_seed: u64,
-        (runs, evaluations): (u32, u32),
-        resolution: f64,
-    ) -> Shrink {
+    fn with_resolution(plan: &CampaignPlan, shrinking: Shrinking, resolution: f64) -> Shrink {
+        let Shrinking { test, failing, simulator_seed, runs, evaluations, name: _ } = shrinking;
         let runs = runs.max(1);
         Shrink {
-            space: Space::of(plan, resolution),
+            space: ShrinkSpace::from_plan(plan, resolution),
+            plan: plan.clone(),
+            failing,
             test,
             simulator_seed,
             runs,
@@ -125,8 +118,20 @@ impl Shrink {
             asked: 0,
             generation: 0,
             awaited: 0,
-            arrived: None,
+            reduced: None,
         }
+    }
+
+    /// Takes of each run of the generation asked last its number, and whether it failed as the test did.
+    pub fn learn(&mut self, results: &[(u32, bool)]) {
+        assert!(results.len() == self.awaited, "exactly the generation asked last is told");
+        self.awaited = 0;
+        for (tried, runs) in self.tried[self.asked..].iter_mut().zip(results.chunks(self.runs as usize)) {
+            let failed = runs.iter().filter(|(_, failed)| *failed).count();
+            tried.failed = Some(u32::try_from(failed).unwrap_or(u32::MAX));
+            tried.number = runs[0].0;
+        }
+        self.generation += 1;
     }
 
     /// All tests that were tried, in the order in which they were asked for.
@@ -136,16 +141,16 @@ impl Shrink {
 
     /// Positions among those tried of the tests that were gone to so far, the smallest last. Empty where the test that was
     /// given does not fail, and as long as that is not known.
-    pub fn kept(&self) -> Vec<usize> {
-        let arrived = self.arrived.clone();
-        // With nothing more to be run the walk goes as far as what is known leads.
-        let arrived = arrived.or_else(|| walk(&self.space, &self.test, self, true).ok());
-        arrived.map_or_else(Vec::new, |arrived| arrived.kept)
+    pub fn accepted(&self) -> Vec<usize> {
+        let reduced = self.reduced.clone();
+        // With nothing more to be run the reduce goes as far as what is known leads.
+        let reduced = reduced.or_else(|| reduce(&self.space, &self.test, self, true).ok());
+        reduced.map_or_else(Vec::new, |reduced| reduced.accepted)
     }
 
-    /// Whether nothing of the smallest test can be made smaller by one step alone: all of that was run.
+    /// Whether no single step can shrink the smallest test: all of them were run.
     pub fn is_minimal(&self) -> bool {
-        self.arrived.as_ref().is_some_and(|arrived| arrived.minimal)
+        self.reduced.as_ref().is_some_and(|reduced| reduced.minimal)
     }
 
     /// In how many runs each test is run.
@@ -154,7 +159,7 @@ impl Shrink {
     }
 }
 
-impl Answers for Shrink {
+impl Oracle for Shrink {
     fn find(&self, test: &Test) -> Option<(usize, bool)> {
         let &at = self.known.get(&content(test))?;
         Some((at, self.tried[at].failed? == self.runs))
@@ -169,12 +174,12 @@ fn content(test: &Test) -> String {
 impl Strategy for Shrink {
     fn ask(&mut self) -> Vec<Candidate> {
         assert!(self.awaited == 0, "a generation is told before the next is asked");
-        if self.arrived.is_some() {
+        if self.reduced.is_some() {
             return Vec::new();
         }
-        let Asked { phase, mut tests, base } = match walk(&self.space, &self.test, self, self.left == 0) {
-            Ok(arrived) => {
-                self.arrived = Some(arrived);
+        let Pending { phase, mut tests, base } = match reduce(&self.space, &self.test, self, self.left == 0) {
+            Ok(reduced) => {
+                self.reduced = Some(reduced);
                 return Vec::new();
             }
             Err(asked) => asked,
@@ -204,21 +209,16 @@ impl Strategy for Shrink {
     }
 
     fn tell(&mut self, results: &[Evaluated]) {
-        assert!(results.len() == self.awaited, "exactly the generation asked last is told");
-        self.awaited = 0;
-        for (tried, runs) in self.tried[self.asked..].iter_mut().zip(results.chunks(self.runs as usize)) {
-            let failed = runs.iter().filter(|run| run.failing).count();
-            tried.failed = Some(u32::try_from(failed).unwrap_or(u32::MAX));
-            tried.number = runs[0].number;
-        }
-        self.generation += 1;
+        let failed = |run: &Observation| fails(&self.plan, &self.failing, &run.outcome, |id| run.value(id));
+        let results: Vec<(u32, bool)> = results.iter().map(|result| (result.number, failed(&result.run))).collect();
+        self.learn(&results);
     }
 
     fn ended(&self) -> Option<String> {
-        let arrived = self.arrived.as_ref()?;
-        Some(if arrived.kept.is_empty() {
+        let reduced = self.reduced.as_ref()?;
+        Some(if reduced.accepted.is_empty() {
             "the test did not fail again".to_owned()
-        } else if arrived.minimal {
+        } else if reduced.minimal {
             "no single step is left that still fails".to_owned()
         } else {
             "all evaluations were used up".to_owned()

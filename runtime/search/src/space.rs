@@ -1,10 +1,15 @@
 //! The space of tests that a campaign permits: which operations, when, how strong.
 //!
-//! It is defined in one place, [`permitted`], from which all strategies draw and to which crossover and mutation return.
+//! It is defined in one place, [`TestSpace`]. All strategies draw from it, and crossover and mutation return to it.
 
-pub mod apart;
-pub mod choice;
-pub mod condition;
-pub mod initial;
-pub mod permitted;
-pub mod range;
+pub(crate) mod apart;
+pub(crate) mod condition;
+pub(crate) mod initial;
+pub(crate) mod parameter_space;
+pub(crate) mod range;
+pub(crate) mod test_space;
+
+pub use initial::fresh_test;
+pub use parameter_space::ParameterSpace;
+pub use range::Range;
+pub use test_space::{ActivationSpace, OperationSpace, TestSpace};

@@ -89,7 +89,7 @@ impl Point {
     /// With the start `s` and end `e` of each interval as shares of its operation's window: T1 is the mean of
     /// `(s + e) / 2`, T2 the mean of `e - s`, T3 the population standard deviation of `(s + e) / 2`. With the normalised
     /// parameters of all operations that were active: P1 is their mean, P2 their population standard deviation.
-    pub fn of(disturbances: &[Disturbance], convention: Convention) -> Option<Point> {
+    pub fn from_disturbances(disturbances: &[Disturbance], convention: Convention) -> Option<Point> {
         let active: Vec<&Disturbance> =
             disturbances.iter().filter(|it| !it.intervals.is_empty() && it.window.length() > 0.0).collect();
         let share = |of: &Disturbance, time: f64| (time - of.window.start) / of.window.length();
@@ -162,9 +162,9 @@ impl Intensity {
     }
 }
 
-/// The distance of two points over some dimensions (the paper's equation 1): Euclidean, with counts divided by
+/// The distance of two points over some dimensions [SESAME 2023, equation 1]: Euclidean, with counts divided by
 /// `largest_count`. Give the most operations a test of the campaign may hold, or 1 for counts as they are (as the
-/// original and the paper have it). `None` if one of the points lacks one of the dimensions.
+/// original platform and [SESAME 2023] do). `None` if one of the points lacks one of the dimensions.
 pub fn distance(a: &Point, b: &Point, over: &[Dimension], largest_count: f64) -> Option<f64> {
     let whole = over.iter().all(|&dimension| a.get(dimension).is_some() && b.get(dimension).is_some());
     whole.then(|| distance_of_any(a, b, over, largest_count))

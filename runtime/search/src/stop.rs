@@ -1,6 +1,6 @@
 //! Whether a search has gone on for long enough.
 //!
-//! Two of the rules say something about cells that no test has hit yet. They go by an upper bound, not by an estimate:
+//! Two of the rules are about cells that no test has hit yet. They use an upper bound, not an estimate:
 //!
 //! - Good and Turing (1953): of n tests, f₁ fell into cells that no other fell into; the next test falls into a new cell
 //!   with a probability M of about f₁ / n. How far n M is from f₁ has a variance of about n M + 2 f₂ (Esty 1983), with f₂
@@ -22,7 +22,7 @@ use std::time::Duration;
 use sesame_optimise::dominance::Fitness;
 use sesame_optimise::front::Front;
 use sesame_optimise::hypervolume::{self, Growth};
-use sesame_plan::{CampaignPlan, Search, StopRule};
+use sesame_plan::{CampaignPlan, StopRule};
 
 use crate::Evaluated;
 use crate::coverage::{Coverage, Feasible, Grid};
@@ -56,16 +56,18 @@ pub struct StopRules {
 
 impl StopRules {
     /// The rules of a plan's campaign, before its first generation.
-    pub fn of(plan: &CampaignPlan) -> StopRules {
-        // A plan whose cells are no grid is refused before.
+    pub fn from_plan(plan: &CampaignPlan) -> StopRules {
+        // A plan whose cells do not form a grid was refused before.
         let cells = plan.campaign.coverage.as_ref().and_then(|goal| Grid::new(goal.axes.clone()).ok());
-        // Making a test smaller is not what the campaign's rules are about.
-        let shrinks = matches!(plan.campaign.search, Search::Shrink { .. });
         let asks = plan.campaign.stop.iter().any(|rule| matches!(rule, StopRule::Completeness { .. }));
         StopRules {
-            feasible: cells.as_ref().filter(|_| asks).map(|grid| Feasible::of(plan, grid)),
-            rules: if shrinks { Vec::new() } else { plan.campaign.stop.clone() },
-            independent: matches!(plan.campaign.search, Search::Random { .. }),
+            feasible: cells.as_ref().filter(|_| asks).map(|grid| Feasible::from_plan(plan, grid)),
+            rules: plan.campaign.stop.clone(),
+            independent: plan
+                .campaign
+                .search
+                .strategy()
+                .is_some_and(|strategy| strategy.kind().properties().independent),
             cells: cells.map(|grid| Coverage::new(grid, 1)),
             tests: 0,
             once: 0,
@@ -88,7 +90,7 @@ impl StopRules {
             self.front.add(result.number, &result.fitness);
             self.worst.resize(objectives.len(), f64::NEG_INFINITY);
             for (worst, value) in self.worst.iter_mut().zip(objectives) {
-                // What has no end is no place to measure from.
+                // A hypervolume cannot be measured from infinity.
                 if value.is_finite() {
                     *worst = worst.max(*value);
                 }
@@ -236,12 +238,14 @@ mod tests {
     use sesame_plan::CoverageGoal;
     use sesame_rng::Stream;
 
+    use sesame_plan::{Search, Strategy};
+
     use super::*;
     use crate::strategy;
-    use crate::testing::landscape::LANDSCAPES;
+    use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     fn plan(search: Search, stop: &[StopRule]) -> CampaignPlan {
-        let mut plan = LANDSCAPES[0].plan(search);
+        let mut plan = SYNTHETIC_ROBOTS[0].plan(search);
         let grid = Grid::parse("T1:0:1:6,T2:0:0.5:6,P1:0:1:3").unwrap();
         plan.campaign.coverage = Some(CoverageGoal { axes: grid.axes().to_vec(), hits: 1, stop_at: None });
         plan.campaign.stop = stop.to_vec();
@@ -250,8 +254,8 @@ mod tests {
 
     /// Evaluations after which a search stops, and why; `None` where it does not.
     fn stopped(plan: &CampaignPlan, seed: u64) -> Option<(usize, String)> {
-        let run = LANDSCAPES[0].campaign(strategy(plan, seed).unwrap().as_mut());
-        let mut rules = StopRules::of(plan);
+        let run = SYNTHETIC_ROBOTS[0].campaign(strategy(plan, seed).unwrap().as_mut());
+        let mut rules = StopRules::from_plan(plan);
         let mut done = 0;
         for generation in run.tests.chunks(10) {
             rules.tell(generation);
@@ -264,7 +268,7 @@ mod tests {
     }
 
     fn random(evaluations: u32, rule: StopRule) -> CampaignPlan {
-        plan(Search::Random { evaluations }, &[rule])
+        plan(Search::new(Strategy::Random, evaluations), &[rule])
     }
 
     /// Chances of cells, each with a name.
@@ -288,7 +292,7 @@ mod tests {
 
     /// Hits of each cell when a random search stops that looks every so many tests; `None` where it goes on for 20,000.
     fn hits_when_stopped(rule: StopRule, chances: &[f64], every: u32, seed: u64) -> Option<Vec<u32>> {
-        let mut rules = StopRules::of(&random(20_000, rule));
+        let mut rules = StopRules::from_plan(&random(20_000, rule));
         let axes = Grid::parse(&format!("T1:0:1:{}", chances.len())).unwrap();
         rules.cells = Some(Coverage::new(axes, 1));
         // What can be reached is not to help.
@@ -316,7 +320,7 @@ mod tests {
         None
     }
 
-    /// The share that was promised, and whether it was there when a search stopped.
+    /// The share that was reserved, and whether it was there when a search stopped.
     fn kept(rule: StopRule, chances: &[f64], hits: &[u32]) -> bool {
         let unseen = || chances.iter().zip(hits).filter(|(_, hits)| **hits == 0).map(|(chance, _)| *chance);
         match rule {
@@ -382,9 +386,9 @@ mod tests {
         const LONGEST: u32 = 5_000;
         let grid = Grid::parse("T1:0:1:6,T2:0:0.5:6,P1:0:1:3").unwrap();
         let mut rows = Vec::new();
-        for landscape in LANDSCAPES.iter().take(robots) {
+        for landscape in SYNTHETIC_ROBOTS.iter().take(robots) {
             let tests = |evaluations: u32, seed: u64| {
-                let plan = landscape.plan(Search::Random { evaluations });
+                let plan = landscape.plan(Search::new(Strategy::Random, evaluations));
                 landscape.campaign(strategy(&plan, seed).unwrap().as_mut()).tests
             };
             let mut chances = vec![0.0; grid.len()];
@@ -397,10 +401,10 @@ mod tests {
             for seed in 1..=seeds {
                 let run = tests(LONGEST, seed);
                 for (&rule, (good, stops)) in rules.iter().zip(&mut found) {
-                    let mut plan = landscape.plan(Search::Random { evaluations: LONGEST });
+                    let mut plan = landscape.plan(Search::new(Strategy::Random, LONGEST));
                     plan.campaign.coverage = Some(CoverageGoal { axes: grid.axes().to_vec(), hits: 1, stop_at: None });
                     plan.campaign.stop = vec![rule];
-                    let mut rules = StopRules::of(&plan);
+                    let mut rules = StopRules::from_plan(&plan);
                     let stopped = run.chunks(50).any(|generation| {
                         rules.tell(generation);
                         rules.reached(Duration::ZERO).is_some()
@@ -431,7 +435,7 @@ mod tests {
     fn random_searches_of_all_robots_stop_when_they_have_hit_what_was_promised() {
         let shares = [0.5, 0.8, 0.9].map(|share| StopRule::Completeness { share }).to_vec();
         let discoveries = [0.2, 0.1, 0.05, 0.02].map(|below| StopRule::Discovery { below }).to_vec();
-        for (what, share, tests) in robots(&[shares, discoveries].concat(), LANDSCAPES.len(), 60, 40_000) {
+        for (what, share, tests) in robots(&[shares, discoveries].concat(), SYNTHETIC_ROBOTS.len(), 60, 40_000) {
             println!("{what}: {share} after {tests}");
             assert!(share >= 0.9, "{what}: {share}");
         }
@@ -440,7 +444,7 @@ mod tests {
     #[test]
     fn a_few_tests_are_never_enough_to_call_cells_complete() {
         let chances = vec![0.01; 100];
-        let mut rules = StopRules::of(&random(1_000, StopRule::Completeness { share: 0.9 }));
+        let mut rules = StopRules::from_plan(&random(1_000, StopRule::Completeness { share: 0.9 }));
         rules.feasible = None;
         rules.cells = Some(Coverage::new(Grid::parse("T1:0:1:100").unwrap(), 1));
         assert_eq!(chances.len(), rules.cells.as_ref().unwrap().grid().len());
@@ -454,7 +458,7 @@ mod tests {
 
     #[test]
     fn cells_that_can_be_reached_are_enough_to_know_and_say_so_without_bias() {
-        let search = Search::Nsga2 { population: 10, evaluations: 600 };
+        let search = Search::new(Strategy::Nsga2 { population: 10 }, 600);
         let mut plan = plan(search, &[StopRule::Completeness { share: 0.4 }]);
         plan.campaign.exploration = Some(sesame_plan::Exploration::Construct { share: 1.0, until: None });
         let (done, why) = stopped(&plan, 1).unwrap();
@@ -467,12 +471,12 @@ mod tests {
 
     #[test]
     fn a_search_that_learns_is_told_that_its_bounds_are_biased() {
-        let search = Search::Nsga2 { population: 10, evaluations: 3_000 };
+        let search = Search::new(Strategy::Nsga2 { population: 10 }, 3_000);
         let (done, why) = stopped(&plan(search.clone(), &[StopRule::Discovery { below: 0.1 }]), 1).unwrap();
         assert!(done < 3_000 && why.contains("biased"), "{why}");
         // Where nobody knows which cells can be reached, as where conditions switch.
         let plan = plan(search, &[StopRule::Completeness { share: 0.4 }]);
-        let mut rules = StopRules::of(&plan);
+        let mut rules = StopRules::from_plan(&plan);
         rules.feasible = None;
         let cells = rules.cells.as_ref().unwrap().grid().len();
         for test in 0..20_000 {
@@ -485,7 +489,7 @@ mod tests {
 
     #[test]
     fn a_search_stops_where_its_front_no_longer_grows_and_the_first_rule_that_holds_counts() {
-        let search = Search::Nsga2 { population: 10, evaluations: 400 };
+        let search = Search::new(Strategy::Nsga2 { population: 10 }, 400);
         let slow = StopRule::Stagnation { generations: 5, below: 0.02 };
         let (done, why) = stopped(&plan(search.clone(), &[slow]), 2).unwrap();
         assert!(why.starts_with("its hypervolume grew by") && done >= 60, "{done}: {why}");
@@ -497,38 +501,39 @@ mod tests {
     #[test]
     fn time_is_up_when_it_is() {
         let plan = random(10, StopRule::WallTime { seconds: 5.0 });
-        let rules = StopRules::of(&plan);
+        let rules = StopRules::from_plan(&plan);
         assert_eq!(rules.reached(Duration::from_millis(4_999)), None);
         assert!(rules.reached(Duration::from_secs(5)).unwrap().contains("5 s of wall time"));
     }
 
     proptest! {
-        #[test]
-        fn growth_is_what_two_fronts_measured_from_one_place_differ_by(seed: u64, generations in 1usize..4) {
-            let plan = random(10, StopRule::Stagnation { generations: 6, below: 0.1 });
-            let mut rules = StopRules::of(&plan);
-            let mut stream = Stream::derive(seed, "test", &[]);
-            let mut all: Vec<Evaluated> = Vec::new();
-            for number in 0..6u32 {
-                let fitness = Fitness::Measured(vec![stream.unit(), stream.unit()]);
-                let result = Evaluated { number, test: sesame_plan::Test::default(), fitness, point: None, course: None, margins: Vec::new(), failing: false };
-                rules.tell(std::slice::from_ref(&result));
-                all.push(result);
-            }
-            let worst = |at: usize| all.iter().map(|it| match &it.fitness {
-                Fitness::Measured(objectives) => objectives[at],
-                _ => unreachable!("all are measured"),
-            }).fold(f64::NEG_INFINITY, f64::max);
-            let reference = [worst(0), worst(1)];
-            let volume = |tests: &[Evaluated]| {
-                let front = Front::of(tests.iter().map(|it| (it.number, &it.fitness)));
-                let points: Vec<&[f64]> = front.members().iter().map(|it| it.objectives.as_slice()).collect();
-                hypervolume::hypervolume(&points, &reference)
-            };
-            let (now, then) = (volume(&all), volume(&all[..6 - generations]));
-            let expected = if now > 0.0 { (now - then) / now } else { 0.0 };
-            prop_assert!((rules.growth(generations).unwrap().share - expected).abs() < 1e-12);
-            prop_assert_eq!(rules.growth(6), None);
-        }
-    }
+           #[test]
+           fn growth_is_what_two_fronts_measured_from_one_place_differ_by(seed: u64, generations in 1usize..4) {
+               let plan = random(10, StopRule::Stagnation { generations: 6, below: 0.1 });
+               let mut rules = StopRules::from_plan(&plan);
+               let mut stream = Stream::derive(seed, "test", &[]);
+               let mut all: Vec<Evaluated> = Vec::new();
+               for number in 0..6u32 {
+                   let fitness = Fitness::Measured(vec![stream.unit(), stream.unit()]);
+                   let result = Evaluated { number, test: sesame_plan::Test::default(), fitness, point: None, run: crate::testing::no_run(),
+    fresh_runs: Vec::new() };
+                   rules.tell(std::slice::from_ref(&result));
+                   all.push(result);
+               }
+               let worst = |at: usize| all.iter().map(|it| match &it.fitness {
+                   Fitness::Measured(objectives) => objectives[at],
+                   _ => unreachable!("all are measured"),
+               }).fold(f64::NEG_INFINITY, f64::max);
+               let reference = [worst(0), worst(1)];
+               let volume = |tests: &[Evaluated]| {
+                   let front = Front::from_tests(tests.iter().map(|it| (it.number, &it.fitness)));
+                   let points: Vec<&[f64]> = front.members().iter().map(|it| it.objectives.as_slice()).collect();
+                   hypervolume::hypervolume(&points, &reference)
+               };
+               let (now, then) = (volume(&all), volume(&all[..6 - generations]));
+               let expected = if now > 0.0 { (now - then) / now } else { 0.0 };
+               prop_assert!((rules.growth(generations).unwrap().share - expected).abs() < 1e-12);
+               prop_assert_eq!(rules.growth(6), None);
+           }
+       }
 }

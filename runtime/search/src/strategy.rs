@@ -1,18 +1,20 @@
-//! What a strategy is: it is asked for tests and told what came out of them.
+//! The contract of strategies: a strategy is asked for tests and told their results.
 
+use std::sync::Arc;
+
+use sesame_base::observation::Observation;
 use sesame_optimise::dominance::Fitness;
 use sesame_optimise::nsga2::{self, Nsga2, Variation};
 use sesame_plan::{KnownTestId, Test};
 
-use crate::evolve::predict::Course;
 use crate::evolve::variation::TestVariation;
-use crate::margin::Margin;
 use crate::sspr::Point;
 
 /// How tests are found, by ask and tell.
 ///
-/// The caller alternates: it asks for a generation, evaluates all of it in whatever order, and tells the results in the
-/// order asked. The tests of all generations together are exactly [`Search::evaluations`]; of [`Shrink`], at most.
+/// The caller alternates: it asks for a generation, evaluates all of it in any order, and tells the results in the order
+/// asked. The number of tests of all generations together is exactly [`Task::evaluations`](sesame_plan::Task::evaluations);
+/// when a test is shrunk, at most.
 pub trait Strategy: Send {
     /// The next generation of tests; empty when the search is over.
     fn ask(&mut self) -> Vec<Candidate>;
@@ -20,15 +22,20 @@ pub trait Strategy: Send {
     /// Takes the results of exactly the generation asked last, in its order.
     fn tell(&mut self, results: &[Evaluated]);
 
-    /// Takes how the condition variables went in the undisturbed run, before the first generation is asked.
-    fn reference(&mut self, _: Course) {}
+    /// Takes the reference run, before the first generation is asked.
+    fn begin(&mut self, _reference: &Observation) {}
+
+    /// Whether it reads the series of metrics in the runs that it is told. To others the caller may tell runs without them.
+    fn reads_series(&self) -> bool {
+        false
+    }
 
     /// What the search gave up, for the record of the campaign.
     fn given_up(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// Why the search is over, where there is more to say than that all tests were evaluated.
+    /// Why the search is over, if there is more to say than that all tests were evaluated.
     fn ended(&self) -> Option<String> {
         None
     }
@@ -43,39 +50,41 @@ pub struct Candidate {
     pub parents: Vec<u32>,
     /// The generation it belongs to, from 0.
     pub generation: u32,
-    /// The known test it is, where a search runs known tests for their own sake.
+    /// Which known test it is, if known tests are run.
     pub known: Option<KnownTestId>,
-    /// The simulator's seed in its run; `None` for the campaign's own. Equal tests with seeds of their own are run each.
+    /// The simulator's seed in its run; `None` for the campaign's own. Equal tests with seeds of their own are each run.
     pub simulator_seed: Option<u64>,
 }
 
-/// A test with its result.
+/// A test with its result. What a strategy learns from beside the fitness, it derives from the runs itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluated {
     /// The caller's number of the test, unique in the campaign.
     pub number: u32,
     /// The test, as asked.
     pub test: Test,
-    /// Its fitness, from [`fitness`].
+    /// Its fitness, from [`fitness`](crate::fitness); of a confirmed test, from its fresh runs.
     pub fitness: Fitness,
     /// Where its run lies in the reduced parameter space, if it counts for coverage.
     pub point: Option<Point>,
-    /// How the condition variables went in its run, where the campaign [predicts](needs_courses).
-    pub course: Option<Course>,
-    /// How far each requirement of the plan is from its violation, from [`margins`], where the campaign
-    /// [asks for them](needs_margins); else empty.
-    pub margins: Vec<Margin>,
-    /// Whether it failed as a campaign that [makes a test smaller](Search::Shrink) has it; else false.
-    pub failing: bool,
+    /// Its own run.
+    pub run: Arc<Observation>,
+    /// The runs that confirm it, without series; empty if it is not confirmed.
+    pub fresh_runs: Vec<Observation>,
 }
 
-/// Variation of tests that is told what came of them.
+/// Variation of tests that learns from results.
 pub(crate) trait Learning: Variation<Genome = Test> {
     /// Takes the results of the generation asked last, in its order.
     fn learn(&mut self, results: &[Evaluated]);
 
-    /// Takes how the condition variables went in the undisturbed run.
-    fn reference(&mut self, _: Course) {}
+    /// Takes the reference run.
+    fn begin(&mut self, _reference: &Observation) {}
+
+    /// As [`Strategy::reads_series`].
+    fn reads_series(&self) -> bool {
+        false
+    }
 
     /// What it gave up, each in a sentence.
     fn given_up(&self) -> Vec<String> {
@@ -84,7 +93,7 @@ pub(crate) trait Learning: Variation<Genome = Test> {
 }
 
 impl Learning for TestVariation {
-    /// Selection alone decides what becomes of results.
+    /// Results only matter to selection.
     fn learn(&mut self, _: &[Evaluated]) {}
 }
 
@@ -98,8 +107,12 @@ impl<V: Learning + Send> Strategy for Nsga2<V> {
             .collect()
     }
 
-    fn reference(&mut self, course: Course) {
-        self.variation_mut().reference(course);
+    fn begin(&mut self, reference: &Observation) {
+        self.variation_mut().begin(reference);
+    }
+
+    fn reads_series(&self) -> bool {
+        self.variation().reads_series()
     }
 
     fn given_up(&self) -> Vec<String> {

@@ -9,7 +9,7 @@ use sesame_optimise::front::Front;
 use sesame_plan::{CampaignPlan, Confirmation, Test};
 use sesame_results::record::{self, Event, EventKind, Recorder, Repetition, TestRecord};
 use sesame_rng::derive_seed;
-use sesame_search::{self as search, Confirming, Evaluated, Judged};
+use sesame_search::{ConfirmedFront, Evaluated, GenerationTest};
 
 use crate::campaign::error::{CampaignError, Halt};
 use crate::campaign::evaluator::Evaluator;
@@ -32,14 +32,14 @@ pub(super) fn confirmation_seed(seed: u64, test: u32, repetition: u32) -> u64 {
 pub(super) struct ConfirmedSearch {
     confirmation: Confirmation,
     seed: u64,
-    front: Confirming,
+    front: ConfirmedFront,
     repeated: RepeatedTests,
 }
 
 impl ConfirmedSearch {
     /// For a campaign with this seed.
     pub(super) fn new(confirmation: Confirmation, seed: u64) -> Self {
-        ConfirmedSearch { confirmation, seed, front: Confirming::default(), repeated: RepeatedTests::default() }
+        ConfirmedSearch { confirmation, seed, front: ConfirmedFront::default(), repeated: RepeatedTests::default() }
     }
 
     /// Takes a test that may be confirmed until the next generation comes.
@@ -62,9 +62,8 @@ impl ConfirmedSearch {
         self.repeated.all_identical().then(|| DETERMINISTIC_SIMULATOR.to_owned())
     }
 
-    /// Confirms the tests of a generation that would be on the front, or violate a requirement, until all tests on the
-    /// front are confirmed; then gives tests their confirmed fitness and margins. `each` sees the number of runs and
-    /// the front.
+    /// Confirms the tests of a generation that would be on the front, or violate a requirement, until all tests on the front
+    /// are confirmed; then gives tests their confirmed fitness and fresh runs. `each` sees the number of runs and the front.
     pub(super) fn confirm(
         &mut self,
         plan: &CampaignPlan,
@@ -74,7 +73,7 @@ impl ConfirmedSearch {
         violating: &BTreeSet<u32>,
         each: &mut dyn FnMut(u32, &Front),
     ) -> Result<(), Halt> {
-        self.front.begin(tests.iter().map(|test| Judged {
+        self.front.begin(tests.iter().map(|test| GenerationTest {
             number: test.number,
             stands_for: numbering.stands_for(test.number),
             first: test.fitness.clone(),
@@ -96,9 +95,7 @@ impl ConfirmedSearch {
         for (test, fitness) in tests.iter_mut().zip(self.front.fitness()) {
             test.fitness = fitness.clone();
             let runs = evaluator.repetitions_of(numbering.stands_for(test.number));
-            if let Some(confirmed) = record::confirmed_margins(plan, runs).filter(|_| search::needs_margins(plan)) {
-                test.margins = confirmed;
-            }
+            test.fresh_runs = record::confirming_runs(plan, runs).unwrap_or_default();
         }
         Ok(())
     }

@@ -48,9 +48,10 @@ impl Traces {
 }
 
 impl<'a> Evaluator<'a> {
-    /// One that goes on with what the recorder holds.
+    /// One that goes on with what the recorder holds. `series` says whether the search reads the series of metrics.
     pub(super) fn new(
         plan: &CampaignPlan,
+        series: bool,
         recorder: &'a mut Recorder,
         executor: &'a mut dyn Executor,
         interrupted: &'a AtomicBool,
@@ -62,7 +63,6 @@ impl<'a> Evaluator<'a> {
             Some(keep) => Some(Traces { folder: repository.make_trace_folder()?, keep }),
             None => None,
         };
-        let series = sesame_search::needs_courses(plan);
         Ok(Evaluator { recorder, executor, recorded, repetitions, traces, series, interrupted })
     }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use sesame_base::observation::Observation;
-use sesame_plan::{CampaignPlan, KnownTestId, OperationId, Search, Test};
+use sesame_plan::{CampaignPlan, OperationId, Task, Test};
 use sesame_results::record::{Difference, Verdict, differences, verdict};
 
 /// An operation on a topic that nothing in the system receives, or of whose members nothing receives some.
@@ -47,14 +47,13 @@ impl fmt::Display for Unheard {
 
 /// The operations that tests of this campaign may hold and whose messages had no receiver, wholly or in part, in its
 /// reference run.
-pub(super) fn unheard(plan: &CampaignPlan, reference: &Observation) -> Vec<Unheard> {
-    let of_tests = |tests: &[KnownTestId]| -> BTreeSet<OperationId> {
-        tests.iter().flat_map(|&id| &plan.test(id).test.operations).map(|used| used.operation).collect()
-    };
-    let operations = match &plan.campaign.search {
-        Search::Known { tests } => of_tests(tests),
-        Search::Repeat { test, .. } | Search::Shrink { test, .. } => of_tests(&[*test]),
-        _ => plan.campaign.operations.iter().copied().collect(),
+pub(super) fn unheard(plan: &CampaignPlan, task: &Task, reference: &Observation) -> Vec<Unheard> {
+    let of_test = |test: &Test| -> Vec<OperationId> { test.operations.iter().map(|used| used.operation).collect() };
+    let operations: BTreeSet<OperationId> = match (task, task.repeated(plan)) {
+        (_, Some(repeated)) => of_test(repeated.test).into_iter().collect(),
+        (Task::Known { tests }, _) => tests.iter().flat_map(|&id| of_test(&plan.test(id).test)).collect(),
+        (Task::Shrink(shrinking), _) => of_test(&shrinking.test).into_iter().collect(),
+        (Task::Campaign | Task::Repeat { .. }, _) => plan.campaign.operations.iter().copied().collect(),
     };
     let found = operations.into_iter().filter_map(|id| {
         let operation = plan.operation(id);
@@ -112,7 +111,7 @@ mod tests {
         let heard = |unheard: &[&str]| {
             let mut reference = sample::observe(&plan, &Test::default(), 1);
             reference.unheard = unheard.iter().map(|&path| path.to_owned()).collect();
-            super::unheard(&plan, &reference)
+            super::unheard(&plan, &Task::Campaign, &reference)
         };
         assert_eq!(heard(&[]), []);
         let operation = plan.operation(plan.campaign.operations[0]);
@@ -126,10 +125,9 @@ mod tests {
         }
         let partly = Unheard { of: paths.len() + 1, ..found[0].clone() };
         assert!(!partly.wholly() && partly.to_string().contains("other members only"));
-        let mut known = plan.clone();
-        known.campaign.search = Search::Known { tests: Vec::new() };
+        let known = Task::Known { tests: Vec::new() };
         let mut reference = sample::observe(&plan, &Test::default(), 1);
         reference.unheard = topic.paths.clone();
-        assert_eq!(super::unheard(&known, &reference), [], "only what is to be run counts");
+        assert_eq!(super::unheard(&plan, &known, &reference), [], "only what is to be run counts");
     }
 }

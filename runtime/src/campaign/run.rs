@@ -4,14 +4,15 @@
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use sesame_base::observation::{Observation, Outcome};
 use sesame_optimise::front::Front;
-use sesame_plan::{CampaignPlan, Search};
-use sesame_results::record::{self, Recorder, Repository, ResultSet, Status};
+use sesame_plan::{CampaignPlan, Task};
+use sesame_results::record::{Recorder, Repository, ResultSet, Status};
 use sesame_search as search;
-use sesame_search::{Course, Evaluated, Neighbours, Strategy};
+use sesame_search::{Evaluated, Neighbours, Strategy};
 
 use crate::campaign::confirmation::ConfirmedSearch;
 use crate::campaign::error::{CampaignError, Halt};
@@ -38,8 +39,8 @@ pub enum CampaignEnd {
     Interrupted,
 }
 
-/// Runs a campaign in worker processes and records it; what the recorder already holds is not simulated again. Each
-/// worker gets a folder of its own in `directory`.
+/// Runs the task of a recorder, with the plan of that task, in worker processes and records it; what the recorder already holds is not simulated again. Each worker
+/// gets a folder of its own in `directory`.
 pub fn run_campaign(
     plan: &CampaignPlan,
     recorder: Recorder,
@@ -49,8 +50,9 @@ pub fn run_campaign(
     listener: &mut Listener<'_>,
 ) -> Result<CampaignEnd, CampaignError> {
     // Before any process is started, so that a plan without a search is refused at once.
-    let strategy = search::strategy(plan, settings.seed)?;
-    let mut pool = Pool::start(&settings.pool(plan.campaign.search.evaluations(), directory, FIRST_TIMEOUT))?;
+    let task = recorder.repository().task().clone();
+    let strategy = search::strategy_of_task(plan, &task, settings.seed)?;
+    let mut pool = Pool::start(&settings.pool(task.evaluations(plan), directory, FIRST_TIMEOUT))?;
     run_with(plan, strategy, recorder, settings, &mut pool, interrupted, listener)
 }
 
@@ -64,8 +66,9 @@ fn run_with(
     interrupted: &AtomicBool,
     listener: &mut Listener<'_>,
 ) -> Result<CampaignEnd, CampaignError> {
-    let evaluator = Evaluator::new(plan, &mut recorder, executor, interrupted)?;
-    let run = Campaign::begin(plan, strategy, evaluator, settings, listener).and_then(Campaign::finish);
+    let task = recorder.repository().task().clone();
+    let evaluator = Evaluator::new(plan, strategy.reads_series(), &mut recorder, executor, interrupted)?;
+    let run = Campaign::begin(plan, &task, strategy, evaluator, settings, listener).and_then(Campaign::finish);
     match run {
         Ok(stop) => Ok(CampaignEnd::Finished(Box::new(recorder.finish(&stop)?))),
         Err(Halt::Stopped) => {
@@ -99,6 +102,8 @@ struct Campaign<'a, 'l> {
     front: Front,
     /// Tests evaluated.
     done: u32,
+    /// Tests to evaluate in total, at most.
+    total: u32,
     listener: &'a mut Listener<'l>,
 }
 
@@ -106,6 +111,7 @@ impl<'a, 'l> Campaign<'a, 'l> {
     /// Performs the first reference run, and checks that the campaign makes sense.
     fn begin(
         plan: &'a CampaignPlan,
+        task: &Task,
         mut strategy: Box<dyn Strategy>,
         mut evaluator: Evaluator<'a>,
         settings: &Settings,
@@ -117,7 +123,7 @@ impl<'a, 'l> Campaign<'a, 'l> {
         if let Outcome::Crash { .. } | Outcome::Timeout { .. } = reference.outcome {
             return Err(CampaignError::Reference(reference.outcome.detail().unwrap_or_default()).into());
         }
-        let unheard = reference::unheard(plan, &reference);
+        let unheard = reference::unheard(plan, task, &reference);
         if unheard.iter().any(Unheard::wholly) && !settings.allow_unheard {
             return Err(CampaignError::Unheard(unheard.into_iter().filter(Unheard::wholly).collect()).into());
         }
@@ -137,9 +143,7 @@ impl<'a, 'l> Campaign<'a, 'l> {
         for text in observers.iter().filter_map(|observer| observer.warning()) {
             evaluator.warn(None, text)?;
         }
-        if let Some(course) = Course::of(plan, &reference).filter(|_| search::needs_courses(plan)) {
-            strategy.reference(course);
-        }
+        strategy.begin(&reference);
         let mut campaign = Campaign {
             plan,
             evaluator,
@@ -148,9 +152,10 @@ impl<'a, 'l> Campaign<'a, 'l> {
             reference,
             observers,
             confirmed: plan.campaign.confirm.map(|confirmation| ConfirmedSearch::new(confirmation, settings.seed)),
-            neighbours: Neighbours::of(plan),
+            neighbours: Neighbours::from_plan(plan),
             front: Front::default(),
             done: 0,
+            total: task.evaluations(plan),
             listener,
         };
         campaign.tell(CampaignEvent::SearchStarted);
@@ -221,8 +226,8 @@ impl<'a, 'l> Campaign<'a, 'l> {
     /// violate a requirement.
     fn evaluate(&mut self, planned: Vec<PlannedTest>) -> Result<(Vec<Evaluated>, BTreeSet<u32>), Halt> {
         let plan = self.plan;
-        let (needs_course, needs_margins) = (search::needs_courses(plan), search::needs_margins(plan));
-        let total = plan.campaign.search.evaluations();
+        let series = self.strategy.reads_series();
+        let total = self.total;
         let mut tests = Vec::with_capacity(planned.len());
         let mut violating = BTreeSet::new();
         let Campaign { evaluator, observers, confirmed, front, done, listener, .. } = self;
@@ -245,9 +250,8 @@ impl<'a, 'l> Campaign<'a, 'l> {
                 test: record.test.clone(),
                 fitness,
                 point,
-                course: if needs_course { Course::of(plan, &record.observation) } else { None },
-                margins: if needs_margins { search::margins(plan, &record.observation) } else { Vec::new() },
-                failing: is_failing(plan, &record.observation),
+                run: Arc::new(if series { record.observation.clone() } else { record.observation.without_series() }),
+                fresh_runs: Vec::new(),
             });
             listener(
                 CampaignEvent::TestEnded(record),
@@ -266,9 +270,9 @@ impl<'a, 'l> Campaign<'a, 'l> {
 
     /// Confirms what is to be confirmed of a generation, and puts confirmed values in place of those of single runs.
     fn confirm(&mut self, tests: &mut [Evaluated], violating: &BTreeSet<u32>) -> Result<(), Halt> {
-        let Campaign { plan, evaluator, observers, confirmed, numbering, front, done, listener, .. } = self;
+        let Campaign { plan, evaluator, observers, confirmed, numbering, front, done, total, listener, .. } = self;
         let Some(confirmed) = confirmed else { return Ok(()) };
-        let (done, total) = (*done, plan.campaign.search.evaluations());
+        let (done, total) = (*done, *total);
         confirmed.confirm(plan, evaluator, numbering, tests, violating, &mut |confirmation_runs, front| {
             let progress = Progress { done, total, confirmation_runs, front, coverage: coverage(observers) };
             listener(CampaignEvent::ConfirmationAdvanced, progress);
@@ -280,7 +284,7 @@ impl<'a, 'l> Campaign<'a, 'l> {
     fn tell(&mut self, event: CampaignEvent<'_>) {
         let progress = Progress {
             done: self.done,
-            total: self.plan.campaign.search.evaluations(),
+            total: self.total,
             confirmation_runs: self.confirmed.as_ref().map_or(0, ConfirmedSearch::runs),
             front: &self.front,
             coverage: coverage(&self.observers),
@@ -291,12 +295,6 @@ impl<'a, 'l> Campaign<'a, 'l> {
 
 fn coverage(observers: &[Box<dyn Observer>]) -> Option<&search::coverage::Coverage> {
     observers.iter().find_map(|observer| observer.coverage())
-}
-
-/// Whether a run fails as the test that is being shrunk does; false in all other campaigns.
-fn is_failing(plan: &CampaignPlan, observation: &Observation) -> bool {
-    let Search::Shrink { failing, .. } = &plan.campaign.search else { return false };
-    record::fails(plan, failing, &observation.outcome, |id| observation.value(id))
 }
 
 /// Performs a reference run: it is a test without operations.

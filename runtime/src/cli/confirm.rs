@@ -125,7 +125,7 @@ fn run_once(repository: &Repository) -> Result<Vec<u32>, Failure> {
 /// Prints what fresh runs say of these tests. The exit code is for all that is recorded.
 fn report_outcome(repository: &Repository, tests: &[u32], options: &Options) -> Result<ExitCode, Failure> {
     let summary = report::summary(repository)?;
-    let code = options.gate.code(&summary, repository.plan());
+    let code = options.gate.code(&summary, repository);
     let confirmed: Vec<_> = summary.confirmed.into_iter().filter(|test| tests.contains(&test.number)).collect();
     match options.format {
         Format::Text => print(&report::confirmed_text(&confirmed, text_options()))?,

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use serde::Serialize;
 
-use sesame_plan::{CampaignPlan, Domain};
+use sesame_plan::{CampaignPlan, Domain, Task};
 use sesame_relay::files::SpaceFiles as _;
 use sesame_relay::fuzz::unimplemented_operations;
 use sesame_relay::metric::unimplemented_hooks;
@@ -182,6 +182,7 @@ pub(super) fn begin(
     results: &Path,
     name: &str,
     plan: &CampaignPlan,
+    task: &Task,
     seed: u64,
     execution: &ExecutionArgs,
 ) -> Result<(Recorder, PathBuf), Failure> {
@@ -190,7 +191,7 @@ pub(super) fn begin(
         say(format_args!("note: an earlier run is unfinished: `resume {}` goes on with it", shown(unfinished)));
     }
     let folder = claim.folder.clone();
-    Ok((Recorder::create_in(claim, plan, seed, execution.workers())?, folder))
+    Ok((Recorder::create_in(claim, plan, task, seed, execution.workers())?, folder))
 }
 
 /// Runs a campaign to its end and says what was found.
@@ -280,7 +281,7 @@ pub(super) fn report_outcome(
             print_json(&Concluded { results: folder, report: page, digest, summary: &summary })?;
         }
     }
-    Ok(output.gate.code(&summary, repository.plan()))
+    Ok(output.gate.code(&summary, repository))
 }
 
 /// A path as the user would type it: relative to where they are, if it is below.

@@ -9,8 +9,8 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 
 use sesame_base::test_number::TestNumber;
-use sesame_plan::{CampaignPlan, Search};
-use sesame_results::record::Verdict;
+use sesame_plan::{CampaignPlan, Task};
+use sesame_results::record::{Repository, Verdict};
 use sesame_results::report::Summary;
 
 use crate::cli::failure::NOT_AS_REQUIRED;
@@ -45,8 +45,8 @@ enum Finding {
 
 impl Gate {
     /// The exit code after these findings; says on standard error what closes the gate.
-    pub(super) fn code(&self, summary: &Summary, plan: &CampaignPlan) -> ExitCode {
-        let objections = self.objections(summary, plan);
+    pub(super) fn code(&self, summary: &Summary, repository: &Repository) -> ExitCode {
+        let objections = self.objections(summary, repository.plan(), repository.task());
         for objection in &objections {
             say(format_args!("not as required: {objection}"));
         }
@@ -54,7 +54,7 @@ impl Gate {
     }
 
     /// All that is not as required, a sentence each.
-    fn objections(&self, summary: &Summary, plan: &CampaignPlan) -> Vec<String> {
+    fn objections(&self, summary: &Summary, plan: &CampaignPlan, task: &Task) -> Vec<String> {
         let asked = |finding| self.fail_on.contains(&finding) || self.fail_on.contains(&Finding::Any);
         let mut objections = Vec::new();
         if asked(Finding::Violation) {
@@ -77,11 +77,11 @@ impl Gate {
                 .extend(open.map(|it| format!("{} is inconclusive in {}", it.requirement, tests(it.inconclusive))));
             objections.extend(expectations(summary, Verdict::Inconclusive, "is inconclusive"));
         }
-        if matches!(plan.campaign.search, Search::Known { .. }) {
+        if matches!(task, Task::Known { .. }) {
             objections.extend(not_as_expected(summary));
         }
         if !self.fail_on.contains(&Finding::Nothing) {
-            objections.extend(insufficient(summary, &plan.campaign.search));
+            objections.extend(insufficient(summary, plan, task));
         }
         objections.dedup();
         objections
@@ -90,8 +90,8 @@ impl Gate {
 
 /// All that could close a gate.
 #[cfg(test)]
-pub(super) fn every_objection(summary: &Summary, plan: &CampaignPlan) -> Vec<String> {
-    Gate { fail_on: vec![Finding::Any] }.objections(summary, plan)
+pub(super) fn every_objection(summary: &Summary, repository: &Repository) -> Vec<String> {
+    Gate { fail_on: vec![Finding::Any] }.objections(summary, repository.plan(), repository.task())
 }
 
 fn tests(count: usize) -> String {
@@ -121,10 +121,11 @@ fn not_as_expected(summary: &Summary) -> Vec<String> {
 /// Why results are insufficient: so little is known that "nothing was found" would mislead, whichever gates are set.
 ///
 /// Shrinking and repeating are about a single test: if it crashes, so do most of their runs.
-fn insufficient(summary: &Summary, search: &Search) -> Vec<String> {
+fn insufficient(summary: &Summary, plan: &CampaignPlan, task: &Task) -> Vec<String> {
     let counts = summary.counts;
+    let is_about_one_test = task.shrinking().is_some() || task.repeated(plan).is_some();
     let ran = counts.evaluations - counts.duplicates;
-    if ran == 0 || matches!(search, Search::Repeat { .. } | Search::Shrink { .. }) {
+    if ran == 0 || is_about_one_test {
         return Vec::new();
     }
     let mut objections = Vec::new();
@@ -161,7 +162,7 @@ mod tests {
     }
 
     fn objections(fail_on: &[Finding], summary: &Summary, plan: &CampaignPlan) -> Vec<String> {
-        Gate { fail_on: fail_on.to_vec() }.objections(summary, plan)
+        Gate { fail_on: fail_on.to_vec() }.objections(summary, plan, &Task::Campaign)
     }
 
     fn crash(number: u32) -> Failure {

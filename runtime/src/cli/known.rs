@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use sesame_plan::{CampaignPlan, KnownTestId, Search};
+use sesame_plan::{CampaignPlan, KnownTestId, Task};
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
 use crate::cli::failure::Failure;
@@ -35,18 +35,13 @@ pub(super) fn known(
     results: &Path,
     options: &Options,
 ) -> Result<ExitCode, Failure> {
-    let mut plan = plan.clone();
-    let tests = chosen(&plan, &options.names).map_err(Failure)?;
-    plan.campaign.search = Search::Known { tests };
-    // Nothing is sought, so there is no front.
-    plan.campaign.objectives.clear();
-    plan.campaign.coverage = None;
-    plan.campaign.confirm = None;
+    let task = Task::Known { tests: chosen(plan, &options.names).map_err(Failure)? };
+    let plan = task.plan(plan);
     let files = claim_files(runner, &plan)?;
     refuse_unfilled(runner, &plan, true)?;
     let seed = options.seed.unwrap_or(plan.campaign.seed);
     let results = options.results.as_deref().unwrap_or(results);
-    let (recorder, folder) = begin(results, "known", &plan, seed, &options.execution)?;
+    let (recorder, folder) = begin(results, "known", &plan, &task, seed, &options.execution)?;
     execute(&plan, recorder, &folder, seed, &options.execution, &options.output, files)
 }
 

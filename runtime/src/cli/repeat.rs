@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use sesame_base::test_number::TestNumber;
-use sesame_plan::{CampaignPlan, KnownTest, KnownTestId, Search, Test};
+use sesame_plan::{CampaignPlan, KnownTest, Task, Test};
 use sesame_rng::derive_seed;
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
@@ -56,7 +56,7 @@ pub(super) fn repeat(
     options: &Options,
 ) -> Result<ExitCode, Failure> {
     let declared = plan.tests.iter().find(|test| test.name == options.test && options.results.is_none());
-    let Repeated { name, test, mut plan, seed, results } = match declared {
+    let Repeated { name, test, plan, seed, results } = match declared {
         Some(KnownTest { name, test, .. }) => Repeated {
             name: name.clone(),
             test: test.clone(),
@@ -67,11 +67,13 @@ pub(super) fn repeat(
         None => recorded(plan, results, options)?,
     };
     let seed = options.seed.unwrap_or_else(|| derive_seed(seed, &format!("repeat {name}"), &[]));
-    repeating(&mut plan, &name, test, options.times);
+    let folder_name = format!("repeat-{name}");
+    let task = Task::Repeat { name, test, times: options.times };
+    let plan = task.plan(&plan);
     let files = claim_files(runner, &plan)?;
     refuse_unfilled(runner, &plan, true)?;
     let results = options.into.as_deref().unwrap_or(&results);
-    let (recorder, folder) = begin(results, &format!("repeat-{name}"), &plan, seed, &options.execution)?;
+    let (recorder, folder) = begin(results, &folder_name, &plan, &task, seed, &options.execution)?;
     execute(&plan, recorder, &folder, seed, &options.execution, &options.output, files)
 }
 
@@ -87,42 +89,4 @@ fn recorded(plan: &CampaignPlan, results: &Path, options: &Options) -> Result<Re
         seed: repository.campaign().seed,
         results: run.parent().unwrap_or(run).to_owned(),
     })
-}
-
-/// Puts the repetition of a test in the place of what the campaign does.
-fn repeating(plan: &mut CampaignPlan, name: &str, test: Test, times: u32) {
-    let position = plan.tests.iter().position(|known| known.name == name && known.test == test);
-    let position = position.unwrap_or_else(|| {
-        plan.tests.push(KnownTest { name: name.to_owned(), doc: String::new(), test, expectations: Vec::new() });
-        plan.tests.len() - 1
-    });
-    let test = KnownTestId(u32::try_from(position).expect("a plan holds fewer than 2^32 tests"));
-    plan.campaign.search = Search::Repeat { test, times };
-    // Nothing is sought, so there is no front.
-    plan.campaign.objectives.clear();
-    plan.campaign.coverage = None;
-    plan.campaign.confirm = None;
-}
-
-#[cfg(test)]
-mod tests {
-    use sesame_results::record::sample;
-
-    use super::super::results_folder::same_model;
-    use super::*;
-
-    #[test]
-    fn a_found_test_joins_the_known_ones_and_the_model_stays_the_same() {
-        let plan = sample::plan();
-        let mut changed = plan.clone();
-        repeating(&mut changed, "T9", Test::default(), 5);
-        assert_eq!(changed.campaign.search, Search::Repeat { test: KnownTestId(1), times: 5 });
-        assert_eq!((changed.tests[1].name.as_str(), &changed.tests[1].test), ("T9", &Test::default()));
-        assert!(same_model(&changed, &plan), "so that `resume` goes on with it");
-
-        let mut known = plan.clone();
-        repeating(&mut known, "known_jitter", plan.tests[0].test.clone(), 5);
-        assert_eq!(known.campaign.search, Search::Repeat { test: KnownTestId(0), times: 5 });
-        assert_eq!(known.tests, plan.tests);
-    }
 }

@@ -40,6 +40,8 @@ pub(super) fn same_model(recorded: &CampaignPlan, plan: &CampaignPlan) -> bool {
     comparable.campaign.coverage.clone_from(&plan.campaign.coverage);
     comparable.campaign.confirm = plan.campaign.confirm;
     comparable.campaign.neighbours = plan.campaign.neighbours;
+    comparable.campaign.exploration.clone_from(&plan.campaign.exploration);
+    comparable.campaign.stop.clone_from(&plan.campaign.stop);
     comparable.campaign.seed = plan.campaign.seed;
     comparable.campaign.doc.clone_from(&plan.campaign.doc);
     for (metric, today) in comparable.metrics.iter_mut().zip(&plan.metrics) {
@@ -51,7 +53,7 @@ pub(super) fn same_model(recorded: &CampaignPlan, plan: &CampaignPlan) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use sesame_plan::{CoverageGoal, Dimension, GridAxis, KnownTestId, Search};
+    use sesame_plan::{CoverageGoal, Dimension, GridAxis, Task};
     use sesame_results::record::sample;
 
     use super::*;
@@ -66,8 +68,10 @@ mod tests {
         };
         assert!(changed(|plan| plan.tests.clear()));
         assert!(changed(|plan| plan.campaign.objectives.clear()));
-        assert!(changed(|plan| plan.campaign.search = Search::Known { tests: vec![KnownTestId(0)] }));
+        assert!(changed(|plan| plan.campaign.search.set_evaluations(7)));
         assert!(changed(|plan| plan.metrics[0].line += 7));
+        // What a command does instead of the campaign changes nothing of the model, so that `resume` goes on with it.
+        assert!(same_model(&Task::Known { tests: Vec::new() }.plan(&plan), &plan));
         let axes = || vec![GridAxis { dimension: Dimension::T1, low: 0.0, high: 1.0, cells: 6 }];
         let goal = || CoverageGoal { axes: axes(), hits: 1, stop_at: None };
         assert!(same_model(&plan, &{

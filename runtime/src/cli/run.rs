@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use sesame_plan::{CampaignPlan, Search};
+use sesame_plan::{CampaignPlan, Task};
 use sesame_results::record::{self, Recorder};
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled, shown};
@@ -54,23 +54,13 @@ pub(super) fn run(
 ) -> Result<ExitCode, Failure> {
     let mut plan = plan.clone();
     if let Some(wanted) = options.evaluations {
-        match &mut plan.campaign.search {
-            Search::Nsga2 { evaluations, .. }
-            | Search::MapElites { evaluations, .. }
-            | Search::Random { evaluations }
-            | Search::Sobol { evaluations }
-            | Search::Falsification { evaluations, .. }
-            | Search::LatinHypercube { evaluations }
-            | Search::Shrink { evaluations, .. } => *evaluations = wanted,
-            Search::Repeat { times, .. } => *times = wanted,
-            Search::Known { tests } => tests.truncate(usize::try_from(wanted).unwrap_or(usize::MAX)),
-        }
+        plan.campaign.search.set_evaluations(wanted);
     }
     let files = claim_files(runner, &plan)?;
     refuse_unfilled(runner, &plan, options.allow_unimplemented)?;
     let seed = options.seed.unwrap_or(plan.campaign.seed);
     let results = options.results.as_deref().unwrap_or(results);
-    let (recorder, folder) = begin(results, &seed.to_string(), &plan, seed, &options.execution)?;
+    let (recorder, folder) = begin(results, &seed.to_string(), &plan, &Task::Campaign, seed, &options.execution)?;
     execute(&plan, recorder, &folder, seed, &options.execution, &options.output, files)
 }
 

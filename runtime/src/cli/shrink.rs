@@ -7,7 +7,7 @@ use clap::Args;
 
 use sesame_base::observation::{Observation, Outcome};
 use sesame_base::test_number::TestNumber;
-use sesame_plan::{CampaignPlan, Failing, KnownTest, KnownTestId, RequirementId, Search};
+use sesame_plan::{CampaignPlan, Failing, RequirementId, Shrinking, Task};
 use sesame_results::record::{Origin, Repository, TestRecord, Verdict, verdict};
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
@@ -63,11 +63,19 @@ pub(super) fn shrink(
     let run = repository.path().parent().unwrap_or(results);
     let into = options.into.as_deref().or(run.parent()).unwrap_or(run);
     let seed = repository.campaign().seed;
-    let mut plan = repository.plan().clone();
-    shrinking(&mut plan, &name, &record, failing, options);
+    let folder_name = format!("shrink-{name}");
+    let task = Task::Shrink(Shrinking {
+        name,
+        test: record.test,
+        failing,
+        simulator_seed: record.simulator_seed,
+        runs: options.runs,
+        evaluations: options.evaluations,
+    });
+    let plan = task.plan(repository.plan());
     let files = claim_files(runner, &plan)?;
     refuse_unfilled(runner, &plan, true)?;
-    let (recorder, folder) = begin(into, &format!("shrink-{name}"), &plan, seed, &options.execution)?;
+    let (recorder, folder) = begin(into, &folder_name, &plan, &task, seed, &options.execution)?;
     execute(&plan, recorder, &folder, seed, &options.execution, &options.output, files)
 }
 
@@ -125,33 +133,10 @@ fn violated(plan: &CampaignPlan, observation: &Observation) -> Vec<RequirementId
     requirements.filter(|(_, requirement)| of(requirement) == Verdict::Violated).map(|(id, _)| id).collect()
 }
 
-/// Puts making a test smaller in the place of what the campaign does.
-fn shrinking(plan: &mut CampaignPlan, name: &str, record: &TestRecord, failing: Failing, options: &Options) {
-    plan.tests.push(KnownTest {
-        name: name.to_owned(),
-        doc: String::new(),
-        test: record.test.clone(),
-        expectations: Vec::new(),
-    });
-    let test = KnownTestId(u32::try_from(plan.tests.len() - 1).expect("a plan holds fewer than 2^32 tests"));
-    plan.campaign.search = Search::Shrink {
-        test,
-        failing,
-        simulator_seed: record.simulator_seed,
-        runs: options.runs,
-        evaluations: options.evaluations,
-    };
-    // Nothing is sought, so there is no front.
-    plan.campaign.objectives.clear();
-    plan.campaign.coverage = None;
-    plan.campaign.confirm = None;
-}
-
 #[cfg(test)]
 mod tests {
     use sesame_results::record::sample;
 
-    use super::super::results_folder::same_model;
     use super::*;
 
     fn found(name: &str, wanted: &[&str]) -> Result<Failing, String> {
@@ -180,26 +165,5 @@ mod tests {
         let record = repository.test(1).unwrap();
         let Err(Failure(words)) = failing(&repository, &record, &["R1".to_owned()]) else { panic!("it is refused") };
         assert!(words.starts_with("the reference run violates R1 too"), "{words}");
-    }
-
-    #[test]
-    fn what_is_made_smaller_leaves_the_model_as_it_is() {
-        let plan = sample::plan();
-        let record = sample::record(&plan, 9, Origin::Search, plan.tests[0].test.clone());
-        let options = Options {
-            test: "T9".to_owned(),
-            results: None,
-            into: None,
-            requirement: Vec::new(),
-            runs: 3,
-            evaluations: 50,
-            execution: ExecutionArgs::default(),
-            output: OutputArgs::default(),
-        };
-        let mut changed = plan.clone();
-        shrinking(&mut changed, "T9", &record, Failing::Crash, &options);
-        assert!(same_model(&changed, &plan), "so that `resume` goes on with it");
-        assert_eq!(changed.campaign.search.evaluations(), 50);
-        assert_eq!(changed.tests[1].test, record.test);
     }
 }

@@ -9,8 +9,8 @@ use sesame_base::observation::{Counters, MetricObservation, Observation, Operati
 use sesame_plan::stl::{self, Robustness};
 use sesame_plan::{
     ActivationMode, Aggregate, Campaign, CampaignPlan, Copies, Count, Drain, Expression, Field, Input, MessageId,
-    MessageType, Metric, MetricSource, Operation, OperationKind, Requirement, SCHEMA, Search, Side, Simulator, Test,
-    Topic, Transport, Trend, Type,
+    MessageType, Metric, MetricSource, Operation, OperationKind, Requirement, SCHEMA, Search, Side, Simulator,
+    Strategy, Test, Topic, Transport, Trend, Type,
 };
 use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
 use sesame_relay::metric::MetricTable;
@@ -134,7 +134,7 @@ pub(crate) fn plan(
             count: Count { min: 1, max: 5 },
             copies,
             activation: ActivationMode::Time,
-            search: Search::Random { evaluations: 1 },
+            search: Search::new(Strategy::Random, 1),
             coverage: None,
             exploration: None,
             confirm: None,

@@ -157,7 +157,7 @@ impl Importer<'_> {
             (start < end).then_some(Span { start, end })
         });
         let test_operation =
-            TestOperation { operation: id, activation, parameters, draw_seed: operation.seed.cast_unsigned() };
+            TestOperation { operation: id, activation, parameters, operation_seed: operation.seed.cast_unsigned() };
         let effect = OperationEffect { intervals: intervals.into_iter().collect(), ..OperationEffect::default() };
         Ok((test_operation, effect))
     }

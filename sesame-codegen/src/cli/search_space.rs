@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace};
-use sesame_plan::{CampaignPlan, Confirmation, Copies, Dimension, Search, Shape};
-use sesame_search::Permitted;
+use sesame_plan::{CampaignPlan, Confirmation, Copies, Dimension, Shape};
 use sesame_search::coverage::{Feasible, Grid};
-use sesame_search::space::choice::PermittedChoice;
-use sesame_search::space::permitted::{PermittedActivation, PermittedOperation};
+use sesame_search::space::ParameterSpace;
+use sesame_search::space::TestSpace;
+use sesame_search::space::{ActivationSpace, OperationSpace};
 use sesame_search::sspr::extent;
 
 /// A number that may be anything in a range counts as so many values.
@@ -18,24 +18,13 @@ const REFERENCE_RUNS: u64 = 2;
 /// The space that a campaign searches, and its cost in simulated time, as comments of a `.sesame` file.
 pub(super) fn described(plan: &CampaignPlan) -> String {
     let mut lines = Vec::new();
-    let runs = match plan.campaign.search {
-        Search::Nsga2 { evaluations, .. }
-        | Search::MapElites { evaluations, .. }
-        | Search::Random { evaluations }
-        | Search::Sobol { evaluations }
-        | Search::Falsification { evaluations, .. }
-        | Search::LatinHypercube { evaluations } => {
-            match Permitted::of(plan) {
-                Ok(permitted) => space(plan, &permitted, &mut lines),
-                Err(error) => lines.push(("tests", error.to_string())),
-            }
-            u64::from(evaluations)
+    if plan.campaign.search.strategy().is_some() {
+        match TestSpace::from_plan(plan) {
+            Ok(test_space) => space(plan, &test_space, &mut lines),
+            Err(error) => lines.push(("tests", error.to_string())),
         }
-        Search::Repeat { times, .. } => u64::from(times),
-        Search::Known { ref tests } => tests.len() as u64,
-        Search::Shrink { evaluations, .. } => u64::from(evaluations),
-    };
-    let runs = runs + REFERENCE_RUNS;
+    }
+    let runs = u64::from(plan.campaign.search.evaluations()) + REFERENCE_RUNS;
     let end = plan.campaign.end_after;
     lines.push((
         "cost",
@@ -55,7 +44,7 @@ pub(super) fn described(plan: &CampaignPlan) -> String {
     out
 }
 
-fn space(plan: &CampaignPlan, permitted: &Permitted, lines: &mut Vec<(&str, String)>) {
+fn space(plan: &CampaignPlan, permitted: &TestSpace, lines: &mut Vec<(&str, String)>) {
     let kinds = permitted.operations();
     let (fewest, most) = (permitted.fewest(), permitted.most());
     let copies: Vec<usize> = kinds.iter().map(|kind| permitted.most_copies(kind)).collect();
@@ -91,7 +80,7 @@ fn space(plan: &CampaignPlan, permitted: &Permitted, lines: &mut Vec<(&str, Stri
     lines.push(("reduced (SSPR)", extents.join("  ")));
     let goal = plan.campaign.coverage.as_ref();
     if let Some(grid) = goal.and_then(|goal| Grid::new(goal.axes.clone()).ok()) {
-        let feasible = Feasible::of(plan, &grid);
+        let feasible = Feasible::from_plan(plan, &grid);
         let known = if feasible.is_exact() { "" } else { ", as far as known" };
         lines.push(("cells", format!("{} of {} can be reached{known}", feasible.count(), grid.len())));
     }
@@ -128,27 +117,27 @@ fn entering(tests: u32, objectives: usize) -> f64 {
 }
 
 /// How many numbers, points' coordinates, texts and conditions a test chooses for an operation.
-fn numbers(operation: &PermittedOperation) -> usize {
+fn numbers(operation: &OperationSpace) -> usize {
     let activation = match operation.activation {
-        PermittedActivation::Offline => 0,
-        PermittedActivation::Time(_) | PermittedActivation::Condition { .. } => 2,
+        ActivationSpace::Offline => 0,
+        ActivationSpace::Time(_) | ActivationSpace::Condition { .. } => 2,
     };
     let parameters = operation.parameters.iter().map(|parameter| match parameter {
-        PermittedChoice::Number(_, Shape::Range) => 2,
-        PermittedChoice::Number(_, Shape::Value) | PermittedChoice::Items(_) => 1,
-        PermittedChoice::Point(_) => 3,
+        ParameterSpace::Number(_, Shape::Range) => 2,
+        ParameterSpace::Number(_, Shape::Value) | ParameterSpace::Items(_) => 1,
+        ParameterSpace::Point(_) => 3,
     });
     activation + parameters.sum::<usize>()
 }
 
 /// The decimal logarithm of the number of ways to choose all of an operation.
-fn size(operation: &PermittedOperation) -> f64 {
+fn size(operation: &OperationSpace) -> f64 {
     // Two ordered ends in so many steps.
     let pair = |steps: f64| (steps * (steps + 1.0) / 2.0).log10();
     let activation = match &operation.activation {
-        PermittedActivation::Offline => 0.0,
-        PermittedActivation::Time(_) => pair(STEPS),
-        PermittedActivation::Condition { space, .. } => {
+        ActivationSpace::Offline => 0.0,
+        ActivationSpace::Time(_) => pair(STEPS),
+        ActivationSpace::Condition { space, .. } => {
             let end = match space.end {
                 ConditionEnd::Condition => conditions(space),
                 ConditionEnd::Length { low, high } => {
@@ -163,7 +152,7 @@ fn size(operation: &PermittedOperation) -> f64 {
         }
     };
     let parameters = operation.parameters.iter().map(|parameter| match parameter {
-        PermittedChoice::Number(range, shape) => {
+        ParameterSpace::Number(range, shape) => {
             let steps = match (range.integer, range.high - range.low) {
                 (_, width) if width <= 0.0 => 1.0,
                 (true, width) => (width + 1.0).min(STEPS),
@@ -174,8 +163,8 @@ fn size(operation: &PermittedOperation) -> f64 {
                 Shape::Range => pair(steps),
             }
         }
-        PermittedChoice::Point(axes) => axes.iter().filter(|axis| axis.low < axis.high).count() as f64 * STEPS.log10(),
-        PermittedChoice::Items(items) => (items.len() as f64).log10(),
+        ParameterSpace::Point(axes) => axes.iter().filter(|axis| axis.low < axis.high).count() as f64 * STEPS.log10(),
+        ParameterSpace::Items(items) => (items.len() as f64).log10(),
     });
     activation + parameters.sum::<f64>()
 }
@@ -262,7 +251,7 @@ mod tests {
 
     #[test]
     fn the_cost_of_confirming_says_what_is_confirmed() {
-        let confirmation = Confirmation { times: 4, by: sesame_plan::Typical::Mean, violations: true };
+        let confirmation = Confirmation { times: 4, by: sesame_plan::Statistic::Mean, violations: true };
         let said = confirming(confirmation, 60, 2);
         assert!(
             said.starts_with(

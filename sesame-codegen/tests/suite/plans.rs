@@ -4,7 +4,7 @@ use sesame_codegen::emit::Environment;
 use sesame_codegen::plan::{HookPlan, RunnerPlan};
 use sesame_plan::{
     ActivationMode, Campaign, CampaignPlan, Count, Direction, Field, FieldRef, MessageId, MessageType, Metric,
-    MetricId, MetricSource, Node, Search, Simulator, Topic, TopicId, Transport, Type,
+    MetricId, MetricSource, Node, Search, Simulator, Strategy, Topic, TopicId, Transport, Type,
 };
 
 fn field(name: &str, doc: &str, ty: Type) -> Field {
@@ -103,7 +103,7 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 count: Count { min: 1, max: 5 },
                 copies: sesame_plan::Copies::default(),
                 activation: ActivationMode::Time,
-                search: Search::Random { evaluations: 10 },
+                search: Search::new(Strategy::Random, 10),
                 coverage: None,
                 exploration: None,
                 confirm: None,

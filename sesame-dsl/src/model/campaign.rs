@@ -1,7 +1,7 @@
 //! Campaigns: how tests are found and run.
 
 use super::condition::ConditionSpace;
-use sesame_plan::{Confirmation, Copies, Dimension, Exploration, Recorded, StopRule};
+use sesame_plan::{Confirmation, Copies, Dimension, Exploration, Recorded, StopRule, Strategy};
 
 use super::declaration::Declaration;
 use super::ids::{CampaignId, MetricId, OperationId, TestId};
@@ -42,52 +42,13 @@ pub struct Campaign {
 /// How the tests of a campaign are found.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Search {
-    /// NSGA-II over tests of these operations.
-    Nsga2 {
+    /// A strategy chooses tests of these operations. The campaign has what the strategy needs.
+    Strategy {
         /// What a test holds.
         template: TestTemplate,
-        /// Tests per generation: even, at least 2.
-        population: u32,
-        /// Tests in total: at least `population`.
-        evaluations: u32,
-    },
-    /// Independent random tests of these operations.
-    Random {
-        /// What a test holds.
-        template: TestTemplate,
-        /// Tests in total: at least 1.
-        evaluations: u32,
-    },
-    /// MAP-Elites over the cells of the campaign's coverage, which it has.
-    MapElites {
-        /// What a test holds.
-        template: TestTemplate,
-        /// Tests per generation: even, at least 2.
-        population: u32,
-        /// Tests in total: at least `population`.
-        evaluations: u32,
-    },
-    /// Latin hypercube sampling of tests by time.
-    LatinHypercube {
-        /// What a test holds.
-        template: TestTemplate,
-        /// Tests in total: at least 1.
-        evaluations: u32,
-    },
-    /// Sobol' sampling of tests by time.
-    Sobol {
-        /// What a test holds.
-        template: TestTemplate,
-        /// Tests in total: at least 1.
-        evaluations: u32,
-    },
-    /// Focused falsification of the space's requirements, of which there is one at least, by tests by time.
-    Falsification {
-        /// What a test holds.
-        template: TestTemplate,
-        /// Tests at a time: at least 1. Default 1.
-        population: u32,
-        /// Tests in total: at least 1.
+        /// Which, with its settings: a population that is bred in pairs is even and at least 2, another is at least 1.
+        strategy: Strategy,
+        /// Tests in total: at least 1, and at least a population that is bred.
         evaluations: u32,
     },
     /// One known test again and again.
@@ -108,12 +69,7 @@ impl Search {
     /// What its tests hold; `None` where nothing is searched.
     pub fn template(&self) -> Option<&TestTemplate> {
         match self {
-            Search::Nsga2 { template, .. }
-            | Search::Random { template, .. }
-            | Search::MapElites { template, .. }
-            | Search::LatinHypercube { template, .. }
-            | Search::Sobol { template, .. }
-            | Search::Falsification { template, .. } => Some(template),
+            Search::Strategy { template, .. } => Some(template),
             Search::Repeat { .. } | Search::Passive { .. } => None,
         }
     }

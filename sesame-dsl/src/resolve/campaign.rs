@@ -4,10 +4,11 @@ use super::exploration::exploring;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
-    self, Activation, ActivationMode, CampaignId, Copies, Id as _, MetricId, OperationId, Search, TestId, TestTemplate,
+    self, Activation, ActivationMode, CampaignId, Copies, Id as _, MetricId, OperationId, Population, Search, TestId,
+    TestTemplate,
 };
 use crate::span::Span;
-use crate::syntax::ast::{self, Count, Strategy};
+use crate::syntax::ast::{self, Count};
 use crate::units::Unit;
 
 /// The seed of a campaign that gives none.
@@ -276,44 +277,30 @@ impl<'a> Resolver<'a> {
         search: &'a ast::Search,
         template: Option<TestTemplate>,
     ) -> Option<Search> {
-        let strategy = search.strategy?;
+        let kind = search.strategy?;
         let population = self.single(&search.population, "population").copied();
         let evaluations = self.single(&search.evaluations, "evaluations").copied();
         if evaluations.is_none() && !search.has_errors {
             self.missing(&campaign.head.name, "its number of evaluations", "evaluations 200");
         }
         let found = evaluations.and_then(|count| self.count(count, 1, "the number of evaluations"));
-        match strategy {
-            Strategy::Random | Strategy::LatinHypercube | Strategy::Sobol => {
+        let size = match kind.properties().population {
+            Population::None => {
                 if let Some((span, _)) = search.population.first() {
-                    let what = match strategy {
-                        Strategy::Random => "random search",
-                        Strategy::Sobol => "Sobol search",
-                        _ => "Latin hypercube",
-                    };
-                    let title = format!("a {what} has no setting `population`");
+                    let title = format!("a {} has no setting `population`", kind.properties().noun);
                     let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, *span, title)
                         .label("remove this")
                         .note("its settings are `evaluations` and `seed`");
                     self.report(diagnostic);
                     return None;
                 }
-                let (template, evaluations) = (template?, found?);
-                Some(match strategy {
-                    Strategy::Random => Search::Random { template, evaluations },
-                    Strategy::Sobol => Search::Sobol { template, evaluations },
-                    _ => Search::LatinHypercube { template, evaluations },
-                })
+                0
             }
-            Strategy::Falsification => {
-                let population = match population {
-                    Some(count) => self.count(count, 1, "the population"),
-                    None => Some(1),
-                };
-                let (template, population, evaluations) = (template?, population?, found?);
-                Some(Search::Falsification { template, population, evaluations })
-            }
-            Strategy::Nsga2 | Strategy::MapElites => {
+            Population::Batch => match population {
+                Some(count) => self.count(count, 1, "the population")?,
+                None => 1,
+            },
+            Population::Bred => {
                 let Some(count) = population else {
                     if !search.has_errors {
                         self.missing(&campaign.head.name, "its population size", "population 10");
@@ -341,13 +328,10 @@ impl<'a> Resolver<'a> {
                     self.report(diagnostic);
                     return None;
                 }
-                let (template, population, evaluations) = (template.filter(|_| even)?, size, found);
-                Some(match strategy {
-                    Strategy::Nsga2 => Search::Nsga2 { template, population, evaluations },
-                    _ => Search::MapElites { template, population, evaluations },
-                })
+                even.then_some(size)?
             }
-        }
+        };
+        Some(Search::Strategy { template: template?, strategy: kind.with_settings(size), evaluations: found? })
     }
 
     fn repeat(&mut self, repeat: &'a ast::Repeat, end_after: Option<f64>) -> Option<Search> {

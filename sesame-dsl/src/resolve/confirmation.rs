@@ -2,8 +2,8 @@
 
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{Confirmation, Typical};
-use crate::syntax::ast::{self, Strategy};
+use crate::model::{Averaging, Confirmation, Statistic};
+use crate::syntax::ast;
 
 impl<'a> Resolver<'a> {
     /// The campaign's confirmation. The outer `None` means that it has mistakes.
@@ -14,10 +14,10 @@ impl<'a> Resolver<'a> {
         let Some(written) = campaign.confirms.first() else { return Some(None) };
         let times = self.count(written.times, 1, "the number of confirming runs");
         let by = match self.single(&written.by, "by") {
-            None | Some(ast::Typical::Mean) => Some(Typical::Mean),
-            Some(ast::Typical::Median) => Some(Typical::Median),
+            None | Some(ast::Typical::Mean) => Some(Statistic::Mean),
+            Some(ast::Typical::Median) => Some(Statistic::Median),
             Some(ast::Typical::Quantile(share)) => {
-                self.share(share, "the share of a quantile").map(|share| Typical::Quantile { share })
+                self.share(share, "the share of a quantile").map(|share| Statistic::Quantile { share })
             }
         };
         let violations = self.single(&written.violations, "violations").is_some();
@@ -38,19 +38,13 @@ impl<'a> Resolver<'a> {
     #[expect(clippy::option_option, reason = "the outer `None` means a mistake, the inner is the model's")]
     pub(super) fn neighbours(&mut self, search: &'a ast::Search) -> Option<Option<u32>> {
         let Some(&count) = self.single(&search.neighbours, "neighbours") else { return Some(None) };
-        let learns_nothing = "its tests do not depend on the results of earlier ones";
-        let (strategy, note) = match search.strategy? {
-            Strategy::Random => ("random search", learns_nothing),
-            Strategy::LatinHypercube => ("Latin hypercube", learns_nothing),
-            Strategy::Sobol => ("Sobol search", learns_nothing),
-            Strategy::Falsification => {
-                ("falsification", "its model of the distance to a violation already accounts for noise")
-            }
-            Strategy::Nsga2 | Strategy::MapElites => {
-                return self.count(count, 1, "the number of neighbours").map(Some);
-            }
+        let properties = search.strategy?.properties();
+        let note = match properties.averaging {
+            Averaging::Possible => return self.count(count, 1, "the number of neighbours").map(Some),
+            Averaging::LearnsNothing => "its tests do not depend on the results of earlier ones",
+            Averaging::ByItself => "its model of the distance to a violation already accounts for noise",
         };
-        let title = format!("a {strategy} has no setting `neighbours`");
+        let title = format!("a {} has no setting `neighbours`", properties.noun);
         let diagnostic =
             Diagnostic::new(Code::UNKNOWN_NAME, search.neighbours[0].0, title).label("remove this").note(note);
         self.report(diagnostic);

@@ -4,9 +4,9 @@
 use super::Resolver;
 use super::quantity::percent;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{BoostedChildren, Dimension, Exploration};
+use crate::model::{BoostedChildren, Dimension, Exploration, StrategyProperties};
 use crate::span::Span;
-use crate::syntax::ast::{self, ActivationMode, ExplorationKind, Strategy};
+use crate::syntax::ast::{self, ActivationMode, ExplorationKind};
 
 /// Default settings of a boost: those of the original platform.
 const EVERY: u32 = 2;
@@ -173,32 +173,25 @@ impl<'a> Resolver<'a> {
         let without_cells = campaign.coverages.is_empty() && !campaign.inherited_errors;
         let strategy = campaign.searches.first().and_then(|search| Some((search.span, search.strategy?)));
         if let Some((span, strategy)) = strategy {
-            let keyword = match strategy {
-                Strategy::Nsga2 => "nsga2",
-                Strategy::MapElites => "map_elites",
-                Strategy::Random => "random",
-                Strategy::LatinHypercube => "latin_hypercube",
-                Strategy::Sobol => "sobol",
-                Strategy::Falsification => "falsification",
-            };
-            if strategy == Strategy::MapElites && without_cells {
-                let title = "`search map_elites` needs a `coverage`".to_owned();
+            let StrategyProperties { keyword, needs_coverage, by_time_only, needs_requirements, .. } =
+                strategy.properties();
+            if needs_coverage && without_cells {
+                let title = format!("`search {keyword}` needs a `coverage`");
                 refuse(span, title, "add a `coverage`; the search keeps the best tests of each cell");
             }
-            let by_windows = matches!(strategy, Strategy::LatinHypercube | Strategy::Sobol | Strategy::Falsification);
-            if by_windows && by_condition {
+            if by_time_only && by_condition {
                 let title = format!("`search {keyword}` cannot be combined with `activate by condition`");
                 refuse(span, title, "this search chooses time windows: use `activate by time`, or another search");
             }
-            if strategy == Strategy::Falsification && without_requirements {
-                let title = "`search falsification` needs a `requirement`".to_owned();
+            if needs_requirements && without_requirements {
+                let title = format!("`search {keyword}` needs a `requirement`");
                 refuse(span, title, "add a `requirement` that the search can try to violate");
             }
         }
         if let Some(exploration) = campaign.explorations.first() {
             let span = exploration.span;
             let (word, kind) = (exploring(exploration), exploration.kind);
-            if strategy.is_some_and(|(_, strategy)| strategy != Strategy::Nsga2) {
+            if strategy.is_some_and(|(_, strategy)| !strategy.properties().explores) {
                 let title = format!("`{word}` only works with `search nsga2`");
                 refuse(span, title, "use `search nsga2`, or remove this");
             } else if kind != ExplorationKind::Novelty {

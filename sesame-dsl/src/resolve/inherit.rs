@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::list;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::syntax::ast::{ActivationMode, Campaign, Exploration, ExplorationKind, File, Strategy};
+use crate::syntax::ast::{ActivationMode, Campaign, Exploration, ExplorationKind, File};
 
 /// Copies inherited clauses. A clause that a campaign writes replaces the inherited one as a whole; `search`, `repeat` and
 /// `passive` count as one clause here, and clauses of a search are not copied to a campaign without one.
@@ -123,7 +123,7 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
 /// Whether a campaign can explore like its base. Explorations change an evolution, and except for novelty each works
 /// either on time windows or on conditions. If the base itself does not fit, that is reported there.
 fn suits(exploration: &Exploration, child: &Campaign) -> bool {
-    let evolves = child.searches.iter().all(|search| search.strategy.is_none_or(|it| it == Strategy::Nsga2));
+    let evolves = child.searches.iter().all(|search| search.strategy.is_none_or(|it| it.properties().explores));
     let by_condition = child.activates.iter().any(|(_, mode)| matches!(mode, ActivationMode::Condition(_)));
     let novel = exploration.kind == ExplorationKind::Novelty;
     evolves && (novel || by_condition == (exploration.kind == ExplorationKind::Predict))

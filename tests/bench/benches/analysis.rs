@@ -10,13 +10,13 @@ use sesame_plan::{Activation, Dimension, Span};
 use sesame_results::analysis::{self, Selection};
 use sesame_results::record::{Origin, Recorder, Repository, TestRecord};
 use sesame_rng::Stream;
-use sesame_search::Permitted;
 use sesame_search::coverage::Grid;
-use sesame_search::space::initial::fresh_test;
+use sesame_search::space::TestSpace;
+use sesame_search::space::fresh_test;
 use sesame_search::sspr::Convention;
 
 /// A test with random operations, observed as planned, and random values.
-fn record(permitted: &Permitted, metrics: usize, number: u32) -> TestRecord {
+fn record(permitted: &TestSpace, metrics: usize, number: u32) -> TestRecord {
     let mut stream = Stream::derive(1, "bench", &[u64::from(number)]);
     let test = fresh_test(permitted, &mut stream);
     let operations = test.operations.iter().map(|it| {
@@ -70,7 +70,7 @@ fn analyses(criterion: &mut Criterion) {
         plan.metrics.push(plan.metrics[1].clone());
         "third".clone_into(&mut plan.metrics[2].name);
         plan.campaign.objectives.push(sesame_plan::MetricId(2));
-        let permitted = Permitted::of(&plan).expect("the space has operations");
+        let permitted = TestSpace::from_plan(&plan).expect("the space has operations");
         let mut recorder = Recorder::create(&folder, &plan, 1, 1).expect("the folder is empty");
         for number in 1..=tests {
             recorder.commit(&record(&permitted, plan.metrics.len(), number)).expect("the number is new");

@@ -30,7 +30,7 @@ fn active(plan: &CampaignPlan, names: &[&str]) -> Test {
             operation: OperationId(u32::try_from(at).expect("few operations")),
             activation: Activation::Time { start: 0.0, end: 1000.0 },
             parameters: parameters.collect(),
-            draw_seed: 1,
+            operation_seed: 1,
         }
     };
     Test { operations: names.iter().map(operation).collect() }

@@ -2,6 +2,7 @@
 //! which nothing is simulated, and how they grow. With each test come its point, the front, the cells, and the rules
 //! that stop.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use sesame_base::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
@@ -9,12 +10,12 @@ use sesame_optimise::front::Front;
 use sesame_plan::condition::{ConditionEnd, ConditionSpace, Integers, Variable};
 use sesame_plan::{
     Activation, ActivationMode, BoostedChildren, Bound, CampaignPlan, CoverageGoal, Dimension, Exploration, MetricId,
-    Requirement, Search, Span, StopRule,
+    Requirement, Search, Span, StopRule, Strategy,
 };
 use sesame_rng::Stream;
 use sesame_search as search;
 use sesame_search::coverage::{Coverage, Grid};
-use sesame_search::{Candidate, Course, Evaluated, StopRules, sspr};
+use sesame_search::{Candidate, Evaluated, StopRules, sspr};
 
 const FIXED: Exploration =
     Exploration::Boost { every_generations: 2, children: BoostedChildren::Every { iterations: 2 }, tries: 10 };
@@ -28,7 +29,7 @@ const LINEAR: Exploration = Exploration::Boost {
 type Searched = fn(u32) -> Search;
 
 fn nsga2(evaluations: u32) -> Search {
-    Search::Nsga2 { population: 10, evaluations }
+    Search::new(Strategy::Nsga2 { population: 10 }, evaluations)
 }
 
 /// The space of the benchmarks with the paper's cells, and a rule that looks at the front after each generation.
@@ -98,14 +99,12 @@ fn spent(plan: &CampaignPlan) -> Duration {
     let mut spent = Duration::ZERO;
     let begun = Instant::now();
     let mut strategy = search::strategy(plan, 1).expect("the campaign can be searched");
-    let (courses, margins) = (search::needs_courses(plan), search::needs_margins(plan));
-    if let Some(course) = Course::of(plan, &observe(plan, 0, &[])).filter(|_| courses) {
-        strategy.reference(course);
-    }
+    strategy.begin(&observe(plan, 0, &[]));
+    let series = strategy.reads_series();
     let goal = plan.campaign.coverage.as_ref().expect("the campaign counts cells");
     let mut coverage = Coverage::new(Grid::new(goal.axes.clone()).expect("it is a grid"), goal.hits);
     let mut front = Front::default();
-    let mut rules = StopRules::of(plan);
+    let mut rules = StopRules::from_plan(plan);
     let mut number = 0;
     spent += begun.elapsed();
     loop {
@@ -126,9 +125,8 @@ fn spent(plan: &CampaignPlan) -> Duration {
             if let Some(point) = &point {
                 coverage.add(point);
             }
-            let course = if courses { Course::of(plan, &observation) } else { None };
-            let margins = if margins { search::margins(plan, &observation) } else { Vec::new() };
-            told.push(Evaluated { number, test, fitness, point, course, margins, failing: false });
+            let run = Arc::new(if series { observation } else { observation.without_series() });
+            told.push(Evaluated { number, test, fitness, point, run, fresh_runs: Vec::new() });
             spent += begun.elapsed();
         }
         let begun = Instant::now();
@@ -151,12 +149,12 @@ fn main() {
         ("`boost linear`", nsga2, Some(LINEAR)),
         ("`construct`", nsga2, Some(Exploration::Construct { share: 0.5, until: None })),
         ("`predict`", nsga2, Some(Exploration::Predict { candidates: 20 })),
-        ("`map_elites`", |evaluations| Search::MapElites { population: 10, evaluations }, None),
-        ("`random`", |evaluations| Search::Random { evaluations }, None),
-        ("`latin_hypercube`", |evaluations| Search::LatinHypercube { evaluations }, None),
-        ("`sobol`", |evaluations| Search::Sobol { evaluations }, None),
+        ("`map_elites`", |evaluations| Search::new(Strategy::MapElites { population: 10 }, evaluations), None),
+        ("`random`", |evaluations| Search::new(Strategy::Random, evaluations), None),
+        ("`latin_hypercube`", |evaluations| Search::new(Strategy::LatinHypercube, evaluations), None),
+        ("`sobol`", |evaluations| Search::new(Strategy::Sobol, evaluations), None),
         ("`novelty`", nsga2, Some(Exploration::Novelty { neighbours: 10, over: Dimension::ALL.to_vec() })),
-        ("`falsification`", |evaluations| Search::Falsification { population: 1, evaluations }, None),
+        ("`falsification`", |evaluations| Search::new(Strategy::Falsification { population: 1 }, evaluations), None),
     ];
     println!("| strategy | {} |", counts.iter().map(u32::to_string).collect::<Vec<_>>().join(" | "));
     println!("|---|{}", "---:|".repeat(counts.len()));

@@ -277,7 +277,7 @@ fn relayed(payload: Payload, case: &Case, switch: Switch) -> (Vec<(u32, Value)>,
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     let parameters = case.choices.iter().map(|(_, choice)| choice.clone()).collect();
     let used =
-        TestOperation { operation: OperationId(0), activation: switch.activation(), parameters, draw_seed: SEED };
+        TestOperation { operation: OperationId(0), activation: switch.activation(), parameters, operation_seed: SEED };
     let test = Test { operations: vec![used] };
     let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).unwrap().received_everywhere();
     let [payload_wire, switch_wire] = ["payload", "switch"].map(|name| wires.find(name).unwrap());

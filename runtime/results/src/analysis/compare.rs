@@ -150,7 +150,7 @@ pub fn compare(runs: &[Run], reference: Option<&[f64]>, grid: Option<Grid>) -> R
         .flat_map(|run| run.front.members())
         .map(|it| Fitness::Measured(it.objectives.clone()))
         .collect();
-    let joint = Front::of((0..).zip(&fitness));
+    let joint = Front::from_tests((0..).zip(&fitness));
     let distance = IgdPlus::to(joint.members().iter().map(|member| member.objectives.as_slice()));
     for run in measured.iter_mut().filter(|_| needed > 0) {
         let volume = if finite { volume(&run.front, &reference) } else { None };
@@ -237,7 +237,7 @@ fn measure(run: &Run, cells: Option<&(Grid, u32)>) -> Result<Measured, RecordErr
         }
         judged.push((test.number, fitness));
     })?;
-    measured.front = Front::of(judged.iter().map(|(number, fitness)| (*number, fitness)));
+    measured.front = Front::from_tests(judged.iter().map(|(number, fitness)| (*number, fitness)));
     measured.coverage = coverage.map(|coverage| coverage.share());
     Ok(measured)
 }

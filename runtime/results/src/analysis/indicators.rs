@@ -93,7 +93,7 @@ pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<
     })?;
     let needed = plan.campaign.coverage.as_ref().map_or(1, |goal| goal.hits);
     let coverage = grid.as_ref().map(|grid| Coverage::new(grid.clone(), needed));
-    let whole = Front::of(tests.iter().map(|test| (test.number, &test.fitness)));
+    let whole = Front::from_tests(tests.iter().map(|test| (test.number, &test.fitness)));
     let distance = IgdPlus::to(whole.members().iter().map(|member| member.objectives.as_slice()))
         .filter(|_| !objectives.is_empty());
     let oriented = |point: &[f64]| -> Vec<f64> {
@@ -141,7 +141,7 @@ pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<
         generations,
         reference: named(plan, reference.as_deref().unwrap_or_default()),
         cells: grid.as_ref().map(Grid::len),
-        feasible: grid.as_ref().map(|grid| Feasible::of(plan, grid).count()),
+        feasible: grid.as_ref().map(|grid| Feasible::from_plan(plan, grid).count()),
     })
 }
 
@@ -214,7 +214,7 @@ fn of_sets(
     for (set, _) in repository.result_set_sizes()? {
         let members = repository.members(&set.name)?;
         let member = |number: &u32| tests.binary_search_by_key(number, |test| test.number).ok().map(|at| &tests[at]);
-        let front = Front::of(members.iter().filter_map(member).map(|test| (test.number, &test.fitness)));
+        let front = Front::from_tests(members.iter().filter_map(member).map(|test| (test.number, &test.fitness)));
         let mut distance = distance.cloned();
         for member in front.members() {
             if let Some(distance) = &mut distance {

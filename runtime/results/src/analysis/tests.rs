@@ -84,7 +84,7 @@ fn points_are_those_of_the_observed_intervals_in_the_convention_asked_for() {
         let Datum::Test(test) = &row[0] else { panic!("{row:?}") };
         let record = repository.test(repository.find(&test.to_string()).unwrap()).unwrap();
         let disturbances = sesame_search::sspr::observed(repository.plan(), &record.test, &record.observation);
-        let point = sesame_search::sspr::Point::of(&disturbances, Convention::Original).unwrap();
+        let point = sesame_search::sspr::Point::from_disturbances(&disturbances, Convention::Original).unwrap();
         for (datum, dimension) in row[1..].iter().zip(Dimension::ALL) {
             assert_eq!(*datum, Datum::real(point.get(dimension)), "{test} {dimension:?}");
         }

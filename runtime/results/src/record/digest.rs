@@ -12,7 +12,7 @@ use crate::record::schema::{self, PIECES_SINCE};
 const CONTENT: &[(&str, &str)] = &[
     (
         "campaign",
-        "SELECT space, name, source, generator, runtime, seed, evaluations, end_after_s, plan, stop FROM campaign",
+        "SELECT space, name, source, generator, runtime, seed, evaluations, end_after_s, coalesce(plan || task, plan), stop FROM campaign",
     ),
     ("metrics", "SELECT id, name, unit, direction, objective, default_value FROM metrics ORDER BY id"),
     (
@@ -90,6 +90,8 @@ const PORTION: usize = 1 << 16;
 /// `F` and the 8 bytes of the IEEE 754 double (little endian, zero without sign), `T`, the length in bytes as 8 bytes (little
 /// endian) and the UTF-8 bytes for a text, `B`, the length likewise and the bytes for a blob. Everything is read from the
 /// file each time: no stored hash is used.
+///
+/// The task of a run that is not the campaign is hashed with the plan, which it follows.
 ///
 /// Results of an earlier schema have the digest that their release computed. Names of columns and verdicts are not hashed,
 /// so the content of a run hashes the same in schemas 6 and 7, except for two things: the plan's JSON, and the outcome of a

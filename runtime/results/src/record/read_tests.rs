@@ -199,7 +199,7 @@ impl Repository {
                     operation,
                     activation: self.activation(number, operation, window, conditions)?,
                     parameters,
-                    draw_seed: self.seed(&operation_seed)?,
+                    operation_seed: self.seed(&operation_seed)?,
                 });
             }
             if !chosen.is_empty() {

@@ -9,7 +9,7 @@ use sesame_base::condition;
 use sesame_base::observation::{Observation, Outcome};
 use sesame_base::test_number::TestNumber;
 use sesame_plan::condition::{Condition, Operand};
-use sesame_plan::{Activation, CampaignPlan, Choice};
+use sesame_plan::{Activation, CampaignPlan, Choice, Task};
 use sesame_search as search;
 use sesame_search::indicators::GenerationIndicators;
 
@@ -34,19 +34,37 @@ pub struct Recorder {
 impl Recorder {
     /// Begins the results of a run in a folder, which is made if absent and must not hold results.
     pub fn create(folder: &Path, plan: &CampaignPlan, seed: u64, workers: u32) -> Result<Recorder, RecordError> {
+        Recorder::create_for(folder, plan, &Task::Campaign, seed, workers)
+    }
+
+    /// As [`Recorder::create`], of a run that does this task.
+    pub fn create_for(
+        folder: &Path,
+        plan: &CampaignPlan,
+        task: &Task,
+        seed: u64,
+        workers: u32,
+    ) -> Result<Recorder, RecordError> {
         std::fs::create_dir_all(folder).map_err(|e| RecordError::io("make the folder for results", folder, e))?;
-        Recorder::create_locked(folder, Lock::acquire(folder)?, plan, seed, workers)
+        Recorder::create_locked(folder, Lock::acquire(folder)?, plan, task, seed, workers)
     }
 
     /// Begins the results of a run in a folder that was claimed for it.
-    pub fn create_in(claim: Claim, plan: &CampaignPlan, seed: u64, workers: u32) -> Result<Recorder, RecordError> {
-        Recorder::create_locked(&claim.folder, claim.lock, plan, seed, workers)
+    pub fn create_in(
+        claim: Claim,
+        plan: &CampaignPlan,
+        task: &Task,
+        seed: u64,
+        workers: u32,
+    ) -> Result<Recorder, RecordError> {
+        Recorder::create_locked(&claim.folder, claim.lock, plan, task, seed, workers)
     }
 
     fn create_locked(
         folder: &Path,
         lock: Lock,
         plan: &CampaignPlan,
+        task: &Task,
         seed: u64,
         workers: u32,
     ) -> Result<Recorder, RecordError> {
@@ -67,7 +85,7 @@ impl Recorder {
         }
         let failed = |error| RecordError::database("begin the results", &path, error);
         let mut connection = Connection::open(&begun).map_err(failed)?;
-        schema::install(&mut connection, plan, seed).map_err(failed)?;
+        schema::install(&mut connection, plan, task, seed).map_err(failed)?;
         connection.close().map_err(|(_, error)| failed(error))?;
         std::fs::rename(&begun, &path).map_err(|e| RecordError::io("begin the results", &path, e))?;
         let connection = Connection::open(&path).map_err(failed)?;
@@ -530,7 +548,7 @@ fn write_operations(transaction: &Transaction<'_>, plan: &CampaignPlan, record: 
                 end_condition,
                 length,
                 times,
-                operation.draw_seed.to_string(),
+                operation.operation_seed.to_string(),
                 counters.map(|c| count(c.seen)),
                 counters.map(|c| count(c.changed)),
                 counters.map(|c| count(c.dropped)),

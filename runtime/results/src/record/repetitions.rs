@@ -9,8 +9,7 @@ use sesame_base::test_number::TestNumber;
 use sesame_optimise::dominance::Fitness;
 use sesame_plan::{CampaignPlan, Requirement};
 use sesame_search as search;
-use sesame_search::Margin;
-use sesame_search::confirming::{typical, typical_margin};
+use sesame_search::aggregate;
 
 use crate::record::columns::{finite, index, metric_value, perhaps_finite, position, unsigned};
 use crate::record::recorder::write_event;
@@ -26,20 +25,12 @@ pub fn confirmed_fitness(plan: &CampaignPlan, repetitions: &[Repetition]) -> Opt
         .iter()
         .map(|run| search::fitness_of(plan, &run.outcome, |metric| run.value(metric).value))
         .collect();
-    Some(typical(&runs, confirmation.by))
+    Some(aggregate(&runs, confirmation.by))
 }
 
-/// How far the repetitions of a test are from violating each requirement, by the campaign's way to sum them up; `None` as
-/// for [`confirmed_fitness`]. The margin of a requirement is unknown where too few repetitions say something about it.
-pub fn confirmed_margins(plan: &CampaignPlan, repetitions: &[Repetition]) -> Option<Vec<Margin>> {
-    let confirmation = plan.campaign.confirm?;
-    let runs: Vec<Vec<Margin>> =
-        own(plan, repetitions)?.iter().map(|run| search::margins(plan, &run.observation())).collect();
-    let of = |requirement: usize| {
-        let margins: Vec<Margin> = runs.iter().map(|run| run[requirement]).collect();
-        typical_margin(&margins, confirmation.by)
-    };
-    Some((0..plan.requirements.len()).map(of).collect())
+/// The runs by which a campaign confirmed a test, without their series; `None` as for [`confirmed_fitness`].
+pub fn confirming_runs(plan: &CampaignPlan, repetitions: &[Repetition]) -> Option<Vec<Observation>> {
+    Some(own(plan, repetitions)?.iter().map(Repetition::observation).collect())
 }
 
 /// The repetitions by which a campaign itself confirms a test, if it does and all are there.
@@ -232,7 +223,8 @@ impl Repository {
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_plan::{Confirmation, Typical};
+    use sesame_optimise::falsify::Margin;
+    use sesame_plan::{Confirmation, Statistic};
 
     use super::*;
     use crate::record::{DATABASE, sample};
@@ -348,7 +340,7 @@ mod tests {
         let completed = |position, collisions| repetition(3, position, Outcome::Completed, Some(collisions));
         let runs = [completed(1, 2.0), completed(2, 4.0), completed(3, 90.0)];
         assert_eq!(confirmed_fitness(&plan, &runs), None, "it does not confirm");
-        plan.campaign.confirm = Some(Confirmation { times: 2, by: Typical::Mean, violations: false });
+        plan.campaign.confirm = Some(Confirmation { times: 2, by: Statistic::Mean, violations: false });
         // Fuzzing time is minimised, collisions are maximised.
         let Some(Fitness::Measured(values)) = confirmed_fitness(&plan, &runs) else { panic!("both have values") };
         assert_eq!(values, [f64::midpoint(1.1, 2.1), -3.0]);
@@ -359,16 +351,19 @@ mod tests {
         let mut plan = sample::plan();
         let completed = |position, collisions| repetition(3, position, Outcome::Completed, Some(collisions));
         let runs = [completed(1, 2.0), completed(2, 4.0), completed(3, 90.0)];
-        assert_eq!(confirmed_margins(&plan, &runs), None, "it does not confirm");
-        plan.campaign.confirm = Some(Confirmation { times: 2, by: Typical::Mean, violations: false });
+        assert_eq!(confirming_runs(&plan, &runs), None, "it does not confirm");
+        plan.campaign.confirm = Some(Confirmation { times: 2, by: Statistic::Mean, violations: false });
+        let margins = |runs: &[Repetition]| {
+            confirming_runs(&plan, runs).map(|runs| search::confirmed_margins(&plan, Statistic::Mean, &runs))
+        };
         // R1: at most 0 collisions. R4 bounds a metric without value here.
-        let margins = confirmed_margins(&plan, &runs).unwrap();
-        assert_eq!(margins[0], Margin { value: Some(-3.0), violated: true });
-        assert_eq!(margins[3], Margin { value: None, violated: false });
+        let confirmed = margins(&runs).unwrap();
+        assert_eq!(confirmed[0], Margin { value: Some(-3.0), violated: true });
+        assert_eq!(confirmed[3], Margin { value: None, violated: false });
         let crash = Outcome::Crash { message: "gone".to_owned() };
         let one_crash = [repetition(3, 1, crash, Some(0.0)), completed(2, 4.0)];
-        assert_eq!(confirmed_margins(&plan, &one_crash).unwrap()[0], Margin { value: None, violated: false });
-        assert_eq!(confirmed_margins(&plan, &runs[1..]), None, "one of its own is missing");
+        assert_eq!(margins(&one_crash).unwrap()[0], Margin { value: None, violated: false });
+        assert_eq!(margins(&runs[1..]), None, "one of its own is missing");
     }
     /// A run: how it ended, and whether it shows a collision; `None` where it has no value.
     fn run() -> impl Strategy<Value = (Outcome, Option<bool>)> {

@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 
 use rusqlite::{Connection, Row, params};
 
-use sesame_plan::CampaignPlan;
+use sesame_plan::{CampaignPlan, Task};
 use sesame_search::indicators::GenerationIndicators;
 
 use crate::record::columns::{finite, perhaps_finite, position};
 use crate::record::files::{DATABASE, TRACES, trace_file};
-use crate::record::{Event, EventKind, GenerationCoverage, RecordError, ResultSet, Session, Status, recognise, schema};
+use crate::record::{
+    Event, EventKind, GenerationCoverage, RecordError, ResultSet, Session, Status, earlier_plans, recognise, schema,
+};
 
 /// The results of one campaign run, to be read.
 #[derive(Debug)]
@@ -22,11 +24,16 @@ pub struct Repository {
     pub(super) facts: CampaignFacts,
 }
 
+/// The recorded campaign: plan, seed, version of the runtime, why it ended, task.
+type CampaignColumns = (String, String, String, Option<String>, Option<String>);
+
 /// What is fixed for a campaign run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CampaignFacts {
     /// Everything the runner knew of the campaign.
     pub plan: CampaignPlan,
+    /// What the run does with the plan.
+    pub task: Task,
     /// The one seed that decided everything.
     pub seed: u64,
     /// Version of the runtime that ran it.
@@ -52,20 +59,21 @@ impl Repository {
             .map_err(|e| RecordError::database("read the campaign", &path, e))?;
         // Before the first query: an object with the name of a table may be a view that never ends.
         recognise::tables(&connection, &path, schema)?;
-        let row: Result<(String, String, String, Option<String>), _> =
-            connection.query_row("SELECT plan, seed, runtime, stop FROM campaign", [], |row| {
-                Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))
-            });
-        let (plan, seed, runtime, stop) = row.map_err(|source| match source {
+        let sql = schema::query("SELECT plan, seed, runtime, stop, task FROM campaign", schema);
+        let row: rusqlite::Result<CampaignColumns> = connection.query_row(&sql, [], |row| {
+            let task = if schema >= schema::TASK_SINCE { row.get(4)? } else { None };
+            Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, task))
+        });
+        let (plan, seed, runtime, stop, task) = row.map_err(|source| match source {
             rusqlite::Error::QueryReturnedNoRows => RecordError::damaged(&path, "there is no campaign in it"),
             _ => RecordError::database("read the campaign", &path, source),
         })?;
-        let plan = serde_json::from_str(&plan)
-            .map_err(|e| RecordError::damaged(&path, format!("its plan cannot be read: {e}")))?;
+        let (plan, task) =
+            earlier_plans::read(&plan, task.as_deref()).map_err(|reason| RecordError::damaged(&path, reason))?;
         recognise::views(&connection, &path, &plan)?;
         let seed = seed.parse().map_err(|_| RecordError::damaged(&path, format!("`{seed}` is not a seed")))?;
         connection.set_prepared_statement_cache_capacity(STATEMENTS);
-        Ok(Repository { connection, path, schema, facts: CampaignFacts { plan, seed, runtime, stop } })
+        Ok(Repository { connection, path, schema, facts: CampaignFacts { plan, task, seed, runtime, stop } })
     }
 
     /// The database's file.
@@ -98,6 +106,11 @@ impl Repository {
     /// Everything the runner knew of the campaign.
     pub fn plan(&self) -> &CampaignPlan {
         &self.facts.plan
+    }
+
+    /// What the run does with the plan.
+    pub fn task(&self) -> &Task {
+        &self.facts.task
     }
 
     /// SHA-256 over the canonical content of a results repository, as 64 hexadecimal digits.

@@ -8,7 +8,8 @@ use sesame_plan::condition::{Comparison, Condition, ConditionEnd, ConditionSpace
 use sesame_plan::{
     Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Count, Direction, Domain, KnownTest,
     KnownTestId, Metric, MetricId, MetricSource, Moment, Operation, OperationId, OperationKind, Parameter, Requirement,
-    SCHEMA, Search, Shape, Simulator, Span, Test, TestOperation, Topic, TopicId, Transport, Trend, Type, ValueMode,
+    SCHEMA, Search, Shape, Simulator, Span, Strategy, Test, TestOperation, Topic, TopicId, Transport, Trend, Type,
+    ValueMode,
 };
 use sesame_rng::Stream;
 use sesame_search as search;
@@ -134,7 +135,7 @@ pub fn plan() -> CampaignPlan {
                     operation: OperationId(1),
                     activation: Activation::Time { start: 8.0, end: 57.0 },
                     parameters: vec![Choice::Range { low: 0.27, high: 0.29 }],
-                    draw_seed: 7,
+                    operation_seed: 7,
                 }],
             },
             expectations: vec![],
@@ -147,7 +148,7 @@ pub fn plan() -> CampaignPlan {
             count: Count { min: 1, max: 5 },
             copies: sesame_plan::Copies::default(),
             activation: ActivationMode::Time,
-            search: Search::Nsga2 { population: 10, evaluations: 210 },
+            search: Search::new(Strategy::Nsga2 { population: 10 }, 210),
             coverage: None,
             exploration: None,
             confirm: None,
@@ -201,7 +202,7 @@ pub fn conditional_test() -> Test {
         operation: OperationId(operation),
         activation,
         parameters,
-        draw_seed: 11,
+        operation_seed: 11,
     };
     let start = Condition::And(Box::new(near()), Box::new(Condition::Or(Box::new(fast()), Box::new(near()))));
     let offset = Choice::Range { low: -0.1, high: 0.2 };
@@ -332,7 +333,7 @@ fn random_test(plan: &CampaignPlan, seed: u64, number: u32) -> Test {
                 operation: OperationId(u32::try_from(id).expect("what is made up here can be recorded")),
                 activation: Activation::Time { start, end: start + length },
                 parameters,
-                draw_seed: stream.bits(),
+                operation_seed: stream.bits(),
             }
         })
         .collect();
@@ -445,7 +446,7 @@ fn recorded(folder: &Path, plan: &CampaignPlan, searched: u32, fronts: bool) -> 
         Recorder::create(folder, plan, plan.campaign.seed, 2).expect("what is made up here can be recorded");
     let records = records(plan, searched);
     let mut indicators = Indicators::new(Some(&search::fitness(plan, &records[0].observation)));
-    let mut front_so_far = search::Front::default();
+    let mut front_so_far = sesame_optimise::front::Front::default();
     recorder.commit(&records[0]).expect("what is made up here can be recorded");
     for (at, record) in records.iter().enumerate().skip(1) {
         recorder.commit(record).expect("what is made up here can be recorded");

@@ -65,7 +65,7 @@ impl ScannedTest {
                 disturbance(plan, it.operation, &it.choices, intervals)
             })
             .collect();
-        Point::of(&disturbances, convention)
+        Point::from_disturbances(&disturbances, convention)
     }
 
     /// Its point, if it counts for coverage: it had an effect, and is not a duplicate.

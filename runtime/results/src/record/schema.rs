@@ -8,7 +8,7 @@ use std::path::Path;
 use rusqlite::{Connection, OpenFlags};
 
 use sesame_base::verdict::ends;
-use sesame_plan::{CampaignPlan, Direction};
+use sesame_plan::{CampaignPlan, Direction, Task};
 
 use crate::record::columns::index;
 use crate::record::{RecordError, series_views};
@@ -31,6 +31,8 @@ pub(super) const STANDARD_WORDS_SINCE: i64 = 7;
 
 /// The first schema with series in pieces; before, each point was a row.
 pub(super) const PIECES_SINCE: i64 = 6;
+/// The first schema with the column `task`.
+pub(super) const TASK_SINCE: i64 = 7;
 
 /// Columns that this release reads from tables, and their names before [`STANDARD_WORDS_SINCE`].
 const RENAMED: [(&str, &str); 2] = [("operation_seed", "draw_seed"), ("no_effect", "void")];
@@ -40,18 +42,29 @@ pub(super) fn query(sql: &str, schema: i64) -> Cow<'_, str> {
     if schema >= STANDARD_WORDS_SINCE {
         return Cow::Borrowed(sql);
     }
-    Cow::Owned(RENAMED.iter().fold(sql.to_owned(), |sql, (now, before)| sql.replace(now, before)))
+    let sql = if schema < TASK_SINCE {
+        sql.replace(", task FROM", " FROM").replace("coalesce(plan || task, plan)", "plan")
+    } else {
+        sql.to_owned()
+    };
+    Cow::Owned(RENAMED.iter().fold(sql, |sql, (now, before)| sql.replace(now, before)))
 }
 
 /// Makes all tables and views, and fills in what is fixed for a campaign; all or nothing.
-pub(crate) fn install(connection: &mut Connection, plan: &CampaignPlan, seed: u64) -> rusqlite::Result<()> {
+pub(crate) fn install(
+    connection: &mut Connection,
+    plan: &CampaignPlan,
+    task: &Task,
+    seed: u64,
+) -> rusqlite::Result<()> {
+    let text = |value| serde_json::to_string(value).expect("a task is plain data with text keys");
     let transaction = connection.transaction()?;
     transaction.execute_batch(DDL)?;
     transaction.execute_batch(&series_views::views())?;
     transaction.execute_batch(&wide_views(plan))?;
     transaction.execute(
-        "INSERT INTO campaign (id, space, name, source, generator, runtime, seed, evaluations, end_after_s, plan) \
-         VALUES (1, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+        "INSERT INTO campaign (id, space, name, source, generator, runtime, seed, evaluations, end_after_s, plan, task) \
+         VALUES (1, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
         rusqlite::params![
             plan.space,
             plan.campaign.name,
@@ -59,9 +72,10 @@ pub(crate) fn install(connection: &mut Connection, plan: &CampaignPlan, seed: u6
             plan.generator,
             env!("CARGO_PKG_VERSION"),
             seed.to_string(),
-            plan.campaign.search.evaluations(),
+            task.evaluations(plan),
             plan.campaign.end_after,
             serde_json::to_string(plan).expect("a plan is plain data with text keys"),
+            (*task != Task::Campaign).then(|| text(task)),
         ],
     )?;
     for (id, metric) in plan.metrics.iter().enumerate() {

@@ -18,7 +18,8 @@ CREATE TABLE campaign (
     evaluations     INTEGER NOT NULL, -- tests the search was to evaluate
     end_after_s     REAL NOT NULL,  -- simulation time at which a test ends
     plan            TEXT NOT NULL,  -- everything the runner knew about the campaign, JSON
-    stop            TEXT            -- why the run ended; NULL while it is unfinished
+    stop            TEXT,           -- why the run ended; NULL while it is unfinished
+    task            TEXT            -- what the run does instead of the campaign (known, repeat, shrink), JSON; NULL for the campaign
 ) STRICT;
 
 CREATE TABLE metrics (

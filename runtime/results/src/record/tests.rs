@@ -12,8 +12,8 @@ use sesame_base::observation::{MetricObservation, OperationEffect, Reach};
 use sesame_optimise::nsga2::Variation as _;
 use sesame_plan::condition::ConditionEnd;
 use sesame_plan::{Activation, Bound, Choice, MetricId, OperationId, Test};
-use sesame_search::evolve::variation::{Rates, TestVariation};
-use sesame_search::space::permitted::Permitted;
+use sesame_search::space::TestSpace;
+use sesame_search::{Rates, TestVariation};
 
 use super::*;
 
@@ -156,7 +156,7 @@ fn activations_of_every_kind_come_back_as_they_were() {
 fn tests_by_condition_that_hold_an_offline_operation_vary_and_come_back_as_they_were() {
     for end in [ConditionEnd::Condition, ConditionEnd::Length { low: 1.0, high: 15.0 }] {
         let plan = sample::offline_plan(end);
-        let mut variation = TestVariation::new(Permitted::of(&plan).unwrap(), Rates::by_condition(), 5);
+        let mut variation = TestVariation::new(TestSpace::from_plan(&plan).unwrap(), Rates::by_condition(), 5);
         let mut tests = [variation.initial(0), variation.initial(1)];
         let folder = folder();
         let mut recorder = Recorder::create(folder.path(), &plan, 42, 2).unwrap();

@@ -91,7 +91,7 @@ fn block(plan: &CampaignPlan, doc: &str, record: &TestRecord, name: &str) -> Str
                 }
             };
         }
-        let _ = writeln!(text, " {} seed {}", activation(plan, used), used.draw_seed);
+        let _ = writeln!(text, " {} seed {}", activation(plan, used), used.operation_seed);
     }
     expectations(&mut text, plan, record);
     text.push_str("}\n");
@@ -213,7 +213,7 @@ mod tests {
             operation: OperationId(4),
             activation: Activation::Offline,
             parameters: vec![Choice::Text { text: "hot".to_owned() }],
-            draw_seed: 11,
+            operation_seed: 11,
         };
         let record = sample::record(&plan, 5, crate::record::Origin::Search, Test { operations: vec![used] });
         let before = block(&plan, "T5 of `coverage_experiment`, seed 42.", &record, "spoilt");

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use sesame_base::observation::Counters;
-use sesame_plan::{Confirmation, Span, Typical};
+use sesame_plan::{Confirmation, Span, Statistic};
 
 use crate::analysis::confirmed::ConfirmedTest;
 use crate::present::number::{self, fixed, join_words, plural};
@@ -137,9 +137,9 @@ pub(crate) fn once_sentence(summary: &Summary) -> Option<String> {
 pub(crate) fn values_sentence(confirmation: Confirmation) -> String {
     let runs = plural(confirmation.times as usize, "fresh run", "fresh runs");
     match confirmation.by {
-        Typical::Mean => format!("Values are means of {runs} of each test."),
-        Typical::Median => format!("Values are medians of {runs} of each test."),
-        Typical::Quantile { share } => {
+        Statistic::Mean => format!("Values are means of {runs} of each test."),
+        Statistic::Median => format!("Values are medians of {runs} of each test."),
+        Statistic::Quantile { share } => {
             format!("Values are those that {} % of {runs} of each test reach or exceed.", number::number(100.0 * share))
         }
     }

@@ -1,5 +1,7 @@
 //! Reports on a made-up campaign, read as a user reads them.
 
+use sesame_plan::Task;
+
 use super::*;
 use crate::record::{Origin, Repository, Standing, sample};
 
@@ -166,7 +168,7 @@ fn a_grid_of_one_dimension_is_a_row_and_one_without_a_test_is_empty() {
 }
 
 /// What a campaign shows that does so instead of searching.
-fn instead(search: sesame_plan::Search) -> (tempfile::TempDir, Repository) {
+fn instead(task: &Task) -> (tempfile::TempDir, Repository) {
     let folder = tempfile::tempdir().unwrap();
     let mut plan = sample::plan();
     let expect = |metric, bound| sesame_plan::Expectation { metric: sesame_plan::MetricId(metric), bound };
@@ -174,14 +176,13 @@ fn instead(search: sesame_plan::Search) -> (tempfile::TempDir, Repository) {
         expect(0, sesame_plan::Bound::Within { low: 1.0, high: 40.0 }),
         expect(1, sesame_plan::Bound::Equal { value: 49.0f64.next_up() }),
     ];
-    plan.campaign.objectives.clear();
-    plan.campaign.search = search;
-    let mut recorder = crate::record::Recorder::create(folder.path(), &plan, 1, 1).unwrap();
+    let plan = task.plan(&plan);
+    let mut recorder = crate::record::Recorder::create_for(folder.path(), &plan, task, 1, 1).unwrap();
     let test = plan.tests[0].test.clone();
     let known = sesame_plan::KnownTestId(0);
-    match plan.campaign.search {
-        sesame_plan::Search::Repeat { times, .. } => {
-            for number in 1..=times {
+    match task {
+        Task::Repeat { times, .. } => {
+            for number in 1..=*times {
                 recorder.commit(&sample::record(&plan, number, crate::record::Origin::Search, test.clone())).unwrap();
             }
         }
@@ -192,14 +193,18 @@ fn instead(search: sesame_plan::Search) -> (tempfile::TempDir, Repository) {
 
 #[test]
 fn a_repetition_says_how_often_each_requirement_was_violated() {
-    let (_folder, repository) = instead(sesame_plan::Search::Repeat { test: sesame_plan::KnownTestId(0), times: 10 });
+    let (_folder, repository) = instead(&Task::Repeat {
+        name: "known_jitter".to_owned(),
+        test: sample::plan().tests[0].test.clone(),
+        times: 10,
+    });
     insta::assert_snapshot!("repeated", summary_text(&summary(&repository).unwrap(), WIDE));
     assert!(page(&repository).unwrap().contains("95 % Wilson interval"));
 }
 
 #[test]
 fn known_tests_are_compared_with_what_they_expect() {
-    let (_folder, repository) = instead(sesame_plan::Search::Known { tests: vec![sesame_plan::KnownTestId(0)] });
+    let (_folder, repository) = instead(&Task::Known { tests: vec![sesame_plan::KnownTestId(0)] });
     insta::assert_snapshot!("known", summary_text(&summary(&repository).unwrap(), WIDE));
     let html = page(&repository).unwrap();
     assert!(parsed(&html).descendants().any(|node| node.text() == Some("= 49.00000000000001 s")));

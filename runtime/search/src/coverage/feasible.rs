@@ -7,9 +7,9 @@ use sesame_rng::derive_seed;
 
 use crate::coverage::grid::{Grid, place_on};
 use crate::coverage::spread::{self, Member};
-use crate::space::choice::PermittedChoice;
-use crate::space::permitted::{Permitted, PermittedActivation};
+use crate::space::parameter_space::ParameterSpace;
 use crate::space::range::Range;
+use crate::space::test_space::{ActivationSpace, TestSpace};
 use crate::sspr::{Class, Window, class_of};
 
 /// Ways to make up a test of operations that differ, at most; beyond, every cell counts as feasible.
@@ -54,7 +54,7 @@ pub struct Feasible {
 
 impl Feasible {
     /// The feasible cells of a campaign.
-    pub fn of(plan: &CampaignPlan, grid: &Grid) -> Feasible {
+    pub fn from_plan(plan: &CampaignPlan, grid: &Grid) -> Feasible {
         Feasible::with_margin(plan, grid, MARGIN)
     }
 
@@ -99,13 +99,13 @@ impl Feasible {
     fn compute(plan: &CampaignPlan, grid: &Grid, one_interval_each: bool, margin: f64) -> Feasible {
         let reaches = vec![true; grid.len()];
         let all = Feasible { reaches, exact: false, kinds: Vec::new(), mixtures: Vec::new(), ways: Vec::new() };
-        let Ok(permitted) = Permitted::of(plan) else { return all };
+        let Ok(test_space) = TestSpace::from_plan(plan) else { return all };
         let sectors = Sectors::of(grid, one_interval_each, margin);
-        let (kinds, operations) = sectors.kinds(plan, &permitted);
+        let (kinds, operations) = sectors.kinds(plan, &test_space);
         // Operations beside the run are no part of the point and may take the place of others.
-        let offline = permitted.operations().iter().any(|it| it.activation == PermittedActivation::Offline);
-        let fewest = if one_interval_each && !offline { permitted.fewest() } else { 1 };
-        let Some(mut mixtures) = mixtures(kinds.len(), fewest, permitted.most()) else { return all };
+        let offline = test_space.operations().iter().any(|it| it.activation == ActivationSpace::Offline);
+        let fewest = if one_interval_each && !offline { test_space.fewest() } else { 1 };
+        let Some(mut mixtures) = mixtures(kinds.len(), fewest, test_space.most()) else { return all };
 
         // Where tests hold copies of one operation, and these constrain each other.
         let crowded = |mixture: &[usize]| mixture.iter().zip(&operations).any(|(count, kind)| *count > kind.len());
@@ -218,9 +218,9 @@ enum Values {
 impl Values {
     /// What the numbers of a parameter can be: one for a number, three for a point, none for a text, a file, or what
     /// has no width.
-    fn of(domain: &Domain, permitted: &PermittedChoice) -> Vec<Values> {
-        match (domain, permitted) {
-            (&Domain::Number { low, high, .. }, &PermittedChoice::Number(range, shape)) => {
+    fn of(domain: &Domain, parameter_space: &ParameterSpace) -> Vec<Values> {
+        match (domain, parameter_space) {
+            (&Domain::Number { low, high, .. }, &ParameterSpace::Number(range, shape)) => {
                 Values::of_number((low, high), range, shape).into_iter().collect()
             }
             (Domain::Point { low, high }, _) => {
@@ -291,13 +291,13 @@ impl Sectors {
 
     /// The operations of a campaign that are active during the run; those that the grid cannot tell apart are one. Of each
     /// kind beside it the operations that are of it.
-    fn kinds(&self, plan: &CampaignPlan, permitted: &Permitted) -> (Vec<KindOfOperation>, Vec<Vec<OperationId>>) {
+    fn kinds(&self, plan: &CampaignPlan, test_space: &TestSpace) -> (Vec<KindOfOperation>, Vec<Vec<OperationId>>) {
         let timed = self.has(&[Dimension::T1, Dimension::T2, Dimension::T3]);
         let graded = self.has(&[Dimension::P1, Dimension::P2]);
         let classed = self.has(&[Dimension::O1, Dimension::O2, Dimension::O3]);
         let mut kinds: Vec<KindOfOperation> = Vec::new();
         let mut operations: Vec<Vec<OperationId>> = Vec::new();
-        for it in permitted.operations() {
+        for it in test_space.operations() {
             let operation = plan.operation(it.operation);
             let Some(window) = Window::of(plan, it) else { continue };
             let window = if self.one_interval_each { window } else { Window { shortest: 0.0, ..window } };
@@ -306,7 +306,7 @@ impl Sectors {
                 window: if timed { window } else { Window { start: 0.0, end: 1.0, shortest: 0.0 } },
                 parameters: parameters
                     .filter(|_| graded)
-                    .flat_map(|(parameter, permitted)| Values::of(&parameter.domain, permitted))
+                    .flat_map(|(parameter, parameter_space)| Values::of(&parameter.domain, parameter_space))
                     .collect(),
                 class: if classed { class_of(&operation.kind) } else { Class::Other },
             };

@@ -13,7 +13,7 @@ pub struct Grid {
     axes: Vec<GridAxis>,
 }
 
-/// Why something is no grid.
+/// Why axes do not form a grid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GridError {
     /// An axis that is not written as it should be.
@@ -22,7 +22,7 @@ pub enum GridError {
     /// A dimension that does not exist.
     #[error("there is no dimension `{0}`; there are T1, T2, T3, P1, P2, O0, O1, O2 and O3")]
     NoDimension(String),
-    /// Ends that are no range.
+    /// Ends that do not form a range.
     #[error("the axis {dimension} runs from {low} to {high}; the first must be less")]
     Ends {
         /// The dimension.

@@ -1,549 +1,200 @@
-//! Construction of tests: the reduction of tests to points, inverted.
+//! Evolution that constructs tests for cells that need them.
 //!
-//! Given a test and a cell, [`Constructor::place_in_cell`] changes the test as little as may be so that its point lies in the
-//! cell. The reduction throws away almost everything, so almost everything can stay: how many operations there are unless
-//! the cell counts them, the order of their windows, and of a sub-range its middle, as only its width is counted.
+//! A share of each generation's tests, including the first, are changed as little as possible so that they lie in a feasible
+//! cell with too few hits. They are first made like every other test, by selection, crossover and mutation, so a constructed
+//! test descends from good parents and keeps of them what the cell leaves open. Of the cells that need tests the nearest is
+//! chosen, so that little is changed.
 //!
-//! 1. *Numbers of operations* (O0 to O3): operations are added, removed or replaced until all are as the cell wants them.
-//! 2. *Timing* (T1 to T3): midpoints first, since they decide how long windows can be. All are moved by one amount until
-//!    T1 is in the cell, and towards the middles of their windows until there is room for lengths as the cell wants them
-//!    (T2); then apart or together until T3 is. Lengths follow, moved by one amount until their mean is in the cell, each
-//!    between the shortest and what its midpoint leaves. What is permitted of midpoints is convex, and where they are
-//!    farthest apart is a vertex of it, as in the computation of feasible cells; so every spread up to that is found.
-//! 3. *Intensity* (P1, P2): likewise with the normalised parameters.
-//!
-//! Where copies of one operation must not be active at the same time, its window is divided among them first, in the order
-//! in which they are: each has a part to itself, and whatever is done inside of those is permitted.
-//!
-//! Attempts begin at the test itself; then at what the computation of feasible cells says of the cell, the numbers of
-//! operations of each kind that reach it; the last ones at fresh tests. What comes out is reduced again and kept only if it
-//! lies in the cell, so whole numbers and rounding can cost an attempt but never put a test into another cell.
+//! Two things can fail: a constructed test may miss its cell when it runs (no effect, or a run that broke off), or no test
+//! can be built. Cells with fewer failures come first. After three misses, or five attempts to build without success, each
+//! from another test, a cell is given up. The end of the search reports what was given up and why.
 
-mod spread;
+pub(crate) mod placement;
 
-use spread::{Member, Wanted};
-
-use sesame_plan::{Activation, CampaignPlan, Choice, Copies, Dimension, Domain, OperationId, Test, TestOperation};
+use sesame_optimise::nsga2::{Child, Variation};
+use sesame_plan::Test;
 use sesame_rng::Stream;
 
-use crate::Permitted;
-use crate::coverage::{Feasible, Grid};
-use crate::space::choice::PermittedChoice;
-use crate::space::initial::{fresh_operation, fresh_test};
-use crate::space::permitted::{PermittedActivation, PermittedOperation};
-use crate::sspr::{Class, Convention, Point, class_of, planned};
+use crate::coverage::{Grid, edge};
+use crate::evolve::cells::Cells;
+use crate::evolve::construct::placement::CellPlacer;
+use crate::strategy::Learning;
+use crate::{Evaluated, TestVariation};
 
-/// Attempts from the test itself, with other random choices each.
-const FROM_THE_TEST: u32 = 4;
-/// Attempts from each way to make up a test that is known to reach the cell.
-const FROM_A_WAY: u32 = 2;
-/// How far above the shortest that a cell wants the mean of the lengths can be at least, as a share of what it wants:
-/// midpoints leave as much room. In first attempts, and in later ones, which seek what is hard to reach.
-const SHARES_FOR_LENGTHS: [f64; 2] = [0.02, 1e-4];
-/// Attempts from fresh tests after those.
-const FROM_FRESH: u32 = 4;
+/// Misses after which a cell is given up.
+const MOST_MISSES: u32 = 3;
+/// Attempts to build a test for a cell, each from another test, after which it is given up.
+const MOST_ATTEMPTS: u32 = 5;
+/// Cells named where some were given up.
+const MOST_NAMED: usize = 20;
+/// Cells tried for one test before it stays as it is.
+const MOST_CELLS_TRIED: usize = 8;
 
-/// Puts tests of one campaign by time into cells of one grid.
+/// How much is constructed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Construction {
+    /// The share of the tests of each generation, in `0..=1`.
+    pub(crate) share: f64,
+    /// The share of all cells from which on none is constructed any more.
+    pub(crate) until: f64,
+}
+
+/// Variation of tests with construction.
 #[derive(Debug, Clone)]
-pub(crate) struct Constructor {
-    permitted: Permitted,
-    grid: Grid,
-    feasible: Feasible,
-    copies: Copies,
+pub(crate) struct ConstructingVariation {
+    tests: TestVariation,
+    cells: Cells,
+    placer: CellPlacer,
+    construction: Construction,
+    seed: u64,
+    /// Per cell, how often a test constructed for it fell elsewhere.
+    missed: Vec<u32>,
+    /// Per cell, how often no test for it could be built.
+    unbuilt: Vec<u32>,
+    /// Per test of the generation asked last, the cell it was constructed for.
+    aims: Vec<Option<usize>>,
 }
 
-/// What a cell demands: per dimension of the grid the values from the first up to, not including, the second.
-struct Demands(Vec<(Dimension, (f64, f64))>);
-
-impl Demands {
-    fn of(&self, dimension: Dimension) -> Option<(f64, f64)> {
-        self.0.iter().find(|(it, _)| *it == dimension).map(|(_, ends)| *ends)
-    }
-
-    fn any_of(&self, dimensions: &[Dimension]) -> bool {
-        dimensions.iter().any(|&dimension| self.of(dimension).is_some())
-    }
-}
-
-/// Where a permitted window lies, and an operation's in it, in shares of `within`.
-struct Window {
-    at: usize,
-    low: f64,
-    high: f64,
-    shortest: f64,
-    start: f64,
-    end: f64,
-}
-
-/// A number that an operation's parameters count with.
-struct Number {
-    operation: usize,
-    parameter: usize,
-    axis: usize,
-    member: Member,
-}
-
-impl Constructor {
-    pub(crate) fn new(permitted: Permitted, grid: Grid, feasible: Feasible, copies: Copies) -> Self {
-        Constructor { permitted, grid, feasible, copies }
-    }
-
-    /// A permitted test in a cell, like the given one; `None` where none was found.
-    pub(crate) fn place_in_cell(
-        &self,
-        test: &Test,
-        cell: usize,
-        plan: &CampaignPlan,
-        stream: &mut Stream,
-    ) -> Option<Test> {
-        let places = self.grid.axes().iter().zip(self.grid.place(cell));
-        let demands = Demands(places.map(|(axis, at)| (axis.dimension, Grid::bounds(axis, at))).collect());
-        let from_the_test = (0..FROM_THE_TEST).find_map(|attempt| {
-            let begun = self.numbered(test.clone(), &demands, plan, stream)?;
-            self.finished(begun, test, cell, &demands, plan, attempt, stream)
-        });
-        if from_the_test.is_some() {
-            return from_the_test;
+impl ConstructingVariation {
+    pub(crate) fn new(
+        tests: TestVariation,
+        cells: Cells,
+        placer: CellPlacer,
+        construction: Construction,
+        seed: u64,
+    ) -> Self {
+        let none = vec![0; cells.grid().len()];
+        ConstructingVariation {
+            tests,
+            cells,
+            placer,
+            construction,
+            seed,
+            missed: none.clone(),
+            unbuilt: none,
+            aims: Vec::new(),
         }
-        for way in self.feasible.ways(cell) {
-            let built = (0..FROM_A_WAY).find_map(|attempt| {
-                let begun = self.made_of(test, &way, stream)?;
-                self.finished(begun, test, cell, &demands, plan, attempt, stream)
-            });
-            if built.is_some() {
-                return built;
-            }
-        }
-        (0..FROM_FRESH).find_map(|attempt| {
-            let begun = self.numbered(self.fresh(stream), &demands, plan, stream)?;
-            self.finished(begun, test, cell, &demands, plan, attempt, stream)
-        })
     }
 
-    /// The test with windows and parameters moved into the cell, if that was found.
-    #[expect(clippy::too_many_arguments, reason = "all that an attempt goes by")]
-    fn finished(
-        &self,
-        mut built: Test,
-        origin: &Test,
-        cell: usize,
-        demands: &Demands,
-        plan: &CampaignPlan,
-        attempt: u32,
-        stream: &mut Stream,
-    ) -> Option<Test> {
-        if !self.time(&mut built, demands, plan, attempt, stream) || !self.grade(&mut built, demands, plan, stream) {
-            return None;
-        }
-        for (at, operation) in built.operations.iter_mut().enumerate() {
-            let changed = origin.operations.get(at).is_none_or(|before| before != operation);
-            if changed {
-                operation.draw_seed = stream.bits();
-            }
-        }
-        self.permitted.settle(&mut built, stream);
-        let point = Point::of(&planned(plan, &built)?, Convention::Ours)?;
-        (self.grid.cell_of(&point) == Some(cell)).then_some(built)
+    fn is_given_up(&self, cell: usize) -> bool {
+        self.missed[cell] >= MOST_MISSES || self.unbuilt[cell] >= MOST_ATTEMPTS
     }
 
-    /// A test of so many operations of each kind: those that this test has, and fresh ones. Copies of one only where a
-    /// kind has no other operations. What acts beside the run makes up what a test must hold at least; `None` where it
-    /// cannot.
-    fn made_of(&self, test: &Test, way: &[(&[OperationId], usize)], stream: &mut Stream) -> Option<Test> {
-        let mut operations = Vec::new();
-        for &(kind, count) in way {
-            let mut taken: Vec<OperationId> = Vec::new();
-            for operation in &test.operations {
-                let id = operation.operation;
-                if taken.len() < count && kind.contains(&id) && !taken.contains(&id) {
-                    operations.push(operation.clone());
-                    taken.push(id);
-                }
-            }
-            while taken.len() < count {
-                // Each operation once more before any is there twice more.
-                let times = |id: OperationId| taken.iter().filter(|&&it| it == id).count();
-                let fewest = kind.iter().map(|&id| times(id)).min().unwrap_or_default();
-                let open: Vec<OperationId> = kind.iter().copied().filter(|&id| times(id) == fewest).collect();
-                let id = open[stream.below(open.len())];
-                let permitted = self.permitted.find(id).expect("what reaches a cell is permitted");
-                operations.push(fresh_operation(permitted, stream));
-                taken.push(id);
-            }
-        }
-        let kinds = self.permitted.operations().iter();
-        let beside: Vec<&PermittedOperation> =
-            kinds.filter(|kind| kind.activation == PermittedActivation::Offline).collect();
-        let mut built = Test { operations };
-        while built.operations.len() < self.permitted.fewest() {
-            let one = self.another(&beside, &built, stream)?;
-            built.operations.push(one);
-        }
-        let order = stream.permutation(built.operations.len());
-        Some(Test { operations: order.into_iter().map(|at| built.operations[at].clone()).collect() })
+    /// Whether the test at this place of its generation is constructed: as evenly spread as the share permits.
+    fn constructs(&self, place: u64) -> bool {
+        let before = libm::floor(place as f64 * self.construction.share);
+        let after = libm::floor((place + 1) as f64 * self.construction.share);
+        after > before && self.cells.expected_share() < self.construction.until
     }
 
-    /// The test with as many operations as the cell wants.
-    fn numbered(&self, mut test: Test, demands: &Demands, plan: &CampaignPlan, stream: &mut Stream) -> Option<Test> {
-        self.number(&mut test, demands, plan, stream).then_some(test)
-    }
-
-    /// Of these operations one, fresh: if copies are not welcome one that the test does not hold, where there is one.
-    fn another(&self, of: &[&PermittedOperation], test: &Test, stream: &mut Stream) -> Option<TestOperation> {
-        let held = |kind: &PermittedOperation| test.operations.iter().any(|it| it.operation == kind.operation);
-        let new: Vec<&PermittedOperation> = of.iter().copied().filter(|kind| !held(kind)).collect();
-        let open = match self.copies {
-            Copies::MayOverlap => of,
-            Copies::Apart if new.is_empty() => of,
-            Copies::Apart | Copies::Once => &new,
-        };
-        (!open.is_empty()).then(|| fresh_operation(open[stream.below(open.len())], stream))
-    }
-
-    /// A fresh test, half of it of any operations alike: a cell may ask for some that fresh tests rarely hold.
-    fn fresh(&self, stream: &mut Stream) -> Test {
-        let kinds: Vec<&PermittedOperation> = self.permitted.operations().iter().collect();
-        let mut test = fresh_test(&self.permitted, stream);
-        for at in 0..test.operations.len() {
-            if stream.chance(0.5)
-                && let Some(other) = self.another(&kinds, &test, stream)
-            {
-                test.operations[at] = other;
-            }
+    /// The test, or one constructed from it.
+    fn place(&mut self, test: Test, place: u64, mut stream: Stream) -> Test {
+        let constructed = if self.constructs(place) { self.constructed(&test, &mut stream) } else { None };
+        let aim = constructed.as_ref().map(|(cell, _)| *cell);
+        let test = constructed.map_or(test, |(_, test)| test);
+        if let Some(cell) = aim.or_else(|| self.cells.cell_of(&test)) {
+            self.cells.reserve(cell);
         }
+        self.aims.push(aim);
         test
     }
 
-    fn kind_of(&self, operation: &TestOperation) -> &PermittedOperation {
-        self.permitted.find(operation.operation).expect("a test of a campaign holds operations of that campaign")
-    }
-
-    /// Adds, removes and replaces operations until their numbers are those of the cell. A walk of random steps, each
-    /// towards what lacks or is too much.
-    fn number(&self, test: &mut Test, demands: &Demands, plan: &CampaignPlan, stream: &mut Stream) -> bool {
-        let class = |kind: &PermittedOperation| class_of(&plan.operation(kind.operation).kind);
-        let active = |kind: &PermittedOperation| kind.activation != PermittedActivation::Offline;
-        let is = |kind: &PermittedOperation, dimension: Dimension| {
-            active(kind)
-                && match dimension {
-                    Dimension::O1 => class(kind) == Class::Value,
-                    Dimension::O2 => class(kind) == Class::Loss,
-                    Dimension::O3 => class(kind) == Class::Delay,
-                    // Whatever can be counted.
-                    Dimension::P1 | Dimension::P2 => graded(plan, kind),
-                    Dimension::O0 | Dimension::T1 | Dimension::T2 | Dimension::T3 => true,
-                }
-        };
-        // Every test in a cell is active, graded where parameters count, and a spread takes two.
-        let least = |dimension: Dimension| match (dimension, demands.of(dimension)) {
-            (Dimension::T3 | Dimension::P2, Some((low, _))) if low > 0.0 => Some(2.0),
-            (Dimension::T1 | Dimension::T2 | Dimension::T3 | Dimension::P1 | Dimension::P2, Some(_)) => Some(1.0),
-            _ => None,
-        };
-        for _ in 0..4 * self.permitted.most() + 8 {
-            let wrong = demands.0.iter().find_map(|&(dimension, (low, high))| {
-                let these = test.operations.iter().filter(|it| is(self.kind_of(it), dimension)).count() as f64;
-                let (low, high) = match dimension {
-                    Dimension::O0 | Dimension::O1 | Dimension::O2 | Dimension::O3 => (low, high),
-                    _ => (least(dimension)?, f64::INFINITY),
-                };
-                (these < low || these >= high).then_some((dimension, these < low))
-            });
-            let Some((dimension, too_few)) = wrong else { return true };
-            let operations = &test.operations;
-            // Those that may leave: of what is too much, or anything else than what lacks.
-            let leaving: Vec<usize> =
-                (0..operations.len()).filter(|&at| is(self.kind_of(&operations[at]), dimension) != too_few).collect();
-            let coming: Vec<&PermittedOperation> =
-                self.permitted.operations().iter().filter(|kind| is(kind, dimension) == too_few).collect();
-            let replaces = !leaving.is_empty() && !coming.is_empty();
-            let resizes = if too_few {
-                !coming.is_empty() && operations.len() < self.permitted.most()
-            } else {
-                !leaving.is_empty() && operations.len() > self.permitted.fewest()
-            };
-            if !replaces && !resizes {
-                return false;
-            }
-            if replaces && (!resizes || stream.chance(0.5)) {
-                let at = leaving[stream.below(leaving.len())];
-                let Some(other) = self.another(&coming, test, stream) else { return false };
-                test.operations[at] = other;
-            } else if too_few {
-                let Some(other) = self.another(&coming, test, stream) else { return false };
-                test.operations.insert(stream.below(test.operations.len() + 1), other);
-            } else {
-                test.operations.remove(leaving[stream.below(leaving.len())]);
-            }
-        }
-        false
-    }
-
-    /// The windows of the operations that are active by time.
-    fn windows(&self, test: &Test, plan: &CampaignPlan) -> Vec<Window> {
-        let windows = test.operations.iter().enumerate().filter_map(|(at, operation)| {
-            let PermittedActivation::Time(range) = &self.kind_of(operation).activation else { return None };
-            let Activation::Time { start, end } = operation.activation else { return None };
-            let within = plan.operation(operation.operation).within;
-            let share = |time: f64| (time - within.start) / within.length();
-            Some(Window {
-                at,
-                low: share(range.low),
-                high: share(range.high),
-                shortest: range.shortest / within.length(),
-                start: share(start),
-                end: share(end),
-            })
-        });
-        windows.collect()
-    }
-
-    /// Divides the windows of copies among them, in the order in which they lie. First where they are apart already; then
-    /// so that all but one have as much as the cell wants on the side on which it is; then evenly; then as it falls. False
-    /// where they are too many for that.
-    fn divide(
-        &self,
-        windows: &mut [Window],
-        test: &Test,
-        demands: &Demands,
-        attempt: u32,
-        stream: &mut Stream,
-    ) -> bool {
-        if self.copies == Copies::MayOverlap {
-            return true;
-        }
-        let kind = |window: &Window| test.operations[window.at].operation;
-        let mut kinds: Vec<OperationId> = windows.iter().map(kind).collect();
-        kinds.sort_unstable_by_key(|id| id.0);
-        kinds.dedup();
-        for id in kinds {
-            let mut copies: Vec<usize> = (0..windows.len()).filter(|&at| kind(&windows[at]) == id).collect();
-            if copies.len() < 2 {
-                continue;
-            }
-            if self.copies == Copies::Once {
-                return false;
-            }
-            copies.sort_by(|&a, &b| windows[a].start.total_cmp(&windows[b].start));
-            let Window { low, high, shortest, .. } = windows[copies[0]];
-            // Somewhat more than the shortest each, so that rounding takes nothing away from it.
-            let least = 1.001 * shortest;
-            let spare = (high - low) - copies.len() as f64 * least;
-            if spare < 0.0 {
-                return false;
-            }
-            let pairs = || copies.windows(2).map(|pair| (windows[pair[0]].end, windows[pair[1]].start));
-            let apart = pairs().all(|(end, start)| end <= start);
-            let even = (high - low) / copies.len() as f64;
-            let widths: Vec<f64> = match attempt + u32::from(!apart) {
-                0 => {
-                    let ends = pairs().map(|(end, start)| f64::midpoint(end, start)).chain([high]);
-                    let begins = std::iter::once(low).chain(pairs().map(|(end, start)| f64::midpoint(end, start)));
-                    ends.zip(begins).map(|(end, begin)| end - begin).collect()
-                }
-                1 => {
-                    let (t1, t2) = (demands.of(Dimension::T1), demands.of(Dimension::T2));
-                    let length = t2.map_or(least, |(from, to)| f64::midpoint(from.max(0.0), to.min(high - low)));
-                    let wide = t1.is_some_and(|(from, to)| {
-                        f64::midpoint(from.max(low), to.min(high)) > f64::midpoint(low, high)
-                    });
-                    let wide = if wide { 0 } else { copies.len() - 1 };
-                    let narrow = length.max(least).min(even);
-                    let rest = (high - low) - narrow * (copies.len() - 1) as f64;
-                    (0..copies.len()).map(|at| if at == wide { rest } else { narrow }).collect()
-                }
-                2 => vec![even; copies.len()],
-                _ => {
-                    let shares: Vec<f64> =
-                        copies.iter().map(|_| libm::pow(stream.unit(), 1.0 + 5.0 * stream.unit()) + 1e-9).collect();
-                    let all: f64 = shares.iter().sum();
-                    shares.iter().map(|share| least + spare * share / all).collect()
-                }
-            };
-            let mut from = low;
-            for (&at, width) in copies.iter().zip(widths) {
-                (windows[at].low, windows[at].high) = (from, (from + width).min(high));
-                from = windows[at].high;
-            }
-        }
-        true
-    }
-
-    /// Moves the windows.
-    fn time(&self, test: &mut Test, demands: &Demands, plan: &CampaignPlan, attempt: u32, stream: &mut Stream) -> bool {
-        let mut windows = self.windows(test, plan);
-        let timed = demands.any_of(&[Dimension::T1, Dimension::T2, Dimension::T3]);
-        // Where no time is asked for, windows stay, but for those of copies that were put together here.
-        if !timed && (self.copies != Copies::Apart || !crowds(test)) {
-            return true;
-        }
-        if windows.is_empty() || !self.divide(&mut windows, test, demands, attempt, stream) {
-            return false;
-        }
-        let n = windows.len() as f64;
-        let anything = (f64::NEG_INFINITY, f64::INFINITY);
-        let [t1, t2] = [Dimension::T1, Dimension::T2].map(|dimension| demands.of(dimension).unwrap_or(anything));
-        // The longer the intervals, the less room for their midpoints: lengths are as wanted if the midpoints are together
-        // no farther from the middles than this.
-        let shortest = windows.iter().map(|it| it.shortest).sum::<f64>() / n;
-        let width = windows.iter().map(|it| it.high - it.low).sum::<f64>() / n;
-        let longest = t2.1.min(width);
-        let share = SHARES_FOR_LENGTHS[usize::from(attempt > 0)];
-        let length = if t2.0 > shortest { t2.0 + share * (longest - t2.0) } else { shortest };
-        if length > longest {
-            return false;
-        }
-        let midpoints: Vec<Member> = windows
-            .iter()
-            .map(|it| Member {
-                now: f64::midpoint(it.start, it.end),
-                low: it.low + it.shortest / 2.0,
-                high: it.high - it.shortest / 2.0,
-                step: None,
+    fn constructed(&mut self, test: &Test, stream: &mut Stream) -> Option<(usize, Test)> {
+        let point = self.cells.point_of(test);
+        let grid = self.cells.grid();
+        let mut wanting: Vec<(u32, f64, u64, usize)> = (0..grid.len())
+            .filter(|&cell| !self.is_given_up(cell) && self.cells.can_reach(cell) && self.cells.needs_tests(cell))
+            .map(|cell| {
+                let distance = point.as_ref().map_or(0.0, |point| distance(grid, point, cell));
+                (self.missed[cell] + self.unbuilt[cell], distance, stream.bits(), cell)
             })
             .collect();
-        let budget = n * (width - length) / 2.0;
-        let wanted = Wanted { mean: t1, spread: demands.of(Dimension::T3), budget };
-        let Some(midpoints) = spread::place(&midpoints, &wanted, stream) else { return false };
-        let lengths: Vec<Member> = windows
-            .iter()
-            .zip(&midpoints)
-            .map(|(it, midpoint)| {
-                let room = 2.0 * (midpoint - it.low).min(it.high - midpoint);
-                Member { now: it.end - it.start, low: it.shortest, high: room.max(it.shortest), step: None }
-            })
-            .collect();
-        let wanted = Wanted { mean: t2, spread: None, budget: f64::INFINITY };
-        let Some(lengths) = spread::place(&lengths, &wanted, stream) else { return false };
-        for ((window, length), midpoint) in windows.iter().zip(&lengths).zip(&midpoints) {
-            let operation = &mut test.operations[window.at];
-            let PermittedActivation::Time(range) = &self.kind_of(operation).activation else { continue };
-            let within = plan.operation(operation.operation).within;
-            let time = |share: f64| within.start + share * within.length();
-            // Inside its part of the window: what is the end of one copy's part is the same number in the next one's.
-            let part = (time(window.low).max(range.low), time(window.high).min(range.high));
-            let inside = |share: f64| time(share).max(part.0).min(part.1);
-            let (start, end) = (inside(midpoint - length / 2.0), inside(midpoint + length / 2.0));
-            if start >= end {
-                return false;
+        wanting.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+        for (.., cell) in wanting.into_iter().take(MOST_CELLS_TRIED) {
+            match self.placer.place_in_cell(test, cell, self.cells.plan(), stream) {
+                Some(test) if self.tests.claim(&test) => return Some((cell, test)),
+                Some(_) => {}
+                // Feasible as far as known, and yet not found.
+                None => self.unbuilt[cell] += 1,
             }
-            operation.activation = Activation::Time { start, end };
         }
-        true
+        None
+    }
+}
+
+/// How far a point is from a cell: Euclidean, each axis in shares of its length.
+fn distance(grid: &Grid, point: &crate::sspr::Point, cell: usize) -> f64 {
+    let axes = grid.axes().iter().zip(grid.place(cell));
+    let squares = axes.map(|(axis, at)| {
+        let (low, high) = Grid::bounds(axis, at);
+        let length = axis.high - axis.low;
+        // A test without parameters has no intensity, and gets some wherever it is put.
+        let outside = point.get(axis.dimension).map_or(0.0, |value| (low - value).max(value - high).max(0.0));
+        outside * outside / (length * length)
+    });
+    libm::sqrt(squares.sum())
+}
+
+impl Variation for ConstructingVariation {
+    type Genome = Test;
+
+    fn initial(&mut self, index: u64) -> Test {
+        let test = self.tests.initial(index);
+        self.place(test, index, Stream::derive(self.seed, "construct initial", &[index]))
     }
 
-    /// The numbers that the parameters of a test count with.
-    fn numbers(&self, test: &Test, plan: &CampaignPlan) -> Vec<Number> {
-        let mut numbers = Vec::new();
-        for (at, operation) in test.operations.iter().enumerate() {
-            let kind = self.kind_of(operation);
-            if kind.activation == PermittedActivation::Offline {
-                continue;
-            }
-            let declared = plan.operation(operation.operation).parameters.iter();
-            let choices = operation.parameters.iter().zip(&kind.parameters);
-            for (parameter, (declared, (choice, permitted))) in declared.zip(choices).enumerate() {
-                let members = members(&declared.domain, permitted, choice).into_iter();
-                numbers.extend(members.map(|(axis, member)| Number { operation: at, parameter, axis, member }));
+    fn offspring(&mut self, parents: [&Test; 2], generation: u64, pair: u64) -> [Child<Test>; 2] {
+        let mut place = 2 * pair;
+        self.tests.offspring(parents, generation, pair).map(|child| {
+            let stream = Stream::derive(self.seed, "construct", &[generation, place]);
+            let genome = self.place(child.genome, place, stream);
+            place += 1;
+            Child { genome, ..child }
+        })
+    }
+}
+
+impl Learning for ConstructingVariation {
+    fn learn(&mut self, results: &[Evaluated]) {
+        for (aim, result) in self.aims.drain(..).zip(results) {
+            let hit = result.point.as_ref().and_then(|point| self.cells.grid().cell_of(point));
+            if let Some(cell) = aim.filter(|_| hit != aim) {
+                self.missed[cell] += 1;
             }
         }
-        numbers
+        self.cells.learn(results);
     }
 
-    fn grade(&self, test: &mut Test, demands: &Demands, plan: &CampaignPlan, stream: &mut Stream) -> bool {
-        if !demands.any_of(&[Dimension::P1, Dimension::P2]) {
-            return true;
-        }
-        let numbers = self.numbers(test, plan);
-        let members: Vec<Member> = numbers.iter().map(|it| it.member).collect();
-        let anything = (f64::NEG_INFINITY, f64::INFINITY);
-        let wanted = Wanted {
-            mean: demands.of(Dimension::P1).unwrap_or(anything),
-            spread: demands.of(Dimension::P2),
-            budget: f64::INFINITY,
+    fn given_up(&self) -> Vec<String> {
+        let grid = self.cells.grid();
+        // A cell that any test has hit after all is not given up.
+        let cells = |why: &dyn Fn(usize) -> bool| -> Vec<usize> {
+            (0..grid.len()).filter(|&cell| self.cells.needs_tests(cell) && why(cell)).collect()
         };
-        let Some(placed) = spread::place(&members, &wanted, stream) else { return false };
-        for (number, share) in numbers.iter().zip(placed) {
-            let operation = &mut test.operations[number.operation];
-            let kind = self.permitted.find(operation.operation).expect("it was found before");
-            let domain = &plan.operation(operation.operation).parameters[number.parameter].domain;
-            let choice = &mut operation.parameters[number.parameter];
-            set(choice, domain, &kind.parameters[number.parameter], number.axis, share);
-        }
-        true
-    }
-}
-
-/// Whether a test holds an operation twice.
-fn crowds(test: &Test) -> bool {
-    let ids = test.operations.iter().map(|it| it.operation);
-    ids.clone().enumerate().any(|(at, id)| ids.clone().take(at).any(|other| other == id))
-}
-
-/// Whether a kind of operation has a parameter that counts.
-fn graded(plan: &CampaignPlan, kind: &PermittedOperation) -> bool {
-    let declared = plan.operation(kind.operation).parameters.iter();
-    declared.zip(&kind.parameters).any(|(declared, permitted)| match (&declared.domain, permitted) {
-        (Domain::Number { low, high, .. }, PermittedChoice::Number(..)) => low < high,
-        (Domain::Point { low, high }, _) => (0..3).any(|axis| low[axis] < high[axis]),
-        _ => false,
-    })
-}
-
-/// The numbers of one parameter, in shares of what the space permits, each with its axis.
-fn members(domain: &Domain, permitted: &PermittedChoice, choice: &Choice) -> Vec<(usize, Member)> {
-    match (domain, permitted, choice) {
-        (&Domain::Number { low, high, .. }, PermittedChoice::Number(range, _), choice) if low < high => {
-            let width = high - low;
-            let step = range.integer.then_some(1.0 / width);
-            let member = match choice {
-                Choice::Value { value } => Member {
-                    now: (value - low) / width,
-                    low: (range.low - low) / width,
-                    high: (range.high - low) / width,
-                    step,
-                },
-                Choice::Range { low: from, high: to } => {
-                    Member { now: (to - from) / width, low: 0.0, high: (range.high - range.low) / width, step }
-                }
-                _ => return Vec::new(),
-            };
-            vec![(0, member)]
-        }
-        (Domain::Point { low, high }, _, Choice::Point { point }) => (0..3)
-            .filter(|&axis| low[axis] < high[axis])
-            .map(|axis| {
-                let now = (point[axis] - low[axis]) / (high[axis] - low[axis]);
-                (axis, Member { now, low: 0.0, high: 1.0, step: None })
+        let missed = cells(&|cell| self.missed[cell] >= MOST_MISSES);
+        let unbuilt = cells(&|cell| self.missed[cell] < MOST_MISSES && self.unbuilt[cell] >= MOST_ATTEMPTS);
+        let exact = self.cells.feasible().is_exact();
+        let no_test = if exact { "no test could be built" } else { "no test could be built, and there may be none" };
+        [(missed, "three constructed tests had no effect or fell elsewhere"), (unbuilt, no_test)]
+            .into_iter()
+            .filter(|(cells, _)| !cells.is_empty())
+            .map(|(cells, why)| {
+                let named: Vec<String> = cells.iter().take(MOST_NAMED).map(|&cell| named(grid, cell)).collect();
+                let more = cells.len() - named.len();
+                let more = if more > 0 { format!("; and {more} more") } else { String::new() };
+                let (count, noun) = (cells.len(), if cells.len() == 1 { "cell" } else { "cells" });
+                format!("construction gave up {count} {noun}, for each of which {why}: {}{more}", named.join("; "))
             })
-            .collect(),
-        _ => Vec::new(),
+            .collect()
     }
 }
 
-/// Sets one number of a parameter to a share of what the space permits. A sub-range keeps its middle as far as it can.
-fn set(choice: &mut Choice, domain: &Domain, permitted: &PermittedChoice, axis: usize, share: f64) {
-    match (choice, domain, permitted) {
-        (Choice::Value { value }, Domain::Number { low, high, .. }, PermittedChoice::Number(range, _)) => {
-            let set = low + share * (high - low);
-            *value = if range.integer { libm::rint(set) } else { set }.clamp(range.low, range.high);
-        }
-        (
-            Choice::Range { low: from, high: to },
-            Domain::Number { low, high, .. },
-            PermittedChoice::Number(range, _),
-        ) => {
-            let whole = |x: f64| if range.integer { libm::rint(x) } else { x };
-            let width = whole(share * (high - low)).min(range.high - range.low);
-            let start = whole(f64::midpoint(*from, *to) - width / 2.0).min(range.high - width).max(range.low);
-            (*from, *to) = (start, (start + width).min(range.high));
-        }
-        (Choice::Point { point }, Domain::Point { low, high }, _) => {
-            point[axis] = (low[axis] + share * (high[axis] - low[axis])).clamp(low[axis], high[axis]);
-        }
-        _ => {}
-    }
+/// A cell by its ranges, as `T1 0.5–0.667, P1 0–0.333`.
+fn named(grid: &Grid, cell: usize) -> String {
+    let round = |x: f64| libm::rint(x * 1000.0) / 1000.0 + 0.0;
+    let axes = grid.axes().iter().zip(grid.place(cell)).map(|(axis, at)| {
+        let (low, high) = (edge(axis, at), edge(axis, at + 1));
+        format!("{} {}–{}", axis.dimension.name(), round(low), round(high))
+    });
+    axes.collect::<Vec<_>>().join(", ")
 }
-
-#[cfg(test)]
-mod tests;

@@ -20,7 +20,7 @@ const ELITES: usize = 5;
 
 /// MAP-Elites over the tests of one campaign, in generations.
 #[derive(Debug, Clone)]
-pub struct MapElites {
+pub(crate) struct MapElites {
     settings: Settings,
     tests: TestVariation,
     grid: Grid,
@@ -33,7 +33,7 @@ pub struct MapElites {
 
 impl MapElites {
     /// A search before its first generation.
-    pub fn new(settings: Settings, tests: TestVariation, grid: Grid) -> Self {
+    pub(crate) fn new(settings: Settings, tests: TestVariation, grid: Grid) -> Self {
         assert!(settings.population > 0, "a generation has at least one test");
         MapElites { settings, tests, grid, elites: BTreeMap::new(), generation: 0, asked: 0, awaited: 0 }
     }
@@ -121,58 +121,60 @@ mod tests {
 
     use super::*;
     use crate::evolve::variation::Rates;
+    use crate::space::test_space::TestSpace;
     use crate::sspr::{Convention, Point, planned};
-    use crate::testing::landscape::LANDSCAPES;
-    use crate::{Permitted, strategy};
+    use crate::strategy;
+    use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     fn search() -> MapElites {
-        let plan = LANDSCAPES[0].plan(sesame_plan::Search::Random { evaluations: 1 });
-        let tests = TestVariation::new(Permitted::of(&plan).unwrap(), Rates::default(), 1);
+        let plan = SYNTHETIC_ROBOTS[0].plan(sesame_plan::Search::new(sesame_plan::Strategy::Random, 1));
+        let tests = TestVariation::new(TestSpace::from_plan(&plan).unwrap(), Rates::default(), 1);
         let grid = Grid::parse("T1:0:1:2").unwrap();
         MapElites::new(Settings { population: 10, evaluations: 100, seed: 1, survival: Survival::Crowded }, tests, grid)
     }
 
     proptest! {
-        #[test]
-        fn a_cell_keeps_tests_that_no_other_of_it_dominates(
-            results in prop::collection::vec((0u8..6, 0u8..6, any::<bool>()), 1..40),
-        ) {
-            let plan = LANDSCAPES[0].plan(sesame_plan::Search::Random { evaluations: 1 });
-            let mut search = search();
-            let mut all = Vec::new();
-            for (number, (a, b, early)) in (1..).zip(results) {
-                let mut test = search.tests.initial(u64::from(number));
-                for operation in &mut test.operations {
-                    let (start, end) = if early { (5.0, 6.0) } else { (55.0, 56.0) };
-                    operation.activation = sesame_plan::Activation::Time { start, end };
-                }
-                let point = Point::of(&planned(&plan, &test).unwrap(), Convention::Ours);
-                let fitness = Fitness::Measured(vec![f64::from(a), f64::from(b)]);
-                let result = Evaluated { number, test, fitness, point, course: None, margins: Vec::new(), failing: false };
-                search.keep(&result);
-                all.push((early, result));
-            }
-            for (&cell, elites) in &search.elites {
-                prop_assert!(elites.len() <= ELITES);
-                let here = || all.iter().filter(|(early, _)| *early == (cell == 0)).map(|(_, it)| it);
-                for elite in elites {
-                    prop_assert!(!here().any(|other| dominates(&other.fitness, &elite.fitness)));
-                }
-                let best = here().filter(|it| !here().any(|other| dominates(&other.fitness, &it.fitness)));
-                let mut distinct: Vec<&Fitness> = Vec::new();
-                for it in best.filter(|_| true) {
-                    if !distinct.contains(&&it.fitness) {
-                        distinct.push(&it.fitness);
-                    }
-                }
-                prop_assert_eq!(elites.len(), distinct.len().min(ELITES));
-            }
-        }
-    }
+           #[test]
+           fn a_cell_keeps_tests_that_no_other_of_it_dominates(
+               results in prop::collection::vec((0u8..6, 0u8..6, any::<bool>()), 1..40),
+           ) {
+               let plan = SYNTHETIC_ROBOTS[0].plan(sesame_plan::Search::new(sesame_plan::Strategy::Random, 1));
+               let mut search = search();
+               let mut all = Vec::new();
+               for (number, (a, b, early)) in (1..).zip(results) {
+                   let mut test = search.tests.initial(u64::from(number));
+                   for operation in &mut test.operations {
+                       let (start, end) = if early { (5.0, 6.0) } else { (55.0, 56.0) };
+                       operation.activation = sesame_plan::Activation::Time { start, end };
+                   }
+                   let point = Point::from_disturbances(&planned(&plan, &test).unwrap(), Convention::Ours);
+                   let fitness = Fitness::Measured(vec![f64::from(a), f64::from(b)]);
+                   let result = Evaluated { number, test, fitness, point, run: crate::testing::no_run(),
+    fresh_runs: Vec::new() };
+                   search.keep(&result);
+                   all.push((early, result));
+               }
+               for (&cell, elites) in &search.elites {
+                   prop_assert!(elites.len() <= ELITES);
+                   let here = || all.iter().filter(|(early, _)| *early == (cell == 0)).map(|(_, it)| it);
+                   for elite in elites {
+                       prop_assert!(!here().any(|other| dominates(&other.fitness, &elite.fitness)));
+                   }
+                   let best = here().filter(|it| !here().any(|other| dominates(&other.fitness, &it.fitness)));
+                   let mut distinct: Vec<&Fitness> = Vec::new();
+                   for it in best.filter(|_| true) {
+                       if !distinct.contains(&&it.fitness) {
+                           distinct.push(&it.fitness);
+                       }
+                   }
+                   prop_assert_eq!(elites.len(), distinct.len().min(ELITES));
+               }
+           }
+       }
 
     #[test]
     fn it_covers_more_than_an_evolution_for_the_objectives_alone() {
-        let landscape = &LANDSCAPES[0];
+        let landscape = &SYNTHETIC_ROBOTS[0];
         let grid = Grid::parse("T1:0:1:6,T2:0:0.5:6,P1:0:1:3").unwrap();
         let covered = |search, seed| {
             let mut plan = landscape.plan(search);
@@ -185,8 +187,8 @@ mod tests {
             cells.len()
         };
         let sum = |search: fn() -> sesame_plan::Search| (1..=8).map(|seed| covered(search(), seed)).sum::<usize>();
-        let elites = sum(|| sesame_plan::Search::MapElites { population: 10, evaluations: 210 });
-        let evolved = sum(|| sesame_plan::Search::Nsga2 { population: 10, evaluations: 210 });
+        let elites = sum(|| sesame_plan::Search::new(sesame_plan::Strategy::MapElites { population: 10 }, 210));
+        let evolved = sum(|| sesame_plan::Search::new(sesame_plan::Strategy::Nsga2 { population: 10 }, 210));
         assert!(elites > evolved, "{elites} and {evolved} cells of eight seeds");
     }
 }

@@ -1,6 +1,6 @@
 //! Novelty as one objective more (Lehman and Stanley 2011; as a second objective, Mouret 2011).
 //!
-//! How novel a test is, is the mean distance (the paper's equation 1) of its point to those of its nearest neighbours among all
+//! How novel a test is, is the mean distance [SESAME 2023, equation 1] of its point to those of its nearest neighbours among all
 //! tests so far. NSGA-II chooses its survivors by the campaign's objectives and by novelty together, so that tests unlike the
 //! others stay and breed. Nothing else knows of it: fronts, hypervolumes and results are those of the campaign's objectives.
 //!
@@ -56,7 +56,7 @@ impl Strategy for Novel {
             // More of it is better; subtracted from zero, so that there is no negative zero.
             Fitness::Measured(objectives.iter().copied().chain([0.0 - novelty]).collect())
         };
-        self.evolution.reappraise(|member| appraised(member.number));
+        self.evolution.update_fitness(|member| appraised(member.number));
         let told = |result: &Evaluated| Told {
             number: result.number,
             genome: result.test.clone(),
@@ -143,19 +143,19 @@ impl Archive {
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_plan::{Exploration, Search, Span};
+    use sesame_plan::{Exploration, Search, Span, Strategy};
 
     use super::*;
     use crate::coverage::Grid;
     use crate::sspr::{Class, Convention, Disturbance, distance};
     use crate::strategy;
-    use crate::testing::landscape::LANDSCAPES;
+    use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     fn point((start, length): (f64, f64)) -> Point {
         let window = Span { start: 0.0, end: 1.0 };
         let intervals = vec![Span { start: start * (1.0 - length), end: start * (1.0 - length) + length }];
         let of = Disturbance { class: Class::Value, window, intervals, parameters: Vec::new() };
-        Point::of(&[of], Convention::Ours).unwrap()
+        Point::from_disturbances(&[of], Convention::Ours).unwrap()
     }
 
     fn measure(neighbours: usize) -> Measure {
@@ -200,9 +200,9 @@ mod tests {
     #[test]
     fn an_evolution_with_novelty_covers_more_and_keeps_most_of_its_front() {
         let grid = Grid::parse("T1:0:1:6,T2:0:0.5:6,P1:0:1:3").unwrap();
-        let landscape = &LANDSCAPES[0];
+        let landscape = &SYNTHETIC_ROBOTS[0];
         let ran = |exploration: Option<Exploration>| {
-            let mut plan = landscape.plan(Search::Nsga2 { population: 10, evaluations: 210 });
+            let mut plan = landscape.plan(Search::new(Strategy::Nsga2 { population: 10 }, 210));
             plan.campaign.exploration = exploration;
             let (mut covered, mut volume) = (0, 0.0);
             for seed in 1..=8 {

@@ -1,12 +1,12 @@
 //! Coverage by condition, by prediction.
 //!
-//! Where conditions switch operations, only a run tells when they are active, so a test cannot be put into a cell. But most
-//! of what conditions compare goes its own way, disturbed or not: so a test's conditions are weighed on what was recorded
-//! in earlier runs, and the intervals that come out say where the test would lie. Of several candidates for a place in a
-//! generation the one is taken that would most probably fall into a cell that wants tests.
+//! Where conditions switch operations, only a run shows when they are active, so a test cannot be placed in a cell. But most
+//! variables of conditions behave the same whether messages are disturbed or not. So a test's conditions are evaluated on the
+//! recorded values of earlier runs, which gives the intervals, and thus the cell, of the test. Of several candidates for a
+//! place in a generation the one that most probably falls into a cell that needs tests is taken.
 //!
-//! Each candidate is predicted from the undisturbed run and from the runs of its parents. How far each of these two kinds
-//! of source is to be believed is learned from outcomes: as often as its predictions came true, beginning at one of two.
+//! Each candidate is predicted from the reference run and from the runs of its parents. The credibility of these two sources
+//! is learned: the share of their predictions that came true, beginning at one half.
 
 use std::collections::VecDeque;
 
@@ -19,26 +19,27 @@ use sesame_rng::Stream;
 
 use crate::evolve::cells::Cells;
 use crate::space::initial::fresh_test;
+use crate::space::test_space::TestSpace;
 use crate::sspr::{Convention, Point, disturbance};
 use crate::strategy::Learning;
-use crate::{Evaluated, Permitted, TestVariation};
+use crate::{Evaluated, TestVariation};
 
-/// Moments at which a recorded run is looked at: more than enough to tell cells apart.
+/// Moments at which a recorded run is evaluated: more than enough to tell cells apart.
 const MOMENTS: u32 = 350;
-/// Runs remembered at most, the latest.
+/// How many of the latest runs are remembered.
 const REMEMBERED: usize = 200;
 
-/// How the condition variables of a plan went in one run, looked at in even steps.
+/// The values of a plan's condition variables in one run, in even steps.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Course {
+pub(crate) struct VariableTrajectories {
     variables: Vec<MetricId>,
     /// Per moment the values of the variables, each as of its last change; `None` where there was none yet.
     values: Vec<Vec<Option<f64>>>,
 }
 
-impl Course {
-    /// The course of the variables in an observed run; `None` for a campaign by time, which has none.
-    pub fn of(plan: &CampaignPlan, observation: &Observation) -> Option<Course> {
+impl VariableTrajectories {
+    /// The trajectories of the variables in an observed run; `None` for a campaign by time, which has none.
+    pub(crate) fn from_observation(plan: &CampaignPlan, observation: &Observation) -> Option<VariableTrajectories> {
         let ActivationMode::Condition { space } = &plan.campaign.activation else { return None };
         let variables: Vec<MetricId> = space.variables.iter().map(|variable| variable.metric).collect();
         let values = (0..MOMENTS)
@@ -52,15 +53,15 @@ impl Course {
                 variables.iter().map(value).collect()
             })
             .collect();
-        Some(Course { variables, values })
+        Some(VariableTrajectories { variables, values })
     }
 
-    /// Where a test would lie if the variables went this way; `None` if no operation would be active.
-    pub fn predicted(&self, plan: &CampaignPlan, test: &Test) -> Option<Point> {
+    /// Where a test would lie with these values; `None` if no operation would be active.
+    pub(crate) fn predicted(&self, plan: &CampaignPlan, test: &Test) -> Option<Point> {
         let operations = test.operations.iter();
         let disturbances: Vec<_> =
             operations.map(|it| disturbance(plan, it.operation, &it.parameters, self.intervals(plan, it))).collect();
-        Point::of(&disturbances, Convention::Ours)
+        Point::from_disturbances(&disturbances, Convention::Ours)
     }
 
     /// When an operation would be active, in seconds.
@@ -93,13 +94,13 @@ fn time_of(plan: &CampaignPlan, moment: u32) -> f64 {
 
 /// How often predictions from one kind of source came true.
 #[derive(Debug, Clone, Copy)]
-struct Trust {
+struct Credibility {
     right: u32,
     all: u32,
 }
 
-impl Trust {
-    const NEW: Trust = Trust { right: 0, all: 0 };
+impl Credibility {
+    const NEW: Credibility = Credibility { right: 0, all: 0 };
 
     /// The share that came true, by Laplace's rule of succession.
     fn share(self) -> f64 {
@@ -112,82 +113,84 @@ impl Trust {
     }
 }
 
-/// What was predicted of a test that was asked.
+/// What was predicted of a test that was asked for.
 #[derive(Debug, Clone)]
-struct Forecast {
+struct Prediction {
     from_reference: Option<usize>,
     from_parents: Vec<Option<usize>>,
 }
 
-/// Variation of tests by condition that prefers those which would fall into cells that want tests.
+/// Variation of tests by condition that prefers tests predicted to fall into cells that need tests.
 #[derive(Debug, Clone)]
-pub(crate) struct Predicting {
+pub(crate) struct PredictingVariation {
     tests: TestVariation,
-    permitted: Permitted,
+    test_space: TestSpace,
     cells: Cells,
     candidates: u32,
     seed: u64,
-    reference: Option<Course>,
-    /// The latest tests that were run, each with its course, the oldest first.
-    remembered: VecDeque<(Test, Course)>,
-    reference_trust: Trust,
-    parents_trust: Trust,
+    reference: Option<VariableTrajectories>,
+    /// The latest tests that were run, each with its trajectories, the oldest first.
+    remembered: VecDeque<(Test, VariableTrajectories)>,
+    reference_credibility: Credibility,
+    parents_credibility: Credibility,
     /// Of the generation asked last.
-    forecasts: Vec<Forecast>,
+    predictions: Vec<Prediction>,
 }
 
-impl Predicting {
-    pub(crate) fn new(tests: TestVariation, permitted: Permitted, cells: Cells, candidates: u32, seed: u64) -> Self {
-        Predicting {
+impl PredictingVariation {
+    pub(crate) fn new(tests: TestVariation, test_space: TestSpace, cells: Cells, candidates: u32, seed: u64) -> Self {
+        PredictingVariation {
             tests,
-            permitted,
+            test_space,
             cells,
             candidates: candidates.max(1),
             seed,
             reference: None,
             remembered: VecDeque::new(),
-            reference_trust: Trust::NEW,
-            parents_trust: Trust::NEW,
-            forecasts: Vec::new(),
+            reference_credibility: Credibility::NEW,
+            parents_credibility: Credibility::NEW,
+            predictions: Vec::new(),
         }
     }
 
-    fn forecast(&self, test: &Test, parents: &[Course]) -> Forecast {
-        let cell = |course: &Course| self.cells.grid().cell_of(&course.predicted(self.cells.plan(), test)?);
-        Forecast {
+    fn prediction(&self, test: &Test, parents: &[VariableTrajectories]) -> Prediction {
+        let cell = |trajectories: &VariableTrajectories| {
+            self.cells.grid().cell_of(&trajectories.predicted(self.cells.plan(), test)?)
+        };
+        Prediction {
             from_reference: self.reference.as_ref().and_then(cell),
             from_parents: parents.iter().map(cell).collect(),
         }
     }
 
-    /// The share of belief that a test falls into a cell that wants tests, and into any cell at all.
-    fn promise_of(&self, forecast: &Forecast) -> (f64, f64) {
-        let of_parents = self.parents_trust.share() / forecast.from_parents.len().max(1) as f64;
-        let sources = [(self.reference_trust.share(), forecast.from_reference)].into_iter();
-        let sources = sources.chain(forecast.from_parents.iter().map(|&cell| (of_parents, cell)));
+    /// The credence that a test falls into a cell that needs tests, and that it falls into any cell.
+    fn credence_of(&self, prediction: &Prediction) -> (f64, f64) {
+        let of_parents = self.parents_credibility.share() / prediction.from_parents.len().max(1) as f64;
+        let sources = [(self.reference_credibility.share(), prediction.from_reference)].into_iter();
+        let sources = sources.chain(prediction.from_parents.iter().map(|&cell| (of_parents, cell)));
         let (mut all, mut wanted, mut active) = (0.0, 0.0, 0.0);
         for (trust, cell) in sources {
             all += trust;
             if let Some(cell) = cell {
                 active += trust;
-                wanted += if self.cells.wants(cell) { trust } else { 0.0 };
+                wanted += if self.cells.needs_tests(cell) { trust } else { 0.0 };
             }
         }
         (wanted / all, active / all)
     }
 
     /// The best of the test and other candidates: fresh tests in the first generation, else tests changed further.
-    fn chosen(&mut self, test: &Test, parents: &[Course], mut stream: Stream) -> Test {
-        let forecast = self.forecast(test, parents);
+    fn chosen(&mut self, test: &Test, parents: &[VariableTrajectories], mut stream: Stream) -> Test {
+        let prediction = self.prediction(test, parents);
         let mut changed = test.clone();
-        let mut best = (self.promise_of(&forecast), test.clone(), forecast);
+        let mut best = (self.credence_of(&prediction), test.clone(), prediction);
         for turn in 1..self.candidates {
             // Nothing can be better.
             if best.0 == (1.0, 1.0) {
                 break;
             }
             let candidate = if parents.is_empty() {
-                fresh_test(&self.permitted, &mut stream)
+                fresh_test(&self.test_space, &mut stream)
             } else {
                 // Now and then back to where it began, so that most candidates keep much of their parents.
                 if turn % 4 == 0 {
@@ -196,22 +199,22 @@ impl Predicting {
                 self.tests.mutate_again(&mut changed, &mut stream);
                 changed.clone()
             };
-            let forecast = self.forecast(&candidate, parents);
-            let promise = self.promise_of(&forecast);
-            if promise > best.0 && self.tests.claim(&candidate) {
-                best = (promise, candidate, forecast);
+            let prediction = self.prediction(&candidate, parents);
+            let credence = self.credence_of(&prediction);
+            if credence > best.0 && self.tests.claim(&candidate) {
+                best = (credence, candidate, prediction);
             }
         }
-        let (_, test, forecast) = best;
-        if let Some(cell) = forecast.from_reference.or(forecast.from_parents.first().copied().flatten()) {
-            self.cells.promise(cell);
+        let (_, test, prediction) = best;
+        if let Some(cell) = prediction.from_reference.or(prediction.from_parents.first().copied().flatten()) {
+            self.cells.reserve(cell);
         }
-        self.forecasts.push(forecast);
+        self.predictions.push(prediction);
         test
     }
 }
 
-impl Variation for Predicting {
+impl Variation for PredictingVariation {
     type Genome = Test;
 
     fn initial(&mut self, index: u64) -> Test {
@@ -222,34 +225,38 @@ impl Variation for Predicting {
     fn offspring(&mut self, parents: [&Test; 2], generation: u64, pair: u64) -> [Child<Test>; 2] {
         let mut place = 2 * pair;
         let remembered = self.remembered.iter().rev();
-        let courses: Vec<Course> = parents
+        let trajectories: Vec<VariableTrajectories> = parents
             .iter()
             .filter_map(|parent| remembered.clone().find(|(test, _)| test == *parent))
-            .map(|(_, course)| course.clone())
+            .map(|(_, trajectories)| trajectories.clone())
             .collect();
         self.tests.offspring(parents, generation, pair).map(|child| {
             let stream = Stream::derive(self.seed, "predict", &[generation, place]);
-            let genome = self.chosen(&child.genome, &courses, stream);
+            let genome = self.chosen(&child.genome, &trajectories, stream);
             place += 1;
             Child { genome, ..child }
         })
     }
 }
 
-impl Learning for Predicting {
-    fn reference(&mut self, course: Course) {
-        self.reference = Some(course);
+impl Learning for PredictingVariation {
+    fn begin(&mut self, reference: &Observation) {
+        self.reference = VariableTrajectories::from_observation(self.cells.plan(), reference);
+    }
+
+    fn reads_series(&self) -> bool {
+        true
     }
 
     fn learn(&mut self, results: &[Evaluated]) {
-        for (forecast, result) in self.forecasts.drain(..).zip(results) {
+        for (prediction, result) in self.predictions.drain(..).zip(results) {
             let hit = result.point.as_ref().and_then(|point| self.cells.grid().cell_of(point));
-            self.reference_trust.learn(forecast.from_reference == hit);
-            for cell in forecast.from_parents {
-                self.parents_trust.learn(cell == hit);
+            self.reference_credibility.learn(prediction.from_reference == hit);
+            for cell in prediction.from_parents {
+                self.parents_credibility.learn(cell == hit);
             }
-            if let Some(course) = &result.course {
-                self.remembered.push_back((result.test.clone(), course.clone()));
+            if let Some(trajectories) = VariableTrajectories::from_observation(self.cells.plan(), &result.run) {
+                self.remembered.push_back((result.test.clone(), trajectories));
             }
         }
         while self.remembered.len() > REMEMBERED {
@@ -262,14 +269,16 @@ impl Learning for Predicting {
 #[cfg(test)]
 mod tests {
     use sesame_plan::condition::ConditionEnd;
-    use sesame_plan::{CoverageGoal, Exploration, Search};
+    use sesame_plan::{CoverageGoal, Exploration, Search, Strategy};
 
     use super::*;
     use crate::coverage::{Coverage, Grid};
     use crate::strategy;
-    use crate::testing::landscape::LANDSCAPES;
+    use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
-    const NSGA2: Search = Search::Nsga2 { population: 10, evaluations: 80 };
+    fn nsga2() -> Search {
+        Search::new(Strategy::Nsga2 { population: 10 }, 80)
+    }
     const PREDICT: Exploration = Exploration::Predict { candidates: 8 };
 
     fn grid() -> Grid {
@@ -277,7 +286,7 @@ mod tests {
     }
 
     fn plan(end: ConditionEnd, exploration: Option<Exploration>) -> CampaignPlan {
-        let mut plan = LANDSCAPES[0].plan_by_condition(NSGA2, end);
+        let mut plan = SYNTHETIC_ROBOTS[0].plan_by_condition(nsga2(), end);
         plan.campaign.coverage = Some(CoverageGoal { axes: grid().axes().to_vec(), hits: 1, stop_at: None });
         plan.campaign.exploration = exploration;
         plan
@@ -287,15 +296,19 @@ mod tests {
     fn a_test_is_predicted_where_it_falls_if_variables_go_as_they_did() {
         for end in [ConditionEnd::Condition, ConditionEnd::Length { low: 1.0, high: 15.0 }] {
             let plan = plan(end, None);
-            let permitted = Permitted::of(&plan).unwrap();
-            let course = Course::of(&plan, &crate::testing::landscape::Landscape::undisturbed(&plan)).unwrap();
+            let test_space = TestSpace::from_plan(&plan).unwrap();
+            let trajectories = VariableTrajectories::from_observation(
+                &plan,
+                &crate::testing::synthetic_robots::SyntheticRobot::undisturbed(&plan),
+            )
+            .unwrap();
             let (mut same, mut active) = (0, 0);
             for seed in 0..200 {
-                let test = fresh_test(&permitted, &mut Stream::derive(seed, "test", &[]));
+                let test = fresh_test(&test_space, &mut Stream::derive(seed, "test", &[]));
                 let cell = |point: Option<Point>| point.and_then(|point| grid().cell_of(&point));
                 let (foreseen, ran) = (
-                    cell(course.predicted(&plan, &test)),
-                    cell(crate::testing::landscape::Landscape::point(&plan, &test)),
+                    cell(trajectories.predicted(&plan, &test)),
+                    cell(crate::testing::synthetic_robots::SyntheticRobot::point(&plan, &test)),
                 );
                 same += u32::from(foreseen == ran);
                 active += u32::from(ran.is_some());
@@ -312,7 +325,7 @@ mod tests {
                 let plan = plan(end, exploration);
                 let (mut covered, mut void) = (0, 0);
                 for seed in 1..=3 {
-                    let run = LANDSCAPES[0].campaign_of(&plan, strategy(&plan, seed).unwrap().as_mut());
+                    let run = SYNTHETIC_ROBOTS[0].campaign_of(&plan, strategy(&plan, seed).unwrap().as_mut());
                     let mut coverage = Coverage::new(grid(), 1);
                     for result in &run.tests {
                         void += usize::from(result.point.is_none());
@@ -332,12 +345,12 @@ mod tests {
     #[test]
     fn the_seed_decides_and_results_told_again_bring_a_search_back_to_where_it_was() {
         let plan = plan(ConditionEnd::Condition, Some(PREDICT));
-        let run = |seed| LANDSCAPES[0].campaign_of(&plan, strategy(&plan, seed).unwrap().as_mut()).tests;
+        let run = |seed| SYNTHETIC_ROBOTS[0].campaign_of(&plan, strategy(&plan, seed).unwrap().as_mut()).tests;
         let whole = run(4);
         assert_eq!(whole, run(4));
         assert_ne!(whole, run(5));
         let mut resumed = strategy(&plan, 4).unwrap();
-        resumed.reference(whole[0].course.clone().unwrap());
+        resumed.begin(&crate::testing::synthetic_robots::SyntheticRobot::undisturbed(&plan));
         for stored in whole.chunks(10).take(5) {
             let asked: Vec<Test> = resumed.ask().into_iter().map(|candidate| candidate.test).collect();
             assert_eq!(asked, stored.iter().map(|result| result.test.clone()).collect::<Vec<_>>());
@@ -346,12 +359,12 @@ mod tests {
     }
 
     #[test]
-    fn trust_grows_with_what_came_true() {
-        let mut trust = Trust::NEW;
-        assert_eq!(trust.share(), 0.5);
-        trust.learn(true);
-        trust.learn(true);
-        trust.learn(false);
-        assert_eq!(trust.share(), 0.6);
+    fn credibility_is_the_share_that_came_true() {
+        let mut credibility = Credibility::NEW;
+        assert_eq!(credibility.share(), 0.5);
+        credibility.learn(true);
+        credibility.learn(true);
+        credibility.learn(false);
+        assert_eq!(credibility.share(), 0.6);
     }
 }

@@ -3,7 +3,7 @@
 //! A mutated operation draws with a new seed; one that a child has from a parent with that parent's, also if its window had
 //! to give way to another copy. Of copies that come to one child with equal seeds, the later gets a new one: two copies never
 //! draw alike. A child is never one of the tests
-//! asked before in the same campaign (draw seeds aside), unless [`Rates::tries`] attempts to change it all fail.
+//! asked before in the same campaign (apart from operation seeds), unless [`Rates::tries`] attempts to change it all fail.
 //!
 //! # Rates
 //!
@@ -48,8 +48,8 @@ use sesame_rng::{Stream, derive_seed};
 
 use crate::space::condition::{self, contains};
 use crate::space::initial::{fresh_operation, fresh_test};
-use crate::space::permitted::{Permitted, PermittedActivation, PermittedOperation};
 use crate::space::range::{Range, StepSizes};
+use crate::space::test_space::{ActivationSpace, OperationSpace, TestSpace};
 
 /// How often what is varied. All are probabilities except `steps` and `tries`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -109,7 +109,7 @@ impl Rates {
 /// [`Variation`] of the tests of one campaign.
 #[derive(Debug, Clone)]
 pub struct TestVariation {
-    permitted: Permitted,
+    test_space: TestSpace,
     rates: Rates,
     seed: u64,
     /// All tests made so far, by their [`key`]: whole they would be most of what a search of many tests holds in memory.
@@ -118,13 +118,13 @@ pub struct TestVariation {
 
 impl TestVariation {
     /// Variation of what is permitted, at these rates, with all draws from streams of the seed.
-    pub fn new(permitted: Permitted, rates: Rates, seed: u64) -> Self {
-        TestVariation { permitted, rates, seed, made: BTreeSet::new() }
+    pub fn new(test_space: TestSpace, rates: Rates, seed: u64) -> Self {
+        TestVariation { test_space, rates, seed, made: BTreeSet::new() }
     }
 
     /// Mutates a permitted test once more.
     pub(crate) fn mutate_again(&self, test: &mut Test, stream: &mut Stream) {
-        mutate(test, &self.permitted, &self.rates, stream);
+        mutate(test, &self.test_space, &self.rates, stream);
     }
 
     /// Notes a test that was made elsewhere. False if it was made before.
@@ -137,7 +137,7 @@ impl Variation for TestVariation {
     type Genome = Test;
 
     fn initial(&mut self, index: u64) -> Test {
-        let test = fresh_test(&self.permitted, &mut Stream::derive(self.seed, "initial", &[index]));
+        let test = fresh_test(&self.test_space, &mut Stream::derive(self.seed, "initial", &[index]));
         self.made.insert(key(&test));
         test
     }
@@ -145,8 +145,8 @@ impl Variation for TestVariation {
     fn offspring(&mut self, parents: [&Test; 2], generation: u64, pair: u64) -> [Child<Test>; 2] {
         let mut stream = Stream::derive(self.seed, "crossover", &[generation, pair]);
         let crossed = if stream.chance(self.rates.crossover) {
-            let crossed = crossover(parents, &self.permitted, &mut stream);
-            exchange_conditions(parents, crossed, &self.permitted, &self.rates, &mut stream)
+            let crossed = crossover(parents, &self.test_space, &mut stream);
+            exchange_conditions(parents, crossed, &self.test_space, &self.rates, &mut stream)
         } else {
             None
         };
@@ -158,14 +158,14 @@ impl Variation for TestVariation {
         [first, second].map(|(mut genome, heritage)| {
             let mut stream = Stream::derive(self.seed, "mutation", &[generation, place]);
             place += 1;
-            mutate(&mut genome, &self.permitted, &self.rates, &mut stream);
+            mutate(&mut genome, &self.test_space, &self.rates, &mut stream);
             for _ in 0..self.rates.tries {
                 if !self.made.contains(&key(&genome)) {
                     break;
                 }
                 let k = stream.below(genome.operations.len());
-                change_somehow(&mut genome.operations[k], &self.permitted, &self.rates, &mut stream);
-                self.permitted.settle(&mut genome, &mut stream);
+                change_somehow(&mut genome.operations[k], &self.test_space, &self.rates, &mut stream);
+                self.test_space.settle(&mut genome, &mut stream);
             }
             self.made.insert(key(&genome));
             Child { genome, heritage }
@@ -180,7 +180,7 @@ fn key(test: &Test) -> [u64; 2] {
     ["one half of a key", "the other half"].map(|half| derive_seed(0, half, &numbers))
 }
 
-/// What tells two tests apart: their operations in any order, without draw seeds.
+/// What tells two tests apart: their operations in any order, without operation seeds.
 fn identity(test: &Test) -> Vec<Vec<u64>> {
     let mut operations: Vec<Vec<u64>> = test
         .operations
@@ -220,16 +220,16 @@ fn identity(test: &Test) -> Vec<Vec<u64>> {
 
 /// One-point crossover of two lists: each is cut in two, and the tails are exchanged. The cuts are uniform over all that
 /// leave both children with a permitted number of operations and exchange neither nothing nor everything; `None` when
-/// there are none such. Copies of one operation that come together [settle](Permitted::settle).
-pub fn crossover([a, b]: [&Test; 2], permitted: &Permitted, stream: &mut Stream) -> Option<[Test; 2]> {
+/// there are none such. Copies of one operation that come together [settle](TestSpace::settle).
+pub(crate) fn crossover([a, b]: [&Test; 2], test_space: &TestSpace, stream: &mut Stream) -> Option<[Test; 2]> {
     let (a, b) = (&a.operations, &b.operations);
-    let lengths = permitted.fewest()..=permitted.most();
+    let lengths = test_space.fewest()..=test_space.most();
     let mut cuts = Vec::new();
     for i in 0..=a.len() {
         for j in 0..=b.len() {
-            let permitted = lengths.contains(&(i + b.len() - j)) && lengths.contains(&(j + a.len() - i));
+            let fits = lengths.contains(&(i + b.len() - j)) && lengths.contains(&(j + a.len() - i));
             let idle = (i == 0 && j == 0) || (i == a.len() && j == b.len());
-            if permitted && !idle {
+            if fits && !idle {
                 cuts.push((i, j));
             }
         }
@@ -240,7 +240,7 @@ pub fn crossover([a, b]: [&Test; 2], permitted: &Permitted, stream: &mut Stream)
     let (i, j) = cuts[stream.below(cuts.len())];
     Some([[&a[..i], &b[j..]].concat(), [&b[..j], &a[i..]].concat()].map(|operations| {
         let mut test = Test { operations };
-        permitted.settle(&mut test, stream);
+        test_space.settle(&mut test, stream);
         test
     }))
 }
@@ -250,17 +250,17 @@ pub fn crossover([a, b]: [&Test; 2], permitted: &Permitted, stream: &mut Stream)
 fn exchange_conditions(
     parents: [&Test; 2],
     crossed: Option<[Test; 2]>,
-    permitted: &Permitted,
+    test_space: &TestSpace,
     rates: &Rates,
     stream: &mut Stream,
 ) -> Option<[Test; 2]> {
-    let Some(space) = permitted.conditions() else { return crossed };
+    let Some(space) = test_space.conditions() else { return crossed };
     let mut changed = crossed.is_some();
     let [mut a, mut b] = crossed.unwrap_or_else(|| parents.map(Clone::clone));
     for (a, b) in a.operations.iter_mut().zip(&mut b.operations) {
-        // Both are decided by draws of their own, whatever becomes of them.
+        // Both draws are made in any case, so that later ones do not depend on them.
         let [starts, ends] = [(); 2].map(|()| stream.chance(rates.exchange));
-        let [of_a, of_b] = [&*a, &*b].map(|operation| kind_of(operation, permitted).activation.constraints());
+        let [of_a, of_b] = [&*a, &*b].map(|operation| kind_of(operation, test_space).activation.constraints());
         match (&mut a.activation, &mut b.activation) {
             (Activation::Condition { start: c, end: e, .. }, Activation::Condition { start: d, end: f, .. }) => {
                 changed |= starts && condition::exchange([(c, of_a), (d, of_b)], space, stream);
@@ -276,73 +276,74 @@ fn exchange_conditions(
 }
 
 /// Mutates a permitted test; the result is permitted too. Perhaps nothing changes.
-pub fn mutate(test: &mut Test, permitted: &Permitted, rates: &Rates, stream: &mut Stream) {
+pub(crate) fn mutate(test: &mut Test, test_space: &TestSpace, rates: &Rates, stream: &mut Stream) {
     for at in 0..test.operations.len() {
-        mutate_operation(&mut test.operations, at, permitted, rates, stream);
+        mutate_operation(&mut test.operations, at, test_space, rates, stream);
     }
     // Each is decided by a draw of its own, whether or not the list has room for it.
     let [add, duplicate, drop] = [rates.add, rates.duplicate, rates.drop].map(|rate| stream.chance(rate));
     let operations = &mut test.operations;
-    if drop && operations.len() > permitted.fewest() {
+    if drop && operations.len() > test_space.fewest() {
         operations.remove(stream.below(operations.len()));
     }
-    if duplicate && operations.len() < permitted.most() {
-        let has_room = |it: &&TestOperation| permitted.has_room(operations, kind_of(it, permitted));
+    if duplicate && operations.len() < test_space.most() {
+        let has_room = |it: &&TestOperation| test_space.has_room(operations, kind_of(it, test_space));
         let originals: Vec<&TestOperation> = operations.iter().filter(has_room).collect();
         if !originals.is_empty() {
             let mut copy = originals[stream.below(originals.len())].clone();
-            change_somehow(&mut copy, permitted, rates, stream);
+            change_somehow(&mut copy, test_space, rates, stream);
             operations.insert(stream.below(operations.len() + 1), copy);
         }
     }
-    if add && operations.len() < permitted.most() {
+    if add && operations.len() < test_space.most() {
         // As the list is not full, there is one.
-        let kinds: Vec<_> = permitted.operations().iter().filter(|kind| permitted.has_room(operations, kind)).collect();
+        let kinds: Vec<_> =
+            test_space.operations().iter().filter(|kind| test_space.has_room(operations, kind)).collect();
         let kind = kinds[stream.below(kinds.len())];
         let place = stream.below(operations.len() + 1);
         operations.insert(place, fresh_operation(kind, stream));
     }
-    permitted.settle(test, stream);
+    test_space.settle(test, stream);
 }
 
 fn mutate_operation(
     operations: &mut [TestOperation],
     at: usize,
-    permitted: &Permitted,
+    test_space: &TestSpace,
     rates: &Rates,
     stream: &mut Stream,
 ) {
-    if permitted.operations().len() > 1 && stream.chance(rates.retarget) {
+    if test_space.operations().len() > 1 && stream.chance(rates.retarget) {
         let current = operations[at].operation;
-        let is_other = |kind: &&PermittedOperation| kind.operation != current && permitted.has_room(operations, kind);
-        let others: Vec<_> = permitted.operations().iter().filter(is_other).collect();
+        let is_other = |kind: &&OperationSpace| kind.operation != current && test_space.has_room(operations, kind);
+        let others: Vec<_> = test_space.operations().iter().filter(is_other).collect();
         if !others.is_empty() {
             retarget(&mut operations[at], others[stream.below(others.len())], stream);
         }
     }
     let operation = &mut operations[at];
     if stream.chance(rates.window) {
-        change_activation(operation, permitted, rates, stream);
+        change_activation(operation, test_space, rates, stream);
     }
-    let kind = kind_of(operation, permitted);
-    for (choice, permitted) in operation.parameters.iter_mut().zip(&kind.parameters) {
-        if !permitted.is_fixed() && stream.chance(rates.parameter) {
+    let kind = kind_of(operation, test_space);
+    for (choice, parameter_space) in operation.parameters.iter_mut().zip(&kind.parameters) {
+        if !parameter_space.is_fixed() && stream.chance(rates.parameter) {
             *choice = if stream.chance(rates.fresh) {
-                permitted.fresh(stream)
+                parameter_space.fresh(stream)
             } else {
-                permitted.near(choice, rates.steps, stream)
+                parameter_space.near(choice, rates.steps, stream)
             };
-            operation.draw_seed = stream.bits();
+            operation.operation_seed = stream.bits();
         }
     }
 }
 
 /// Puts a fresh instance of another operation in an operation's place, with the same window or the same conditions where
 /// that one permits them.
-fn retarget(operation: &mut TestOperation, kind: &PermittedOperation, stream: &mut Stream) {
+fn retarget(operation: &mut TestOperation, kind: &OperationSpace, stream: &mut Stream) {
     let mut fresh = fresh_operation(kind, stream);
     match (&operation.activation, &kind.activation) {
-        (&Activation::Time { start, end }, PermittedActivation::Time(window)) => {
+        (&Activation::Time { start, end }, ActivationSpace::Time(window)) => {
             let (start, end) = (start.max(window.low), end.min(window.high));
             if end - start >= window.shortest {
                 fresh.activation = Activation::Time { start, end };
@@ -350,7 +351,7 @@ fn retarget(operation: &mut TestOperation, kind: &PermittedOperation, stream: &m
         }
         (
             kept @ (Activation::Condition { start, .. } | Activation::ConditionFor { start, .. }),
-            PermittedActivation::Condition { constraints, .. },
+            ActivationSpace::Condition { constraints, .. },
         ) if constraints.iter().all(|constraint| contains(start, constraint)) => fresh.activation = kept.clone(),
         // What is kept is not permitted there, or one of them is offline and has nothing to keep or to be given.
         _ => {}
@@ -359,43 +360,43 @@ fn retarget(operation: &mut TestOperation, kind: &PermittedOperation, stream: &m
 }
 
 /// Changes the activation, or, of an offline operation, which has none to choose, each parameter.
-fn change_somehow(operation: &mut TestOperation, permitted: &Permitted, rates: &Rates, stream: &mut Stream) {
-    let kind = kind_of(operation, permitted);
-    if kind.activation != PermittedActivation::Offline {
-        return change_activation(operation, permitted, rates, stream);
+fn change_somehow(operation: &mut TestOperation, test_space: &TestSpace, rates: &Rates, stream: &mut Stream) {
+    let kind = kind_of(operation, test_space);
+    if kind.activation != ActivationSpace::Offline {
+        return change_activation(operation, test_space, rates, stream);
     }
-    for (choice, permitted) in operation.parameters.iter_mut().zip(&kind.parameters) {
-        if !permitted.is_fixed() {
-            *choice = permitted.near(choice, rates.steps, stream);
-            operation.draw_seed = stream.bits();
+    for (choice, parameter_space) in operation.parameters.iter_mut().zip(&kind.parameters) {
+        if !parameter_space.is_fixed() {
+            *choice = parameter_space.near(choice, rates.steps, stream);
+            operation.operation_seed = stream.bits();
         }
     }
 }
 
 /// Changes a window, or one of what takes its place: a start condition, an end condition, a length, each alike; if there
 /// is one to choose.
-fn change_activation(operation: &mut TestOperation, permitted: &Permitted, rates: &Rates, stream: &mut Stream) {
-    let kind = kind_of(operation, permitted);
+fn change_activation(operation: &mut TestOperation, test_space: &TestSpace, rates: &Rates, stream: &mut Stream) {
+    let kind = kind_of(operation, test_space);
     match (&mut operation.activation, &kind.activation) {
-        (Activation::Offline, PermittedActivation::Offline) => return,
-        (Activation::Time { start, end }, PermittedActivation::Time(window)) => {
+        (Activation::Offline, ActivationSpace::Offline) => return,
+        (Activation::Time { start, end }, ActivationSpace::Time(window)) => {
             (*start, *end) = if stream.chance(rates.fresh) {
                 window.interval(stream)
             } else {
                 window.interval_near((*start, *end), rates.steps, stream)
             };
         }
-        (Activation::Condition { start, end, .. }, PermittedActivation::Condition { space, constraints, .. }) => {
+        (Activation::Condition { start, end, .. }, ActivationSpace::Condition { space, constraints, .. }) => {
             let (condition, constraints) =
                 if stream.chance(0.5) { (start, constraints.as_slice()) } else { (end, [].as_slice()) };
             *condition = condition::changed(condition, space, constraints, (rates.fresh, rates.steps), stream);
         }
-        (Activation::ConditionFor { start, length, .. }, PermittedActivation::Condition { space, constraints, .. }) => {
+        (Activation::ConditionFor { start, length, .. }, ActivationSpace::Condition { space, constraints, .. }) => {
             change_start_or_length((start, length), constraints, space, rates, stream);
         }
-        (activation, permitted) => unreachable!("{permitted:?} gives no {activation:?}"),
+        (activation, activation_space) => unreachable!("{activation_space:?} gives no {activation:?}"),
     }
-    operation.draw_seed = stream.bits();
+    operation.operation_seed = stream.bits();
 }
 
 fn change_start_or_length(
@@ -418,19 +419,19 @@ fn change_start_or_length(
     }
 }
 
-fn kind_of<'a>(operation: &TestOperation, permitted: &'a Permitted) -> &'a PermittedOperation {
-    permitted.find(operation.operation).expect("a test of a campaign holds operations of that campaign")
+fn kind_of<'a>(operation: &TestOperation, test_space: &'a TestSpace) -> &'a OperationSpace {
+    test_space.find(operation.operation).expect("a test of a campaign holds operations of that campaign")
 }
 
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_plan::{CampaignPlan, Copies, Search};
+    use sesame_plan::{CampaignPlan, Copies, Search, Strategy};
 
     use super::*;
-    use crate::space::permitted::tests::{any_plan, broken_rule};
-    use crate::testing::landscape::LANDSCAPES;
+    use crate::space::test_space::tests::{any_plan, broken_rule};
+    use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     /// Nothing happens.
     const IDLE: Rates = Rates {
@@ -448,13 +449,13 @@ mod tests {
     };
 
     fn seeds(test: &Test) -> BTreeSet<u64> {
-        test.operations.iter().map(|operation| operation.draw_seed).collect()
+        test.operations.iter().map(|operation| operation.operation_seed).collect()
     }
 
     proptest! {
         #[test]
         fn offspring_are_permitted_over_many_generations(plan in any_plan(), seed: u64) {
-            let mut variation = TestVariation::new(Permitted::of(&plan).unwrap(), Rates::default(), seed);
+            let mut variation = TestVariation::new(TestSpace::from_plan(&plan).unwrap(), Rates::default(), seed);
             let mut tests = [variation.initial(0), variation.initial(1)];
             for generation in 1..30 {
                 let [a, b] = &tests;
@@ -468,10 +469,10 @@ mod tests {
         #[test]
         fn crossover_exchanges_tails_and_loses_nothing(plan in any_plan(), seed: u64) {
             let plan = overlapping(plan);
-            let permitted = Permitted::of(&plan).unwrap();
+            let test_space = TestSpace::from_plan(&plan).unwrap();
             let mut stream = Stream::derive(seed, "test", &[]);
-            let [a, b] = [(); 2].map(|()| fresh_test(&permitted, &mut stream));
-            if let Some([c, d]) = crossover([&a, &b], &permitted, &mut stream) {
+            let [a, b] = [(); 2].map(|()| fresh_test(&test_space, &mut stream));
+            if let Some([c, d]) = crossover([&a, &b], &test_space, &mut stream) {
                 prop_assert_eq!(broken_rule(&plan, &c), None);
                 prop_assert_eq!(broken_rule(&plan, &d), None);
                 prop_assert!(seeds(&c) != seeds(&a) && seeds(&c) != seeds(&b));
@@ -486,14 +487,14 @@ mod tests {
 
         #[test]
         fn an_operation_has_a_new_draw_seed_exactly_when_it_is_new_or_changed(plan in any_plan(), seed: u64) {
-            let permitted = Permitted::of(&plan).unwrap();
+            let test_space = TestSpace::from_plan(&plan).unwrap();
             let mut stream = Stream::derive(seed, "test", &[]);
-            let before = fresh_test(&permitted, &mut stream);
+            let before = fresh_test(&test_space, &mut stream);
             let mut after = before.clone();
             let rates = Rates { steps: StepSizes { finest: 0.01, boldest: 0.02 }, ..Rates::default() };
-            mutate(&mut after, &permitted, &rates, &mut stream);
+            mutate(&mut after, &test_space, &rates, &mut stream);
             for operation in &after.operations {
-                match before.operations.iter().find(|old| old.draw_seed == operation.draw_seed) {
+                match before.operations.iter().find(|old| old.operation_seed == operation.operation_seed) {
                     // Only a window that gives way to another copy's changes alone.
                     Some(old) => {
                         let copies = after.operations.iter().filter(|it| it.operation == operation.operation).count();
@@ -516,17 +517,17 @@ mod tests {
 
     #[test]
     fn an_operation_that_a_child_gets_twice_from_one_ancestor_draws_for_itself_the_second_time() {
-        let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
-        let permitted = Permitted::of(&plan).unwrap();
+        let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
+        let test_space = TestSpace::from_plan(&plan).unwrap();
         let mut met = 0;
         for seed in 0..200 {
             let mut stream = Stream::derive(seed, "test", &[]);
-            let parent = fresh_test(&permitted, &mut stream);
+            let parent = fresh_test(&test_space, &mut stream);
             let mut turned = parent.clone();
             turned.operations.reverse();
-            let Some(children) = crossover([&parent, &turned], &permitted, &mut stream) else { continue };
+            let Some(children) = crossover([&parent, &turned], &test_space, &mut stream) else { continue };
             for child in children {
-                assert!(permitted.permits_copies(&child), "{child:?}");
+                assert!(test_space.permits_copies(&child), "{child:?}");
                 met += u32::from(!seeds(&child).is_subset(&seeds(&parent)));
             }
         }
@@ -535,8 +536,8 @@ mod tests {
 
     /// Offspring of two tests by condition when only this is varied.
     fn offspring_of(rates: Rates, end: ConditionEnd, seed: u64) -> ([Test; 2], [Child<Test>; 2]) {
-        let plan = LANDSCAPES[2].plan_by_condition(Search::Random { evaluations: 1 }, end);
-        let mut variation = TestVariation::new(Permitted::of(&plan).unwrap(), rates, seed);
+        let plan = SYNTHETIC_ROBOTS[2].plan_by_condition(Search::new(Strategy::Random, 1), end);
+        let mut variation = TestVariation::new(TestSpace::from_plan(&plan).unwrap(), rates, seed);
         let tests = [variation.initial(0), variation.initial(1)];
         let children = variation.offspring([&tests[0], &tests[1]], 1, 0);
         (tests, children)
@@ -552,7 +553,7 @@ mod tests {
             let operations = |tests: [&Test; 2]| {
                 let all = tests.into_iter().flat_map(|test| &test.operations);
                 let mut all: Vec<_> =
-                    all.map(|it| (it.draw_seed, it.operation, format!("{:?}", it.parameters))).collect();
+                    all.map(|it| (it.operation_seed, it.operation, format!("{:?}", it.parameters))).collect();
                 all.sort();
                 all
             };
@@ -575,7 +576,7 @@ mod tests {
             let (parents, children) = offspring_of(only, ConditionEnd::Length { low: 1.0, high: 15.0 }, seed);
             for (parent, child) in parents.iter().zip(&children) {
                 for (old, new) in parent.operations.iter().zip(&child.genome.operations) {
-                    assert!(old.parameters == new.parameters && old.draw_seed != new.draw_seed);
+                    assert!(old.parameters == new.parameters && old.operation_seed != new.operation_seed);
                     match (&old.activation, &new.activation) {
                         (
                             Activation::ConditionFor { start: a, length: n, .. },
@@ -597,7 +598,7 @@ mod tests {
     fn tests_that_differ_in_their_conditions_are_different_tests() {
         let (tests, _) = offspring_of(IDLE, ConditionEnd::Condition, 1);
         let mut other = tests[0].clone();
-        other.operations[0].draw_seed += 1;
+        other.operations[0].operation_seed += 1;
         assert_eq!(identity(&other), identity(&tests[0]));
         assert_eq!(key(&other), key(&tests[0]));
         let Activation::Condition { start, end, .. } = &mut other.operations[0].activation else { panic!("{other:?}") };
@@ -608,15 +609,15 @@ mod tests {
 
     #[test]
     fn each_way_of_mutation_does_what_its_name_says() {
-        let plan = LANDSCAPES[2].plan(Search::Random { evaluations: 1 });
-        let permitted = Permitted::of(&plan).unwrap();
+        let plan = SYNTHETIC_ROBOTS[2].plan(Search::new(Strategy::Random, 1));
+        let test_space = TestSpace::from_plan(&plan).unwrap();
         let before = (0..100)
-            .map(|i| fresh_test(&permitted, &mut Stream::derive(1, "test", &[i])))
+            .map(|i| fresh_test(&test_space, &mut Stream::derive(1, "test", &[i])))
             .find(|test| test.operations.len() == 3)
             .expect("lists of three are common");
         let mutated = |rates: Rates| {
             let mut test = before.clone();
-            mutate(&mut test, &permitted, &rates, &mut Stream::derive(9, "mutation", &[]));
+            mutate(&mut test, &test_space, &rates, &mut Stream::derive(9, "mutation", &[]));
             test.operations
         };
         let old = &before.operations;

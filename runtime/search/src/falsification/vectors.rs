@@ -7,39 +7,39 @@
 use sesame_plan::{Activation, Choice, Shape, Test, TestOperation};
 use sesame_rng::derive_seed;
 
-use crate::Permitted;
-use crate::space::choice::PermittedChoice;
-use crate::space::permitted::PermittedActivation;
+use crate::space::parameter_space::ParameterSpace;
 use crate::space::range::Range;
+use crate::space::test_space::ActivationSpace;
+use crate::space::test_space::TestSpace;
 
 /// What turns vectors of the unit box into tests.
 #[derive(Debug, Clone)]
 pub(super) struct Vectors {
-    permitted: Permitted,
+    test_space: TestSpace,
     variables: usize,
     seed: u64,
 }
 
 impl Vectors {
     /// The vectors that the tests of a campaign are; `None` if they are none, or if there is nothing to choose.
-    pub(super) fn of(permitted: &Permitted, seed: u64) -> Option<Self> {
-        let kinds = permitted.operations();
-        let once = permitted.fewest() == kinds.len() && permitted.most() == kinds.len();
+    pub(super) fn from_space(test_space: &TestSpace, seed: u64) -> Option<Self> {
+        let kinds = test_space.operations();
+        let once = test_space.fewest() == kinds.len() && test_space.most() == kinds.len();
         let mut variables = 0;
         for kind in kinds {
-            if kind.activation != PermittedActivation::Offline {
+            if kind.activation != ActivationSpace::Offline {
                 return None;
             }
             for parameter in &kind.parameters {
                 variables += match parameter {
                     _ if parameter.is_fixed() => 0,
-                    PermittedChoice::Number(_, Shape::Value) => 1,
-                    PermittedChoice::Point(axes) => axes.iter().filter(|axis| !axis.is_fixed()).count(),
-                    PermittedChoice::Number(_, Shape::Range) | PermittedChoice::Items(_) => return None,
+                    ParameterSpace::Number(_, Shape::Value) => 1,
+                    ParameterSpace::Point(axes) => axes.iter().filter(|axis| !axis.is_fixed()).count(),
+                    ParameterSpace::Number(_, Shape::Range) | ParameterSpace::Items(_) => return None,
                 };
             }
         }
-        (once && variables > 0).then(|| Vectors { permitted: permitted.clone(), variables, seed })
+        (once && variables > 0).then(|| Vectors { test_space: test_space.clone(), variables, seed })
     }
 
     /// How many numbers a test chooses.
@@ -58,18 +58,18 @@ impl Vectors {
             }
             range.at(shares.next().expect("each variable has its number"))
         };
-        let mut operations = Vec::with_capacity(self.permitted.operations().len());
-        for (at, kind) in (0u64..).zip(self.permitted.operations()) {
-            let choice = |parameter: &PermittedChoice| match parameter {
-                PermittedChoice::Number(range, _) => Choice::Value { value: choose(range) },
-                PermittedChoice::Point(axes) => Choice::Point { point: axes.each_ref().map(&mut choose) },
-                PermittedChoice::Items(items) => Choice::Text { text: items[0].clone() },
+        let mut operations = Vec::with_capacity(self.test_space.operations().len());
+        for (at, kind) in (0u64..).zip(self.test_space.operations()) {
+            let choice = |parameter: &ParameterSpace| match parameter {
+                ParameterSpace::Number(range, _) => Choice::Value { value: choose(range) },
+                ParameterSpace::Point(axes) => Choice::Point { point: axes.each_ref().map(&mut choose) },
+                ParameterSpace::Items(items) => Choice::Text { text: items[0].clone() },
             };
             operations.push(TestOperation {
                 operation: kind.operation,
                 activation: Activation::Offline,
                 parameters: kind.parameters.iter().map(choice).collect(),
-                draw_seed: derive_seed(self.seed, "vector", &[number, at]),
+                operation_seed: derive_seed(self.seed, "vector", &[number, at]),
             });
         }
         Test { operations }
@@ -83,7 +83,7 @@ mod tests {
     use sesame_plan::{ActivationMode, CampaignPlan, Count, Domain, Moment, OperationKind};
 
     use super::*;
-    use crate::space::permitted::tests::{any_timed_plan, broken_rule};
+    use crate::space::test_space::tests::{any_timed_plan, broken_rule};
 
     /// All operations before the start, and each in every test.
     fn all_before_the_start(mut plan: CampaignPlan) -> CampaignPlan {
@@ -108,14 +108,14 @@ mod tests {
             plan in any_timed_plan(), shares in prop::collection::vec(0.0..=1.0f64, 40), number: u64,
         ) {
             let plan = all_before_the_start(plan);
-            let permitted = Permitted::of(&plan).unwrap();
+            let test_space = TestSpace::from_plan(&plan).unwrap();
             let texts = plan.campaign.operations.iter().flat_map(|&id| &plan.operation(id).parameters);
             let chosen = texts.clone().any(|parameter| {
                 let items = |items: &Vec<String>| items.len() > 1;
                 matches!(&parameter.domain, Domain::Texts { texts: of } | Domain::Files { files: of } if items(of))
             });
-            let Some(vectors) = Vectors::of(&permitted, 1) else {
-                let fixed = permitted.operations().iter().all(|it| it.parameters.iter().all(PermittedChoice::is_fixed));
+            let Some(vectors) = Vectors::from_space(&test_space, 1) else {
+                let fixed = test_space.operations().iter().all(|it| it.parameters.iter().all(ParameterSpace::is_fixed));
                 prop_assert!(chosen || fixed, "numbers are to be chosen, and nothing else");
                 return Ok(());
             };
@@ -129,12 +129,15 @@ mod tests {
 
     #[test]
     fn tests_that_differ_in_windows_or_in_what_they_hold_are_no_vectors() {
-        let plan = || crate::testing::landscape::LANDSCAPES[0].plan(sesame_plan::Search::Random { evaluations: 1 });
-        assert!(Vectors::of(&Permitted::of(&plan()).unwrap(), 1).is_none(), "windows");
+        let plan = || {
+            crate::testing::synthetic_robots::SYNTHETIC_ROBOTS[0]
+                .plan(sesame_plan::Search::new(sesame_plan::Strategy::Random, 1))
+        };
+        assert!(Vectors::from_space(&TestSpace::from_plan(&plan()).unwrap(), 1).is_none(), "windows");
         let fixed = all_before_the_start(plan());
-        assert_eq!(Vectors::of(&Permitted::of(&fixed).unwrap(), 1).unwrap().variables(), 2);
+        assert_eq!(Vectors::from_space(&TestSpace::from_plan(&fixed).unwrap(), 1).unwrap().variables(), 2);
         let mut fewer = fixed;
         fewer.campaign.count.min = 1;
-        assert!(Vectors::of(&Permitted::of(&fewer).unwrap(), 1).is_none(), "one operation or two");
+        assert!(Vectors::from_space(&TestSpace::from_plan(&fewer).unwrap(), 1).is_none(), "one operation or two");
     }
 }

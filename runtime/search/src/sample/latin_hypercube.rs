@@ -7,14 +7,14 @@
 use sesame_plan::Test;
 use sesame_rng::{Stream, derive_seed, keyed_unit};
 
-use crate::Permitted;
-use crate::sample::decoded::{BELOW_ONE, decoded};
-use crate::sample::in_turn::Sampling;
+use crate::sample::decode::{BELOW_ONE, decoded};
+use crate::sample::sampled_search::Sampling;
+use crate::space::test_space::TestSpace;
 
 /// So many tests, spread evenly over each choice.
 #[derive(Debug, Clone)]
-pub struct LatinHypercube {
-    permitted: Permitted,
+pub(crate) struct LatinHypercube {
+    test_space: TestSpace,
     seed: u64,
     /// Per choice, the order in which its strata are taken.
     strata: Vec<Vec<usize>>,
@@ -23,8 +23,8 @@ pub struct LatinHypercube {
 
 impl LatinHypercube {
     /// So many tests of what is permitted.
-    pub fn new(permitted: Permitted, evaluations: u32, seed: u64) -> Self {
-        LatinHypercube { permitted, seed, strata: Vec::new(), evaluations }
+    pub(crate) fn new(test_space: TestSpace, evaluations: u32, seed: u64) -> Self {
+        LatinHypercube { test_space, seed, strata: Vec::new(), evaluations }
     }
 
     /// The value of the `index`th test for a choice, in `0..1`: each of as many equal parts holds one test's.
@@ -41,8 +41,8 @@ impl LatinHypercube {
 
 impl Sampling for LatinHypercube {
     fn test(&mut self, index: u32) -> Test {
-        let permitted = self.permitted.clone();
-        decoded(&permitted, self.seed, index, |choice| self.value(choice, index))
+        let test_space = self.test_space.clone();
+        decoded(&test_space, self.seed, index, |choice| self.value(choice, index))
     }
 }
 
@@ -52,13 +52,13 @@ mod tests {
 
     use super::*;
     use crate::space::initial::place;
-    use crate::space::permitted::tests::{any_timed_plan, broken_rule};
-    use crate::testing::landscape::LANDSCAPES;
+    use crate::space::test_space::tests::{any_timed_plan, broken_rule};
+    use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     #[test]
     fn each_choice_has_one_test_in_each_of_its_equal_parts() {
-        let plan = LANDSCAPES[0].plan(sesame_plan::Search::Random { evaluations: 1 });
-        let mut search = LatinHypercube::new(Permitted::of(&plan).unwrap(), 40, 3);
+        let plan = SYNTHETIC_ROBOTS[0].plan(sesame_plan::Search::new(sesame_plan::Strategy::Random, 1));
+        let mut search = LatinHypercube::new(TestSpace::from_plan(&plan).unwrap(), 40, 3);
         for choice in 0..8 {
             let mut strata: Vec<usize> = (0..40).map(|index| place(search.value(choice, index), 40)).collect();
             strata.sort_unstable();
@@ -73,7 +73,7 @@ mod tests {
     proptest! {
         #[test]
         fn tests_are_permitted(plan in any_timed_plan(), seed: u64) {
-            let mut search = LatinHypercube::new(Permitted::of(&plan).unwrap(), 20, seed);
+            let mut search = LatinHypercube::new(TestSpace::from_plan(&plan).unwrap(), 20, seed);
             for index in 0..20 {
                 prop_assert_eq!(broken_rule(&plan, &search.test(index)), None);
             }

@@ -6,28 +6,28 @@
 use sesame_optimise::sobol::SobolPoints;
 use sesame_plan::Test;
 
-use crate::Permitted;
-use crate::sample::decoded::decoded;
-use crate::sample::in_turn::Sampling;
+use crate::sample::decode::decoded;
+use crate::sample::sampled_search::Sampling;
+use crate::space::test_space::TestSpace;
 
 /// Tests along scrambled Sobol' points. The nth depends on the seed and n alone.
 #[derive(Debug, Clone)]
-pub struct Sobol {
-    permitted: Permitted,
+pub(crate) struct Sobol {
+    test_space: TestSpace,
     seed: u64,
     points: SobolPoints,
 }
 
 impl Sobol {
     /// Tests of what is permitted.
-    pub fn new(permitted: Permitted, seed: u64) -> Self {
-        Sobol { permitted, seed, points: SobolPoints::new(seed) }
+    pub(crate) fn new(test_space: TestSpace, seed: u64) -> Self {
+        Sobol { test_space, seed, points: SobolPoints::new(seed) }
     }
 }
 
 impl Sampling for Sobol {
     fn test(&mut self, index: u32) -> Test {
-        decoded(&self.permitted, self.seed, index, |choice| self.points.value(choice, index))
+        decoded(&self.test_space, self.seed, index, |choice| self.points.value(choice, index))
     }
 }
 
@@ -36,13 +36,13 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::space::permitted::tests::{any_timed_plan, broken_rule};
-    use crate::testing::landscape::LANDSCAPES;
+    use crate::space::test_space::tests::{any_timed_plan, broken_rule};
+    use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     #[test]
     fn every_beginning_has_tests_of_all_lengths_alike() {
-        let plan = LANDSCAPES[0].plan(sesame_plan::Search::Random { evaluations: 1 });
-        let mut search = Sobol::new(Permitted::of(&plan).unwrap(), 3);
+        let plan = SYNTHETIC_ROBOTS[0].plan(sesame_plan::Search::new(sesame_plan::Strategy::Random, 1));
+        let mut search = Sobol::new(TestSpace::from_plan(&plan).unwrap(), 3);
         let mut lengths = [0; 6];
         (0..64).for_each(|index| lengths[search.test(index).operations.len()] += 1);
         // One to five operations follow from fifths of the first choice, of which 64ths are taken once each.
@@ -52,7 +52,7 @@ mod tests {
     proptest! {
         #[test]
         fn tests_are_permitted(plan in any_timed_plan(), seed: u64) {
-            let mut search = Sobol::new(Permitted::of(&plan).unwrap(), seed);
+            let mut search = Sobol::new(TestSpace::from_plan(&plan).unwrap(), seed);
             for index in 0..20 {
                 prop_assert_eq!(broken_rule(&plan, &search.test(index)), None);
             }

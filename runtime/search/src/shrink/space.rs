@@ -1,4 +1,4 @@
-//! What is smaller: the shortest windows, the mild end of each parameter, and how far one step goes.
+//! What smaller means: the shortest windows, the neutral end of each parameter, and how far one step goes.
 
 use sesame_plan::condition::{Condition, ConditionEnd, ConditionSpace};
 use sesame_plan::{
@@ -6,17 +6,17 @@ use sesame_plan::{
     ValueMode,
 };
 
-use crate::space::choice::PermittedChoice;
 use crate::space::condition::is_allowed;
+use crate::space::parameter_space::ParameterSpace;
 use crate::space::range::Range;
 
 /// One step as a share of what is permitted: of an operation's window, and of a parameter's range. Whole numbers go by
 /// the nearest whole number of this size, and by 1 at least.
 pub const RESOLUTION: f64 = 0.01;
 
-/// In what the tests of a campaign can be made smaller.
+/// In what ways the tests of a campaign can be shrunk.
 #[derive(Debug, Clone)]
-pub(super) struct Space {
+pub(super) struct ShrinkSpace {
     /// Operations that a test holds at least.
     pub(super) fewest: usize,
     resolution: f64,
@@ -35,14 +35,14 @@ struct Bounds {
 /// A parameter that can be made milder.
 #[derive(Debug, Clone)]
 enum Parameter {
-    Number(Mild),
+    Number(NeutralValue),
     /// A point: its coordinates, each by itself.
-    Point([Mild; 3]),
+    Point([NeutralValue; 3]),
 }
 
 /// A permitted range of numbers, and where in it a disturbance is mildest.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Mild {
+pub(super) struct NeutralValue {
     /// The number that disturbs least; `None` where no number is milder than another, so that only narrower sub-ranges
     /// are milder.
     pub(super) end: Option<f64>,
@@ -50,9 +50,9 @@ pub(super) struct Mild {
     pub(super) step: f64,
 }
 
-impl Space {
+impl ShrinkSpace {
     /// That of a plan's campaign, in steps of this share of what is permitted.
-    pub(super) fn of(plan: &CampaignPlan, resolution: f64) -> Space {
+    pub(super) fn from_plan(plan: &CampaignPlan, resolution: f64) -> ShrinkSpace {
         let campaign = &plan.campaign;
         let conditions = match &campaign.activation {
             ActivationMode::Time => None,
@@ -61,22 +61,23 @@ impl Space {
         let operations = plan.operations.iter().map(|operation| {
             let end = operation.within.end.min(campaign.end_after).max(operation.within.start);
             let parameters = operation.parameters.iter().map(|parameter| {
-                let mild = |range: Range, shape| {
+                let neutral = |range: Range, shape| {
                     let step = (range.high - range.low) * resolution;
                     let step = if range.integer { libm::round(step).max(1.0) } else { step };
-                    let end = mild_end(&operation.kind, &parameter.name).map(|end| end.clamp(range.low, range.high));
+                    let end =
+                        neutral_value(&operation.kind, &parameter.name).map(|end| end.clamp(range.low, range.high));
                     // A value that is no stronger than another is left as it is.
                     let known = end.is_some() || shape == Shape::Range;
-                    (known && !range.is_fixed()).then_some(Mild { end, step })
+                    (known && !range.is_fixed()).then_some(NeutralValue { end, step })
                 };
-                match PermittedChoice::of(&parameter.domain)? {
-                    PermittedChoice::Number(range, shape) => mild(range, shape).map(Parameter::Number),
-                    PermittedChoice::Point(axes) => {
-                        let fixed = |range: Range| Mild { end: Some(range.low), step: 0.0 };
-                        mild_end(&operation.kind, &parameter.name)?;
-                        Some(Parameter::Point(axes.map(|axis| mild(axis, Shape::Value).unwrap_or(fixed(axis)))))
+                match ParameterSpace::from_domain(&parameter.domain)? {
+                    ParameterSpace::Number(range, shape) => neutral(range, shape).map(Parameter::Number),
+                    ParameterSpace::Point(axes) => {
+                        let fixed = |range: Range| NeutralValue { end: Some(range.low), step: 0.0 };
+                        neutral_value(&operation.kind, &parameter.name)?;
+                        Some(Parameter::Point(axes.map(|axis| neutral(axis, Shape::Value).unwrap_or(fixed(axis)))))
                     }
-                    PermittedChoice::Items(_) => None,
+                    ParameterSpace::Items(_) => None,
                 }
             });
             Bounds {
@@ -85,7 +86,12 @@ impl Space {
                 parameters: parameters.collect(),
             }
         });
-        Space { fewest: campaign.count.min.max(1) as usize, resolution, operations: operations.collect(), conditions }
+        ShrinkSpace {
+            fewest: campaign.count.min.max(1) as usize,
+            resolution,
+            operations: operations.collect(),
+            conditions,
+        }
     }
 
     fn bounds(&self, operation: OperationId) -> &Bounds {
@@ -112,15 +118,15 @@ impl Space {
     }
 
     /// What is milder of a number; `None` where nothing is, and for a point.
-    pub(super) fn number(&self, operation: OperationId, parameter: usize) -> Option<Mild> {
+    pub(super) fn number(&self, operation: OperationId, parameter: usize) -> Option<NeutralValue> {
         match self.bounds(operation).parameters.get(parameter)? {
-            Some(Parameter::Number(mild)) => Some(*mild),
+            Some(Parameter::Number(neutral)) => Some(*neutral),
             _ => None,
         }
     }
 
     /// What is milder of a point's coordinates; `None` where nothing is, and for a number.
-    pub(super) fn point(&self, operation: OperationId, parameter: usize) -> Option<[Mild; 3]> {
+    pub(super) fn point(&self, operation: OperationId, parameter: usize) -> Option<[NeutralValue; 3]> {
         match self.bounds(operation).parameters.get(parameter)? {
             Some(Parameter::Point(axes)) => Some(*axes),
             _ => None,
@@ -137,13 +143,13 @@ impl Space {
             Activation::Time { .. } | Activation::Offline => Vec::new(),
             Activation::ConditionFor { start, length, times } => {
                 let demanding = may_start(start);
-                let starts = parts_left_out(start).into_iter().filter(|it| !demanding || may_start(it));
+                let starts = simplified(start).into_iter().filter(|it| !demanding || may_start(it));
                 starts.map(|start| Activation::ConditionFor { start, length: *length, times: *times }).collect()
             }
             Activation::Condition { start, end, times } => {
                 let (demanding_start, demanding_end) = (may_start(start), may_end(end));
-                let starts = parts_left_out(start).into_iter().filter(|it| !demanding_start || may_start(it));
-                let ends = parts_left_out(end).into_iter().filter(|it| !demanding_end || may_end(it));
+                let starts = simplified(start).into_iter().filter(|it| !demanding_start || may_start(it));
+                let ends = simplified(end).into_iter().filter(|it| !demanding_end || may_end(it));
                 let with_start = starts.map(|start| Activation::Condition { start, end: end.clone(), times: *times });
                 let with_end = ends.map(|end| Activation::Condition { start: start.clone(), end, times: *times });
                 with_start.chain(with_end).collect()
@@ -161,15 +167,15 @@ type Join = fn(Box<Condition>, Box<Condition>) -> Condition;
 
 /// A condition with one `and` or `or` in it replaced by one of its sides, in each way; those that leave out most come
 /// first.
-fn parts_left_out(condition: &Condition) -> Vec<Condition> {
+fn simplified(condition: &Condition) -> Vec<Condition> {
     let (a, b, join): (_, _, Join) = match condition {
         Condition::Compare { .. } => return Vec::new(),
         Condition::And(a, b) => (a, b, Condition::And),
         Condition::Or(a, b) => (a, b, Condition::Or),
     };
     let mut found = vec![(**a).clone(), (**b).clone()];
-    found.extend(parts_left_out(a).into_iter().map(|a| join(Box::new(a), b.clone())));
-    found.extend(parts_left_out(b).into_iter().map(|b| join(a.clone(), Box::new(b))));
+    found.extend(simplified(a).into_iter().map(|a| join(Box::new(a), b.clone())));
+    found.extend(simplified(b).into_iter().map(|b| join(a.clone(), Box::new(b))));
     found
 }
 
@@ -186,7 +192,7 @@ fn parts_left_out(condition: &Condition) -> Vec<Condition> {
 /// | duplicate | one copy |
 /// | custom | 0, as far as anybody can know |
 /// | random absolute, stuck at | none: of a sub-range only a narrower one is milder |
-fn mild_end(kind: &OperationKind, parameter: &str) -> Option<f64> {
+fn neutral_value(kind: &OperationKind, parameter: &str) -> Option<f64> {
     match kind {
         OperationKind::RandomValue { mode: ValueMode::Absolute, .. }
         | OperationKind::StuckAt { .. }
@@ -222,7 +228,7 @@ fn strength_of(plan: &CampaignPlan, used: &TestOperation) -> f64 {
     let operation = plan.operation(used.operation);
     let mut shares = Vec::new();
     for (parameter, choice) in operation.parameters.iter().zip(&used.parameters) {
-        let end = mild_end(&operation.kind, &parameter.name);
+        let end = neutral_value(&operation.kind, &parameter.name);
         let mut add = |(low, high): (f64, f64), (from, to): (f64, f64), shape| {
             let share = match end.map(|end| end.clamp(low, high)) {
                 Some(end) => (from - end).abs().max((to - end).abs()) / (high - end).max(end - low),

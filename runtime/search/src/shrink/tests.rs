@@ -2,22 +2,26 @@ use std::collections::BTreeSet;
 
 use proptest::prelude::*;
 
-use sesame_optimise::dominance::Fitness;
 use sesame_plan::condition::ConditionEnd;
 use sesame_plan::{
-    Activation, ActivationMode, Choice, Domain, OperationId, OperationKind, Search, Shape, TestOperation,
+    Activation, ActivationMode, Choice, Domain, OperationId, OperationKind, Search, Shape, Strategy, TestOperation,
 };
 use sesame_rng::Stream;
 
 use super::*;
 use crate::Strategy as _;
-use crate::shrink::dial;
+use crate::shrink::axis;
 use crate::space::initial::fresh_test;
-use crate::space::permitted::Permitted;
-use crate::space::permitted::tests::{any_plan, broken_rule};
-use crate::testing::landscape::LANDSCAPES;
+use crate::space::test_space::TestSpace;
+use crate::space::test_space::tests::{any_plan, broken_rule};
+use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
-/// Makes a test smaller where a run of it fails as `fails` has it.
+/// How a test that fails with the simulator's seed 7 is shrunk.
+fn shrinking(test: Test, runs: u32, evaluations: u32) -> Shrinking {
+    Shrinking { name: "T1".to_owned(), test, failing: Failing::Crash, simulator_seed: 7, runs, evaluations }
+}
+
+/// Shrinks a test as long as a run of it fails by `fails`.
 fn shrunk(mut shrink: Shrink, mut fails: impl FnMut(&Test, u64) -> bool) -> Shrink {
     let mut number = 0;
     loop {
@@ -25,26 +29,19 @@ fn shrunk(mut shrink: Shrink, mut fails: impl FnMut(&Test, u64) -> bool) -> Shri
         if asked.is_empty() {
             return shrink;
         }
-        let mut told = Vec::new();
-        for candidate in asked {
-            number += 1;
-            let failing = fails(&candidate.test, candidate.simulator_seed.unwrap());
-            told.push(Evaluated {
-                number,
-                test: candidate.test,
-                fitness: Fitness::Measured(Vec::new()),
-                point: None,
-                course: None,
-                margins: Vec::new(),
-                failing,
-            });
-        }
-        shrink.tell(&told);
+        let told: Vec<(u32, bool)> = asked
+            .into_iter()
+            .map(|candidate| {
+                number += 1;
+                (number, fails(&candidate.test, candidate.simulator_seed.unwrap()))
+            })
+            .collect();
+        shrink.learn(&told);
     }
 }
 
 fn smallest(shrink: &Shrink) -> Option<&Test> {
-    Some(&shrink.tried()[*shrink.kept().last()?].test)
+    Some(&shrink.tried()[*shrink.accepted().last()?].test)
 }
 
 /// A number that looks random and is the same for the same test.
@@ -60,7 +57,7 @@ fn scattered(test: &Test, seed: u64) -> f64 {
 fn grown(before: &Test, after: &Test) -> Option<String> {
     let mut left = before.operations.iter();
     for used in &after.operations {
-        let was = left.find(|it| it.draw_seed == used.draw_seed && it.operation == used.operation)?;
+        let was = left.find(|it| it.operation_seed == used.operation_seed && it.operation == used.operation)?;
         let inside = match (&was.activation, &used.activation) {
             (Activation::Time { start: a, end: b }, Activation::Time { start, end }) => {
                 a <= start && start < end && end <= b
@@ -87,7 +84,7 @@ fn grown(before: &Test, after: &Test) -> Option<String> {
 }
 
 /// Every test that is one step smaller, in whatever order.
-fn one_step_smaller(space: &Space, test: &Test) -> Vec<Test> {
+fn one_step_smaller(space: &ShrinkSpace, test: &Test) -> Vec<Test> {
     let mut found = Vec::new();
     if test.operations.len() > space.fewest {
         for place in 0..test.operations.len() {
@@ -103,9 +100,9 @@ fn one_step_smaller(space: &Space, test: &Test) -> Vec<Test> {
             found.push(simpler);
         }
     }
-    for dial in dial::times(test).into_iter().chain(dial::parameters(test)) {
+    for dial in axis::times(test).into_iter().chain(axis::parameters(test)) {
         if dial.steps(space, test) > 0 {
-            found.push(dial.turned(space, test, 1));
+            found.push(dial.shrink_along(space, test, 1));
         }
     }
     found
@@ -118,15 +115,15 @@ proptest! {
     fn whatever_fails_the_smallest_test_fails_is_permitted_and_loses_nothing_by_one_step(
         plan in any_plan(), seed: u64, share in 0.05..0.95f64,
     ) {
-        let permitted = Permitted::of(&plan).unwrap();
-        let mut original = fresh_test(&permitted, &mut Stream::derive(seed, "test", &[]));
+        let test_space = TestSpace::from_plan(&plan).unwrap();
+        let mut original = fresh_test(&test_space, &mut Stream::derive(seed, "test", &[]));
         for (at, used) in (0u64..).zip(&mut original.operations) {
-            used.draw_seed = at;
+            used.operation_seed = at;
         }
         let fails = |test: &Test, _| *test == original || scattered(test, seed) < share;
         let mut asked = BTreeSet::new();
         let mut repeated = false;
-        let shrink = Shrink::with_resolution(&plan, original.clone(), 7, (1, 100_000), 0.1);
+        let shrink = Shrink::with_resolution(&plan, shrinking(original.clone(), 1, 100_000), 0.1);
         let shrink = shrunk(shrink, |test, run| {
             repeated |= !asked.insert(content(test));
             fails(test, run)
@@ -170,13 +167,13 @@ proptest! {
                 operation: OperationId(u32::try_from(at % 2).unwrap()),
                 activation: Activation::Time { start: stream.uniform(0.0, moment), end: stream.uniform(moment + 0.1, 65.0) },
                 parameters: vec![Choice::Value { value: loss }],
-                draw_seed: at,
+                operation_seed: at,
             });
         }
         let is_needed = |at: usize| needs[at].3 || at == 0;
         // Some are needed at a moment, some over the second half of their window too.
         let enough = |used: &TestOperation| {
-            let at = usize::try_from(used.draw_seed).unwrap();
+            let at = usize::try_from(used.operation_seed).unwrap();
             let (moment, loss, part, _) = needs[at];
             let Activation::Time { end: last, .. } = original.operations[at].activation else { panic!("windows") };
             let (&Activation::Time { start, end }, &Choice::Value { value }) = (&used.activation, &used.parameters[0])
@@ -184,10 +181,10 @@ proptest! {
             start <= moment && end >= moment + (last - moment) * part && value >= loss * part
         };
         let fails = |test: &Test| {
-            let holds = |at: usize| test.operations.iter().any(|used| used.draw_seed == at as u64 && enough(used));
+            let holds = |at: usize| test.operations.iter().any(|used| used.operation_seed == at as u64 && enough(used));
             (0..needs.len()).filter(|&at| is_needed(at)).all(holds)
         };
-        let shrink = shrunk(Shrink::with_resolution(&plan, original.clone(), 7, (1, 100_000), 0.1), |test, _| fails(test));
+        let shrink = shrunk(Shrink::with_resolution(&plan, shrinking(original.clone(), 1, 100_000), 0.1), |test, _| fails(test));
         let found = smallest(&shrink).unwrap();
         prop_assert_eq!(found.operations.len(), (0..needs.len()).filter(|&at| is_needed(at)).count());
         let size = |used: &TestOperation| match (&used.activation, &used.parameters[0]) {
@@ -196,7 +193,7 @@ proptest! {
         };
         for used in &found.operations {
             // Operations do not depend on each other here, so each is looked at by itself.
-            let mut all = vec![Test { operations: vec![original.operations[usize::try_from(used.draw_seed).unwrap()].clone()] }];
+            let mut all = vec![Test { operations: vec![original.operations[usize::try_from(used.operation_seed).unwrap()].clone()] }];
             for at in 0..3 {
                 all = all.iter().flat_map(|test| turned_anyhow(&shrink.space, test, at)).collect();
             }
@@ -211,7 +208,7 @@ proptest! {
 
 /// Two operations that lose messages, one to five per test.
 fn losses() -> CampaignPlan {
-    let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     for operation in &mut plan.operations {
         operation.kind = OperationKind::PacketLoss;
         operation.parameters[0].domain = Domain::Number { low: 0.0, high: 1.0, shape: Shape::Value, integer: false };
@@ -220,9 +217,9 @@ fn losses() -> CampaignPlan {
 }
 
 /// A test with one of its dials turned in every way, and as it is.
-fn turned_anyhow(space: &Space, test: &Test, dial: usize) -> Vec<Test> {
-    let dial = [dial::times(test), dial::parameters(test)].concat()[dial];
-    let turned = (1..=dial.steps(space, test)).map(|steps| dial.turned(space, test, steps));
+fn turned_anyhow(space: &ShrinkSpace, test: &Test, dial: usize) -> Vec<Test> {
+    let dial = [axis::times(test), axis::parameters(test)].concat()[dial];
+    let turned = (1..=dial.steps(space, test)).map(|steps| dial.shrink_along(space, test, steps));
     std::iter::once(test.clone()).chain(turned).collect()
 }
 
@@ -232,7 +229,7 @@ fn offsets(operations: &[(u32, (f64, f64), Choice)]) -> Test {
         operation: OperationId(*operation),
         activation: Activation::Time { start: *start, end: *end },
         parameters: vec![choice.clone()],
-        draw_seed: at,
+        operation_seed: at,
     };
     Test { operations: (0u64..).zip(operations).map(used).collect() }
 }
@@ -253,8 +250,8 @@ fn only(test: &Test) -> (f64, f64, f64, f64) {
 
 #[test]
 fn a_made_up_robot_shows_what_of_a_test_mattered() {
-    let robot = &LANDSCAPES[0];
-    let plan = robot.plan(Search::Random { evaluations: 1 });
+    let robot = &SYNTHETIC_ROBOTS[0];
+    let plan = robot.plan(Search::new(Strategy::Random, 1));
     // Only an offset above 0.2 on the second signal between 30 s and 33 s counts, on the average of its sub-range.
     let original = offsets(&[
         (0, (1.0, 7.0), range(0.0, 0.3)),
@@ -262,7 +259,7 @@ fn a_made_up_robot_shows_what_of_a_test_mattered() {
         (0, (16.0, 28.0), range(-0.3, 0.0)),
     ]);
     assert!(robot.measure(&original).1 > 0.0);
-    let shrink = shrunk(Shrink::new(&plan, original, 7, 1, 200), |test, _| robot.measure(test).1 > 0.0);
+    let shrink = shrunk(Shrink::new(&plan, shrinking(original, 1, 200)), |test, _| robot.measure(test).1 > 0.0);
     let (start, end, low, high) = only(smallest(&shrink).unwrap());
     assert!(end - start < 0.9 && 29.0 < start && end < 33.7, "{start} to {end}");
     assert!(f64::midpoint(low, high) > 0.2 && high - low < 0.02 && high < 0.215, "{low} to {high}");
@@ -271,13 +268,13 @@ fn a_made_up_robot_shows_what_of_a_test_mattered() {
 
 #[test]
 fn windows_close_in_from_both_ends_down_to_the_shortest_that_is_permitted() {
-    let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     let original = offsets(&[(0, (2.0, 50.0), range(-0.2, 0.25))]);
-    let shrink = shrunk(Shrink::new(&plan, original.clone(), 7, 1, 500), |_, _| true);
+    let shrink = shrunk(Shrink::new(&plan, shrinking(original.clone(), 1, 500)), |_, _| true);
     let (start, end, low, high) = only(smallest(&shrink).unwrap());
     assert!((end - start - 0.065).abs() < 1e-9, "a thousandth of 65 s: {start} to {end}");
     assert_eq!((low, high), (0.0, 0.0), "an offset is mildest at zero");
-    let shrink = shrunk(Shrink::new(&plan, original, 7, 1, 500), |test, _| {
+    let shrink = shrunk(Shrink::new(&plan, shrinking(original, 1, 500)), |test, _| {
         let (start, end, low, high) = only(test);
         start <= 10.0 && end >= 41.0 && low <= -0.1 && high >= 0.1
     });
@@ -288,11 +285,11 @@ fn windows_close_in_from_both_ends_down_to_the_shortest_that_is_permitted() {
 
 #[test]
 fn a_sub_range_that_lies_off_its_mild_end_goes_there_as_a_whole() {
-    let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     for sign in [1.0, -1.0] {
         let ends = |a: f64, b: f64| range((a * sign).min(b * sign), (a * sign).max(b * sign));
         let original = offsets(&[(0, (2.0, 50.0), ends(0.2, 0.3))]);
-        let shrink = shrunk(Shrink::new(&plan, original, 7, 1, 500), |test, _| {
+        let shrink = shrunk(Shrink::new(&plan, shrinking(original, 1, 500)), |test, _| {
             let (_, _, low, high) = only(test);
             f64::midpoint(low, high) * sign >= 0.1
         });
@@ -310,7 +307,7 @@ fn a_value_goes_to_what_disturbs_least_of_its_kind() {
         plan.operations[0].parameters[0].name = name.to_owned();
         plan.operations[0].parameters[0].domain = Domain::Number { low, high, shape: Shape::Value, integer: false };
         let original = offsets(&[(0, (2.0, 50.0), Choice::Value { value: low * 0.4 + high * 0.6 })]);
-        let shrink = shrunk(Shrink::new(&plan, original, 7, 1, 500), |_, _| true);
+        let shrink = shrunk(Shrink::new(&plan, shrinking(original, 1, 500)), |_, _| true);
         let Choice::Value { value } = smallest(&shrink).unwrap().operations[0].parameters[0] else { panic!("a value") };
         value
     };
@@ -337,16 +334,16 @@ fn a_value_goes_to_what_disturbs_least_of_its_kind() {
 #[test]
 fn a_condition_loses_what_does_not_matter_and_activations_get_fewer_and_shorter() {
     use sesame_base::condition::testing::{above, and, below, or};
-    let robot = &LANDSCAPES[0];
+    let robot = &SYNTHETIC_ROBOTS[0];
     let length = ConditionEnd::Length { low: 1.0, high: 15.0 };
-    let mut plan = robot.plan_by_condition(Search::Random { evaluations: 1 }, length);
+    let mut plan = robot.plan_by_condition(Search::new(Strategy::Random, 1), length);
     if let ActivationMode::Condition { space } = &mut plan.campaign.activation {
         space.times = 3;
     }
     let start = and(or(above(2, 3.0), below(3, 4.0)), and(above(4, 2.0), below(2, 19.0)));
     let mut original = offsets(&[(0, (0.0, 1.0), range(0.1, 0.3))]);
     original.operations[0].activation = Activation::ConditionFor { start, length: 12.0, times: 3 };
-    let shrink = shrunk(Shrink::new(&plan, original, 7, 1, 500), |test, _| {
+    let shrink = shrunk(Shrink::new(&plan, shrinking(original, 1, 500)), |test, _| {
         let Activation::ConditionFor { start, length, times } = &test.operations[0].activation else { panic!() };
         sesame_base::condition::mentions(start, &|it| it == sesame_base::condition::testing::variable(4))
             && *length > 4.0
@@ -361,11 +358,11 @@ fn a_condition_loses_what_does_not_matter_and_activations_get_fewer_and_shorter(
 
 #[test]
 fn with_several_runs_a_test_has_to_fail_in_each() {
-    let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     let original = offsets(&[(0, (2.0, 50.0), range(-0.2, 0.25)), (1, (2.0, 50.0), range(-0.2, 0.25))]);
     let mut seeds = BTreeSet::new();
     // With the seed of the test everything fails, with the others only what has both operations.
-    let shrink = shrunk(Shrink::new(&plan, original, 7, 3, 900), |test, seed| {
+    let shrink = shrunk(Shrink::new(&plan, shrinking(original, 3, 900)), |test, seed| {
         seeds.insert(seed);
         seed == 7 || test.operations.len() == 2
     });
@@ -379,13 +376,15 @@ fn with_several_runs_a_test_has_to_fail_in_each() {
 
 #[test]
 fn when_the_evaluations_are_used_up_the_smallest_so_far_is_told_as_such() {
-    let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     let original = offsets(&[(0, (2.0, 50.0), range(-0.2, 0.25)), (1, (2.0, 50.0), range(-0.2, 0.25))]);
-    let whole =
-        shrunk(Shrink::new(&plan, original.clone(), 7, 1, 500), |test, _| test.operations.len() == 2).tried().len();
+    let whole = shrunk(Shrink::new(&plan, shrinking(original.clone(), 1, 500)), |test, _| test.operations.len() == 2)
+        .tried()
+        .len();
     for evaluations in 1..=60 {
-        let shrink =
-            shrunk(Shrink::new(&plan, original.clone(), 7, 1, evaluations), |test, _| test.operations.len() == 2);
+        let shrink = shrunk(Shrink::new(&plan, shrinking(original.clone(), 1, evaluations)), |test, _| {
+            test.operations.len() == 2
+        });
         assert!(shrink.tried().len() <= evaluations as usize);
         assert_eq!(shrink.is_minimal(), evaluations as usize >= whole, "{evaluations} of {whole}");
         assert_eq!(smallest(&shrink).unwrap().operations.len(), 2);
@@ -403,9 +402,9 @@ fn when_the_evaluations_are_used_up_the_smallest_so_far_is_told_as_such() {
 
 #[test]
 fn a_test_that_does_not_fail_again_is_left_as_it_is() {
-    let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     let original = offsets(&[(0, (2.0, 50.0), range(-0.2, 0.25))]);
-    let shrink = shrunk(Shrink::new(&plan, original, 7, 2, 500), |_, seed| seed == 7);
+    let shrink = shrunk(Shrink::new(&plan, shrinking(original, 2, 500)), |_, seed| seed == 7);
     assert_eq!((smallest(&shrink), shrink.tried().len(), shrink.tried()[0].failed), (None, 1, Some(1)));
     assert_eq!(shrink.ended().as_deref(), Some("the test did not fail again"));
 }

@@ -16,7 +16,7 @@ use crate::space::range::{Range, StepSizes};
 const TRIES: u32 = 50;
 
 /// Whether a search may use a condition: one that must contain something, or an end condition, which need not.
-pub fn is_allowed(condition: &Condition, space: &ConditionSpace, constraints: &[Constraint]) -> bool {
+pub(crate) fn is_allowed(condition: &Condition, space: &ConditionSpace, constraints: &[Constraint]) -> bool {
     depth(condition) <= space.depth
         && constraints.iter().all(|constraint| contains(condition, constraint))
         && of_one_unit(condition, space)
@@ -36,7 +36,7 @@ fn of_one_unit(condition: &Condition, space: &ConditionSpace) -> bool {
 }
 
 /// Whether a condition contains what a constraint demands.
-pub fn contains(condition: &Condition, constraint: &Constraint) -> bool {
+pub(crate) fn contains(condition: &Condition, constraint: &Constraint) -> bool {
     mentions(condition, &|operand| match (constraint, operand) {
         (Constraint::Variable { metric }, Operand::Variable(variable)) => variable == *metric,
         (Constraint::Integer { bounds }, Operand::Number(number)) => {
@@ -49,7 +49,7 @@ pub fn contains(condition: &Condition, constraint: &Constraint) -> bool {
 /// A fresh condition; `None` when so many tries give none that is allowed. Its number of levels is uniform over what the
 /// campaign allows, as far as conditions of these levels are allowed (ramped growth): every inner part has one branch as
 /// deep as it can be, and one of any depth below that.
-pub fn grown(space: &ConditionSpace, constraints: &[Constraint], stream: &mut Stream) -> Option<Condition> {
+pub(crate) fn grown(space: &ConditionSpace, constraints: &[Constraint], stream: &mut Stream) -> Option<Condition> {
     if space.variables.is_empty() || space.depth == 0 {
         return None;
     }
@@ -70,7 +70,7 @@ pub fn grown(space: &ConditionSpace, constraints: &[Constraint], stream: &mut St
 /// A condition that differs from another in one place and is allowed like it; perhaps it differs in nothing. With the
 /// probability `fresh`, a part of it is grown anew; else a comparison changes its sign, its number by a step, or a
 /// variable.
-pub fn changed(
+pub(crate) fn changed(
     condition: &Condition,
     space: &ConditionSpace,
     constraints: &[Constraint],
@@ -94,7 +94,7 @@ pub fn changed(
 
 /// Exchanges a part of one condition for a part of another (subtree crossover), so that both are allowed still. Says
 /// whether anything changed.
-pub fn exchange(
+pub(crate) fn exchange(
     [(a, of_a), (b, of_b)]: [(&mut Condition, &[Constraint]); 2],
     space: &ConditionSpace,
     stream: &mut Stream,
@@ -249,7 +249,7 @@ fn nth_comparison(condition: &mut Condition, at: usize) -> &mut Condition {
 
 /// What tells conditions apart, as numbers: the order of operands of `and` and `or` and their grouping do not, and neither
 /// does the way round in which a comparison is written.
-pub fn identity(condition: &Condition) -> Vec<u64> {
+pub(crate) fn identity(condition: &Condition) -> Vec<u64> {
     let side = |operand: Operand| match operand {
         Operand::Variable(metric) => [0, u64::from(metric.0)],
         Operand::Number(number) => [1, (number + 0.0).to_bits()],

@@ -19,28 +19,28 @@ use sesame_rng::Stream;
 
 use crate::space::apart;
 use crate::space::condition::grown;
-use crate::space::permitted::{Permitted, PermittedActivation, PermittedOperation};
 use crate::space::range::Range;
+use crate::space::test_space::{ActivationSpace, OperationSpace, TestSpace};
 
 /// The share of fresh tests in which each place is drawn for itself.
 const EACH_FOR_ITSELF: f64 = 0.25;
 
 /// A fresh test; one that the campaign permits.
-pub fn fresh_test(permitted: &Permitted, stream: &mut Stream) -> Test {
-    let kinds = fresh_kinds(permitted, &mut || stream.unit());
+pub fn fresh_test(test_space: &TestSpace, stream: &mut Stream) -> Test {
+    let kinds = fresh_kinds(test_space, &mut || stream.unit());
     let mut test = Test { operations: kinds.into_iter().map(|kind| fresh_operation(kind, stream)).collect() };
-    permitted.settle_windows(&mut test, apart::spread);
+    test_space.settle_windows(&mut test, apart::spread);
     test
 }
 
 /// The kinds of operations of a fresh test, in their order, by numbers in `0..1`. Numbers that are uniform and independent
 /// give the distribution that the head of this module states.
-pub fn fresh_kinds<'a>(permitted: &'a Permitted, number: &mut impl FnMut() -> f64) -> Vec<&'a PermittedOperation> {
-    let operations = permitted.operations();
-    let (fewest, most) = (permitted.fewest(), permitted.most());
+pub(crate) fn fresh_kinds<'a>(test_space: &'a TestSpace, number: &mut impl FnMut() -> f64) -> Vec<&'a OperationSpace> {
+    let operations = test_space.operations();
+    let (fewest, most) = (test_space.fewest(), test_space.most());
     let length = fewest + place(number(), most - fewest + 1);
-    let each_for_itself = permitted.copies() != Copies::Once && number() < EACH_FOR_ITSELF;
-    let mut kinds: Vec<&PermittedOperation> = Vec::new();
+    let each_for_itself = test_space.copies() != Copies::Once && number() < EACH_FOR_ITSELF;
+    let mut kinds: Vec<&OperationSpace> = Vec::new();
     for kind in operations {
         // What is certain takes no number.
         if kind.inclusion >= 1.0 || (kind.inclusion > 0.0 && number() < kind.inclusion) {
@@ -52,10 +52,10 @@ pub fn fresh_kinds<'a>(permitted: &'a Permitted, number: &mut impl FnMut() -> f6
         let pool = if likely.is_empty() { operations.iter().collect() } else { likely };
         kinds.push(pool[place(number(), pool.len())]);
     }
-    let mut places: Vec<&PermittedOperation> = Vec::with_capacity(length);
+    let mut places: Vec<&OperationSpace> = Vec::with_capacity(length);
     while places.len() < length {
-        let held = |kind: &PermittedOperation| places.iter().filter(|it| it.operation == kind.operation).count();
-        let mut pool: Vec<_> = kinds.iter().copied().filter(|kind| held(kind) < permitted.most_copies(kind)).collect();
+        let held = |kind: &OperationSpace| places.iter().filter(|it| it.operation == kind.operation).count();
+        let mut pool: Vec<_> = kinds.iter().copied().filter(|kind| held(kind) < test_space.most_copies(kind)).collect();
         let new: Vec<_> = pool.iter().copied().filter(|kind| held(kind) == 0).collect();
         let copies = new.is_empty();
         if !each_for_itself && !copies {
@@ -66,7 +66,7 @@ pub fn fresh_kinds<'a>(permitted: &'a Permitted, number: &mut impl FnMut() -> f6
             if places.len() >= fewest {
                 break;
             }
-            pool = operations.iter().filter(|kind| held(kind) < permitted.most_copies(kind)).collect();
+            pool = operations.iter().filter(|kind| held(kind) < test_space.most_copies(kind)).collect();
         }
         let kind = pool[place(number(), pool.len())];
         // The first copies are as likely at the beginning of the list as at its end.
@@ -77,28 +77,28 @@ pub fn fresh_kinds<'a>(permitted: &'a Permitted, number: &mut impl FnMut() -> f6
 }
 
 /// The place of a value in `0..1` among so many equal parts.
-pub fn place(value: f64, parts: usize) -> usize {
+pub(crate) fn place(value: f64, parts: usize) -> usize {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is below the number of parts")]
     let place = libm::floor(value * parts as f64) as usize;
     place.min(parts - 1)
 }
 
-/// A fresh instance of an operation, with a draw seed of its own.
-pub fn fresh_operation(kind: &PermittedOperation, stream: &mut Stream) -> TestOperation {
+/// A fresh instance of an operation, with an operation seed of its own.
+pub(crate) fn fresh_operation(kind: &OperationSpace, stream: &mut Stream) -> TestOperation {
     let activation = fresh_activation(&kind.activation, stream);
-    let parameters = kind.parameters.iter().map(|permitted| permitted.fresh(stream)).collect();
-    TestOperation { operation: kind.operation, activation, parameters, draw_seed: stream.bits() }
+    let parameters = kind.parameters.iter().map(|parameter_space| parameter_space.fresh(stream)).collect();
+    TestOperation { operation: kind.operation, activation, parameters, operation_seed: stream.bits() }
 }
 
 /// A fresh window, or fresh conditions; of an offline operation there is nothing to choose.
-fn fresh_activation(activation: &PermittedActivation, stream: &mut Stream) -> Activation {
+fn fresh_activation(activation: &ActivationSpace, stream: &mut Stream) -> Activation {
     match activation {
-        PermittedActivation::Offline => Activation::Offline,
-        PermittedActivation::Time(window) => {
+        ActivationSpace::Offline => Activation::Offline,
+        ActivationSpace::Time(window) => {
             let (start, end) = window.interval(stream);
             Activation::Time { start, end }
         }
-        PermittedActivation::Condition { space, constraints, first } => {
+        ActivationSpace::Condition { space, constraints, first } => {
             let [first_start, first_end] = &**first;
             let start = grown(space, constraints, stream).unwrap_or_else(|| first_start.clone());
             match space.end {
@@ -119,19 +119,19 @@ fn fresh_activation(activation: &PermittedActivation, stream: &mut Stream) -> Ac
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_plan::{Count, OperationId, Search};
+    use sesame_plan::{Count, OperationId, Search, Strategy};
 
     use super::*;
-    use crate::space::permitted::tests::{any_plan, broken_rule};
-    use crate::testing::landscape::LANDSCAPES;
+    use crate::space::test_space::tests::{any_plan, broken_rule};
+    use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     fn fresh_tests(inclusion: &[f64], count: Count) -> Vec<Vec<u32>> {
-        let mut plan = LANDSCAPES[2].plan(Search::Random { evaluations: 1 });
+        let mut plan = SYNTHETIC_ROBOTS[2].plan(Search::new(Strategy::Random, 1));
         plan.campaign.count = count;
         plan.campaign.operations = (0u32..).map(OperationId).take(inclusion.len()).collect();
         plan.operations.iter_mut().zip(inclusion).for_each(|(op, &p)| op.inclusion = p);
-        let permitted = Permitted::of(&plan).unwrap();
-        let kinds = |i| fresh_test(&permitted, &mut Stream::derive(1, "test", &[i])).operations;
+        let test_space = TestSpace::from_plan(&plan).unwrap();
+        let kinds = |i| fresh_test(&test_space, &mut Stream::derive(1, "test", &[i])).operations;
         (0..6_000).map(|i| kinds(i).iter().map(|op| op.operation.0).collect()).collect()
     }
 
@@ -171,8 +171,8 @@ mod tests {
     proptest! {
         #[test]
         fn fresh_tests_are_permitted(plan in any_plan(), seed: u64) {
-            let permitted = Permitted::of(&plan).unwrap();
-            let test = fresh_test(&permitted, &mut Stream::derive(seed, "test", &[]));
+            let test_space = TestSpace::from_plan(&plan).unwrap();
+            let test = fresh_test(&test_space, &mut Stream::derive(seed, "test", &[]));
             prop_assert_eq!(broken_rule(&plan, &test), None);
         }
     }

@@ -97,7 +97,7 @@ pub fn observed(plan: &CampaignPlan, test: &Test, observation: &Observation) -> 
 
 /// Where a run lies in the reduced parameter space; `None` where no operation was active with an effect.
 pub fn observed_point(plan: &CampaignPlan, test: &Test, observation: &Observation) -> Option<Point> {
-    Point::of(&observed(plan, test, observation), Convention::Ours)
+    Point::from_disturbances(&observed(plan, test, observation), Convention::Ours)
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 
 use sesame_plan::{ActivationMode, CampaignPlan, Dimension, Shape};
 
-use crate::space::choice::PermittedChoice;
-use crate::space::permitted::{Permitted, PermittedOperation};
+use crate::space::parameter_space::ParameterSpace;
+use crate::space::test_space::{OperationSpace, TestSpace};
 use crate::sspr::{Class, Window, class_of};
 
 /// The least and the greatest value of a dimension over all tests that a campaign permits; `None` where no test has one.
@@ -11,14 +11,14 @@ use crate::sspr::{Class, Window, class_of};
 /// These are the ends of each dimension alone: not every combination of them can be had, which is what
 /// [`Feasible`](crate::coverage::Feasible) tells. Where conditions switch operations, any times inside their windows
 /// count as possible.
-pub fn extent(plan: &CampaignPlan, permitted: &Permitted, dimension: Dimension) -> Option<(f64, f64)> {
-    let timed: Vec<Timing> = permitted.operations().iter().filter_map(|it| Timing::of(plan, it)).collect();
+pub fn extent(plan: &CampaignPlan, test_space: &TestSpace, dimension: Dimension) -> Option<(f64, f64)> {
+    let timed: Vec<Timing> = test_space.operations().iter().filter_map(|it| Timing::of(plan, it)).collect();
     if timed.is_empty() {
         return None;
     }
     let by_condition = matches!(plan.campaign.activation, ActivationMode::Condition { .. });
-    let offline = timed.len() < permitted.operations().len();
-    let (fewest, most) = (permitted.fewest(), permitted.most());
+    let offline = timed.len() < test_space.operations().len();
+    let (fewest, most) = (test_space.fewest(), test_space.most());
     // One that acts beside the run, or whose conditions never hold, counts in no dimension.
     let fewest = if offline || by_condition { 1 } else { fewest };
     let least = |of: fn(&Timing) -> f64| timed.iter().map(of).fold(f64::INFINITY, f64::min);
@@ -32,9 +32,9 @@ pub fn extent(plan: &CampaignPlan, permitted: &Permitted, dimension: Dimension) 
         Dimension::T1 => Some(midpoints),
         Dimension::T2 => Some((least(|it| it.window.shortest), greatest(|it| it.window.end - it.window.start))),
         Dimension::T3 => Some((0.0, if several { (midpoints.1 - midpoints.0) / 2.0 } else { 0.0 })),
-        Dimension::P1 => shares(plan, permitted).into_iter().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))),
+        Dimension::P1 => shares(plan, test_space).into_iter().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))),
         Dimension::P2 => {
-            let all = shares(plan, permitted);
+            let all = shares(plan, test_space);
             let (low, high) = all.iter().copied().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
             let several = most > 1 || timed.iter().any(|it| it.numbers > 1);
             Some((0.0, if several { (high - low) / 2.0 } else { 0.0 }))
@@ -54,7 +54,7 @@ struct Timing {
 }
 
 impl Timing {
-    fn of(plan: &CampaignPlan, it: &PermittedOperation) -> Option<Timing> {
+    fn of(plan: &CampaignPlan, it: &OperationSpace) -> Option<Timing> {
         let window = Window::of(plan, it)?;
         let numbers = it.parameters.iter().map(|parameter| shares_of(parameter).len()).sum();
         Some(Timing { window, class: class_of(&plan.operation(it.operation).kind), numbers })
@@ -62,16 +62,16 @@ impl Timing {
 }
 
 /// Between what each number of the operations lies that are active during the run, as a share of what is permitted.
-fn shares(plan: &CampaignPlan, permitted: &Permitted) -> Vec<(f64, f64)> {
-    let active = permitted.operations().iter().filter(|it| !plan.operation(it.operation).kind.is_offline());
+fn shares(plan: &CampaignPlan, test_space: &TestSpace) -> Vec<(f64, f64)> {
+    let active = test_space.operations().iter().filter(|it| !plan.operation(it.operation).kind.is_offline());
     active.flat_map(|it| it.parameters.iter().flat_map(shares_of)).collect()
 }
 
-fn shares_of(parameter: &PermittedChoice) -> Vec<(f64, f64)> {
+fn shares_of(parameter: &ParameterSpace) -> Vec<(f64, f64)> {
     match parameter {
-        PermittedChoice::Number(range, Shape::Value | Shape::Range) if range.low < range.high => vec![(0.0, 1.0)],
-        PermittedChoice::Point(axes) => axes.iter().filter(|axis| axis.low < axis.high).map(|_| (0.0, 1.0)).collect(),
-        PermittedChoice::Number(..) | PermittedChoice::Items(_) => Vec::new(),
+        ParameterSpace::Number(range, Shape::Value | Shape::Range) if range.low < range.high => vec![(0.0, 1.0)],
+        ParameterSpace::Point(axes) => axes.iter().filter(|axis| axis.low < axis.high).map(|_| (0.0, 1.0)).collect(),
+        ParameterSpace::Number(..) | ParameterSpace::Items(_) => Vec::new(),
     }
 }
 
@@ -91,19 +91,19 @@ mod tests {
 
     use super::*;
     use crate::space::initial::fresh_test;
-    use crate::space::permitted::tests::any_timed_plan;
+    use crate::space::test_space::tests::any_timed_plan;
     use crate::sspr::{Convention, Point, planned};
 
     proptest! {
         #[test]
         fn every_test_lies_inside(plan in any_timed_plan(), seed: u64) {
-            let permitted = Permitted::of(&plan).unwrap();
+            let test_space = TestSpace::from_plan(&plan).unwrap();
             for n in 0..60 {
-                let test = fresh_test(&permitted, &mut Stream::derive(seed, "test", &[n]));
-                let Some(point) = Point::of(&planned(&plan, &test).unwrap(), Convention::Ours) else { continue };
+                let test = fresh_test(&test_space, &mut Stream::derive(seed, "test", &[n]));
+                let Some(point) = Point::from_disturbances(&planned(&plan, &test).unwrap(), Convention::Ours) else { continue };
                 for dimension in Dimension::ALL {
                     let Some(value) = point.get(dimension) else { continue };
-                    let (low, high) = extent(&plan, &permitted, dimension).unwrap();
+                    let (low, high) = extent(&plan, &test_space, dimension).unwrap();
                     prop_assert!(low - 1e-9 <= value && value <= high + 1e-9, "{dimension:?}: {value} in {low}..{high}");
                 }
             }
@@ -112,9 +112,10 @@ mod tests {
 
     #[test]
     fn the_cells_of_the_papers_table_have_the_ends_that_table_gives_them() {
-        let plan = crate::testing::landscape::LANDSCAPES[0].plan(sesame_plan::Search::Random { evaluations: 1 });
-        let permitted = Permitted::of(&plan).unwrap();
-        let of = |dimension| extent(&plan, &permitted, dimension).unwrap();
+        let plan = crate::testing::synthetic_robots::SYNTHETIC_ROBOTS[0]
+            .plan(sesame_plan::Search::new(sesame_plan::Strategy::Random, 1));
+        let test_space = TestSpace::from_plan(&plan).unwrap();
+        let of = |dimension| extent(&plan, &test_space, dimension).unwrap();
         assert_eq!(of(Dimension::P1), (0.0, 1.0));
         assert_eq!(of(Dimension::P2), (0.0, 0.5));
         assert_eq!(of(Dimension::O0), (1.0, 5.0));

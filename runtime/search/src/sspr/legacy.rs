@@ -71,7 +71,7 @@ fn the_originals_table_of_reduced_tests_is_reproduced() {
     let mut farthest: f64 = 0.0;
     for (row, test) in rows.iter().zip(&tests) {
         assert_eq!(row[0], test.name);
-        let point = Point::of(&test.disturbances, Convention::Original).expect("every test has windows");
+        let point = Point::from_disturbances(&test.disturbances, Convention::Original).expect("every test has windows");
         for (dimension, written) in Dimension::ALL.into_iter().zip(&row[2..11]) {
             let written: f64 = written.parse().expect("a number");
             farthest = farthest.max((written - point.get(dimension).expect("every test has parameters")).abs());
@@ -87,7 +87,8 @@ fn covered(tests: &[Performed], after: &[usize]) -> Vec<usize> {
     let mut coverage = Coverage::new(Grid::new(axes).expect("it is a grid"), 1);
     let mut curve = Vec::new();
     for test in tests {
-        coverage.add(&Point::of(&test.disturbances, Convention::Original).expect("every test has windows"));
+        coverage
+            .add(&Point::from_disturbances(&test.disturbances, Convention::Original).expect("every test has windows"));
         curve.push(coverage.covered());
     }
     after.iter().map(|&tests| curve[tests - 1]).collect()

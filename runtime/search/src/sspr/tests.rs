@@ -12,9 +12,9 @@ use sesame_plan::{
 use sesame_rng::Stream;
 
 use super::*;
-use crate::Permitted;
 use crate::space::initial::fresh_test;
-use crate::space::permitted::tests::any_timed_plan;
+use crate::space::test_space::TestSpace;
+use crate::space::test_space::tests::any_timed_plan;
 
 fn disturbance(class: Class, intervals: &[(f64, f64)], parameters: &[Intensity]) -> Disturbance {
     Disturbance {
@@ -68,13 +68,13 @@ fn a_test_worked_out_by_hand_has_the_point_of_each_convention() {
     };
     let counts = |o2: f64, o3: f64| [Some(3.0), Some(1.0), Some(o2), Some(o3)];
     let [o0, o1, o2, o3] = counts(1.0, 1.0);
-    let ours = Point::of(&test, Convention::Ours).unwrap();
+    let ours = Point::from_disturbances(&test, Convention::Ours).unwrap();
     let p2 = variance([0.3, 0.5, 0.2]).sqrt();
     assert_close(&ours, [a, b, c, Some(p1), Some(p2), o0, o1, o2, o3]);
     // The probability to lose is half of the way up, so that to keep is half of the way too.
-    let original = Point::of(&test, Convention::Original).unwrap();
+    let original = Point::from_disturbances(&test, Convention::Original).unwrap();
     assert_close(&original, [a, b, c, Some(p1), Some(variance([0.3, 0.5, 0.2])), o0, o1, o2, o3]);
-    let paper = Point::of(&test, Convention::Paper).unwrap();
+    let paper = Point::from_disturbances(&test, Convention::Paper).unwrap();
     let (mean, spread) = ((0.3 + 0.7 + 0.4) / 3.0, variance([0.3, 0.7, 0.4]).sqrt());
     assert_close(&paper, [a, b, c, Some(mean), Some(spread), o0, o1, o2, o3]);
 }
@@ -87,7 +87,7 @@ fn the_original_swaps_losses_and_delays_and_counts_what_is_kept() {
         disturbance(Class::Delay, &[(20.0, 40.0)], &[]),
         disturbance(Class::Other, &[(20.0, 40.0)], &[]),
     ];
-    let get = |convention, dimension| Point::of(&losses, convention).unwrap().get(dimension).unwrap();
+    let get = |convention, dimension| Point::from_disturbances(&losses, convention).unwrap().get(dimension).unwrap();
     assert_eq!([get(Convention::Ours, Dimension::O2), get(Convention::Ours, Dimension::O3)], [2.0, 1.0]);
     assert_eq!([get(Convention::Original, Dimension::O2), get(Convention::Original, Dimension::O3)], [1.0, 2.0]);
     assert_eq!(get(Convention::Ours, Dimension::O0), 4.0);
@@ -99,16 +99,17 @@ fn the_original_swaps_losses_and_delays_and_counts_what_is_kept() {
 fn what_was_never_active_is_no_part_of_the_point() {
     let active = disturbance(Class::Value, &[(20.0, 40.0)], &[range(0.0, 1.0)]);
     let idle = disturbance(Class::Loss, &[], &[value(1.2)]);
-    let both = Point::of(&[idle.clone(), active.clone()], Convention::Ours);
-    assert_eq!(both, Point::of(&[active], Convention::Ours));
-    assert_eq!(Point::of(&[idle], Convention::Ours), None);
-    assert_eq!(Point::of(&[], Convention::Ours), None);
+    let both = Point::from_disturbances(&[idle.clone(), active.clone()], Convention::Ours);
+    assert_eq!(both, Point::from_disturbances(&[active], Convention::Ours));
+    assert_eq!(Point::from_disturbances(&[idle], Convention::Ours), None);
+    assert_eq!(Point::from_disturbances(&[], Convention::Ours), None);
 }
 
 #[test]
 fn a_test_without_parameters_has_no_intensity() {
     let fixed = Intensity { permitted: (0.5, 0.5), chosen: (0.5, 0.5), shape: Shape::Value };
-    let point = Point::of(&[disturbance(Class::Loss, &[(20.0, 40.0)], &[fixed])], Convention::Ours).unwrap();
+    let point =
+        Point::from_disturbances(&[disturbance(Class::Loss, &[(20.0, 40.0)], &[fixed])], Convention::Ours).unwrap();
     assert_eq!(point.get(Dimension::P1), None);
     assert_eq!(point.get(Dimension::P2), None);
     assert_eq!(distance(&point, &point, &[Dimension::T1], 1.0), Some(0.0));
@@ -124,7 +125,7 @@ fn a_planned_window_is_cut_at_the_end_of_the_campaign() {
             operation: sesame_plan::OperationId(0),
             activation: Activation::Time { start, end },
             parameters: Vec::new(),
-            draw_seed: 0,
+            operation_seed: 0,
         }],
     };
     let cut = planned(&plan, &test(6.0, 9.0)).unwrap();
@@ -196,9 +197,9 @@ proptest! {
         for (operation, kind) in plan.operations.iter_mut().zip(kinds.into_iter().cycle()) {
             operation.kind = kind;
         }
-        let permitted = Permitted::of(&plan).unwrap();
-        let test = fresh_test(&permitted, &mut Stream::derive(seed, "test", &[]));
-        let point = Point::of(&planned(&plan, &test).unwrap(), Convention::Ours).unwrap();
+        let test_space = TestSpace::from_plan(&plan).unwrap();
+        let test = fresh_test(&test_space, &mut Stream::derive(seed, "test", &[]));
+        let point = Point::from_disturbances(&planned(&plan, &test).unwrap(), Convention::Ours).unwrap();
         for dimension in Dimension::ALL {
             match (point.get(dimension), naive(&plan, &test, dimension)) {
                 // A difference of squares loses half of the digits.
@@ -210,14 +211,14 @@ proptest! {
 
     #[test]
     fn distances_are_a_metric_over_any_dimensions(plan in any_timed_plan(), seed: u64, chosen in 1usize..512) {
-        let permitted = Permitted::of(&plan).unwrap();
+        let test_space = TestSpace::from_plan(&plan).unwrap();
         let point = |n| {
-            let test = fresh_test(&permitted, &mut Stream::derive(seed, "test", &[n]));
-            Point::of(&planned(&plan, &test).unwrap(), Convention::Ours)
+            let test = fresh_test(&test_space, &mut Stream::derive(seed, "test", &[n]));
+            Point::from_disturbances(&planned(&plan, &test).unwrap(), Convention::Ours)
         };
         let [Some(a), Some(b), Some(c)] = [point(0), point(1), point(2)] else { return Ok(()) };
         let over: Vec<Dimension> = (0..9).filter(|bit| chosen >> bit & 1 == 1).map(|bit| Dimension::ALL[bit]).collect();
-        let most = permitted.most() as f64;
+        let most = test_space.most() as f64;
         let (Some(ab), Some(bc), Some(ac)) =
             (distance(&a, &b, &over, most), distance(&b, &c, &over, most), distance(&a, &c, &over, most))
         else {

@@ -2,7 +2,7 @@
 
 use sesame_plan::CampaignPlan;
 
-use crate::space::permitted::{PermittedActivation, PermittedOperation};
+use crate::space::test_space::{ActivationSpace, OperationSpace};
 
 /// Where the intervals of an operation may lie, in shares of its permitted window.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,15 +16,15 @@ pub(crate) struct Window {
 impl Window {
     /// That of an operation in a campaign; `None` for one that acts before the start or after the end. Where conditions
     /// switch an operation, its intervals may be as short as they like.
-    pub(crate) fn of(plan: &CampaignPlan, permitted: &PermittedOperation) -> Option<Window> {
-        let within = plan.operation(permitted.operation).within;
+    pub(crate) fn of(plan: &CampaignPlan, operation_space: &OperationSpace) -> Option<Window> {
+        let within = plan.operation(operation_space.operation).within;
         let share = |time: f64| (time - within.start) / within.length();
-        Some(match &permitted.activation {
-            PermittedActivation::Offline => return None,
-            PermittedActivation::Time(range) => {
+        Some(match &operation_space.activation {
+            ActivationSpace::Offline => return None,
+            ActivationSpace::Time(range) => {
                 Window { start: share(range.low), end: share(range.high), shortest: range.shortest / within.length() }
             }
-            PermittedActivation::Condition { .. } => {
+            ActivationSpace::Condition { .. } => {
                 Window { start: 0.0, end: share(within.end.min(plan.campaign.end_after)), shortest: 0.0 }
             }
         })

@@ -22,7 +22,7 @@ impl CoverageOfEachGeneration {
     /// For the tests of a plan, and this goal of its campaign.
     pub(super) fn new(plan: &CampaignPlan, goal: &CoverageGoal) -> Result<Self, GridError> {
         let grid = Grid::new(goal.axes.clone())?;
-        let feasible = Feasible::of(plan, &grid);
+        let feasible = Feasible::from_plan(plan, &grid);
         let coverage = Coverage::new(grid, goal.hits);
         Ok(CoverageOfEachGeneration { coverage, feasible, stop_at: goal.stop_at })
     }

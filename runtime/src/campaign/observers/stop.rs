@@ -19,7 +19,7 @@ pub(super) struct Rules {
 impl Rules {
     /// Those of a plan, from now on.
     pub(super) fn new(plan: &CampaignPlan) -> Self {
-        Rules { rules: StopRules::of(plan), begun: Instant::now() }
+        Rules { rules: StopRules::from_plan(plan), begun: Instant::now() }
     }
 }
 

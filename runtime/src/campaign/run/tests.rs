@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use sesame_plan::{Confirmation, CoverageGoal, Dimension, GridAxis, Typical};
-use sesame_results::record::sample;
+use sesame_plan::{Confirmation, CoverageGoal, Dimension, GridAxis, Search, Statistic};
+use sesame_results::record::{self, sample};
 use sesame_rng::Stream;
 
 use super::*;
@@ -59,11 +59,11 @@ impl Executor for InThread<'_> {
 /// The sample campaign, with all that a campaign can do on the way.
 fn plan() -> CampaignPlan {
     let mut plan = sample::plan();
-    plan.campaign.search = Search::Nsga2 { population: 10, evaluations: 60 };
+    plan.campaign.search = Search::new(sesame_plan::Strategy::Nsga2 { population: 10 }, 60);
     let axis = |dimension| GridAxis { dimension, low: 0.0, high: 1.0, cells: 4 };
     plan.campaign.coverage =
         Some(CoverageGoal { axes: vec![axis(Dimension::T1), axis(Dimension::T2)], hits: 1, stop_at: None });
-    plan.campaign.confirm = Some(Confirmation { times: 2, by: Typical::Median, violations: true });
+    plan.campaign.confirm = Some(Confirmation { times: 2, by: Statistic::Median, violations: true });
     plan
 }
 

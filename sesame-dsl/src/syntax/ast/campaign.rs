@@ -1,6 +1,6 @@
 //! Campaigns: how tests are found and run.
 
-use sesame_plan::Copies;
+use sesame_plan::{Copies, StrategyKind};
 
 use super::exploration::{Confirm, Coverage, Exploration, Stop};
 use super::words::{Count, Head, Name, Quantity, Range};
@@ -80,22 +80,12 @@ pub(crate) struct Operations {
 pub(crate) struct Search {
     pub(crate) span: Span,
     /// `None` for a strategy that is not supported yet.
-    pub(crate) strategy: Option<Strategy>,
+    pub(crate) strategy: Option<StrategyKind>,
     pub(crate) population: Vec<(Span, Count)>,
     pub(crate) evaluations: Vec<(Span, Count)>,
     pub(crate) seed: Vec<(Span, Count)>,
     pub(crate) neighbours: Vec<(Span, Count)>,
     pub(crate) has_errors: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Strategy {
-    Nsga2,
-    Random,
-    MapElites,
-    LatinHypercube,
-    Sobol,
-    Falsification,
 }
 
 #[derive(Debug, Clone)]

@@ -1,12 +1,12 @@
 //! Campaigns: their clauses, searches, and what conditions are grown from.
 
 use sesame_grammar::Rule;
-use sesame_plan::Copies;
+use sesame_plan::{Copies, StrategyKind};
 
 use super::reader::{Pair, Reader, child, children, expect_child};
 use crate::span::Span;
 use crate::syntax::ast::{
-    ActivationMode, ByCondition, Campaign, Count, Inherited, Operations, Passive, Record, Repeat, Search, Strategy,
+    ActivationMode, ByCondition, Campaign, Count, Inherited, Operations, Passive, Record, Repeat, Search,
 };
 
 impl Reader<'_> {
@@ -102,15 +102,7 @@ impl Reader<'_> {
             self.unsupported(&strategy);
             return search;
         }
-        let strategies = [
-            (Rule::k_nsga2, Strategy::Nsga2),
-            (Rule::k_map_elites, Strategy::MapElites),
-            (Rule::k_latin_hypercube, Strategy::LatinHypercube),
-            (Rule::k_sobol, Strategy::Sobol),
-            (Rule::k_falsification, Strategy::Falsification),
-            (Rule::k_random, Strategy::Random),
-        ];
-        search.strategy = strategies.into_iter().find(|(rule, _)| child(pair, *rule).is_some()).map(|(_, it)| it);
+        search.strategy = pair.clone().into_inner().find_map(|word| StrategyKind::from_keyword(word.as_str()));
         let settings = expect_child(pair, Rule::search_settings);
         search.has_errors = self.members(&settings, |reader, setting| {
             let value = (reader.keyword_span(&setting), reader.count(&expect_child(&setting, Rule::number)));

@@ -155,7 +155,7 @@ fn an_activation_that_does_not_fit_its_operation_is_damage() {
         operation: OperationId(4),
         activation: Activation::Offline,
         parameters: vec![Choice::Text { text: "hot".to_owned() }],
-        draw_seed: 1,
+        operation_seed: 1,
     };
     let mut test = sample::conditional_test();
     test.operations.push(offline);

@@ -104,7 +104,7 @@ fn change(record: &mut TestRecord, kind: usize) {
         23 => next_up(observation.metrics[4].reach.high.as_mut().expect("it has a value")),
         24 => observation.metrics[4].not_finite = Some(1.5),
         12 => drop(observation.metrics[2].series.pop()),
-        13 => record.test.operations[0].draw_seed ^= 1,
+        13 => record.test.operations[0].operation_seed ^= 1,
         14 => observation.operations[0].counters.seen += 1,
         15 => observation.operations[0].counters.side_effects += 1,
         16 => next_up(&mut observation.operations[0].intervals[0].end),

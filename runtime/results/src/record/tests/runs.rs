@@ -173,7 +173,7 @@ fn a_folder_that_a_run_left_without_results_is_taken_by_the_next_one_unless_it_i
         let other = claim_folder(results.path(), "42").unwrap();
         assert_eq!(other.folder, results.path().join("42-2"), "{left:?}: the first is claimed");
         drop(other);
-        let recorder = Recorder::create_in(claim, &sample::plan(), 42, 1).unwrap();
+        let recorder = Recorder::create_in(claim, &sample::plan(), &sesame_plan::Task::Campaign, 42, 1).unwrap();
         assert_eq!(claim_folder(results.path(), "42").unwrap().folder, results.path().join("42-2"));
         recorder.finish("done").unwrap();
         std::fs::remove_dir_all(&run).unwrap();

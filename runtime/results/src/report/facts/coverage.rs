@@ -97,7 +97,7 @@ pub(crate) fn coverage(repository: &Repository) -> Result<Option<CoverageSummary
             points.push(point);
         }
     })?;
-    let reachable = Feasible::of(plan, &grid);
+    let reachable = Feasible::from_plan(plan, &grid);
     let mut counted = Coverage::new(grid, goal.hits);
     let curve = curve(&mut counted, points);
     Ok(Some(CoverageSummary {

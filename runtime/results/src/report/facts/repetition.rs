@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use sesame_plan::{CampaignPlan, Search};
+use sesame_plan::{CampaignPlan, Task};
 
 use crate::analysis::statistics::wilson;
 use crate::record::{Origin, Tally, TestRow};
@@ -31,9 +31,9 @@ pub struct ViolationRate {
     pub interval: Option<[f64; 2]>,
 }
 
-/// The results of a campaign that repeats a test; `None` for any other.
-pub(crate) fn repetition(plan: &CampaignPlan, rows: &[TestRow]) -> Option<Repetition> {
-    let Search::Repeat { test, .. } = plan.campaign.search else { return None };
+/// The results of a run that repeats a test; `None` for any other.
+pub(crate) fn repetition(plan: &CampaignPlan, task: &Task, rows: &[TestRow]) -> Option<Repetition> {
+    let repeated = task.repeated(plan)?;
     let requirements = plan.requirements.iter().map(|requirement| {
         let runs = rows.iter().filter(|row| row.origin == Origin::Search);
         let tally = Tally::of(runs.map(|row| row.verdict(requirement)));
@@ -45,5 +45,5 @@ pub(crate) fn repetition(plan: &CampaignPlan, rows: &[TestRow]) -> Option<Repeti
             interval: wilson(tally.violated, tally.conclusive()),
         }
     });
-    Some(Repetition { test: plan.test(test).name.clone(), requirements: requirements.collect() })
+    Some(Repetition { test: repeated.name.to_owned(), requirements: requirements.collect() })
 }

@@ -309,7 +309,7 @@ fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> 
                     text: number::choice(&operation.kind, parameter, choice),
                 })
                 .collect(),
-            operation_seed: used.draw_seed,
+            operation_seed: used.operation_seed,
             counters: effect.map(|effect| effect.counters),
             first_touch: effect.and_then(|effect| effect.first_touch),
             last_touch: effect.and_then(|effect| effect.last_touch),

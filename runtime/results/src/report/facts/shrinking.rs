@@ -6,10 +6,10 @@ use serde::Serialize;
 
 use sesame_base::condition;
 use sesame_base::test_number::TestNumber;
-use sesame_optimise::dominance::Fitness;
-use sesame_plan::{Activation, CampaignPlan, Dimension, Failing, MetricId, RequirementId, Search, Test, TestOperation};
+use sesame_plan::{Activation, CampaignPlan, Dimension, Failing, MetricId, RequirementId, Test, TestOperation};
+use sesame_search::shrink::Shrink;
 use sesame_search::shrink::strength;
-use sesame_search::{Evaluated, Shrink, Strategy as _, sspr};
+use sesame_search::{Strategy as _, sspr};
 
 use crate::present::number::{self, fixed};
 use crate::record::{MetricValue, RecordError, Repository, TestRow, fails};
@@ -102,30 +102,27 @@ impl Shrinking {
 /// How a test was shrunk, if these results are of a shrink: the search is replayed over the recorded tests.
 pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Option<Shrinking>, RecordError> {
     let plan = repository.plan();
-    let (Search::Shrink { test, failing, .. }, Some(mut search)) = (&plan.campaign.search, Shrink::of(plan)) else {
-        return Ok(None);
-    };
+    let Some(shrunk) = repository.task().shrinking() else { return Ok(None) };
+    let (name, failing) = (shrunk.name.clone(), &shrunk.failing);
+    let mut search = Shrink::new(plan, shrunk.clone());
     let rows: BTreeMap<u32, &TestRow> = rows.iter().map(|row| (row.number, row)).collect();
     let mut number = 0;
     loop {
-        let mut told = Vec::new();
         let asked = search.ask();
+        let mut results = Vec::with_capacity(asked.len());
         for candidate in &asked {
             number += 1;
             let Some(row) = rows.get(&number).filter(|row| row.test == candidate.test) else { break };
-            let failing = fails(plan, failing, &row.outcome, |id| row.value(id));
-            let (test, fitness) = (candidate.test.clone(), Fitness::Measured(Vec::new()));
-            told.push(Evaluated { number, test, fitness, point: None, course: None, margins: Vec::new(), failing });
+            results.push((number, fails(plan, failing, &row.outcome, |id| row.value(id))));
         }
-        // An unfinished run is shown up to its last complete generation.
-        if asked.is_empty() || told.len() < asked.len() {
+        // Of an unfinished run, only whole generations count.
+        if asked.is_empty() || results.len() < asked.len() {
             break;
         }
-        search.tell(&told);
+        search.learn(&results);
     }
-    let name = plan.test(*test).name.clone();
     let metrics = metrics(plan, failing);
-    let kept = search.kept();
+    let kept = search.accepted();
     let steps = search.tried().iter().enumerate().filter_map(|(at, tried)| {
         let row = rows.get(&tried.number)?;
         Some(ShrinkStep {
@@ -262,7 +259,7 @@ fn activation(plan: &CampaignPlan, activation: &Activation) -> String {
 
 #[cfg(test)]
 mod tests {
-    use sesame_plan::{KnownTest, KnownTestId};
+    use sesame_plan::Task;
 
     use super::*;
     use crate::record::{Origin, Recorder, TestRecord, sample};
@@ -270,22 +267,25 @@ mod tests {
 
     /// A test of the sample campaign made smaller, as far as so many runs.
     fn recorded(most: usize) -> (tempfile::TempDir, Repository) {
-        let mut plan = sample::plan();
+        let plan = sample::plan();
         let found = sample::records(&plan, 60);
         let fails_r1 = |record: &TestRecord| record.observation.metrics.first().and_then(|it| it.value) > Some(0.0);
         let found = found.iter().find(|record| record.number > 20 && fails_r1(record)).unwrap();
         assert!(found.test.operations.len() > 1);
-        let test = KnownTestId(u32::try_from(plan.tests.len()).unwrap());
-        let (name, doc) = (format!("T{}", found.number), String::new());
-        plan.tests.push(KnownTest { name, doc, test: found.test.clone(), expectations: Vec::new() });
         let failing = Failing::Violation { requirements: vec![RequirementId(0)] };
-        plan.campaign.search =
-            Search::Shrink { test, failing: failing.clone(), simulator_seed: 9, runs: 1, evaluations: 200 };
-        plan.campaign.objectives.clear();
+        let task = Task::Shrink(sesame_plan::Shrinking {
+            name: format!("T{}", found.number),
+            test: found.test.clone(),
+            failing: failing.clone(),
+            simulator_seed: 9,
+            runs: 1,
+            evaluations: 200,
+        });
+        let plan = task.plan(&plan);
         let folder = tempfile::tempdir().unwrap();
-        let mut recorder = Recorder::create(folder.path(), &plan, 42, 1).unwrap();
+        let mut recorder = Recorder::create_for(folder.path(), &plan, &task, 42, 1).unwrap();
         recorder.commit(&sample::record(&plan, 0, Origin::Reference, Test::default())).unwrap();
-        let mut search = Shrink::of(&plan).unwrap();
+        let mut search = Shrink::new(&plan, task.shrinking().unwrap().clone());
         let mut number = 0;
         loop {
             let asked = search.ask();
@@ -301,8 +301,7 @@ mod tests {
                 };
                 let failing = fails(&plan, &failing, &record.observation.outcome, value);
                 recorder.commit(&record).unwrap();
-                let (test, fitness) = (candidate.test.clone(), Fitness::Measured(Vec::new()));
-                told.push(Evaluated { number, test, fitness, point: None, course: None, margins: Vec::new(), failing });
+                told.push((number, failing));
                 if number as usize == most {
                     return (folder, recorder.finish("stopped").unwrap());
                 }
@@ -310,7 +309,7 @@ mod tests {
             if asked.is_empty() {
                 return (folder, recorder.finish(&search.ended().unwrap()).unwrap());
             }
-            search.tell(&told);
+            search.learn(&told);
         }
     }
 

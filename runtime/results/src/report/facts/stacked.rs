@@ -128,7 +128,7 @@ mod tests {
     use proptest::prelude::*;
 
     use sesame_plan::{Activation, Search, TestOperation};
-    use sesame_search::testing::landscape::LANDSCAPES;
+    use sesame_search::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     use super::*;
 
@@ -156,7 +156,7 @@ mod tests {
             operation: OperationId(operation),
             activation: Activation::Time { start: 0.0, end: 1.0 },
             parameters: vec![Choice::Range { low, high }],
-            draw_seed: 0,
+            operation_seed: 0,
         });
         let spans = drawn.iter().map(|it| it.2.iter().map(|&(start, end)| Span { start, end }).collect());
         (Test { operations: operations.collect() }, spans.collect())
@@ -166,7 +166,7 @@ mod tests {
         /// Beside every moment between two edges, looked at by itself.
         #[test]
         fn what_was_stacked_is_what_moments_say(drawn in drawn()) {
-            let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+            let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 1));
             let (test, spans) = test_of(&drawn);
             let observed: Vec<&[Span]> = spans.iter().map(Vec::as_slice).collect();
             let found = stacked(&plan, &test, &observed);
@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn three_offsets_at_once_are_told_with_their_sum_and_what_is_declared() {
-        let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+        let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 1));
         let at = |start: f64, end: f64| (0, (0.2, 0.26), vec![(start, end)]);
         let words = |drawn: &[Drawn]| {
             let (test, spans) = test_of(drawn);

@@ -270,7 +270,7 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
             .map(|requirement| summarise_requirement(plan, &judge, requirement, rows))
             .collect(),
         expectations: expectations(plan, rows),
-        repetition: repetition(plan, rows),
+        repetition: repetition(plan, repository.task(), rows),
         shrinking: shrinking(repository, rows)?,
         failures: rows.iter().flat_map(|row| failures(&judge, row)).collect(),
         not_finite: rows.iter().filter_map(|row| not_finite(plan, row)).collect(),

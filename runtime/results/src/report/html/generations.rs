@@ -329,7 +329,7 @@ fn generation_fronts(repository: &Repository, rows: &[TestRow]) -> Result<Vec<Ge
                 .filter_map(|&number| row_of(rows, number))
                 .map(|row| (row.number, fitness_of(plan, &row.outcome, |id| row.value(id).value)))
                 .collect();
-            members = Front::of(fitness.iter().map(|(number, fitness)| (*number, fitness))).numbers();
+            members = Front::from_tests(fitness.iter().map(|(number, fitness)| (*number, fitness))).numbers();
         }
         fronts.push(GenerationFront { generation, members });
     }

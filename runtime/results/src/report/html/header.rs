@@ -1,6 +1,6 @@
 //! The head of the page: what was run, and how.
 
-use sesame_plan::Search;
+use sesame_plan::{Search, Task};
 
 use crate::present::markup::Markup;
 use crate::present::number::{self, plural};
@@ -27,24 +27,14 @@ pub(super) fn header(
     }
     body.element("p", &[("class", "headline")], &format!("{}.", headline(summary)));
     body.element("p", &[], &format!("{}.", counts_sentence(summary)));
-    let search = match &plan.campaign.search {
-        Search::Nsga2 { population, evaluations } => {
-            format!("NSGA-II, population {population}, {evaluations} evaluations")
-        }
-        Search::MapElites { population, evaluations } => {
-            format!("MAP-Elites, {population} tests per generation, {evaluations} evaluations")
-        }
-        Search::LatinHypercube { evaluations } => format!("Latin hypercube, {evaluations} evaluations"),
-        Search::Sobol { evaluations } => format!("Sobol points, {evaluations} evaluations"),
-        Search::Falsification { population: 1, evaluations } => format!("falsification, {evaluations} evaluations"),
-        Search::Falsification { population, evaluations } => {
-            format!("falsification, {population} tests at a time, {evaluations} evaluations")
-        }
-        Search::Random { evaluations } => format!("random, {evaluations} evaluations"),
-        Search::Repeat { test, times } => format!("{} repeated {times} times", plan.test(*test).name),
-        Search::Known { tests } => plural(tests.len(), "regression test", "regression tests"),
-        Search::Shrink { test, evaluations, .. } => {
-            format!("{} shrunk, {evaluations} evaluations at most", plan.test(*test).name)
+    let budget = |what: &str| format!("{what}, {} evaluations", facts.task.evaluations(plan));
+    let search = match (&facts.task, &plan.campaign.search) {
+        (Task::Campaign, Search::Strategy { strategy, .. }) => budget(&strategy.title()),
+        (Task::Known { tests }, _) => plural(tests.len(), "regression test", "regression tests"),
+        (Task::Shrink(shrinking), _) => format!("{} at most", budget(&format!("{} shrunk", shrinking.name))),
+        (Task::Campaign, Search::Repeat { .. }) | (Task::Repeat { .. }, _) => {
+            let repeated = facts.task.repeated(plan);
+            repeated.map_or_else(String::new, |it| format!("{} repeated {} times", it.name, it.times))
         }
     };
     let search = match plan.campaign.coverage.as_ref().and_then(|goal| goal.stop_at) {

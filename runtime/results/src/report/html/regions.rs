@@ -1,7 +1,5 @@
 //! Where tests fail, as a section of the page.
 
-use sesame_plan::Search;
-
 use crate::analysis::Selection;
 use crate::analysis::regions::{Regions, all_regions};
 use crate::present::markup::Markup;
@@ -16,7 +14,7 @@ const FEWEST: usize = 20;
 pub(super) fn regions(body: &mut Markup, repository: &Repository) -> Result<(), RecordError> {
     let plan = repository.plan();
     // Elsewhere tests are not there to be compared with each other.
-    if matches!(plan.campaign.search, Search::Repeat { .. } | Search::Known { .. } | Search::Shrink { .. }) {
+    if !repository.task().searches(plan) {
         return Ok(());
     }
     let mut found = all_regions(repository, &Selection::default())?;

@@ -11,7 +11,7 @@ fn confirmed() -> (tempfile::TempDir, Repository) {
     let folder = tempfile::tempdir().unwrap();
     let mut plan = sample::plan();
     plan.campaign.confirm =
-        Some(sesame_plan::Confirmation { times: 3, by: sesame_plan::Typical::Mean, violations: false });
+        Some(sesame_plan::Confirmation { times: 3, by: sesame_plan::Statistic::Mean, violations: false });
     let first = sample::campaign(folder.path(), &plan, 60);
     let members = first.latest_result_set().unwrap().unwrap().members;
     let rows = first.tests().unwrap();

@@ -5,34 +5,34 @@ use sesame_rng::Stream;
 
 use super::*;
 use crate::space::initial::fresh_test;
-use crate::space::permitted::PermittedOperation;
-use crate::space::permitted::tests::any_timed_plan;
+use crate::space::test_space::OperationSpace;
+use crate::space::test_space::tests::any_timed_plan;
 use crate::sspr::{Convention, Point, planned};
-use crate::testing::landscape::LANDSCAPES;
+use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
 fn point(plan: &CampaignPlan, test: &Test) -> Point {
     let disturbances = planned(plan, test).expect("tests are active by time");
-    Point::of(&disturbances, Convention::Ours).expect("windows begin before the campaign's end")
+    Point::from_disturbances(&disturbances, Convention::Ours).expect("windows begin before the campaign's end")
 }
 
 /// The permitted window of an operation by time.
-fn window_of(kind: &PermittedOperation) -> Range {
+fn window_of(kind: &OperationSpace) -> Range {
     match kind.activation {
-        PermittedActivation::Time(window) => window,
+        ActivationSpace::Time(window) => window,
         _ => panic!("by time: {kind:?}"),
     }
 }
 
 /// The cell that random tests find, most of them far from the middle: windows short or long, values at their ends.
 fn found(plan: &CampaignPlan, grid: &Grid, tests: u64) -> BTreeSet<usize> {
-    let permitted = Permitted::of(plan).unwrap();
+    let test_space = TestSpace::from_plan(plan).unwrap();
     let mut cells = BTreeSet::new();
     for n in 0..tests {
         let mut stream = Stream::derive(n, "sample", &[]);
-        let mut test = fresh_test(&permitted, &mut stream);
+        let mut test = fresh_test(&test_space, &mut stream);
         let same = stream.chance(0.5).then(|| stream.unit());
         for it in &mut test.operations {
-            let kind = permitted.find(it.operation).unwrap();
+            let kind = test_space.find(it.operation).unwrap();
             if stream.chance(0.7) {
                 let window = window_of(kind);
                 let whole = window.high - window.low;
@@ -41,23 +41,23 @@ fn found(plan: &CampaignPlan, grid: &Grid, tests: u64) -> BTreeSet<usize> {
                 let start = window.low + (whole - length) * [0.0, 1.0, stream.unit()][stream.below(3)];
                 it.activation = sesame_plan::Activation::Time { start, end: (start + length).min(window.high) };
             }
-            for (choice, permitted) in it.parameters.iter_mut().zip(&kind.parameters) {
-                *choice = match (stream.below(4), permitted) {
-                    (0, PermittedChoice::Number(range, Shape::Value)) => Choice::Value { value: range.low },
-                    (0, PermittedChoice::Number(range, Shape::Range)) => {
+            for (choice, parameter_space) in it.parameters.iter_mut().zip(&kind.parameters) {
+                *choice = match (stream.below(4), parameter_space) {
+                    (0, ParameterSpace::Number(range, Shape::Value)) => Choice::Value { value: range.low },
+                    (0, ParameterSpace::Number(range, Shape::Range)) => {
                         Choice::Range { low: range.low, high: range.low }
                     }
-                    (1, PermittedChoice::Number(range, Shape::Value)) => Choice::Value { value: range.high },
-                    (1, PermittedChoice::Number(range, Shape::Range)) => {
+                    (1, ParameterSpace::Number(range, Shape::Value)) => Choice::Value { value: range.high },
+                    (1, ParameterSpace::Number(range, Shape::Range)) => {
                         Choice::Range { low: range.low, high: range.high }
                     }
-                    (0, PermittedChoice::Point(axes)) => Choice::Point { point: axes.map(|axis| axis.low) },
-                    (1, PermittedChoice::Point(axes)) => Choice::Point { point: axes.map(|axis| axis.high) },
-                    _ => permitted.fresh(&mut stream),
+                    (0, ParameterSpace::Point(axes)) => Choice::Point { point: axes.map(|axis| axis.low) },
+                    (1, ParameterSpace::Point(axes)) => Choice::Point { point: axes.map(|axis| axis.high) },
+                    _ => parameter_space.fresh(&mut stream),
                 };
             }
         }
-        permitted.settle(&mut test, &mut stream);
+        test_space.settle(&mut test, &mut stream);
         cells.extend(grid.cell_of(&point(plan, &test)));
     }
     cells
@@ -65,7 +65,7 @@ fn found(plan: &CampaignPlan, grid: &Grid, tests: u64) -> BTreeSet<usize> {
 
 /// Whether a climber finds a test in a cell: it moves what a test chooses until the point's distance to the cell is none.
 fn climbs_into(plan: &CampaignPlan, grid: &Grid, cell: usize) -> bool {
-    let permitted = Permitted::of(plan).unwrap();
+    let test_space = TestSpace::from_plan(plan).unwrap();
     let place = grid.place(cell);
     let outside = |test: &Test| {
         let point = point(plan, test);
@@ -81,7 +81,7 @@ fn climbs_into(plan: &CampaignPlan, grid: &Grid, cell: usize) -> bool {
     let steps = crate::space::range::StepSizes { finest: 0.001, boldest: 0.4 };
     for start in 0..150 {
         let mut stream = Stream::derive(start, "climb", &[cell as u64]);
-        let mut test = fresh_test(&permitted, &mut stream);
+        let mut test = fresh_test(&test_space, &mut stream);
         let mut now = outside(&test);
         for _ in 0..400 {
             if now == 0.0 {
@@ -92,7 +92,7 @@ fn climbs_into(plan: &CampaignPlan, grid: &Grid, cell: usize) -> bool {
             for _ in 0..moved {
                 let at = stream.below(other.operations.len());
                 let it = &mut other.operations[at];
-                let kind = permitted.find(it.operation).unwrap();
+                let kind = test_space.find(it.operation).unwrap();
                 if stream.chance(0.5) || kind.parameters.is_empty() {
                     let sesame_plan::Activation::Time { start, end } = it.activation else { panic!("by time") };
                     let (start, end) = window_of(kind).interval_near((start, end), steps, &mut stream);
@@ -102,7 +102,7 @@ fn climbs_into(plan: &CampaignPlan, grid: &Grid, cell: usize) -> bool {
                     it.parameters[which] = kind.parameters[which].near(&it.parameters[which], steps, &mut stream);
                 }
             }
-            permitted.settle(&mut other, &mut stream);
+            test_space.settle(&mut other, &mut stream);
             let then = outside(&other);
             if then <= now {
                 (test, now) = (other, then);
@@ -155,7 +155,7 @@ proptest! {
 
     #[test]
     fn random_tests_find_feasible_cells_only(plan in campaigns(), grid in grids()) {
-        let feasible = Feasible::of(&plan, &grid);
+        let feasible = Feasible::from_plan(&plan, &grid);
         for cell in found(&plan, &grid, 400) {
             prop_assert!(feasible.reaches(cell), "{:?}", grid.place(cell));
         }
@@ -185,10 +185,10 @@ fn table_3() -> Grid {
 
 #[test]
 fn of_the_papers_108_cells_96_can_be_reached() {
-    let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 1));
     // Tests end after the windows do, or the last midpoints could not be reached.
     assert!(plan.campaign.end_after >= 65.0);
-    let feasible = Feasible::of(&plan, &table_3());
+    let feasible = Feasible::from_plan(&plan, &table_3());
     assert_eq!((feasible.count(), feasible.is_exact()), (96, true));
     // An interval of a third of the window or more has no midpoint in the first sixth of it.
     let cell = |t1: usize, t2: usize, p1: usize| (t1 * 6 + t2) * 3 + p1;
@@ -198,9 +198,9 @@ fn of_the_papers_108_cells_96_can_be_reached() {
 
 #[test]
 fn a_campaign_that_ends_early_reaches_less() {
-    let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 1));
     plan.campaign.end_after = 32.5;
-    let feasible = Feasible::of(&plan, &Grid::parse("T1:0:1:4,O0:0.5:6.5:6").unwrap());
+    let feasible = Feasible::from_plan(&plan, &Grid::parse("T1:0:1:4,O0:0.5:6.5:6").unwrap());
     let reached: Vec<usize> = (0..24).filter(|&cell| feasible.reaches(cell)).collect();
     // The first two quarters, with one to five operations.
     assert_eq!(reached, [0, 1, 2, 3, 4, 6, 7, 8, 9, 10]);
@@ -209,20 +209,20 @@ fn a_campaign_that_ends_early_reaches_less() {
 #[test]
 fn one_operation_has_no_spread_and_five_have_some() {
     let grid = Grid::parse("T3:0:0.5:5,P2:0:0.5:5,O0:0.5:5.5:5").unwrap();
-    let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
-    let feasible = Feasible::of(&plan, &grid);
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 1));
+    let feasible = Feasible::from_plan(&plan, &grid);
     let alone: Vec<Vec<u32>> = (0..grid.len()).filter(|&c| feasible.reaches(c)).map(|c| grid.place(c)).collect();
     assert!(alone.iter().filter(|place| place[2] == 0).eq([&vec![0, 0, 0]]));
     assert!(alone.contains(&vec![4, 4, 1]), "two at the ends of the window, one parameter at each end");
     // Of three numbers in 0..=1 the greatest deviation is the square root of 2/9.
     assert!(alone.contains(&vec![4, 4, 2]));
     plan.campaign.count = Count { min: 1, max: 1 };
-    assert_eq!(Feasible::of(&plan, &grid).count(), 1);
+    assert_eq!(Feasible::from_plan(&plan, &grid).count(), 1);
 }
 
 #[test]
 fn whole_numbers_reach_the_values_they_have() {
-    let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 1));
     for operation in &mut plan.operations {
         let parameter = &mut operation.parameters[0];
         parameter.domain = Domain::Number { low: 0.0, high: 2.0, shape: Shape::Value, integer: true };
@@ -230,7 +230,7 @@ fn whole_numbers_reach_the_values_they_have() {
     plan.campaign.count = Count { min: 1, max: 2 };
     // Cells around 0, 1/4, 1/2, 3/4 and 1, with the eighths between them.
     let grid = Grid::parse("P1:-0.0625:1.0625:9,O0:0.5:2.5:2").unwrap();
-    let feasible = Feasible::of(&plan, &grid);
+    let feasible = Feasible::from_plan(&plan, &grid);
     let reached: Vec<Vec<u32>> = (0..grid.len()).filter(|&c| feasible.reaches(c)).map(|c| grid.place(c)).collect();
     let of = |count: u32| reached.iter().filter(|place| place[1] == count).map(|place| place[0]).collect::<Vec<_>>();
     assert_eq!((of(0), of(1)), (vec![0, 4, 8], vec![0, 2, 4, 6, 8]));
@@ -245,20 +245,23 @@ fn very_many_kinds_of_operations_make_no_cell_infeasible() {
 
 #[test]
 fn windows_of_copies_that_lie_apart_are_as_long_together_as_one() {
-    let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 1));
     let grid = Grid::parse("T2:0:1:10,O0:0.5:5.5:5").unwrap();
     let longest = |plan: &CampaignPlan, count: usize| {
-        let feasible = Feasible::of(plan, &grid);
+        let feasible = Feasible::from_plan(plan, &grid);
         (0..10).filter(|t2| feasible.reaches(t2 * 5 + count - 1)).max().map(|t2| t2 + 1)
     };
     assert_eq!([1, 2, 3, 4, 5].map(|n| longest(&plan, n)), [Some(10); 5]);
     // Two operations: three or more have two whole windows together.
     plan.campaign.copies = Copies::Apart;
     assert_eq!([1, 2, 3, 4, 5].map(|n| longest(&plan, n)), [10, 10, 7, 6, 5].map(Some));
-    assert!(!Feasible::of(&plan, &grid).is_exact());
+    assert!(!Feasible::from_plan(&plan, &grid).is_exact());
     // What one operation alone reaches is certain.
-    assert_eq!((Feasible::of(&plan, &table_3()).count(), Feasible::of(&plan, &table_3()).is_exact()), (96, true));
+    assert_eq!(
+        (Feasible::from_plan(&plan, &table_3()).count(), Feasible::from_plan(&plan, &table_3()).is_exact()),
+        (96, true)
+    );
     plan.campaign.copies = Copies::Once;
     assert_eq!([1, 2, 3, 4, 5].map(|n| longest(&plan, n)), [Some(10), Some(10), None, None, None]);
-    assert!(Feasible::of(&plan, &grid).is_exact());
+    assert!(Feasible::from_plan(&plan, &grid).is_exact());
 }

@@ -1,52 +1,54 @@
 //! What all strategies draw: permitted tests, and the same ones.
 
 use sesame_plan::condition::ConditionEnd;
-use sesame_plan::{CampaignPlan, Copies, Count, CoverageGoal, Dimension, Exploration, Search, Test};
+use sesame_plan::{CampaignPlan, Copies, Count, CoverageGoal, Dimension, Exploration, Search, Strategy, Test};
 
 use crate::coverage::Grid;
-use crate::space::permitted::tests::{broken_copies, broken_rule};
-use crate::testing::landscape::{LANDSCAPES, Landscape};
-use crate::{Permitted, strategy};
+use crate::space::test_space::TestSpace;
+use crate::space::test_space::tests::{broken_copies, broken_rule};
+use crate::strategy;
+use crate::testing::synthetic_robots::{SYNTHETIC_ROBOTS, SyntheticRobot};
 
 const ALL: [Copies; 3] = [Copies::Apart, Copies::MayOverlap, Copies::Once];
 
 /// Every strategy by time, with what it needs.
 fn by_time(copies: Copies, evaluations: u32) -> Vec<CampaignPlan> {
     let plan = |search, exploration| {
-        let mut plan = LANDSCAPES[0].plan(search);
+        let mut plan = SYNTHETIC_ROBOTS[0].plan(search);
         let grid = Grid::parse("T1:0:1:6,T2:0:0.5:6,P1:0:1:3").unwrap();
         plan.campaign.coverage = Some(CoverageGoal { axes: grid.axes().to_vec(), hits: 1, stop_at: None });
         plan.campaign.exploration = exploration;
         plan.campaign.copies = copies;
-        plan.requirements = vec![Landscape::fewer_hits_than(20.0)];
+        plan.requirements = vec![SyntheticRobot::fewer_hits_than(20.0)];
         plan
     };
-    let nsga2 = Search::Nsga2 { population: 10, evaluations };
+    let nsga2 = Search::new(Strategy::Nsga2 { population: 10 }, evaluations);
     let children = sesame_plan::BoostedChildren::Every { iterations: 1 };
     vec![
-        plan(Search::Random { evaluations }, None),
-        plan(Search::Sobol { evaluations }, None),
-        plan(Search::LatinHypercube { evaluations }, None),
+        plan(Search::new(Strategy::Random, evaluations), None),
+        plan(Search::new(Strategy::Sobol, evaluations), None),
+        plan(Search::new(Strategy::LatinHypercube, evaluations), None),
         plan(nsga2.clone(), None),
         plan(nsga2.clone(), Some(Exploration::Boost { every_generations: 1, children, tries: 5 })),
         plan(nsga2.clone(), Some(Exploration::Construct { share: 0.5, until: None })),
         plan(nsga2, Some(Exploration::Novelty { neighbours: 5, over: vec![Dimension::T1, Dimension::P1] })),
-        plan(Search::MapElites { population: 10, evaluations }, None),
-        plan(Search::Falsification { population: 10, evaluations: evaluations.min(60) }, None),
+        plan(Search::new(Strategy::Nsga3 { population: 10 }, evaluations), None),
+        plan(Search::new(Strategy::MapElites { population: 10 }, evaluations), None),
+        plan(Search::new(Strategy::Falsification { population: 10 }, evaluations.min(60)), None),
     ]
 }
 
 fn tests_of(plan: &CampaignPlan, seed: u64) -> Vec<Test> {
     let mut strategy = strategy(plan, seed).unwrap();
-    LANDSCAPES[0].campaign_of(plan, strategy.as_mut()).tests.into_iter().map(|it| it.test).collect()
+    SYNTHETIC_ROBOTS[0].campaign_of(plan, strategy.as_mut()).tests.into_iter().map(|it| it.test).collect()
 }
 
 /// All tests of a campaign are permitted, as the plan itself has it and as the search does.
 fn assert_permitted(plan: &CampaignPlan, tests: &[Test]) {
-    let permitted = Permitted::of(plan).unwrap();
+    let test_space = TestSpace::from_plan(plan).unwrap();
     for test in tests {
         assert_eq!(broken_rule(plan, test), None, "{:?} {:?}", plan.campaign.search, plan.campaign.copies);
-        assert!(permitted.permits_copies(test), "{test:?}");
+        assert!(test_space.permits_copies(test), "{test:?}");
     }
 }
 
@@ -67,7 +69,7 @@ fn every_strategy_draws_permitted_tests_only() {
 #[test]
 fn four_thousand_tests_of_an_evolution_are_permitted() {
     for copies in ALL {
-        let mut plan = LANDSCAPES[0].plan(Search::Nsga2 { population: 20, evaluations: 4_000 });
+        let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Nsga2 { population: 20 }, 4_000));
         plan.campaign.copies = copies;
         let tests = tests_of(&plan, 3);
         assert_permitted(&plan, &tests);
@@ -81,12 +83,15 @@ fn strategies_by_condition_draw_permitted_tests_only() {
     let evaluations = 200;
     for copies in ALL {
         for (search, exploration) in [
-            (Search::Random { evaluations }, None),
-            (Search::Nsga2 { population: 10, evaluations }, None),
-            (Search::Nsga2 { population: 10, evaluations }, Some(Exploration::Predict { candidates: 4 })),
-            (Search::MapElites { population: 10, evaluations }, None),
+            (Search::new(Strategy::Random, evaluations), None),
+            (Search::new(Strategy::Nsga2 { population: 10 }, evaluations), None),
+            (
+                Search::new(Strategy::Nsga2 { population: 10 }, evaluations),
+                Some(Exploration::Predict { candidates: 4 }),
+            ),
+            (Search::new(Strategy::MapElites { population: 10 }, evaluations), None),
         ] {
-            let mut plan = LANDSCAPES[0].plan_by_condition(search, ConditionEnd::Length { low: 1.0, high: 9.0 });
+            let mut plan = SYNTHETIC_ROBOTS[0].plan_by_condition(search, ConditionEnd::Length { low: 1.0, high: 9.0 });
             let grid = Grid::parse("T1:0:1:6,T2:0:0.5:6").unwrap();
             plan.campaign.coverage = Some(CoverageGoal { axes: grid.axes().to_vec(), hits: 1, stop_at: None });
             plan.campaign.exploration = exploration;
@@ -106,14 +111,14 @@ fn fresh_tests_hold_copies_as_often_whatever_draws_them() {
     let evaluations = 2_000;
     for copies in [Copies::Apart, Copies::MayOverlap] {
         let shares = [
-            Search::Random { evaluations },
-            Search::Sobol { evaluations },
-            Search::LatinHypercube { evaluations },
+            Search::new(Strategy::Random, evaluations),
+            Search::new(Strategy::Sobol, evaluations),
+            Search::new(Strategy::LatinHypercube, evaluations),
             // Its first generation alone.
-            Search::Nsga2 { population: evaluations, evaluations },
+            Search::new(Strategy::Nsga2 { population: evaluations }, evaluations),
         ]
         .map(|search| {
-            let mut plan = LANDSCAPES[2].plan(search);
+            let mut plan = SYNTHETIC_ROBOTS[2].plan(search);
             plan.campaign.copies = copies;
             plan.campaign.count = Count { min: 1, max: 5 };
             let mut strategy = strategy(&plan, 7).unwrap();
@@ -124,11 +129,10 @@ fn fresh_tests_hold_copies_as_often_whatever_draws_them() {
                 let results = asked.into_iter().zip(0..).map(|(it, number)| crate::Evaluated {
                     number,
                     test: it.test,
-                    fitness: crate::Fitness::Unfit(crate::Unfit::Void),
+                    fitness: sesame_optimise::dominance::Fitness::Unfit(sesame_optimise::dominance::Unfit::Void),
                     point: None,
-                    course: None,
-                    margins: Vec::new(),
-                    failing: false,
+                    run: crate::testing::no_run(),
+                    fresh_runs: Vec::new(),
                 });
                 strategy.tell(&results.collect::<Vec<_>>());
             }

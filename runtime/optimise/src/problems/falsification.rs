@@ -1,9 +1,6 @@
-//! Published falsification problems over the unit box, on which strategies are compared with published figures. No
-//! campaign uses them.
+//! Published falsification problems over the unit box, for comparisons with published figures.
 
-mod transmission;
-
-use transmission::Transmission;
+use crate::problems::transmission::{self, Transmission};
 
 /// A problem: margins of a vector of numbers in `0..=1`, one per requirement. A vector falsifies it when a margin is 0 or
 /// less.

@@ -1,11 +1,11 @@
 use proptest::prelude::*;
 
-use sesame_plan::{Count, Distribution, Drain, GridAxis, OperationKind, Search};
+use sesame_plan::{Count, Distribution, Drain, GridAxis, OperationKind, Search, Strategy};
 
 use super::*;
 use crate::coverage::Feasible;
-use crate::space::permitted::tests::{any_timed_plan, broken_rule};
-use crate::testing::landscape::LANDSCAPES;
+use crate::space::test_space::tests::{any_timed_plan, broken_rule};
+use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
 fn table_3() -> Grid {
     let axis = |dimension, high, cells| GridAxis { dimension, low: 0.0, high, cells };
@@ -13,19 +13,19 @@ fn table_3() -> Grid {
 }
 
 fn cell_of(plan: &CampaignPlan, grid: &Grid, test: &Test) -> Option<usize> {
-    grid.cell_of(&Point::of(&planned(plan, test)?, Convention::Ours)?)
+    grid.cell_of(&Point::from_disturbances(&planned(plan, test)?, Convention::Ours)?)
 }
 
 /// Cells of a plan into which no test was constructed, and how many feasible ones there are.
 fn not_reached(plan: &CampaignPlan, grid: &Grid, seed: u64) -> (Vec<Vec<u32>>, usize) {
-    let permitted = Permitted::of(plan).unwrap();
-    let feasible = Feasible::of(plan, grid);
-    let constructor = Constructor::new(permitted.clone(), grid.clone(), feasible.clone(), plan.campaign.copies);
+    let test_space = TestSpace::from_plan(plan).unwrap();
+    let feasible = Feasible::from_plan(plan, grid);
+    let placer = CellPlacer::new(test_space.clone(), grid.clone(), feasible.clone(), plan.campaign.copies);
     let mut stream = Stream::derive(seed, "test", &[]);
     let mut failed = Vec::new();
     for cell in (0..grid.len()).filter(|&cell| feasible.reaches(cell)) {
-        let from = fresh_test(&permitted, &mut stream);
-        match constructor.place_in_cell(&from, cell, plan, &mut stream) {
+        let from = fresh_test(&test_space, &mut stream);
+        match placer.place_in_cell(&from, cell, plan, &mut stream) {
             Some(test) => {
                 assert_eq!(cell_of(plan, grid, &test), Some(cell));
                 assert_eq!(broken_rule(plan, &test), None);
@@ -49,7 +49,7 @@ fn overlaps(test: &Test) -> bool {
 
 /// Twelve operations of all classes, in windows of their own, some with whole numbers and some without a number.
 fn twelve_operations() -> CampaignPlan {
-    let mut plan = LANDSCAPES[2].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[2].plan(Search::new(Strategy::Random, 1));
     plan.operations = (0..12usize)
         .map(|at| {
             let mut operation = plan.operations[at % plan.operations.len()].clone();
@@ -85,23 +85,23 @@ fn twelve_operations() -> CampaignPlan {
 
 /// Cells that random tests fall into, most of them far from the middle: each is a witness that its cell can be reached.
 fn witnessed(plan: &CampaignPlan, grid: &Grid, tests: u64) -> std::collections::BTreeSet<usize> {
-    let permitted = Permitted::of(plan).unwrap();
+    let test_space = TestSpace::from_plan(plan).unwrap();
     let mut cells = std::collections::BTreeSet::new();
     for n in 0..tests {
         let mut stream = Stream::derive(n, "witness", &[]);
-        let mut test = fresh_test(&permitted, &mut stream);
+        let mut test = fresh_test(&test_space, &mut stream);
         let [like, place] = [0, 1].map(|_| stream.chance(0.6).then(|| stream.unit()));
         for it in &mut test.operations {
-            let kind = permitted.find(it.operation).unwrap();
-            let PermittedActivation::Time(window) = kind.activation else { panic!("by time") };
+            let kind = test_space.find(it.operation).unwrap();
+            let ActivationSpace::Time(window) = kind.activation else { panic!("by time") };
             let whole = window.high - window.low;
             let share = like.unwrap_or_else(|| stream.unit());
             let length = (whole * share * share).max(window.shortest);
             let at = place.unwrap_or_else(|| [0.0, 1.0, stream.unit()][stream.below(3)]);
             let start = window.low + (whole - length) * (at + 0.05 * stream.normal()).clamp(0.0, 1.0);
             it.activation = Activation::Time { start, end: (start + length).min(window.high) };
-            for (choice, permitted) in it.parameters.iter_mut().zip(&kind.parameters) {
-                if let (true, PermittedChoice::Number(range, shape)) = (stream.chance(0.4), permitted) {
+            for (choice, parameter_space) in it.parameters.iter_mut().zip(&kind.parameters) {
+                if let (true, ParameterSpace::Number(range, shape)) = (stream.chance(0.4), parameter_space) {
                     let high = stream.chance(0.5);
                     *choice = match shape {
                         sesame_plan::Shape::Value => Choice::Value { value: if high { range.high } else { range.low } },
@@ -122,17 +122,17 @@ fn witnessed(plan: &CampaignPlan, grid: &Grid, tests: u64) -> std::collections::
 /// Of the cells that witnesses fall into, every so manieth: those for which no test could be built from five fresh ones, and
 /// how many were tried.
 fn not_built(plan: &CampaignPlan, grid: &Grid, tests: u64, every: usize) -> (Vec<Vec<u32>>, usize, usize) {
-    let permitted = Permitted::of(plan).unwrap();
-    let feasible = Feasible::of(plan, grid);
+    let test_space = TestSpace::from_plan(plan).unwrap();
+    let feasible = Feasible::from_plan(plan, grid);
     let witnessed = witnessed(plan, grid, tests);
-    let constructor = Constructor::new(permitted.clone(), grid.clone(), feasible.clone(), plan.campaign.copies);
+    let placer = CellPlacer::new(test_space.clone(), grid.clone(), feasible.clone(), plan.campaign.copies);
     let mut stream = Stream::derive(5, "test", &[]);
     let tried: Vec<usize> = witnessed.iter().copied().step_by(every).collect();
     let mut failed = Vec::new();
     for &cell in &tried {
         assert!(feasible.reaches(cell), "a witness is in {:?}", grid.place(cell));
-        let built = (0..5)
-            .find_map(|_| constructor.place_in_cell(&fresh_test(&permitted, &mut stream), cell, plan, &mut stream));
+        let built =
+            (0..5).find_map(|_| placer.place_in_cell(&fresh_test(&test_space, &mut stream), cell, plan, &mut stream));
         match built {
             Some(test) => {
                 assert_eq!(cell_of(plan, grid, &test), Some(cell));
@@ -171,7 +171,7 @@ fn of_all_cells_of_five_dimensions_that_a_million_tests_reach_99_of_100_are_buil
 
 #[test]
 fn copies_of_one_operation_are_built_apart_or_not_at_all() {
-    let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     plan.campaign.operations.truncate(1);
     plan.campaign.count = Count { min: 1, max: 4 };
     plan.campaign.copies = Copies::Apart;
@@ -183,17 +183,17 @@ fn copies_of_one_operation_are_built_apart_or_not_at_all() {
     let too_long = |place: &Vec<u32>| 0.1 * f64::from(place[1]) * copies(place) >= 1.0 - 1e-9;
     let possible = failed.iter().filter(|place| !too_long(place)).count();
     assert!(feasible > 60 && possible * 5 <= feasible, "{possible} of {feasible}: {failed:?}");
-    assert!(!Feasible::of(&plan, &grid).is_exact(), "cells that only copies reach are not certain");
+    assert!(!Feasible::from_plan(&plan, &grid).is_exact(), "cells that only copies reach are not certain");
     plan.campaign.copies = Copies::MayOverlap;
     assert_eq!(not_reached(&plan, &grid, 1).0, Vec::<Vec<u32>>::new());
     plan.campaign.copies = Copies::Once;
-    let once = Feasible::of(&plan, &grid);
+    let once = Feasible::from_plan(&plan, &grid);
     assert!((0..grid.len()).all(|cell| !once.reaches(cell) || grid.place(cell)[2] == 0));
 }
 
 #[test]
 fn every_feasible_cell_of_the_papers_grid_is_reached_from_any_test() {
-    let plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     for seed in 0..5 {
         assert_eq!(not_reached(&plan, &table_3(), seed), (Vec::new(), 96));
     }
@@ -201,7 +201,7 @@ fn every_feasible_cell_of_the_papers_grid_is_reached_from_any_test() {
 
 #[test]
 fn numbers_of_operations_spreads_and_whole_numbers_are_reached_together() {
-    let mut plan = LANDSCAPES[2].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[2].plan(Search::new(Strategy::Random, 1));
     plan.campaign.count = Count { min: 1, max: 4 };
     plan.operations[0].kind = OperationKind::PacketLoss;
     plan.operations[1].kind = OperationKind::Latency { distribution: Distribution::Uniform, drain: Drain::Finish };
@@ -225,17 +225,17 @@ fn numbers_of_operations_spreads_and_whole_numbers_are_reached_together() {
 
 #[test]
 fn a_test_that_lies_in_the_cell_stays_nearly_as_it_is_and_of_others_middles_and_numbers_stay() {
-    let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 1 });
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     // Copies that keep apart leave less room, and some may have to go.
     plan.campaign.copies = Copies::MayOverlap;
-    let (grid, permitted) = (table_3(), Permitted::of(&plan).unwrap());
-    let feasible = Feasible::of(&plan, &grid);
-    let constructor = Constructor::new(permitted.clone(), grid.clone(), feasible.clone(), plan.campaign.copies);
+    let (grid, test_space) = (table_3(), TestSpace::from_plan(&plan).unwrap());
+    let feasible = Feasible::from_plan(&plan, &grid);
+    let placer = CellPlacer::new(test_space.clone(), grid.clone(), feasible.clone(), plan.campaign.copies);
     let mut stream = Stream::derive(4, "test", &[]);
     for _ in 0..50 {
-        let test = fresh_test(&permitted, &mut stream);
+        let test = fresh_test(&test_space, &mut stream);
         let cell = (0..grid.len()).filter(|&cell| feasible.reaches(cell)).nth(stream.below(feasible.count())).unwrap();
-        let built = constructor.place_in_cell(&test, cell, &plan, &mut stream).unwrap();
+        let built = placer.place_in_cell(&test, cell, &plan, &mut stream).unwrap();
         let kinds = |test: &Test| test.operations.iter().map(|it| it.operation).collect::<Vec<_>>();
         assert_eq!(kinds(&built), kinds(&test), "the cell does not count operations");
         for (before, after) in test.operations.iter().zip(&built.operations) {

@@ -15,23 +15,23 @@ use std::collections::BTreeMap;
 
 use sesame_optimise::dominance::{Fitness, Unfit};
 use sesame_optimise::front::Front;
-use sesame_plan::Typical;
+use sesame_plan::Statistic;
 
-use crate::Margin;
+use sesame_optimise::falsify::Margin;
 
 /// The front of a campaign that confirms its tests.
 #[derive(Debug, Clone, Default)]
-pub struct Confirming {
+pub struct ConfirmedFront {
     /// Of all generations before the latest; every test on it is confirmed.
     settled: Front,
     /// What the repetitions of each confirmed test say, by its number.
     confirmed: BTreeMap<u32, Fitness>,
-    generation: Vec<Judged>,
+    generation: Vec<GenerationTest>,
 }
 
 /// A test of the latest generation.
 #[derive(Debug, Clone)]
-pub struct Judged {
+pub struct GenerationTest {
     /// Its number.
     pub number: u32,
     /// The test whose result stands for it; itself unless it is a duplicate.
@@ -42,9 +42,9 @@ pub struct Judged {
     pub violates: bool,
 }
 
-impl Confirming {
+impl ConfirmedFront {
     /// Takes the tests of the next generation.
-    pub fn begin(&mut self, generation: impl IntoIterator<Item = Judged>) {
+    pub fn begin(&mut self, generation: impl IntoIterator<Item = GenerationTest>) {
         self.settled = self.front();
         self.generation = generation.into_iter().collect();
     }
@@ -62,10 +62,10 @@ impl Confirming {
     /// none once the generation is settled. A campaign without objectives has no front.
     pub fn unconfirmed(&self) -> Vec<u32> {
         let front = self.front();
-        let is_on_front = |test: &Judged| {
+        let is_on_front = |test: &GenerationTest| {
             front.members().iter().any(|member| member.number == test.number && !member.objectives.is_empty())
         };
-        let unsure = |test: &&Judged| {
+        let unsure = |test: &&GenerationTest| {
             !self.confirmed.contains_key(&test.stands_for)
                 && (is_on_front(test) || test.violates && test.number == test.stands_for)
         };
@@ -82,7 +82,7 @@ impl Confirming {
         self.generation.iter().map(|test| self.judged(test))
     }
 
-    fn judged<'a>(&'a self, test: &'a Judged) -> &'a Fitness {
+    fn judged<'a>(&'a self, test: &'a GenerationTest) -> &'a Fitness {
         self.confirmed.get(&test.stands_for).unwrap_or(&test.first)
     }
 }
@@ -92,7 +92,7 @@ impl Confirming {
 /// A run without objective values (a crash, a timeout, one in which no operation had any effect) reaches nothing: in a
 /// median and a quantile it stands behind all others. A mean is that of the runs that have values, if these are more than
 /// half of all. Where nothing is left, the test is as unfit as the first of the runs that are.
-pub fn typical(runs: &[Fitness], by: Typical) -> Fitness {
+pub fn aggregate(runs: &[Fitness], by: Statistic) -> Fitness {
     let measured: Vec<&[f64]> = runs.iter().filter_map(Fitness::objectives).collect();
     let unfit = || {
         let why = runs.iter().find(|run| run.objectives().is_none());
@@ -107,28 +107,28 @@ pub fn typical(runs: &[Fitness], by: Typical) -> Fitness {
     };
     let at = |rank: usize, objective: usize| sorted(objective).get(rank).copied();
     let value = |objective: usize| match by {
-        Typical::Mean if 2 * measured.len() <= runs.len() => None,
-        Typical::Mean => {
+        Statistic::Mean if 2 * measured.len() <= runs.len() => None,
+        Statistic::Mean => {
             let sum: f64 = measured.iter().map(|run| run[objective]).sum();
             Some(sum / measured.len() as f64)
         }
-        Typical::Median => {
+        Statistic::Median => {
             let [lower, upper] = [(runs.len() - 1) / 2, runs.len() / 2].map(|rank| at(rank, objective));
             Some(f64::midpoint(lower?, upper?))
         }
-        Typical::Quantile { share } => at(reached_by(share, runs.len()) - 1, objective),
+        Statistic::Quantile { share } => at(reached_by(share, runs.len()) - 1, objective),
     };
     let values: Option<Vec<f64>> =
         (0..objectives).map(|objective| value(objective).filter(|it| !it.is_nan())).collect();
     values.map_or_else(unfit, Fitness::Measured)
 }
 
-/// One margin for several runs of a test: as [`typical`] has it of an objective that is minimised, so a quantile is the
+/// One margin for several runs of a test: aggregated like an objective that is minimised, so a quantile is the
 /// margin that this share of the runs reach or go below. It counts as a violation if such a run violates.
-pub fn typical_margin(runs: &[Margin], by: Typical) -> Margin {
+pub(crate) fn aggregate_margin(runs: &[Margin], by: Statistic) -> Margin {
     let value = |run: &Margin| run.value.map_or(Fitness::Unfit(Unfit::Unmeasured), |it| Fitness::Measured(vec![it]));
     let values: Vec<Fitness> = runs.iter().map(value).collect();
-    let value = typical(&values, by).objectives().map(|values| values[0]);
+    let value = aggregate(&values, by).objectives().map(|values| values[0]);
     // On the edge itself a bound decides, and so the runs that are there know.
     let on_edge = |it: f64| it == 0.0 && runs.iter().any(|run| run.value == Some(0.0) && run.violated);
     Margin { value, violated: value.is_some_and(|it| it < 0.0 || on_edge(it)) }
@@ -136,7 +136,7 @@ pub fn typical_margin(runs: &[Margin], by: Typical) -> Margin {
 
 /// The least number of runs that are at least this share of all; 1 or more.
 fn reached_by(share: f64, runs: usize) -> usize {
-    // A share such as 0.55 is no binary fraction: 55 of 100 are 55 %.
+    // A share such as 0.55 is not a binary fraction: 55 of 100 are 55 %.
     const SLACK: f64 = 1e-9;
     (1..runs).find(|&count| count as f64 >= share * runs as f64 - SLACK).unwrap_or(runs)
 }
@@ -154,12 +154,12 @@ mod tests {
     }
 
     /// A test that violates nothing.
-    fn judged((number, stands_for, first): (u32, u32, Fitness)) -> Judged {
-        Judged { number, stands_for, first, violates: false }
+    fn judged((number, stands_for, first): (u32, u32, Fitness)) -> GenerationTest {
+        GenerationTest { number, stands_for, first, violates: false }
     }
 
     /// Confirms by what a landscape says until the front is settled; how many tests that took.
-    fn settle(confirming: &mut Confirming, truth: impl Fn(u32) -> Fitness) -> usize {
+    fn settle(confirming: &mut ConfirmedFront, truth: impl Fn(u32) -> Fitness) -> usize {
         let mut count = 0;
         loop {
             let wanted = confirming.unconfirmed();
@@ -193,13 +193,13 @@ mod tests {
         assert_eq!(believing.numbers(), [11], "whoever believes the first run has a front of one");
 
         // In the same generation, and in a later one.
-        let mut together = Confirming::default();
+        let mut together = ConfirmedFront::default();
         together.begin(generation(&(0..=11).collect::<Vec<_>>()).into_iter().map(judged));
         assert_eq!(together.unconfirmed(), [11]);
         assert_eq!(settle(&mut together, truth), 12, "those that it hid are confirmed in turn");
         assert_eq!(together.front().numbers(), honest);
 
-        let mut later = Confirming::default();
+        let mut later = ConfirmedFront::default();
         later.begin(generation(&honest).into_iter().map(judged));
         assert_eq!(settle(&mut later, truth), 11);
         later.begin(generation(&[11]).into_iter().map(judged));
@@ -210,8 +210,8 @@ mod tests {
 
     #[test]
     fn tests_that_violate_are_confirmed_wherever_they_lie_and_may_enter_the_front() {
-        let violating = |number, first| Judged { violates: true, ..judged((number, number, first)) };
-        let mut confirming = Confirming::default();
+        let violating = |number, first| GenerationTest { violates: true, ..judged((number, number, first)) };
+        let mut confirming = ConfirmedFront::default();
         let unfit = Fitness::Unfit(Unfit::Crash);
         confirming.begin([judged((1, 1, measured(&[1.0]))), violating(2, measured(&[3.0])), violating(3, unfit)]);
         assert_eq!(confirming.unconfirmed(), [1, 2, 3]);
@@ -221,14 +221,14 @@ mod tests {
         assert_eq!(confirming.unconfirmed(), [0; 0]);
         assert_eq!(confirming.front().numbers(), [3]);
         // A duplicate costs no runs: its original is confirmed.
-        confirming.begin([Judged { stands_for: 2, ..violating(4, measured(&[3.0])) }]);
+        confirming.begin([GenerationTest { stands_for: 2, ..violating(4, measured(&[3.0])) }]);
         assert_eq!(confirming.unconfirmed(), [0; 0]);
     }
 
     #[test]
     fn without_objectives_only_violations_are_confirmed() {
-        let mut confirming = Confirming::default();
-        let violating = Judged { violates: true, ..judged((2, 2, measured(&[]))) };
+        let mut confirming = ConfirmedFront::default();
+        let violating = GenerationTest { violates: true, ..judged((2, 2, measured(&[]))) };
         confirming.begin([judged((1, 1, measured(&[]))), violating]);
         assert_eq!(confirming.unconfirmed(), [2]);
     }
@@ -239,20 +239,24 @@ mod tests {
         let broken = |value: f64| Margin { value: Some(value), violated: true };
         let silent = Margin { value: None, violated: false };
         let runs = [broken(-1.0), kept(3.0), kept(4.0)];
-        assert_eq!(typical_margin(&runs, Typical::Mean), kept(2.0));
-        assert_eq!(typical_margin(&runs, Typical::Median), kept(3.0));
-        assert_eq!(typical_margin(&runs, Typical::Quantile { share: 0.3 }), broken(-1.0));
-        assert_eq!(typical_margin(&runs, Typical::Quantile { share: 1.0 }), kept(4.0), "as near as in the worst run");
-        assert_eq!(typical_margin(&[silent, silent, broken(-1.0)], Typical::Mean), silent, "too few say anything");
-        assert_eq!(typical_margin(&[silent, broken(-1.0), broken(-3.0)], Typical::Mean), broken(-2.0));
+        assert_eq!(aggregate_margin(&runs, Statistic::Mean), kept(2.0));
+        assert_eq!(aggregate_margin(&runs, Statistic::Median), kept(3.0));
+        assert_eq!(aggregate_margin(&runs, Statistic::Quantile { share: 0.3 }), broken(-1.0));
+        assert_eq!(
+            aggregate_margin(&runs, Statistic::Quantile { share: 1.0 }),
+            kept(4.0),
+            "as near as in the worst run"
+        );
+        assert_eq!(aggregate_margin(&[silent, silent, broken(-1.0)], Statistic::Mean), silent, "too few say anything");
+        assert_eq!(aggregate_margin(&[silent, broken(-1.0), broken(-3.0)], Statistic::Mean), broken(-2.0));
         // On the edge the kind of the bound decides.
-        assert_eq!(typical_margin(&[broken(0.0)], Typical::Mean), broken(0.0));
-        assert_eq!(typical_margin(&[kept(0.0)], Typical::Mean), kept(0.0));
+        assert_eq!(aggregate_margin(&[broken(0.0)], Statistic::Mean), broken(0.0));
+        assert_eq!(aggregate_margin(&[kept(0.0)], Statistic::Mean), kept(0.0));
     }
 
     #[test]
     fn a_duplicate_is_what_its_original_is() {
-        let mut confirming = Confirming::default();
+        let mut confirming = ConfirmedFront::default();
         confirming.begin([(1, 1, measured(&[0.0])), (2, 2, measured(&[3.0])), (3, 1, measured(&[0.0]))].map(judged));
         assert_eq!(confirming.unconfirmed(), [1]);
         confirming.confirm(1, measured(&[5.0]));
@@ -266,7 +270,7 @@ mod tests {
 
     #[test]
     fn a_test_that_does_not_even_run_again_leaves_the_front() {
-        let mut confirming = Confirming::default();
+        let mut confirming = ConfirmedFront::default();
         confirming.begin([(1, 1, measured(&[0.0])), (2, 2, Fitness::Unfit(Unfit::Void))].map(judged));
         assert_eq!(settle(&mut confirming, |_| Fitness::Unfit(Unfit::Crash)), 1);
         assert_eq!(confirming.front().numbers(), [0u32; 0]);
@@ -275,14 +279,14 @@ mod tests {
     #[test]
     fn a_quantile_is_reached_by_its_share_of_the_runs() {
         let runs: Vec<Fitness> = [5.0, 1.0, 4.0, 2.0, 3.0].map(|x| measured(&[x])).to_vec();
-        let by = |by| typical(&runs, by);
-        assert_eq!(by(Typical::Mean), measured(&[3.0]));
-        assert_eq!(by(Typical::Median), measured(&[3.0]));
+        let by = |by| aggregate(&runs, by);
+        assert_eq!(by(Statistic::Mean), measured(&[3.0]));
+        assert_eq!(by(Statistic::Median), measured(&[3.0]));
         // Smaller is better: four of five reach 4, and all reach 5.
-        assert_eq!(by(Typical::Quantile { share: 0.8 }), measured(&[4.0]));
-        assert_eq!(by(Typical::Quantile { share: 0.9 }), measured(&[5.0]));
-        assert_eq!(by(Typical::Quantile { share: 0.01 }), measured(&[1.0]));
-        assert_eq!(typical(&runs[..4], Typical::Median), measured(&[3.0]), "between 2 and 4");
+        assert_eq!(by(Statistic::Quantile { share: 0.8 }), measured(&[4.0]));
+        assert_eq!(by(Statistic::Quantile { share: 0.9 }), measured(&[5.0]));
+        assert_eq!(by(Statistic::Quantile { share: 0.01 }), measured(&[1.0]));
+        assert_eq!(aggregate(&runs[..4], Statistic::Median), measured(&[3.0]), "between 2 and 4");
         assert_eq!((reached_by(0.55, 100), reached_by(0.9, 10), reached_by(1.0, 7)), (55, 9, 7));
     }
 
@@ -290,13 +294,13 @@ mod tests {
     fn runs_without_values_reach_nothing() {
         let crash = Fitness::Unfit(Unfit::Crash);
         let runs = [measured(&[1.0]), crash.clone(), measured(&[3.0]), Fitness::Unfit(Unfit::Timeout)];
-        assert_eq!(typical(&runs[..3], Typical::Mean), measured(&[2.0]));
-        assert_eq!(typical(&runs, Typical::Mean), crash, "two of four are not more than half");
-        assert_eq!(typical(&runs[..3], Typical::Median), measured(&[3.0]));
-        assert_eq!(typical(&runs, Typical::Median), crash);
-        assert_eq!(typical(&runs, Typical::Quantile { share: 0.5 }), measured(&[3.0]));
-        assert_eq!(typical(&runs, Typical::Quantile { share: 0.75 }), crash);
-        assert_eq!(typical(&runs[1..2], Typical::Mean), crash);
+        assert_eq!(aggregate(&runs[..3], Statistic::Mean), measured(&[2.0]));
+        assert_eq!(aggregate(&runs, Statistic::Mean), crash, "two of four are not more than half");
+        assert_eq!(aggregate(&runs[..3], Statistic::Median), measured(&[3.0]));
+        assert_eq!(aggregate(&runs, Statistic::Median), crash);
+        assert_eq!(aggregate(&runs, Statistic::Quantile { share: 0.5 }), measured(&[3.0]));
+        assert_eq!(aggregate(&runs, Statistic::Quantile { share: 0.75 }), crash);
+        assert_eq!(aggregate(&runs[1..2], Statistic::Mean), crash);
     }
 
     proptest! {
@@ -308,7 +312,7 @@ mod tests {
         ) {
             let fitness = |(a, b): (u8, u8)| measured(&[f64::from(a), f64::from(b)]);
             let truth = |number: u32| fitness(tests[number as usize].1);
-            let mut confirming = Confirming::default();
+            let mut confirming = ConfirmedFront::default();
             let numbers: Vec<u32> = (0u32..).take(tests.len()).collect();
             let mut confirmations = 0;
             for generation in numbers.chunks(size) {
@@ -319,7 +323,7 @@ mod tests {
                 confirming.confirmed.get(&number).cloned().unwrap_or_else(|| fitness(tests[number as usize].0))
             };
             let all: Vec<(u32, Fitness)> = numbers.iter().map(|&number| (number, known(number))).collect();
-            let front = Front::of(all.iter().map(|(number, fitness)| (*number, fitness)));
+            let front = Front::from_tests(all.iter().map(|(number, fitness)| (*number, fitness)));
             prop_assert_eq!(confirming.front().numbers(), front.numbers());
             prop_assert!(front.numbers().iter().all(|number| confirming.confirmed.contains_key(number)));
             prop_assert_eq!(confirmations, confirming.confirmed.len(), "each once");
@@ -337,13 +341,13 @@ mod tests {
         ) {
             let runs: Vec<Fitness> = values.iter().map(|&x| measured(&[x])).collect();
             let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(low, high), &x| (low.min(x), high.max(x)));
-            for by in [Typical::Mean, Typical::Median, Typical::Quantile { share }] {
-                let Fitness::Measured(found) = typical(&runs, by) else { panic!("all are measured") };
+            for by in [Statistic::Mean, Statistic::Median, Statistic::Quantile { share }] {
+                let Fitness::Measured(found) = aggregate(&runs, by) else { panic!("all are measured") };
                 prop_assert!(found[0] >= low - 1e-12 && found[0] <= high + 1e-12);
                 if values.len() == 1 {
                     prop_assert_eq!(found[0], values[0]);
                 }
-                if let Typical::Quantile { share } = by {
+                if let Statistic::Quantile { share } = by {
                     let reach = values.iter().filter(|&&x| x <= found[0]).count() as f64;
                     prop_assert!(reach >= share * values.len() as f64 - 1e-9);
                     let better = values.iter().filter(|&&x| x < found[0]).count() as f64;

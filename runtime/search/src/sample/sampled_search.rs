@@ -8,28 +8,28 @@ use crate::{Candidate, Evaluated, Strategy};
 const GENERATION: u32 = 50;
 
 /// Tests that are there before any is run.
-pub trait Sampling: Send {
+pub(crate) trait Sampling: Send {
     /// The test of an index, from 0. It depends on the index alone.
     fn test(&mut self, index: u32) -> Test;
 }
 
 /// A search that learns nothing: as many tests of a sampling as evaluations, in generations of 50.
 #[derive(Debug, Clone)]
-pub struct InTurn<S> {
+pub(crate) struct SampledSearch<S> {
     sampling: S,
     evaluations: u32,
     asked: u32,
     awaited: usize,
 }
 
-impl<S: Sampling> InTurn<S> {
+impl<S: Sampling> SampledSearch<S> {
     /// The first so many tests of a sampling.
-    pub fn new(sampling: S, evaluations: u32) -> Self {
-        InTurn { sampling, evaluations, asked: 0, awaited: 0 }
+    pub(crate) fn new(sampling: S, evaluations: u32) -> Self {
+        SampledSearch { sampling, evaluations, asked: 0, awaited: 0 }
     }
 }
 
-impl<S: Sampling> Strategy for InTurn<S> {
+impl<S: Sampling> Strategy for SampledSearch<S> {
     fn ask(&mut self) -> Vec<Candidate> {
         assert!(self.awaited == 0, "a generation is told before the next is asked");
         let generation = self.asked / GENERATION;

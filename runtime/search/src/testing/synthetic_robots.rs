@@ -4,6 +4,8 @@
 //! hits a phase once per 0.2 s in which the signals' biases exceed the phase's thresholds; the bias of a signal is the
 //! sum over the active operations on it of the middle of their sub-range. Hits are maximised, active time minimised.
 
+use std::sync::Arc;
+
 use sesame_base::activation::Activity;
 use sesame_base::observation::{MetricObservation, Observation, Outcome, WallTime};
 use sesame_base::time::SimTime;
@@ -17,9 +19,8 @@ use sesame_plan::{
     Simulator, Span, Test, TestOperation, TopicId, Transport, ValueMode,
 };
 
-use crate::margin::margin_to;
 use crate::sspr::{self, Convention, Point};
-use crate::{Course, Evaluated, Strategy, needs_courses};
+use crate::{Evaluated, Strategy};
 
 /// Where and to what the robot is vulnerable.
 pub struct Phase {
@@ -30,7 +31,7 @@ pub struct Phase {
 }
 
 /// One robot.
-pub struct Landscape {
+pub struct SyntheticRobot {
     /// What it is called in messages of tests.
     pub name: &'static str,
     /// How many signals it has, each with an operation of its own.
@@ -40,8 +41,8 @@ pub struct Landscape {
 }
 
 /// Four robots, from one vulnerable to one signal at a time to one with many signals that do nothing.
-pub const LANDSCAPES: [Landscape; 4] = [
-    Landscape {
+pub const SYNTHETIC_ROBOTS: [SyntheticRobot; 4] = [
+    SyntheticRobot {
         name: "three phases",
         signals: 2,
         phases: &[
@@ -50,7 +51,7 @@ pub const LANDSCAPES: [Landscape; 4] = [
             Phase { start: 50.0, end: 58.0, thresholds: &[(0, -0.1)] },
         ],
     },
-    Landscape {
+    SyntheticRobot {
         name: "joint bias",
         signals: 2,
         phases: &[
@@ -58,7 +59,7 @@ pub const LANDSCAPES: [Landscape; 4] = [
             Phase { start: 40.0, end: 46.0, thresholds: &[(0, -0.05), (1, 0.15)] },
         ],
     },
-    Landscape {
+    SyntheticRobot {
         name: "many signals",
         signals: 6,
         phases: &[
@@ -67,7 +68,7 @@ pub const LANDSCAPES: [Landscape; 4] = [
             Phase { start: 44.0, end: 52.0, thresholds: &[(1, -0.12)] },
         ],
     },
-    Landscape {
+    SyntheticRobot {
         name: "strong bias",
         signals: 2,
         phases: &[
@@ -80,7 +81,7 @@ pub const LANDSCAPES: [Landscape; 4] = [
 /// Active time beyond which a test is worth nothing, in seconds.
 const REFERENCE_TIME: f64 = 130.0;
 
-impl Landscape {
+impl SyntheticRobot {
     /// A campaign on this robot: `random offset [-0.3, 0.3] within [0s, 65s]` on each signal, 1 to 5 per test,
     /// which may overlap.
     pub fn plan(&self, search: Search) -> CampaignPlan {
@@ -237,7 +238,7 @@ impl Landscape {
             let intervals = Self::active(it).into_iter().map(|(start, end)| Span { start, end }).collect();
             sspr::disturbance(plan, it.operation, &it.parameters, intervals)
         });
-        Point::of(&disturbances.collect::<Vec<_>>(), Convention::Ours)
+        Point::from_disturbances(&disturbances.collect::<Vec<_>>(), Convention::Ours)
     }
 
     /// What is recorded of a run: nothing that a test does changes what conditions see.
@@ -259,15 +260,15 @@ impl Landscape {
 
     /// The share of the ideal hypervolume (all hits in no time) that the front of a whole campaign reaches.
     pub fn campaign(&self, strategy: &mut dyn Strategy) -> Run {
-        self.campaign_of(&self.plan(Search::Random { evaluations: 1 }), strategy)
+        self.campaign_of(&self.plan(Search::new(sesame_plan::Strategy::Random, 1)), strategy)
     }
 
-    /// As [`Landscape::campaign`], of a plan that is by condition perhaps.
+    /// As [`SyntheticRobot::campaign`], of a plan that is by condition perhaps.
     pub fn campaign_of(&self, plan: &CampaignPlan, strategy: &mut dyn Strategy) -> Run {
-        let course = needs_courses(plan).then(|| Course::of(plan, &Self::undisturbed(plan))).flatten();
-        if let Some(course) = course.clone() {
-            strategy.reference(course);
-        }
+        let reference = Self::undisturbed(plan);
+        strategy.begin(&reference);
+        // Series are the same in all runs, and most of the work.
+        let recorded = if strategy.reads_series() { reference } else { reference.without_series() };
         let mut front = Front::default();
         let mut tests = Vec::new();
         loop {
@@ -284,19 +285,12 @@ impl Landscape {
                     let fitness =
                         if time < 0.05 { Fitness::Unfit(Unfit::Void) } else { Fitness::Measured(vec![time, -hits]) };
                     let point = if time < 0.05 { None } else { Self::point(plan, &candidate.test) };
-                    let margins = plan.requirements.iter().map(|requirement| {
-                        margin_to(requirement.bound, if requirement.metric.0 == 0 { time } else { hits })
-                    });
-                    let margins = margins.collect();
-                    Evaluated {
-                        number,
-                        test: candidate.test,
-                        fitness,
-                        point,
-                        course: course.clone(),
-                        margins,
-                        failing: false,
+                    let mut run = recorded.clone();
+                    for (metric, value) in run.metrics.iter_mut().zip([time, hits]) {
+                        *metric = MetricObservation::whole(Some(value), true, Vec::new());
                     }
+                    let fresh_runs = Vec::new();
+                    Evaluated { number, test: candidate.test, fitness, point, run: Arc::new(run), fresh_runs }
                 })
                 .collect();
             for result in &results {
@@ -325,13 +319,15 @@ mod tests {
     use super::*;
     use crate::{Candidate, strategy};
 
-    const NSGA2: Search = Search::Nsga2 { population: 10, evaluations: 210 };
+    fn nsga2() -> Search {
+        Search::new(sesame_plan::Strategy::Nsga2 { population: 10 }, 210)
+    }
 
-    fn median_volume(landscape: &Landscape, search: &Search) -> f64 {
+    fn median_volume(landscape: &SyntheticRobot, search: &Search) -> f64 {
         median_volume_of(landscape, &landscape.plan(search.clone()))
     }
 
-    fn median_volume_of(landscape: &Landscape, plan: &CampaignPlan) -> f64 {
+    fn median_volume_of(landscape: &SyntheticRobot, plan: &CampaignPlan) -> f64 {
         let run = |seed| landscape.campaign(strategy(plan, seed).unwrap().as_mut()).volume;
         let mut volumes: Vec<f64> = (1..=10).map(run).collect();
         volumes.sort_by(f64::total_cmp);
@@ -340,9 +336,9 @@ mod tests {
 
     #[test]
     fn evolution_beats_chance_on_every_landscape() {
-        let ratios = LANDSCAPES.map(|landscape| {
-            let random = median_volume(&landscape, &Search::Random { evaluations: 210 });
-            (landscape.name, median_volume(&landscape, &NSGA2) / random)
+        let ratios = SYNTHETIC_ROBOTS.map(|landscape| {
+            let random = median_volume(&landscape, &Search::new(sesame_plan::Strategy::Random, 210));
+            (landscape.name, median_volume(&landscape, &nsga2()) / random)
         });
         assert!(ratios.iter().all(|(_, ratio)| *ratio > 1.1), "{ratios:?}");
     }
@@ -351,10 +347,10 @@ mod tests {
     /// has only the active time to go by.
     #[test]
     fn evolution_beats_chance_where_conditions_switch_and_one_signal_is_enough() {
-        for landscape in [&LANDSCAPES[0], &LANDSCAPES[2], &LANDSCAPES[3]] {
+        for landscape in [&SYNTHETIC_ROBOTS[0], &SYNTHETIC_ROBOTS[2], &SYNTHETIC_ROBOTS[3]] {
             let by_condition = |search| landscape.plan_by_condition(search, ConditionEnd::Condition);
-            let random = median_volume_of(landscape, &by_condition(Search::Random { evaluations: 210 }));
-            let evolved = median_volume_of(landscape, &by_condition(NSGA2));
+            let random = median_volume_of(landscape, &by_condition(Search::new(sesame_plan::Strategy::Random, 210)));
+            let evolved = median_volume_of(landscape, &by_condition(nsga2()));
             assert!(evolved > 1.2 * random, "{}: {evolved} and {random}", landscape.name);
         }
     }
@@ -364,7 +360,7 @@ mod tests {
     #[ignore = "long: 240 searches of 210 tests"]
     fn shares_of_the_ideal_where_conditions_switch() {
         println!("| robot | random | NSGA-II | seeds ahead |\n|---|---:|---:|---:|");
-        for landscape in &LANDSCAPES {
+        for landscape in &SYNTHETIC_ROBOTS {
             let volumes = |search: Search| -> Vec<f64> {
                 let plan = landscape.plan_by_condition(search, ConditionEnd::Condition);
                 (1..=30).map(|seed| landscape.campaign(strategy(&plan, seed).unwrap().as_mut()).volume).collect()
@@ -374,7 +370,7 @@ mod tests {
                 sorted.sort_by(f64::total_cmp);
                 f64::midpoint(sorted[14], sorted[15])
             };
-            let (random, evolved) = (volumes(Search::Random { evaluations: 210 }), volumes(NSGA2));
+            let (random, evolved) = (volumes(Search::new(sesame_plan::Strategy::Random, 210)), volumes(nsga2()));
             let ahead = evolved.iter().zip(&random).filter(|(evolved, random)| evolved > random).count();
             println!("| {} | {:.3} | {:.3} | {ahead} of 30 |", landscape.name, median(&random), median(&evolved));
             assert!(landscape.name == "joint bias" || ahead > 15, "{}: {ahead}", landscape.name);
@@ -383,8 +379,8 @@ mod tests {
 
     #[test]
     fn no_test_is_asked_twice() {
-        for landscape in LANDSCAPES {
-            let plan = landscape.plan(NSGA2);
+        for landscape in SYNTHETIC_ROBOTS {
+            let plan = landscape.plan(nsga2());
             let run = landscape.campaign(strategy(&plan, 5).unwrap().as_mut());
             for (i, result) in run.tests.iter().enumerate() {
                 assert!(!run.tests[..i].iter().any(|earlier| earlier.test == result.test), "{}", landscape.name);
@@ -394,8 +390,10 @@ mod tests {
 
     #[test]
     fn the_seed_decides_everything() {
-        for plan in [LANDSCAPES[1].plan(NSGA2), LANDSCAPES[1].plan_by_condition(NSGA2, ConditionEnd::Condition)] {
-            let run = |seed| LANDSCAPES[1].campaign(strategy(&plan, seed).unwrap().as_mut()).tests;
+        for plan in
+            [SYNTHETIC_ROBOTS[1].plan(nsga2()), SYNTHETIC_ROBOTS[1].plan_by_condition(nsga2(), ConditionEnd::Condition)]
+        {
+            let run = |seed| SYNTHETIC_ROBOTS[1].campaign(strategy(&plan, seed).unwrap().as_mut()).tests;
             assert_eq!(run(3), run(3));
             assert_ne!(run(3), run(4));
         }
@@ -403,8 +401,8 @@ mod tests {
 
     #[test]
     fn a_resumed_search_goes_on_as_if_never_stopped() {
-        let landscape = &LANDSCAPES[0];
-        let plan = landscape.plan(NSGA2);
+        let landscape = &SYNTHETIC_ROBOTS[0];
+        let plan = landscape.plan(nsga2());
         let whole = landscape.campaign(strategy(&plan, 8).unwrap().as_mut()).tests;
         let mut resumed = strategy(&plan, 8).unwrap();
         for stored in whole.chunks(10).take(7) {
@@ -418,7 +416,7 @@ mod tests {
 
     /// All generations of a search in which nothing can be measured.
     fn generations(search: Search) -> Vec<Vec<Candidate>> {
-        let mut plan = LANDSCAPES[0].plan(search);
+        let mut plan = SYNTHETIC_ROBOTS[0].plan(search);
         plan.tests = vec![sesame_plan::KnownTest {
             name: "known".to_owned(),
             doc: String::new(),
@@ -441,9 +439,8 @@ mod tests {
                     test: candidate.test.clone(),
                     fitness: Fitness::Unfit(Unfit::Unmeasured),
                     point: None,
-                    course: None,
-                    margins: Vec::new(),
-                    failing: false,
+                    run: crate::testing::no_run(),
+                    fresh_runs: Vec::new(),
                 })
                 .collect();
             strategy.tell(&results);
@@ -454,20 +451,18 @@ mod tests {
     #[test]
     fn exactly_the_evaluations_asked_for_are_made() {
         let sizes = |search| generations(search).iter().map(Vec::len).collect::<Vec<_>>();
-        assert_eq!(sizes(Search::Nsga2 { population: 7, evaluations: 24 }), [7, 7, 7, 3]);
-        assert_eq!(sizes(Search::Nsga2 { population: 1, evaluations: 3 }), [1, 1, 1]);
-        assert_eq!(sizes(Search::Nsga2 { population: 10, evaluations: 4 }), [4]);
-        assert_eq!(sizes(Search::Nsga2 { population: 10, evaluations: 0 }), [0; 0]);
-        assert_eq!(sizes(Search::Random { evaluations: 120 }), [50, 50, 20]);
+        assert_eq!(sizes(Search::new(sesame_plan::Strategy::Nsga2 { population: 7 }, 24)), [7, 7, 7, 3]);
+        assert_eq!(sizes(Search::new(sesame_plan::Strategy::Nsga2 { population: 1 }, 3)), [1, 1, 1]);
+        assert_eq!(sizes(Search::new(sesame_plan::Strategy::Nsga2 { population: 10 }, 4)), [4]);
+        assert_eq!(sizes(Search::new(sesame_plan::Strategy::Nsga2 { population: 10 }, 0)), [0; 0]);
+        assert_eq!(sizes(Search::new(sesame_plan::Strategy::Random, 120)), [50, 50, 20]);
         assert_eq!(sizes(Search::Repeat { test: sesame_plan::KnownTestId(0), times: 30 }), [30]);
         assert_eq!(sizes(Search::Repeat { test: sesame_plan::KnownTestId(0), times: 0 }), [0; 0]);
-        assert_eq!(sizes(Search::Known { tests: vec![sesame_plan::KnownTestId(0)] }), [1]);
-        assert_eq!(sizes(Search::Known { tests: vec![] }), [0; 0]);
     }
 
     #[test]
     fn parents_are_earlier_tests_and_generations_are_counted() {
-        let generations = generations(Search::Nsga2 { population: 6, evaluations: 30 });
+        let generations = generations(Search::new(sesame_plan::Strategy::Nsga2 { population: 6 }, 30));
         let mut earlier = 0;
         for (n, generation) in (0u32..).zip(&generations) {
             for candidate in generation {
@@ -481,15 +476,15 @@ mod tests {
 
     #[test]
     fn the_random_tests_are_those_an_evolution_begins_with() {
-        let random = &generations(Search::Random { evaluations: 10 })[0];
-        let first = &generations(Search::Nsga2 { population: 10, evaluations: 20 })[0];
+        let random = &generations(Search::new(sesame_plan::Strategy::Random, 10))[0];
+        let first = &generations(Search::new(sesame_plan::Strategy::Nsga2 { population: 10 }, 20))[0];
         assert_eq!(random, first);
     }
 
     #[test]
-    fn a_population_of_nobody_is_refused() {
-        let plan = LANDSCAPES[0].plan(Search::Nsga2 { population: 0, evaluations: 10 });
+    fn a_population_of_0_is_refused() {
+        let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Nsga2 { population: 0 }, 10));
         let Err(refusal) = strategy(&plan, 1) else { panic!("a population of 0 was accepted") };
-        assert_eq!(refusal.to_string(), "campaign `three phases` has a population of 0; give it at least 1");
+        assert_eq!(refusal.to_string(), "campaign `three phases` has a population of 0; it must be at least 1");
     }
 }

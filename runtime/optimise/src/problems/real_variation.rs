@@ -1,4 +1,4 @@
-//! Vectors of real numbers as genomes: what NSGA-II is compared with other implementations on. No campaign uses them.
+//! Variation of vectors of real numbers: the usual operators of NSGA-II, for comparisons with other implementations.
 //!
 //! Simulated binary crossover in its bounded form and polynomial mutation (Deb and Agrawal 1995; Deb 2001).
 

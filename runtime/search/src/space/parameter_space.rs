@@ -7,7 +7,7 @@ use crate::space::range::{Range, StepSizes};
 
 /// What a campaign permits a test to choose for a parameter.
 #[derive(Debug, Clone, PartialEq)]
-pub enum PermittedChoice {
+pub enum ParameterSpace {
     /// A number of a range, or a sub-range of it.
     Number(Range, Shape),
     /// A point: its range on each axis.
@@ -16,19 +16,19 @@ pub enum PermittedChoice {
     Items(Vec<String>),
 }
 
-impl PermittedChoice {
+impl ParameterSpace {
     /// What a domain permits; `None` where a number must be whole and no whole number is permitted.
-    pub fn of(domain: &Domain) -> Option<Self> {
+    pub fn from_domain(domain: &Domain) -> Option<Self> {
         match domain {
             Domain::Number { low, high, shape, integer } => {
-                Some(PermittedChoice::Number(Range::numbers(*low, *high, *integer)?, *shape))
+                Some(ParameterSpace::Number(Range::numbers(*low, *high, *integer)?, *shape))
             }
             Domain::Point { low, high } => {
                 let axis = |axis: usize| Range { low: low[axis], high: high[axis], shortest: 0.0, integer: false };
-                Some(PermittedChoice::Point([axis(0), axis(1), axis(2)]))
+                Some(ParameterSpace::Point([axis(0), axis(1), axis(2)]))
             }
             Domain::Texts { texts: items } | Domain::Files { files: items } => {
-                Some(PermittedChoice::Items(items.clone()))
+                Some(ParameterSpace::Items(items.clone()))
             }
         }
     }
@@ -36,43 +36,43 @@ impl PermittedChoice {
     /// Whether a test has nothing to choose.
     pub fn is_fixed(&self) -> bool {
         match self {
-            PermittedChoice::Number(range, _) => range.is_fixed(),
-            PermittedChoice::Point(axes) => axes.iter().all(|range| range.is_fixed()),
-            PermittedChoice::Items(items) => items.len() <= 1,
+            ParameterSpace::Number(range, _) => range.is_fixed(),
+            ParameterSpace::Point(axes) => axes.iter().all(|range| range.is_fixed()),
+            ParameterSpace::Items(items) => items.len() <= 1,
         }
     }
 
     /// A choice: values, points and items are uniform over what is permitted, sub-ranges over all feasible pairs.
     pub fn fresh(&self, stream: &mut Stream) -> Choice {
         match self {
-            PermittedChoice::Number(range, Shape::Value) => Choice::Value { value: range.number(stream) },
-            PermittedChoice::Number(range, Shape::Range) => {
+            ParameterSpace::Number(range, Shape::Value) => Choice::Value { value: range.number(stream) },
+            ParameterSpace::Number(range, Shape::Range) => {
                 let (low, high) = range.interval(stream);
                 Choice::Range { low, high }
             }
-            PermittedChoice::Point(axes) => Choice::Point { point: axes.map(|range| range.number(stream)) },
-            PermittedChoice::Items(items) => Choice::Text { text: items[stream.below(items.len())].clone() },
+            ParameterSpace::Point(axes) => Choice::Point { point: axes.map(|range| range.number(stream)) },
+            ParameterSpace::Items(items) => Choice::Text { text: items[stream.below(items.len())].clone() },
         }
     }
 
     /// A choice near another: numbers and points move a little, of texts and files another one is taken.
     pub fn near(&self, choice: &Choice, steps: StepSizes, stream: &mut Stream) -> Choice {
         match (self, choice) {
-            (PermittedChoice::Number(range, _), Choice::Value { value }) => {
+            (ParameterSpace::Number(range, _), Choice::Value { value }) => {
                 Choice::Value { value: range.number_near(*value, steps, stream) }
             }
-            (PermittedChoice::Number(range, _), Choice::Range { low, high }) => {
+            (ParameterSpace::Number(range, _), Choice::Range { low, high }) => {
                 let (low, high) = range.interval_near((*low, *high), steps, stream);
                 Choice::Range { low, high }
             }
-            (PermittedChoice::Point(axes), Choice::Point { point }) => {
+            (ParameterSpace::Point(axes), Choice::Point { point }) => {
                 let mut point = *point;
                 for (coordinate, range) in point.iter_mut().zip(axes) {
                     *coordinate = range.number_near(*coordinate, steps, stream);
                 }
                 Choice::Point { point }
             }
-            (PermittedChoice::Items(items), Choice::Text { text }) => {
+            (ParameterSpace::Items(items), Choice::Text { text }) => {
                 let others: Vec<&String> = items.iter().filter(|item| *item != text).collect();
                 let text = if others.is_empty() { text } else { others[stream.below(others.len())] };
                 Choice::Text { text: text.clone() }
@@ -91,7 +91,8 @@ mod tests {
 
     #[test]
     fn points_stay_in_their_box_and_fill_it() {
-        let permitted = PermittedChoice::of(&Domain::Point { low: [-1.0, 0.0, 5.0], high: [1.0, 0.0, 9.0] }).unwrap();
+        let permitted =
+            ParameterSpace::from_domain(&Domain::Point { low: [-1.0, 0.0, 5.0], high: [1.0, 0.0, 9.0] }).unwrap();
         let mut stream = Stream::derive(1, "test", &[]);
         let mut choice = permitted.fresh(&mut stream);
         let (mut least, mut most) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -109,7 +110,7 @@ mod tests {
     #[test]
     fn items_are_uniform_and_a_change_is_always_to_another() {
         let texts = ["a", "b", "c"].map(str::to_owned).to_vec();
-        let permitted = PermittedChoice::of(&Domain::Texts { texts }).unwrap();
+        let permitted = ParameterSpace::from_domain(&Domain::Texts { texts }).unwrap();
         let mut stream = Stream::derive(1, "test", &[]);
         let mut counts = std::collections::BTreeMap::new();
         for _ in 0..6_000 {
@@ -120,7 +121,7 @@ mod tests {
             *counts.entry(text).or_insert(0u32) += 1;
         }
         assert!(counts.len() == 3 && counts.values().all(|n| (1_850..2_150).contains(n)), "{counts:?}");
-        let only = PermittedChoice::Items(vec!["a".to_owned()]);
+        let only = ParameterSpace::Items(vec!["a".to_owned()]);
         assert!(only.is_fixed());
         let choice = Choice::Text { text: "a".to_owned() };
         assert_eq!(only.near(&choice, STEPS, &mut stream), choice);

@@ -4,38 +4,38 @@ use sesame_plan::{Activation, Choice, Shape, Test, TestOperation};
 use sesame_rng::derive_seed;
 
 use crate::space::apart;
-use crate::space::choice::PermittedChoice;
 use crate::space::initial::{fresh_kinds, place};
-use crate::space::permitted::{Permitted, PermittedActivation};
+use crate::space::parameter_space::ParameterSpace;
 use crate::space::range::Range;
+use crate::space::test_space::{ActivationSpace, TestSpace};
 
 /// The test of these numbers, given by the place of the choice: first how many operations there are and which, then of each
 /// in turn its window's length and place, and its parameters. Numbers that are uniform and independent give the distribution
 /// of [random tests](crate::space::initial). By condition there are no such choices: it is for campaigns by time.
-pub(super) fn decoded(permitted: &Permitted, seed: u64, index: u32, mut number: impl FnMut(usize) -> f64) -> Test {
+pub(super) fn decoded(test_space: &TestSpace, seed: u64, index: u32, mut number: impl FnMut(usize) -> f64) -> Test {
     let mut next = 0;
     let mut value = || {
         next += 1;
         number(next - 1)
     };
-    let operations = fresh_kinds(permitted, &mut value)
+    let operations = fresh_kinds(test_space, &mut value)
         .into_iter()
         .enumerate()
         .map(|(slot, kind)| {
             let activation = match kind.activation {
-                PermittedActivation::Time(window) => {
+                ActivationSpace::Time(window) => {
                     let (start, end) = interval(window, [value(), value()]);
                     Activation::Time { start, end }
                 }
                 _ => Activation::Offline,
             };
             let parameters = kind.parameters.iter().map(|it| choice(it, &mut value)).collect();
-            let draw_seed = derive_seed(seed, "draws", &[u64::from(index), slot as u64]);
-            TestOperation { operation: kind.operation, activation, parameters, draw_seed }
+            let operation_seed = derive_seed(seed, "draws", &[u64::from(index), slot as u64]);
+            TestOperation { operation: kind.operation, activation, parameters, operation_seed }
         })
         .collect();
     let mut test = Test { operations };
-    permitted.settle_windows(&mut test, apart::spread);
+    test_space.settle_windows(&mut test, apart::spread);
     test
 }
 
@@ -51,7 +51,7 @@ fn interval(range: Range, [length, place]: [f64; 2]) -> (f64, f64) {
     (start.max(range.low), (start + length).min(range.high))
 }
 
-fn choice(permitted: &PermittedChoice, value: &mut impl FnMut() -> f64) -> Choice {
+fn choice(parameter_space: &ParameterSpace, value: &mut impl FnMut() -> f64) -> Choice {
     let number = |range: &Range, value: f64| {
         if range.integer {
             (range.low + libm::floor(value * (range.high - range.low + 1.0))).min(range.high)
@@ -59,16 +59,16 @@ fn choice(permitted: &PermittedChoice, value: &mut impl FnMut() -> f64) -> Choic
             (range.low + value * (range.high - range.low)).min(range.high)
         }
     };
-    match permitted {
-        PermittedChoice::Number(range, Shape::Value) => Choice::Value { value: number(range, value()) },
-        PermittedChoice::Number(range, Shape::Range) => {
+    match parameter_space {
+        ParameterSpace::Number(range, Shape::Value) => Choice::Value { value: number(range, value()) },
+        ParameterSpace::Number(range, Shape::Range) => {
             let (low, high) = interval(*range, [value(), value()]);
             let whole = |x: f64| if range.integer { libm::rint(x) } else { x };
             Choice::Range { low: whole(low), high: whole(high) }
         }
-        PermittedChoice::Point(axes) => {
+        ParameterSpace::Point(axes) => {
             Choice::Point { point: [0, 1, 2].map(|axis: usize| number(&axes[axis], value())) }
         }
-        PermittedChoice::Items(items) => Choice::Text { text: items[place(value(), items.len())].clone() },
+        ParameterSpace::Items(items) => Choice::Text { text: items[place(value(), items.len())].clone() },
     }
 }

@@ -1,79 +1,85 @@
-//! The way from a test to a smaller one, as a function of what is known of the tests on it.
+//! The reduction of a test, as a function of which tests are known to fail.
 //!
-//! The walk is written as if every question had its answer at once. Where one is missing it breaks off and says which
-//! tests have to be run; with their answers it is walked again from its beginning, to the same place and on. So there is
-//! no state to be kept between two questions, and a walk taken up again is the same walk.
+//! It is written as if an oracle knew every answer. If an answer is missing, the reduction stops and returns the tests that
+//! have to be run; with their results it starts again from the beginning, and gets further. So it has no state between two
+//! questions, and a resumed reduction is the same reduction.
 
 use sesame_plan::Test;
 
 use crate::shrink::Phase;
-use crate::shrink::dial::{self, Dial};
-use crate::shrink::space::Space;
+use crate::shrink::axis::{self, ShrinkAxis};
+use crate::shrink::space::ShrinkSpace;
 
-/// What is known of tests.
-pub(super) trait Answers {
+/// Which tests are known to fail.
+pub(super) trait Oracle {
     /// The index of a test that was asked for, and whether it fails.
     fn find(&self, test: &Test) -> Option<(usize, bool)>;
 }
 
-/// Tests that have to be run before the walk goes on; none of them is known, none is there twice.
+/// Tests that have to be run before the reduction can go on; all are different, and none is known.
 #[derive(Debug)]
-pub(super) struct Asked {
+pub(super) struct Pending {
     pub(super) phase: Phase,
     pub(super) tests: Vec<Test>,
     /// Index of the test that they are made of.
     pub(super) base: Option<usize>,
 }
 
-/// Where a walk ended.
+/// The result of a reduction.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Arrived {
-    /// Indices of the tests that were gone to, in their order; the last one is the smallest. None where the test that
-    /// the walk begins with does not fail.
-    pub(super) kept: Vec<usize>,
+pub(super) struct Reduced {
+    /// Indices of the tests that were accepted, in their order; the last one is the smallest. Empty if the original test
+    /// does not fail.
+    pub(super) accepted: Vec<usize>,
     /// Whether every smaller test that is one step away was run and does not fail.
     pub(super) minimal: bool,
 }
 
-/// A walk on its way.
-struct Walk<'a, A> {
-    space: &'a Space,
-    answers: &'a A,
+/// A reduction in progress.
+struct Reduction<'a, A> {
+    space: &'a ShrinkSpace,
+    oracle: &'a A,
     /// Whether no more tests can be run: what is not known then does not fail.
     exhausted: bool,
     /// Whether anything was taken not to fail for that reason.
     guessed: bool,
     test: Test,
-    kept: Vec<usize>,
+    accepted: Vec<usize>,
 }
 
-/// Walks as far as what is known leads.
-pub(super) fn walk<A: Answers>(space: &Space, original: &Test, answers: &A, exhausted: bool) -> Result<Arrived, Asked> {
-    let mut walk = Walk { space, answers, exhausted, guessed: false, test: original.clone(), kept: Vec::new() };
-    let found = walk.failing(Phase::Original, std::slice::from_ref(original))?;
+/// Reduces a test as far as the answers are known.
+pub(super) fn reduce<A: Oracle>(
+    space: &ShrinkSpace,
+    original: &Test,
+    oracle: &A,
+    exhausted: bool,
+) -> Result<Reduced, Pending> {
+    let mut reduction =
+        Reduction { space, oracle, exhausted, guessed: false, test: original.clone(), accepted: Vec::new() };
+    let found = reduction.failing(Phase::Original, std::slice::from_ref(original))?;
     if let Some(index) = found[0] {
-        walk.kept.push(index);
-        walk.all_the_way()?;
+        reduction.accepted.push(index);
+        reduction.all_the_way()?;
     }
-    Ok(Arrived { minimal: !walk.guessed && !walk.kept.is_empty(), kept: walk.kept })
+    Ok(Reduced { minimal: !reduction.guessed && !reduction.accepted.is_empty(), accepted: reduction.accepted })
 }
 
-impl<A: Answers> Walk<'_, A> {
-    fn all_the_way(&mut self) -> Result<(), Asked> {
+impl<A: Oracle> Reduction<'_, A> {
+    fn all_the_way(&mut self) -> Result<(), Pending> {
         self.fewer_operations()?;
-        self.turn(Phase::Windows, dial::times(&self.test))?;
+        self.shrink_along(Phase::Windows, axis::times(&self.test))?;
         self.simpler_conditions()?;
-        self.turn(Phase::Parameters, dial::parameters(&self.test))?;
-        while self.last_steps()? {}
+        self.shrink_along(Phase::Parameters, axis::parameters(&self.test))?;
+        while self.single_steps()? {}
         Ok(())
     }
 
     /// Which of these tests fail, by their indices. One phase asks for all of them at once.
-    fn failing(&mut self, phase: Phase, tests: &[Test]) -> Result<Vec<Option<usize>>, Asked> {
+    fn failing(&mut self, phase: Phase, tests: &[Test]) -> Result<Vec<Option<usize>>, Pending> {
         let mut unknown: Vec<Test> = Vec::new();
         let mut found = Vec::with_capacity(tests.len());
         for test in tests {
-            let known = self.answers.find(test);
+            let known = self.oracle.find(test);
             if known.is_none() && !unknown.contains(test) {
                 unknown.push(test.clone());
             }
@@ -86,27 +92,27 @@ impl<A: Answers> Walk<'_, A> {
             self.guessed = true;
             return Ok(found);
         }
-        Err(Asked { phase, tests: unknown, base: self.kept.last().copied() })
+        Err(Pending { phase, tests: unknown, base: self.accepted.last().copied() })
     }
 
-    fn go_to(&mut self, test: Test, index: usize) {
+    fn accept(&mut self, test: Test, index: usize) {
         self.test = test;
-        self.kept.push(index);
+        self.accepted.push(index);
     }
 
     /// Goes to the first of these tests that fails, if one does, and says which.
-    fn first_failing(&mut self, phase: Phase, mut tests: Vec<Test>) -> Result<Option<usize>, Asked> {
+    fn first_failing(&mut self, phase: Phase, mut tests: Vec<Test>) -> Result<Option<usize>, Pending> {
         let found = self.failing(phase, &tests)?;
         let Some(at) = found.iter().position(Option::is_some) else { return Ok(None) };
         if let Some(index) = found[at] {
-            self.go_to(tests.swap_remove(at), index);
+            self.accept(tests.swap_remove(at), index);
         }
         Ok(Some(at))
     }
 
     /// Delta debugging (Zeller and Hildebrandt 2002, ddmin): parts of the operations alone, then all but a part, in ever
     /// smaller parts.
-    fn fewer_operations(&mut self) -> Result<(), Asked> {
+    fn fewer_operations(&mut self) -> Result<(), Pending> {
         let mut parts = 2;
         loop {
             let all = self.test.operations.len();
@@ -140,53 +146,55 @@ impl<A: Answers> Walk<'_, A> {
         }
     }
 
-    /// Turns dials as far as they go, all of them side by side, each by bisection.
-    fn turn(&mut self, phase: Phase, dials: Vec<Dial>) -> Result<(), Asked> {
-        // With each dial the fewest steps from here that are known, or taken, to be too many.
-        let mut dials: Vec<(Dial, u32)> =
-            dials.into_iter().map(|dial| (dial, dial.steps(self.space, &self.test).saturating_add(1))).collect();
+    /// Turns axes as far as they go, all of them side by side, each by bisection.
+    fn shrink_along(&mut self, phase: Phase, axes: Vec<ShrinkAxis>) -> Result<(), Pending> {
+        // With each axis the fewest steps from here that are known, or taken, to be too many.
+        let mut axes: Vec<(ShrinkAxis, u32)> =
+            axes.into_iter().map(|axis| (axis, axis.steps(self.space, &self.test).saturating_add(1))).collect();
         loop {
-            for (dial, too_many) in &mut dials {
-                *too_many = (*too_many).min(dial.steps(self.space, &self.test).saturating_add(1));
+            for (axis, too_many) in &mut axes {
+                *too_many = (*too_many).min(axis.steps(self.space, &self.test).saturating_add(1));
             }
-            dials.retain(|(_, too_many)| *too_many > 1);
-            if dials.is_empty() {
+            axes.retain(|(_, too_many)| *too_many > 1);
+            if axes.is_empty() {
                 return Ok(());
             }
             let half = |too_many: u32| too_many / 2;
-            let tests: Vec<Test> =
-                dials.iter().map(|&(dial, too_many)| dial.turned(self.space, &self.test, half(too_many))).collect();
+            let tests: Vec<Test> = axes
+                .iter()
+                .map(|&(axis, too_many)| axis.shrink_along(self.space, &self.test, half(too_many)))
+                .collect();
             let found = self.failing(phase, &tests)?;
-            let turned: Vec<usize> = (0..dials.len()).filter(|&at| found[at].is_some()).collect();
-            for (at, (_, too_many)) in dials.iter_mut().enumerate() {
+            let shrunk: Vec<usize> = (0..axes.len()).filter(|&at| found[at].is_some()).collect();
+            for (at, (_, too_many)) in axes.iter_mut().enumerate() {
                 if found[at].is_none() {
                     *too_many = half(*too_many);
                 }
             }
-            let Some(&first) = turned.first() else { continue };
+            let Some(&first) = shrunk.first() else { continue };
             let mut together = self.test.clone();
             let mut taken = Vec::new();
-            for &at in &turned {
-                let (dial, too_many) = dials[at];
-                let steps = half(too_many).min(dial.steps(self.space, &together));
+            for &at in &shrunk {
+                let (axis, too_many) = axes[at];
+                let steps = half(too_many).min(axis.steps(self.space, &together));
                 if steps > 0 {
-                    together = dial.turned(self.space, &together, steps);
+                    together = axis.shrink_along(self.space, &together, steps);
                     taken.push((at, steps));
                 }
             }
             if self.first_failing(phase, vec![together])?.is_none()
                 && let Some(index) = found[first]
             {
-                taken = vec![(first, half(dials[first].1))];
-                self.go_to(tests[first].clone(), index);
+                taken = vec![(first, half(axes[first].1))];
+                self.accept(tests[first].clone(), index);
             }
             for (at, steps) in taken {
-                dials[at].1 -= steps;
+                axes[at].1 -= steps;
             }
         }
     }
 
-    fn simpler_conditions(&mut self) -> Result<(), Asked> {
+    fn simpler_conditions(&mut self) -> Result<(), Pending> {
         loop {
             let tests = self.with_simpler_conditions();
             if tests.is_empty() || self.first_failing(Phase::Conditions, tests)?.is_none() {
@@ -207,9 +215,9 @@ impl<A: Answers> Walk<'_, A> {
         tests.collect()
     }
 
-    /// Tries everything that is one step smaller. Where something of it fails, goes there and on, and says so; where
-    /// nothing does, no single step is left.
-    fn last_steps(&mut self) -> Result<bool, Asked> {
+    /// Tries every single step. If one of these tests fails, it is accepted, and the result is true; if none does, the test
+    /// is minimal.
+    fn single_steps(&mut self) -> Result<bool, Pending> {
         let mut tests = Vec::new();
         if self.test.operations.len() > self.space.fewest {
             for place in 0..self.test.operations.len() {
@@ -220,24 +228,24 @@ impl<A: Answers> Walk<'_, A> {
         }
         tests.extend(self.with_simpler_conditions());
         let others = tests.len();
-        let dials: Vec<Dial> = [dial::times(&self.test), dial::parameters(&self.test)]
+        let axes: Vec<ShrinkAxis> = [axis::times(&self.test), axis::parameters(&self.test)]
             .concat()
             .into_iter()
-            .filter(|dial| dial.steps(self.space, &self.test) > 0)
+            .filter(|axis| axis.steps(self.space, &self.test) > 0)
             .collect();
-        tests.extend(dials.iter().map(|dial| dial.turned(self.space, &self.test, 1)));
-        let found = self.failing(Phase::LastSteps, &tests)?;
+        tests.extend(axes.iter().map(|axis| axis.shrink_along(self.space, &self.test, 1)));
+        let found = self.failing(Phase::LocalMinimality, &tests)?;
         let Some(first) = found.iter().position(Option::is_some) else { return Ok(false) };
         if first < others {
             if let Some(index) = found[first] {
-                self.go_to(tests.swap_remove(first), index);
+                self.accept(tests.swap_remove(first), index);
             }
             return Ok(true);
         }
-        let loose: Vec<Dial> =
-            dials.iter().zip(&found[others..]).filter(|(_, found)| found.is_some()).map(|(dial, _)| *dial).collect();
+        let loose: Vec<ShrinkAxis> =
+            axes.iter().zip(&found[others..]).filter(|(_, found)| found.is_some()).map(|(axis, _)| *axis).collect();
         // One step of each is known to be possible, so that the halves lead to one at least.
-        self.turn(Phase::LastSteps, loose)?;
+        self.shrink_along(Phase::LocalMinimality, loose)?;
         Ok(true)
     }
 }

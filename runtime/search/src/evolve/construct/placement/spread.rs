@@ -81,7 +81,7 @@ fn settle(members: &[Member], wanted: &Wanted, inside: f64, stream: &mut Stream)
     if members.is_empty() || wanted.budget < 0.0 {
         return None;
     }
-    let set = Permitted::of(members, wanted, inside)?;
+    let set = FeasibleSet::of(members, wanted, inside)?;
     let now: Vec<f64> = members.iter().map(|it| it.clamp(it.now)).collect();
     let moved = set.nearest(&now);
     let Some((least, most)) = wanted.spread else { return Some(moved) };
@@ -113,7 +113,7 @@ fn settle(members: &[Member], wanted: &Wanted, inside: f64, stream: &mut Stream)
 }
 
 /// Where numbers may be: a convex set that is not empty.
-struct Permitted<'a> {
+struct FeasibleSet<'a> {
     members: &'a [Member],
     /// What the mean may be, some way inside of what is wanted.
     mean: (f64, f64),
@@ -122,8 +122,8 @@ struct Permitted<'a> {
     middle: Vec<f64>,
 }
 
-impl<'a> Permitted<'a> {
-    fn of(members: &'a [Member], wanted: &Wanted, inside: f64) -> Option<Permitted<'a>> {
+impl<'a> FeasibleSet<'a> {
+    fn of(members: &'a [Member], wanted: &Wanted, inside: f64) -> Option<FeasibleSet<'a>> {
         let n = members.len() as f64;
         let middles: Vec<f64> = members.iter().map(Member::middle).collect();
         let centre = mean(&middles);
@@ -136,7 +136,7 @@ impl<'a> Permitted<'a> {
         let margin = if (high - low).is_finite() { (high - low) * inside } else { 0.0 };
         let range = (low + margin, high - margin);
         let middle = with_mean(members, &middles, centre.max(range.0).min(range.1));
-        Some(Permitted { members, mean: range, budget: wanted.budget, middle })
+        Some(FeasibleSet { members, mean: range, budget: wanted.budget, middle })
     }
 
     fn spent(&self, numbers: &[f64]) -> f64 {

@@ -1,10 +1,10 @@
-//! What a campaign permits its tests: which operations, how many, when, and how strong.
+//! The space of a campaign's tests: which operations, how many, when, and how strong.
 //!
-//! Every strategy draws from these tests and from no others. Single operations are made of what [`PermittedOperation`]
-//! says; what holds of several copies of one operation, [`Permitted::settle`] brings about in a test that was put together,
-//! and [`Permitted::permits_copies`] tells:
+//! Every strategy draws from these tests and from no others. Single operations are made of what [`OperationSpace`]
+//! says; what holds of several copies of one operation, [`TestSpace::settle`] brings about in a test that was put together,
+//! and [`TestSpace::permits_copies`] tells:
 //!
-//! - no two copies have the same draw seed, so that each draws for itself;
+//! - no two copies have the same operation seed, so that each has random draws of its own;
 //! - [`Copies::Apart`], by time: their windows are disjoint;
 //! - [`Copies::Apart`], by condition: nothing, as the relay makes a copy wait while another is active;
 //! - [`Copies::Apart`], before the start or after the end: there is one, as all would act at the same moment;
@@ -12,118 +12,25 @@
 
 use std::collections::BTreeSet;
 
-use thiserror::Error;
-
 use sesame_plan::condition::{Condition, ConditionSpace, Constraint};
 use sesame_plan::{Activation, ActivationMode, CampaignPlan, Copies, Count, OperationId, Test, TestOperation};
 use sesame_rng::Stream;
 
-use crate::coverage::GridError;
+use crate::SearchError;
 use crate::space::apart::{self, MOST_APART};
-use crate::space::choice::PermittedChoice;
 use crate::space::condition::grown;
 use crate::space::initial::fresh_operation;
+use crate::space::parameter_space::ParameterSpace;
 use crate::space::range::Range;
 
 /// How often a first condition is tried before a campaign is said to have none; so rarely does one try fail where there
 /// are any that this is certain enough.
 const FIRST_TRIES: u64 = 100;
 
-/// Why a plan cannot be searched. The generator refuses such campaigns, so a plan that is one was edited.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum SearchError {
-    /// No operation can be active in a test.
-    #[error("campaign `{campaign}` has no operation that may be active before its end; give it one, or end it later")]
-    NoOperation {
-        /// The campaign.
-        campaign: String,
-    },
-    /// The bounds on the number of operations leave none.
-    #[error("campaign `{campaign}` permits {min} to {max} operations per test; permit at least one, in rising order")]
-    Count {
-        /// The campaign.
-        campaign: String,
-        /// The lower bound.
-        min: u32,
-        /// The upper bound.
-        max: u32,
-    },
-    /// A test has to hold more operations than there are, and may hold each only so often.
-    #[error(
-        "campaign `{campaign}` demands {min} operations per test, and its tests can hold {most}; demand fewer, offer more \
-         operations, or let copies overlap"
-    )]
-    TooFew {
-        /// The campaign.
-        campaign: String,
-        /// The lower bound.
-        min: u32,
-        /// How many operations a test can hold.
-        most: usize,
-    },
-    /// A parameter must be whole, and no whole number is permitted.
-    #[error("operation `{operation}` permits no whole number for `{parameter}`; widen its range to include one")]
-    NoWholeNumber {
-        /// The operation.
-        operation: String,
-        /// The parameter.
-        parameter: String,
-    },
-    /// No condition could be grown that is neither always true nor never.
-    #[error(
-        "campaign `{campaign}` has no start condition for operation `{operation}` that could be true as well as false; \
-         offer more variables, wider integers or more depth, or demand less of it"
-    )]
-    NoCondition {
-        /// The campaign.
-        campaign: String,
-        /// The operation.
-        operation: String,
-    },
-    /// An exploration of cells that the campaign does not count.
-    #[error("campaign `{campaign}` explores cells but does not say which; give it a `coverage`")]
-    NoCoverage {
-        /// The campaign.
-        campaign: String,
-    },
-    /// A strategy that has to choose when operations are active, of a campaign in which conditions do.
-    #[error("campaign `{campaign}` is by condition: when its operations are active only a run can tell")]
-    NotByTime {
-        /// The campaign.
-        campaign: String,
-    },
-    /// A strategy that predicts when conditions hold, of a campaign that has none.
-    #[error("campaign `{campaign}` is by time: there are no conditions whose outcome could be predicted")]
-    NotByCondition {
-        /// The campaign.
-        campaign: String,
-    },
-    /// Cells that are no grid.
-    #[error("the coverage of campaign `{campaign}` cannot be counted: {reason}")]
-    Grid {
-        /// The campaign.
-        campaign: String,
-        /// Why not.
-        reason: GridError,
-    },
-    /// A falsification without anything to falsify.
-    #[error("campaign `{campaign}` has no requirement to violate; add a `requirement` to its space")]
-    NoRequirement {
-        /// The campaign.
-        campaign: String,
-    },
-    /// A population of nobody.
-    #[error("campaign `{campaign}` has a population of 0; give it at least 1")]
-    NoPopulation {
-        /// The campaign.
-        campaign: String,
-    },
-}
-
 /// All that a campaign's tests may be.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Permitted {
-    operations: Vec<PermittedOperation>,
+pub struct TestSpace {
+    operations: Vec<OperationSpace>,
     count: Count,
     copies: Copies,
     conditions: Option<ConditionSpace>,
@@ -131,20 +38,20 @@ pub struct Permitted {
 
 /// One operation as far as a campaign permits it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PermittedOperation {
+pub struct OperationSpace {
     /// Which.
     pub operation: OperationId,
     /// When it may be active.
-    pub activation: PermittedActivation,
+    pub activation: ActivationSpace,
     /// Its parameters, in the operation's order.
-    pub parameters: Vec<PermittedChoice>,
+    pub parameters: Vec<ParameterSpace>,
     /// Probability that a fresh test includes it.
     pub inclusion: f64,
 }
 
 /// When a campaign permits an operation to be active.
 #[derive(Debug, Clone, PartialEq)]
-pub enum PermittedActivation {
+pub enum ActivationSpace {
     /// Never, as it acts before the start or after the end: there is nothing to choose.
     Offline,
     /// In a window of time inside this range, which lies in `within` and the campaign.
@@ -160,19 +67,19 @@ pub enum PermittedActivation {
     },
 }
 
-impl PermittedActivation {
+impl ActivationSpace {
     /// What the start conditions of an operation contain.
     pub fn constraints(&self) -> &[Constraint] {
         match self {
-            PermittedActivation::Condition { constraints, .. } => constraints,
-            PermittedActivation::Offline | PermittedActivation::Time(_) => &[],
+            ActivationSpace::Condition { constraints, .. } => constraints,
+            ActivationSpace::Offline | ActivationSpace::Time(_) => &[],
         }
     }
 }
 
-impl Permitted {
+impl TestSpace {
     /// What a plan's campaign permits. Operations that could only begin at or after its end are left out.
-    pub fn of(plan: &CampaignPlan) -> Result<Self, SearchError> {
+    pub fn from_plan(plan: &CampaignPlan) -> Result<Self, SearchError> {
         let campaign = &plan.campaign;
         let name = || campaign.name.clone();
         let count = Count { min: campaign.count.min.max(1), max: campaign.count.max };
@@ -193,20 +100,19 @@ impl Permitted {
             }
             let mut parameters = Vec::new();
             for parameter in &operation.parameters {
-                let permitted = PermittedChoice::of(&parameter.domain).ok_or_else(|| SearchError::NoWholeNumber {
-                    operation: operation.name.clone(),
-                    parameter: parameter.name.clone(),
+                let parameter_space = ParameterSpace::from_domain(&parameter.domain).ok_or_else(|| {
+                    SearchError::NoWholeNumber { operation: operation.name.clone(), parameter: parameter.name.clone() }
                 })?;
-                parameters.push(permitted);
+                parameters.push(parameter_space);
             }
-            operations.push(PermittedOperation {
+            operations.push(OperationSpace {
                 operation: id,
                 activation: match &conditions {
-                    _ if offline => PermittedActivation::Offline,
-                    None => PermittedActivation::Time(Range::window(operation.within.start, end)),
+                    _ if offline => ActivationSpace::Offline,
+                    None => ActivationSpace::Time(Range::window(operation.within.start, end)),
                     Some(space) => {
                         let none = || SearchError::NoCondition { campaign: name(), operation: operation.name.clone() };
-                        PermittedActivation::Condition {
+                        ActivationSpace::Condition {
                             space: space.clone(),
                             constraints: operation.constraints.clone(),
                             first: Box::new(first_conditions(space, &operation.constraints).ok_or_else(none)?),
@@ -220,12 +126,12 @@ impl Permitted {
         if operations.is_empty() {
             return Err(SearchError::NoOperation { campaign: name() });
         }
-        let permitted = Permitted { operations, count, copies: campaign.copies, conditions };
-        let most = permitted.most();
-        if most < permitted.fewest() {
+        let test_space = TestSpace { operations, count, copies: campaign.copies, conditions };
+        let most = test_space.most();
+        if most < test_space.fewest() {
             return Err(SearchError::TooFew { campaign: name(), min: count.min, most });
         }
-        Ok(permitted)
+        Ok(test_space)
     }
 
     /// What holds of several copies of one operation.
@@ -234,23 +140,23 @@ impl Permitted {
     }
 
     /// How many copies of an operation a test may hold.
-    pub fn most_copies(&self, kind: &PermittedOperation) -> usize {
+    pub fn most_copies(&self, kind: &OperationSpace) -> usize {
         match (self.copies, &kind.activation) {
-            (Copies::Once, _) | (Copies::Apart, PermittedActivation::Offline) => 1,
-            (Copies::Apart, PermittedActivation::Time(_)) => MOST_APART,
-            (Copies::Apart, PermittedActivation::Condition { .. }) | (Copies::MayOverlap, _) => usize::MAX,
+            (Copies::Once, _) | (Copies::Apart, ActivationSpace::Offline) => 1,
+            (Copies::Apart, ActivationSpace::Time(_)) => MOST_APART,
+            (Copies::Apart, ActivationSpace::Condition { .. }) | (Copies::MayOverlap, _) => usize::MAX,
         }
     }
 
     /// Whether a test of these operations may hold one more copy of an operation.
-    pub fn has_room(&self, operations: &[TestOperation], kind: &PermittedOperation) -> bool {
+    pub fn has_room(&self, operations: &[TestOperation], kind: &OperationSpace) -> bool {
         operations.iter().filter(|it| it.operation == kind.operation).count() < self.most_copies(kind)
     }
 
     /// Whether the copies of each operation in a test of this campaign are permitted.
     pub fn permits_copies(&self, test: &Test) -> bool {
         let mut draws = BTreeSet::new();
-        let drawn_alone = test.operations.iter().all(|it| draws.insert((it.operation, it.draw_seed)));
+        let drawn_alone = test.operations.iter().all(|it| draws.insert((it.operation, it.operation_seed)));
         drawn_alone
             && self.operations.iter().all(|kind| {
                 let copies = places_of(test, kind.operation);
@@ -259,7 +165,7 @@ impl Permitted {
                 }
                 let Some(windows) = self.windows_apart(test, kind, &copies) else { return true };
                 let mut settled = windows.clone();
-                if let PermittedActivation::Time(range) = kind.activation {
+                if let ActivationSpace::Time(range) = kind.activation {
                     apart::nearest(range, &mut settled);
                 }
                 settled == windows
@@ -268,7 +174,7 @@ impl Permitted {
 
     /// Makes the copies of each operation in a test what they have to be, and changes nothing else: too many copies leave
     /// the test, each as likely as the others, and where too few operations remain fresh ones of other kinds come in;
-    /// windows are moved apart to the [nearest](apart::nearest) ones; a copy that draws like an earlier one gets a draw seed
+    /// windows are moved apart to the [nearest](apart::nearest) ones; a copy that draws like an earlier one gets an operation seed
     /// of its own. A test that is permitted already stays as it is and takes nothing from the stream.
     pub fn settle(&self, test: &mut Test, stream: &mut Stream) {
         for kind in &self.operations {
@@ -287,8 +193,8 @@ impl Permitted {
         self.settle_windows(test, apart::nearest);
         let mut draws = BTreeSet::new();
         for operation in &mut test.operations {
-            while !draws.insert((operation.operation, operation.draw_seed)) {
-                operation.draw_seed = stream.bits();
+            while !draws.insert((operation.operation, operation.operation_seed)) {
+                operation.operation_seed = stream.bits();
             }
         }
     }
@@ -297,7 +203,7 @@ impl Permitted {
     pub fn settle_windows(&self, test: &mut Test, way: fn(Range, &mut [(f64, f64)])) {
         for kind in &self.operations {
             let copies = places_of(test, kind.operation);
-            let (Some(mut windows), PermittedActivation::Time(range)) =
+            let (Some(mut windows), ActivationSpace::Time(range)) =
                 (self.windows_apart(test, kind, &copies), &kind.activation)
             else {
                 continue;
@@ -310,8 +216,8 @@ impl Permitted {
     }
 
     /// The windows of copies that must not overlap; `None` where they may, and where there is one.
-    fn windows_apart(&self, test: &Test, kind: &PermittedOperation, copies: &[usize]) -> Option<Vec<(f64, f64)>> {
-        let by_time = matches!(kind.activation, PermittedActivation::Time(_));
+    fn windows_apart(&self, test: &Test, kind: &OperationSpace, copies: &[usize]) -> Option<Vec<(f64, f64)>> {
+        let by_time = matches!(kind.activation, ActivationSpace::Time(_));
         if self.copies != Copies::Apart || !by_time || copies.len() < 2 {
             return None;
         }
@@ -323,7 +229,7 @@ impl Permitted {
     }
 
     /// The operations, in the campaign's order; at least one.
-    pub fn operations(&self) -> &[PermittedOperation] {
+    pub fn operations(&self) -> &[OperationSpace] {
         &self.operations
     }
 
@@ -337,15 +243,15 @@ impl Permitted {
         self.count.min as usize
     }
 
-    /// The greatest number of operations of a test, at least [`Permitted::fewest`].
+    /// The greatest number of operations of a test, at least [`TestSpace::fewest`].
     pub fn most(&self) -> usize {
         let copies = self.operations.iter().fold(0usize, |sum, kind| sum.saturating_add(self.most_copies(kind)));
         copies.min(self.count.max as usize)
     }
 
     /// What is permitted of an operation; `None` for one that the campaign does not use.
-    pub fn find(&self, operation: OperationId) -> Option<&PermittedOperation> {
-        self.operations.iter().find(|permitted| permitted.operation == operation)
+    pub fn find(&self, operation: OperationId) -> Option<&OperationSpace> {
+        self.operations.iter().find(|operation_space| operation_space.operation == operation)
     }
 }
 
@@ -376,7 +282,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::space::condition::contains;
     use crate::space::condition::tests::{any_constraints, any_space, wrong};
-    use crate::testing::landscape::LANDSCAPES;
+    use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     /// Plans by time with up to five operations of varied windows and parameters, and varied counts.
     pub(crate) fn any_timed_plan() -> impl Strategy<Value = CampaignPlan> {
@@ -424,7 +330,8 @@ pub(crate) mod tests {
         let copies = prop_oneof![Just(Copies::Apart), Just(Copies::MayOverlap), Just(Copies::Once)];
         let plans = (proptest::collection::vec(operation, 1..6), 1u32..4, 0u32..6, 0.5..120.0f64, copies).prop_map(
             |(operations, min, more, end_after, copies)| {
-                let mut plan = LANDSCAPES[0].plan(Search::Nsga2 { population: 7, evaluations: 40 });
+                let mut plan =
+                    SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Nsga2 { population: 7 }, 40));
                 plan.campaign.operations = (0u32..).map(OperationId).take(operations.len()).collect();
                 plan.campaign.count = Count { min, max: min + more };
                 plan.campaign.end_after = end_after;
@@ -437,7 +344,7 @@ pub(crate) mod tests {
                 plan
             },
         );
-        plans.prop_filter("room for the least number of operations", |plan| Permitted::of(plan).is_ok())
+        plans.prop_filter("room for the least number of operations", |plan| TestSpace::from_plan(plan).is_ok())
     }
 
     /// Such plans, by time or by condition.
@@ -448,7 +355,7 @@ pub(crate) mod tests {
                 plan.campaign.activation = ActivationMode::Condition { space };
                 plan
             });
-        let grows = conditional.prop_filter("conditions to grow", |plan| Permitted::of(plan).is_ok());
+        let grows = conditional.prop_filter("conditions to grow", |plan| TestSpace::from_plan(plan).is_ok());
         prop_oneof![any_timed_plan(), grows]
     }
 
@@ -495,7 +402,7 @@ pub(crate) mod tests {
                     Copies::MayOverlap => false,
                     Copies::Once => true,
                 };
-                if wrong || first.draw_seed == second.draw_seed {
+                if wrong || first.operation_seed == second.operation_seed {
                     return Some(format!("{first:?} and {second:?}"));
                 }
             }
@@ -569,8 +476,8 @@ pub(crate) mod tests {
 
     #[test]
     fn what_cannot_be_searched_is_refused_with_its_reason() {
-        let plan = || LANDSCAPES[0].plan(Search::Random { evaluations: 10 });
-        let refusal = |plan: &CampaignPlan| Permitted::of(plan).map_err(|e| e.to_string()).unwrap_err();
+        let plan = || SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 10));
+        let refusal = |plan: &CampaignPlan| TestSpace::from_plan(plan).map_err(|e| e.to_string()).unwrap_err();
 
         let mut ends_early = plan();
         ends_early.operations.iter_mut().for_each(|op| op.within = Span { start: 70.0, end: 80.0 });
@@ -583,23 +490,23 @@ pub(crate) mod tests {
         let mut no_number = plan();
         let offset = &mut no_number.operations[1].parameters[0];
         offset.domain = Domain::Number { low: 0.2, high: 0.8, shape: Shape::Range, integer: true };
-        assert!(refusal(&no_number).contains("`jitter1` permits no whole number for `offset`"));
+        assert!(refusal(&no_number).contains("the range of `offset` in operation `jitter1` contains no whole number"));
 
-        let mut unreachable =
-            LANDSCAPES[0].plan_by_condition(Search::Random { evaluations: 10 }, ConditionEnd::Condition);
+        let mut unreachable = SYNTHETIC_ROBOTS[0]
+            .plan_by_condition(Search::new(sesame_plan::Strategy::Random, 10), ConditionEnd::Condition);
         let bounds = Integers { lowest: 30, highest: 40 };
         unreachable.operations[1].constraints = vec![Constraint::Integer { bounds }];
-        assert!(refusal(&unreachable).contains("has no start condition for operation `jitter1`"));
+        assert!(refusal(&unreachable).contains("no start condition of operation `jitter1`"));
     }
 
     #[test]
     fn operations_that_begin_after_the_campaign_are_left_out_and_others_are_clipped() {
-        let mut plan = LANDSCAPES[0].plan(Search::Random { evaluations: 10 });
+        let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 10));
         plan.operations[0].within = Span { start: 70.0, end: 80.0 };
         plan.operations[1].within = Span { start: 60.0, end: 90.0 };
-        let permitted = Permitted::of(&plan).unwrap();
-        let [only] = permitted.operations() else { panic!("{permitted:?}") };
-        let PermittedActivation::Time(window) = only.activation else { panic!("{only:?}") };
+        let test_space = TestSpace::from_plan(&plan).unwrap();
+        let [only] = test_space.operations() else { panic!("{test_space:?}") };
+        let ActivationSpace::Time(window) = only.activation else { panic!("{only:?}") };
         assert_eq!((only.operation, window.low, window.high), (OperationId(1), 60.0, 70.0));
     }
 }

@@ -1,0 +1,134 @@
+//! What one run of a runner does with a plan: its campaign, or something else with the same model.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{CampaignPlan, KnownTestId, RequirementId, Search, Test};
+
+/// What one run of a runner does.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Task {
+    /// It performs the plan's campaign: `run`.
+    #[default]
+    Campaign,
+    /// It runs known tests of the plan, each once: `known`.
+    Known {
+        /// Which.
+        tests: Vec<KnownTestId>,
+    },
+    /// It repeats one test: `repeat`.
+    Repeat {
+        /// The test's name.
+        name: String,
+        /// The test.
+        test: Test,
+        /// How often.
+        times: u32,
+    },
+    /// It shrinks a failing test: `shrink`.
+    Shrink(Shrinking),
+}
+
+/// How a failing test is shrunk.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Shrinking {
+    /// The test's name.
+    pub name: String,
+    /// The test.
+    pub test: Test,
+    /// How it fails; the shrunk test fails in the same way.
+    pub failing: Failing,
+    /// The simulator's seed with which it failed.
+    pub simulator_seed: u64,
+    /// In how many runs a smaller test has to fail, from 1. The first has the simulator's seed of the test, the others have
+    /// seeds of their own.
+    pub runs: u32,
+    /// The most runs.
+    pub evaluations: u32,
+}
+
+/// How a test fails.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Failing {
+    /// It violates each of these requirements; at least one.
+    Violation {
+        /// Which.
+        requirements: Vec<RequirementId>,
+    },
+    /// Its run crashes.
+    Crash,
+    /// Its run times out.
+    Timeout,
+}
+
+/// A test that is repeated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Repeated<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// The test.
+    pub test: &'a Test,
+    /// How often.
+    pub times: u32,
+}
+
+impl Task {
+    /// How many tests it evaluates, at most.
+    pub fn evaluations(&self, plan: &CampaignPlan) -> u32 {
+        match self {
+            Task::Campaign => plan.campaign.search.evaluations(),
+            Task::Known { tests } => u32::try_from(tests.len()).unwrap_or(u32::MAX),
+            Task::Repeat { times, .. } => *times,
+            Task::Shrink(shrinking) => shrinking.evaluations,
+        }
+    }
+
+    /// The plan as this task uses it. Only a campaign searches: the others have no objectives, coverage, exploration,
+    /// confirmation or rules to stop.
+    pub fn plan(&self, plan: &CampaignPlan) -> CampaignPlan {
+        let mut plan = plan.clone();
+        if *self != Task::Campaign {
+            let campaign = &mut plan.campaign;
+            campaign.objectives.clear();
+            campaign.coverage = None;
+            campaign.exploration = None;
+            campaign.confirm = None;
+            campaign.neighbours = None;
+            campaign.stop.clear();
+        }
+        plan
+    }
+
+    /// The test that is repeated, by a command or by the campaign itself; `None` if none is.
+    pub fn repeated<'a>(&'a self, plan: &'a CampaignPlan) -> Option<Repeated<'a>> {
+        match (self, &plan.campaign.search) {
+            (Task::Repeat { name, test, times }, _) => Some(Repeated { name, test, times: *times }),
+            (Task::Campaign, &Search::Repeat { test, times }) => {
+                let known = plan.test(test);
+                Some(Repeated { name: &known.name, test: &known.test, times })
+            }
+            _ => None,
+        }
+    }
+
+    /// How a test is shrunk; `None` if none is.
+    pub fn shrinking(&self) -> Option<&Shrinking> {
+        if let Task::Shrink(shrinking) = self { Some(shrinking) } else { None }
+    }
+
+    /// Whether it searches for tests: only a campaign does, unless it repeats a test.
+    pub fn searches(&self, plan: &CampaignPlan) -> bool {
+        *self == Task::Campaign && plan.campaign.search.strategy().is_some()
+    }
+
+    /// The word that tables use for it.
+    pub fn keyword(&self, plan: &CampaignPlan) -> &'static str {
+        match self {
+            Task::Campaign => plan.campaign.search.keyword(),
+            Task::Known { .. } => "known tests",
+            Task::Repeat { .. } => "repeat",
+            Task::Shrink(_) => "shrink",
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! Tests that are known before anything is run: known tests, and one test that is repeated.
+
+use sesame_plan::{KnownTestId, Test};
+use sesame_rng::derive_seed;
+
+use crate::{Candidate, Evaluated, Strategy};
+
+/// Tests that are run in one generation, whatever their results are.
+#[derive(Debug, Clone)]
+pub(crate) struct FixedTests {
+    candidates: Vec<Candidate>,
+    awaited: usize,
+}
+
+impl FixedTests {
+    /// Known tests, each once, in this order.
+    pub(crate) fn known(tests: Vec<(KnownTestId, Test)>) -> Self {
+        let candidate =
+            |(id, test)| Candidate { test, parents: Vec::new(), generation: 0, known: Some(id), simulator_seed: None };
+        FixedTests { candidates: tests.into_iter().map(candidate).collect(), awaited: 0 }
+    }
+
+    /// One test this many times, with equal operation seeds, but another seed of the simulator each time. `seed` is that of
+    /// the run.
+    pub(crate) fn repeated(test: &Test, times: u32, seed: u64) -> Self {
+        let repetition = |repetition: u32| Candidate {
+            test: test.clone(),
+            parents: Vec::new(),
+            generation: 0,
+            known: None,
+            simulator_seed: Some(derive_seed(seed, "simulator", &[u64::from(repetition)])),
+        };
+        FixedTests { candidates: (1..=times).map(repetition).collect(), awaited: 0 }
+    }
+}
+
+impl Strategy for FixedTests {
+    fn ask(&mut self) -> Vec<Candidate> {
+        assert!(self.awaited == 0, "a generation is told before the next is asked");
+        self.awaited = self.candidates.len();
+        std::mem::take(&mut self.candidates)
+    }
+
+    fn tell(&mut self, results: &[Evaluated]) {
+        assert!(self.awaited == results.len(), "exactly the generation asked last is told");
+        self.awaited = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sesame_optimise::dominance::Fitness;
+
+    use super::*;
+
+    #[test]
+    fn known_tests_are_asked_for_once_and_a_repeated_one_with_seeds_of_its_own() {
+        let known = (0..3).map(|id| (KnownTestId(id), Test::default())).collect();
+        let repeated = FixedTests::repeated(&Test::default(), 3, 7);
+        for (mut search, is_known) in [(FixedTests::known(known), true), (repeated, false)] {
+            let asked = search.ask();
+            assert_eq!(asked.len(), 3);
+            assert!(asked.iter().all(|test| test.known.is_some() == is_known));
+            let mut seeds: Vec<u64> = asked.iter().filter_map(|test| test.simulator_seed).collect();
+            seeds.sort_unstable();
+            seeds.dedup();
+            assert_eq!(seeds.len(), if is_known { 0 } else { 3 });
+            let results: Vec<Evaluated> = (1..)
+                .zip(asked)
+                .map(|(number, candidate)| Evaluated {
+                    number,
+                    test: candidate.test,
+                    fitness: Fitness::Measured(Vec::new()),
+                    point: None,
+                    run: crate::testing::no_run(),
+                    fresh_runs: Vec::new(),
+                })
+                .collect();
+            search.tell(&results);
+            assert_eq!(search.ask(), []);
+        }
+    }
+}
