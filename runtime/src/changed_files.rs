@@ -1,18 +1,19 @@
 //! Files of the space that an operation changes for one run, and how they are restored in every case.
 //!
-//! Before a file is changed, its contents are copied into a folder `.sesame-originals` beside the `.sesame` file, and the
-//! copy is on disk before the change is made. So a file is restored after a run that ends, fails or panics; after the death
-//! of the worker, by the worker that replaces it or by the supervisor at its end; and after the death of all, by the next
-//! runner of the space, before it does anything else.
+//! Before a file is changed, its contents are copied into a folder `.sesame-originals` beside the `.sesame` file, and
+//! the copy is on disk before the change is made. So a file is restored after a run that ends, fails or panics; after
+//! the death of the worker, by the worker that replaces it or by the supervisor at its end; and after the death of all,
+//! by the next runner of the space, before it does anything else.
 //!
-//! The folder of originals may have come with the space from somebody else. So nothing in it can lead out of the space's
-//! folder: no link in it or on the path of a file that is restored is followed, nothing that was there before is written
-//! to, and a path that leads elsewhere is an error, before anything is restored.
+//! The folder of originals may have come with the space from somebody else. So nothing in it can lead out of the
+//! space's folder: no link in it or on the path of a file that is restored is followed, nothing that was there before
+//! is written to, and a path that leads elsewhere is an error, before anything is restored.
 //!
-//! Two locks keep runners apart. A supervisor whose campaign may change files holds the first from its start to its end;
-//! every other runner of the space refuses to run tests in that time, since its simulator would see changed files. A worker
-//! holds the second for its life: a runner that starts after a supervisor died waits for that supervisor's last worker.
-//! While files may change, tests run one at a time, since every simulator of the space would see the changes.
+//! Two locks keep runners apart. A supervisor whose campaign may change files holds the first from its start to its
+//! end; every other runner of the space refuses to run tests in that time, since its simulator would see changed files.
+//! A worker holds the second for its life: a runner that starts after a supervisor died waits for that supervisor's
+//! last worker. While files may change, tests run one at a time, since every simulator of the space would see the
+//! changes.
 
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read as _, Write as _};
@@ -140,8 +141,8 @@ impl ChangedFiles {
     }
 
     /// The files below a folder, for a runner that is about to run tests, and the files that an earlier one had left
-    /// changed, which are restored. If the campaign `may_change` files, other runners of the space are locked out as long as
-    /// this lives.
+    /// changed, which are restored. If the campaign `may_change` files, other runners of the space are locked out as
+    /// long as this lives.
     pub(crate) fn for_supervisor(folder: &Path, may_change: bool) -> Result<(Self, Vec<PathBuf>), FileError> {
         let mut files = ChangedFiles::unlocked(folder);
         if !may_change && !files.has_originals()? {
@@ -304,8 +305,8 @@ impl ChangedFiles {
         Ok(entries)
     }
 
-    /// A file that may be restored, as a path of the system: it is below the space's folder or does not exist, and no link
-    /// is on its path. `None` for anything else.
+    /// A file that may be restored, as a path of the system: it is below the space's folder or does not exist, and no
+    /// link is on its path. `None` for anything else.
     fn own_place(&self, path: &Path) -> Option<PathBuf> {
         if path.starts_with(FOLDER) || path.as_os_str().is_empty() {
             return None;

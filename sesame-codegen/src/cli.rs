@@ -57,8 +57,8 @@ enum Command {
     },
     /// Format `.sesame` files. Only white space changes.
     Fmt {
-        /// Files, folders with `.sesame` files, or `-` for standard input to standard output; the `.sesame` files in the
-        /// current folder if omitted.
+        /// Files, folders with `.sesame` files, or `-` for standard input to standard output; the `.sesame` files in
+        /// the current folder if omitted.
         files: Vec<PathBuf>,
         /// Write nothing; show what would change, and exit with code 1 if anything would change.
         #[arg(long)]

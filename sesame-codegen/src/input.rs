@@ -1,8 +1,8 @@
 //! Files that people give to `sesamec`, or that lie beside those: opened only if they are regular files, and read up to
 //! a limit.
 //!
-//! So a pipe without a writer cannot block a command, and an endless device cannot fill the memory. Texts may be quoted in
-//! messages, so a link must not lead to a file of another kind: otherwise a checkout from someone else could show a
+//! So a pipe without a writer cannot block a command, and an endless device cannot fill the memory. Texts may be quoted
+//! in messages, so a link must not lead to a file of another kind: otherwise a checkout from someone else could show a
 //! password or an environment in the log of its checks.
 
 use std::fs::{self, File};

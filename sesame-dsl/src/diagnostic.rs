@@ -1,7 +1,7 @@
 //! What is wrong with a file, as data; [`render`] turns it into text.
 //!
-//! A diagnostic stands for one mistake. Its title says which rule is broken, the primary label adds what the title cannot
-//! know (what was found, what was expected), and suggestions are patches that can be applied as they are.
+//! A diagnostic stands for one mistake. Its title says which rule is broken, the primary label adds what the title
+//! cannot know (what was found, what was expected), and suggestions are patches that can be applied as they are.
 
 mod code;
 pub mod render;
@@ -34,8 +34,8 @@ pub struct Diagnostic {
 /// A possible fix: a message, and the edits that apply it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Suggestion {
-    /// What to do: an imperative or a question that makes sense without the diagnostic around it, because some renderers
-    /// print it alone.
+    /// What to do: an imperative or a question that makes sense without the diagnostic around it, because some
+    /// renderers print it alone.
     pub message: String,
     /// What to replace with what. Spans do not overlap.
     pub edits: Vec<(Span, String)>,
@@ -100,8 +100,8 @@ fn one_line(text: &str) -> String {
 /// The most characters of one sentence.
 const LONGEST: usize = 1000;
 
-/// A sentence short enough to read, even if it quotes a long text: of more than a thousand characters, the beginning and
-/// the end are kept.
+/// A sentence short enough to read, even if it quotes a long text: of more than a thousand characters, the beginning
+/// and the end are kept.
 pub fn shortened(text: String) -> String {
     if text.len() <= LONGEST {
         return text;

@@ -1,16 +1,17 @@
 //! The formatter: one layout for a file, whatever its author's.
 //!
-//! It works on words and signs and on where items and members of blocks begin, not on the kinds of constructs: a construct
-//! that is new to the grammar is laid out by the same few rules. These are:
+//! It works on words and signs and on where items and members of blocks begin, not on the kinds of constructs: a
+//! construct that is new to the grammar is laid out by the same few rules. These are:
 //!
-//! - An item begins a line. So does a member of a block, if anything in the block is on a line of its own; else the block
-//!   stays on its line, with two blanks between its members.
+//! - An item begins a line. So does a member of a block, if anything in the block is on a line of its own; else the
+//!   block stays on its line, with two blanks between its members.
 //! - Inside a member lines end where they did, and what goes on is indented by two.
 //! - At most one empty line stays between items or members.
-//! - Words and signs have one blank between them or none, but for columns: where lines of one kind follow each other, and
-//!   one of them has further blanks before a word that all have, that word is aligned in all of them.
+//! - Words and signs have one blank between them or none, but for columns: where lines of one kind follow each other,
+//!   and one of them has further blanks before a word that all have, that word is aligned in all of them.
 //!
-//! The formatted text has the same words, signs and comments in the same order, and formatting it again changes nothing.
+//! The formatted text has the same words, signs and comments in the same order, and formatting it again changes
+//! nothing.
 
 mod columns;
 mod lines;
@@ -26,8 +27,8 @@ use crate::syntax::parse_bounded;
 
 /// The file `root` of `sources` in the one layout, with `\n` at the ends of lines.
 ///
-/// Only the syntax must be right: names may be unknown and units may not fit. A file with syntax errors is not formatted;
-/// they come back instead, sorted by position.
+/// Only the syntax must be right: names may be unknown and units may not fit. A file with syntax errors is not
+/// formatted; they come back instead, sorted by position.
 pub fn format(sources: &SourceMap, root: FileId) -> Result<String, Vec<Diagnostic>> {
     let text = sources.file(root).text();
     let mut diagnostics = Vec::new();

@@ -14,10 +14,10 @@ use crate::syntax::{self, ast};
 /// The longest chain of imports.
 const MAX_DEPTH: usize = 64;
 
-/// Adds to `sources` what the file `root` imports, and what that imports in turn: each file once, by what `read` says to
-/// its name. A name is relative to the importing file's folder, with `.` and `..` worked out; an absolute one stays. Why
-/// a file cannot be read is kept, and said by [`crate::analyse`] at the import. A name that does not end in `.sesame` is
-/// never asked for: what is read is quoted in diagnostics, so nothing but spaces is.
+/// Adds to `sources` what the file `root` imports, and what that imports in turn: each file once, by what `read` says
+/// to its name. A name is relative to the importing file's folder, with `.` and `..` worked out; an absolute one stays.
+/// Why a file cannot be read is kept, and said by [`crate::analyse`] at the import. A name that does not end in
+/// `.sesame` is never asked for: what is read is quoted in diagnostics, so nothing but spaces is.
 pub fn load_imports(sources: &mut SourceMap, root: FileId, mut read: impl FnMut(&str) -> Result<String, String>) {
     let mut waiting = vec![root];
     while let Some(id) = waiting.pop() {

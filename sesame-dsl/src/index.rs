@@ -129,9 +129,9 @@ impl Index {
         &self.definitions[id.0]
     }
 
-    /// The definitions that a name can stand for, in the order of declarations. `owner.name` is what belongs to an owner,
-    /// or the field of what a topic carries; a name alone is that of a declaration of the space, if there is one, else of
-    /// whatever belongs to one.
+    /// The definitions that a name can stand for, in the order of declarations. `owner.name` is what belongs to an
+    /// owner, or the field of what a topic carries; a name alone is that of a declaration of the space, if there is
+    /// one, else of whatever belongs to one.
     pub fn find(&self, name: &str) -> Vec<DefinitionId> {
         let ids = || (0..self.definitions.len()).map(DefinitionId);
         if let Some((owner, member)) = name.rsplit_once('.') {

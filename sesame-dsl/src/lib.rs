@@ -43,7 +43,8 @@ impl Analysis {
     }
 }
 
-/// Analyses the file `root` of `sources` with all it imports, which [`load_imports`] has added: syntax, names, types and units, ranges, campaigns, and what deserves a warning.
+/// Analyses the file `root` of `sources` with all it imports, which [`load_imports`] has added: syntax, names, types
+/// and units, ranges, campaigns, and what deserves a warning.
 ///
 /// All mistakes of all these kinds come out of one call.
 pub fn analyse(sources: &SourceMap, root: FileId) -> Analysis {

@@ -76,8 +76,8 @@ impl Space {
         self.campaigns.iter().find(|(_, campaign)| campaign.declaration.name == name).map(|(id, _)| id)
     }
 
-    /// Whether copies of one operation may act at the same time in the tests of all campaigns that search, of which there
-    /// is one at least.
+    /// Whether copies of one operation may act at the same time in the tests of all campaigns that search, of which
+    /// there is one at least.
     pub fn copies_may_overlap(&self) -> bool {
         let mut searching = self.campaigns.values().filter_map(|campaign| campaign.search.template()).peekable();
         searching.peek().is_some() && searching.all(|template| template.copies == Copies::MayOverlap)

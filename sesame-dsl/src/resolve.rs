@@ -3,8 +3,8 @@
 //! 1. [`collect`] collects names, and reports duplicates and missing declarations
 //! 2. [`system`] resolves message types (ordered so that each follows those it contains), topics, nodes, the simulator
 //! 3. [`metrics`] resolves metrics (their formulas in [`formula`]) and requirements
-//! 4. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`custom`] those in the user's code) and
-//!    tests
+//! 4. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`custom`] those in the user's code)
+//!    and tests
 //! 5. [`campaign`] resolves campaigns, whose inherited clauses [`inherit`] has copied before all else; [`condition`]
 //!    resolves the conditions of tests and the building blocks of campaigns' conditions
 //! 6. [`eddi`] resolves runtime monitors, [`physical`] labs, and [`lifecycle`] the rest of a system's clauses

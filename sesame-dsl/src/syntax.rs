@@ -1,7 +1,7 @@
 //! From text to [`ast`]: parsing with recovery.
 //!
-//! [`ast`] is the data, `parse` makes it from the grammar's pairs, and `syntax_error` says what is wrong where the grammar
-//! gave up. Both know from `blocks` what stands in which block.
+//! [`ast`] is the data, `parse` makes it from the grammar's pairs, and `syntax_error` says what is wrong where the
+//! grammar gave up. Both know from `blocks` what stands in which block.
 
 pub(crate) mod ast;
 mod blocks;

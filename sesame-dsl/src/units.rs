@@ -1,8 +1,8 @@
 //! Units of measurement: dimensions, exact scales, conversion.
 //!
-//! A scale is a ratio of whole numbers times a power of π, so `150mm` is exactly `0.15m`. Converting a number to another
-//! unit of the same dimension and back changes it by at most the rounding of two divisions. Angle is a dimension of its
-//! own: `rad/s` is not `Hz`.
+//! A scale is a ratio of whole numbers times a power of π, so `150mm` is exactly `0.15m`. Converting a number to
+//! another unit of the same dimension and back changes it by at most the rounding of two divisions. Angle is a
+//! dimension of its own: `rad/s` is not `Hz`.
 
 /// The exponents of the base dimensions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]

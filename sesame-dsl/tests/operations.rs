@@ -49,8 +49,8 @@ impl For {
     }
 }
 
-/// A kind in the words of the language. `AMOUNTS` stands for what is permitted of a number or a point, `RANGE` for a range
-/// in the unit of the target, and `RATE` for amounts per second.
+/// A kind in the words of the language. `AMOUNTS` stands for what is permitted of a number or a point, `RANGE` for a
+/// range in the unit of the target, and `RATE` for amounts per second.
 const KINDS: [(&str, For); 24] = [
     ("random offset AMOUNTS", For::Amounts),
     ("random absolute AMOUNTS", For::Amounts),

@@ -1,8 +1,8 @@
-//! The pages of `sesamec explain` against the compiler: the wrong example of a page gives its code and no other, the right
-//! one gives nothing.
+//! The pages of `sesamec explain` against the compiler: the wrong example of a page gives its code and no other, the
+//! right one gives nothing.
 //!
-//! An example with a `space` is a whole file, one that begins with a declaration of a system stands inside the system of
-//! [`STANDARD`], and any other stands after it.
+//! An example with a `space` is a whole file, one that begins with a declaration of a system stands inside the system
+//! of [`STANDARD`], and any other stands after it.
 
 use sesame_dsl::diagnostic::{CODES, render};
 use sesame_dsl::source::SourceMap;

@@ -7,8 +7,8 @@ use crate::python::asked;
 /// The variable that names a Python with pygmo and pymoo; `./test --long` makes one and sets it.
 pub const PYTHON: &str = "SESAME_OPTIMISERS_PYTHON";
 
-/// One run of NSGA-II, or NSGA-III, on a published problem, with crossover 0.9 of index 15 and mutation of one variable on average
-/// with index 20.
+/// One run of NSGA-II, or NSGA-III, on a published problem, with crossover 0.9 of index 15 and mutation of one variable
+/// on average with index 20.
 #[derive(Debug, Clone, Serialize)]
 pub struct Run {
     /// `pygmo` or `pymoo`, whose NSGA-II it is, or `pymoo nsga3`.

@@ -48,7 +48,8 @@ def pymoo_nsga3_run(problem, population, evaluations, seed):
     from pymoo.problems import get_problem
     from pymoo.util.ref_dirs import get_reference_directions
 
-    # dtlz2_5 has 5 objectives and 14 variables. The spread of reference directions is the finest that the population serves.
+    # dtlz2_5 has 5 objectives and 14 variables. The spread of reference directions is the finest that the population
+    # serves.
     objectives = int(problem.rsplit("_", 1)[1])
     partitions = {3: 12, 5: 6}[objectives]
     directions = get_reference_directions("das-dennis", objectives, n_partitions=partitions)

@@ -14,8 +14,8 @@ pub enum Outcome {
     Completed,
     /// It ran to its end, but no operation had any effect.
     NoEffect,
-    /// It ran to its end in another program, which did not count what operations did: whether they had any effect is not
-    /// known, and its counters are all zero. Only imported tests end so.
+    /// It ran to its end in another program, which did not count what operations did: whether they had any effect is
+    /// not known, and its counters are all zero. Only imported tests end so.
     Unknown,
     /// The simulator or a hook failed or panicked, or the worker process died.
     Crash {
@@ -33,8 +33,8 @@ pub enum Outcome {
 const CAUSE_BYTES: usize = 4096;
 
 impl Outcome {
-    /// A crash for this cause. One that is longer than anybody reads, as simulators and panics may have it, is shortened, and
-    /// says by how much.
+    /// A crash for this cause. One that is longer than anybody reads, as simulators and panics may have it, is
+    /// shortened, and says by how much.
     pub fn crash(mut cause: String) -> Self {
         if cause.len() > CAUSE_BYTES {
             let whole = cause.len();
@@ -80,8 +80,8 @@ pub struct Observation {
     pub end: f64,
     /// Per operation of the test, in its order; empty after a crash of the worker.
     pub operations: Vec<OperationEffect>,
-    /// Of a run that came to its end: names on the wire that operations of the campaign act on and that nobody heard, in
-    /// order of declaration. Neither did the simulator subscribe to them, nor reads them an outbound metric.
+    /// Of a run that came to its end: names on the wire that operations of the campaign act on and that nobody heard,
+    /// in order of declaration. Neither did the simulator subscribe to them, nor reads them an outbound metric.
     pub unheard: Vec<String>,
     /// Per metric of the plan, in its order; empty after a crash of the worker.
     pub metrics: Vec<MetricObservation>,
@@ -139,8 +139,8 @@ pub struct Counters {
     pub injected: u64,
     /// Side effects it had beside messages.
     pub side_effects: u64,
-    /// Messages it changed, dropped, held back or made up on wires that nobody heard. They are in none of the others, and
-    /// no effect.
+    /// Messages it changed, dropped, held back or made up on wires that nobody heard. They are in none of the others,
+    /// and no effect.
     pub unheard: u64,
 }
 
@@ -173,8 +173,8 @@ impl MetricObservation {
     }
 }
 
-/// The values that a metric could have had at the end of a run: of a run that came to its end, its value; of one that broke
-/// off, all that the rest of the run might have made of it. It is never too narrow.
+/// The values that a metric could have had at the end of a run: of a run that came to its end, its value; of one that
+/// broke off, all that the rest of the run might have made of it. It is never too narrow.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Reach {
     /// The least of them, finite; `None` where there is no least.

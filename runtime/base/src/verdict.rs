@@ -29,12 +29,12 @@ impl Verdict {
     }
 }
 
-/// The verdict of a run on a requirement. This rule is the only one: tables, margins, confirmations, and the views of the
-/// database follow it.
+/// The verdict of a run on a requirement. This rule is the only one: tables, margins, confirmations, and the views of
+/// the database follow it.
 ///
-/// The requirement is violated if the bound holds for none of the values that the metric could have taken by the planned end
-/// of the run. It is satisfied if the run reached its planned end, everything that the metric read was finite, and the bound
-/// holds for its value. Otherwise the run is inconclusive.
+/// The requirement is violated if the bound holds for none of the values that the metric could have taken by the
+/// planned end of the run. It is satisfied if the run reached its planned end, everything that the metric read was
+/// finite, and the bound holds for its value. Otherwise the run is inconclusive.
 pub fn verdict(bound: Bound, outcome: &Outcome, shown: MetricValue) -> Verdict {
     if breaks(bound, shown.reach) {
         return Verdict::Violated;

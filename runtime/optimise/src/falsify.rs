@@ -1,9 +1,9 @@
 //! Focused falsification: find a violation of each requirement within a few dozen simulations.
 //!
-//! Each test targets one requirement, which a [bandit] chooses. A [Gaussian process](gaussian_process) is fitted to the margins of
-//! that requirement in all tests so far, and the candidate with the lowest lower confidence bound (mean minus κ standard
-//! deviations) is asked for. κ alternates between 0 and more, so the search both refines and explores. The first few tests are
-//! quasi-random.
+//! Each test targets one requirement, which a [bandit] chooses. A [Gaussian process](gaussian_process) is fitted to the
+//! margins of that requirement in all tests so far, and the candidate with the lowest lower confidence bound (mean
+//! minus κ standard deviations) is asked for. κ alternates between 0 and more, so the search both refines and explores.
+//! The first few tests are quasi-random.
 //!
 //! What is searched is a [`SearchDomain`]: the vectors of a unit box, or the tests of a campaign.
 
@@ -32,8 +32,9 @@ pub trait SearchDomain {
     /// A random point near another; `step` is roughly the size of the change as a share of the domain, in `0..1`.
     fn perturb(&self, point: &Self::Point, step: f64, stream: &mut Stream) -> Self::Point;
 
-    /// A point that does not come from the surrogate, for every second test of a requirement. `best` are the best points so
-    /// far, the best first, at least one. `None` for domains on which margins are smooth enough to rely on the surrogate alone.
+    /// A point that does not come from the surrogate, for every second test of a requirement. `best` are the best
+    /// points so far, the best first, at least one. `None` for domains on which margins are smooth enough to rely on
+    /// the surrogate alone.
     fn explore(&self, _turn: u32, _best: &[&Self::Point], _stream: &mut Stream) -> Option<Self::Point> {
         None
     }
@@ -41,15 +42,16 @@ pub trait SearchDomain {
     /// How many components a distance has, at least one.
     fn components(&self) -> usize;
 
-    /// Pushes the squared distance of two points in each component: 0 in each component for equal points, and the sum is a
-    /// squared distance in some Euclidean space.
+    /// Pushes the squared distance of two points in each component: 0 in each component for equal points, and the sum
+    /// is a squared distance in some Euclidean space.
     fn squared_distances(&self, a: &Self::Point, b: &Self::Point, squares: &mut Vec<f64>);
 }
 
 /// How far a requirement is from its violation in one run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Margin {
-    /// The margin, never NaN, smaller the nearer the requirement is to its violation; `None` if the run is inconclusive.
+    /// The margin, never NaN, smaller the nearer the requirement is to its violation; `None` if the run is
+    /// inconclusive.
     pub value: Option<f64>,
     /// Whether it is violated.
     pub violated: bool,
@@ -62,8 +64,8 @@ pub struct Settings {
     pub requirements: usize,
     /// Tests in total.
     pub evaluations: u32,
-    /// Tests asked for at once after the first ones, at least one. Each test of a batch is chosen as if the earlier ones of the
-    /// batch had the margins that the surrogate predicts for them.
+    /// Tests asked for at once after the first ones, at least one. Each test of a batch is chosen as if the earlier
+    /// ones of the batch had the margins that the surrogate predicts for them.
     pub batch: u32,
     /// The seed of all draws.
     pub seed: u64,
@@ -289,8 +291,8 @@ fn step(least: f64, most: f64, stream: &mut Stream) -> f64 {
     least * libm::pow(most / least, stream.unit())
 }
 
-/// Scales margins and compresses outliers above the median logarithmically: a default of 999 s must not hide the differences
-/// between the others. Unknown margins count as the greatest.
+/// Scales margins and compresses outliers above the median logarithmically: a default of 999 s must not hide the
+/// differences between the others. Unknown margins count as the greatest.
 fn compress_outliers(margins: &[Option<f64>]) -> Vec<f64> {
     let mut known: Vec<f64> = margins.iter().flatten().copied().filter(|margin| margin.is_finite()).collect();
     known.sort_by(f64::total_cmp);

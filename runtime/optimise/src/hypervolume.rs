@@ -8,8 +8,8 @@
 //!
 //! The work still grows exponentially in the number of objectives. [`measured`] therefore counts it, and beyond a bound
 //! on that count estimates the volume from random samples: either of the box around all points, of which the dominated
-//! share is counted, or (Karp and Luby 1983) of the boxes of single points, each with a probability in proportion to its
-//! volume, of which one over the number of boxes that hold a sample is averaged. The first is good where much is
+//! share is counted, or (Karp and Luby 1983) of the boxes of single points, each with a probability in proportion to
+//! its volume, of which one over the number of boxes that hold a sample is averaged. The first is good where much is
 //! dominated, the second does not fail where little is; some first samples decide between them. Neither count nor draws
 //! depend on the machine: equal sets have equal volumes, estimated or not.
 
@@ -51,15 +51,15 @@ pub struct Growth {
     pub at_most: Option<f64>,
 }
 
-/// The volume dominated by the points and bounded by the reference, exact however long it takes. A point counts only where
-/// it is below the reference in every objective. The reference must be finite, the points free of NaN and as long as it;
-/// with no objectives at all the volume is 0.
+/// The volume dominated by the points and bounded by the reference, exact however long it takes. A point counts only
+/// where it is below the reference in every objective. The reference must be finite, the points free of NaN and as long
+/// as it; with no objectives at all the volume is 0.
 pub fn hypervolume(points: &[&[f64]], reference: &[f64]) -> f64 {
     measured(points, reference, u64::MAX).value
 }
 
-/// As [`hypervolume`], estimated where an exact computation would read or write more than `work` coordinates. With three
-/// objectives or fewer it is always exact.
+/// As [`hypervolume`], estimated where an exact computation would read or write more than `work` coordinates. With
+/// three objectives or fewer it is always exact.
 pub fn measured(points: &[&[f64]], reference: &[f64], work: u64) -> Volume {
     let exact = |value| Volume { value, error: None };
     let Some(points) = inside(points, reference) else { return exact(f64::INFINITY) };
@@ -154,8 +154,8 @@ impl Counted {
         for at in 0..rows {
             let point = &set.values[at * objectives..][..objectives];
             let own = extent(&point[..last], below);
-            // What the later points dominate of this one's box: their corners moved into it. They are no worse in the last
-            // objective, so all of these have the height of the box.
+            // What the later points dominate of this one's box: their corners moved into it. They are no worse in the
+            // last objective, so all of these have the height of the box.
             limited.values.clear();
             for other in set.values[(at + 1) * objectives..].chunks(objectives) {
                 corner.clear();
@@ -179,8 +179,8 @@ struct Set {
 }
 
 impl Set {
-    /// Adds a point unless another dominates or equals it, and removes those that it dominates. Says with how many it was
-    /// compared.
+    /// Adds a point unless another dominates or equals it, and removes those that it dominates. Says with how many it
+    /// was compared.
     fn add(&mut self, point: &[f64]) -> usize {
         let wide = self.objectives;
         let rows = self.values.len() / wide;

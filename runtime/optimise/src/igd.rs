@@ -18,8 +18,8 @@ pub struct IgdPlus {
 }
 
 impl IgdPlus {
-    /// The distance to this front, of a set without points yet. Points of the front with an infinite value are left out,
-    /// as nothing is near them; `None` where no point is left.
+    /// The distance to this front, of a set without points yet. Points of the front with an infinite value are left
+    /// out, as nothing is near them; `None` where no point is left.
     pub fn to<'p>(front: impl IntoIterator<Item = &'p [f64]>) -> Option<IgdPlus> {
         let front: Vec<&[f64]> = front.into_iter().filter(|point| point.iter().all(|x| x.is_finite())).collect();
         let scale: Vec<f64> = (0..front.first()?.len())

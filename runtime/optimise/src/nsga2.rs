@@ -61,8 +61,8 @@ pub struct Settings {
 pub enum Survival {
     /// The best by the crowded comparison, as in the paper.
     Crowded,
-    /// Of solutions with equal objective values only one, as long as there are others. The crowded comparison would fill the
-    /// population with equal solutions where there are many.
+    /// Of solutions with equal objective values only one, as long as there are others. The crowded comparison would
+    /// fill the population with equal solutions where there are many.
     Distinct,
     /// By reference points, as in NSGA-III: for three and more objectives.
     ReferencePoints,
@@ -141,8 +141,8 @@ impl<V: Variation> Nsga2<V> {
         &self.population
     }
 
-    /// Updates the fitness of the surviving genomes, for fitness that depends on other genomes. They are ranked again when
-    /// the next generation is told.
+    /// Updates the fitness of the surviving genomes, for fitness that depends on other genomes. They are ranked again
+    /// when the next generation is told.
     pub fn update_fitness(&mut self, mut fitness: impl FnMut(&Told<V::Genome>) -> Fitness) {
         for member in &mut self.population {
             member.fitness = fitness(member);

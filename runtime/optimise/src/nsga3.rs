@@ -1,9 +1,9 @@
-//! Survival by reference points, as in NSGA-III [Deb and Jain 2014]: for three and more objectives, where most solutions
-//! are non-dominated and crowding distances say little.
+//! Survival by reference points, as in NSGA-III [Deb and Jain 2014]: for three and more objectives, where most
+//! solutions are non-dominated and crowding distances say little.
 //!
-//! Reference points are spread evenly over the unit simplex [Das and Dennis 1998]. Objectives are scaled by a hyperplane
-//! through the extreme points of the front; then each solution belongs to the reference line that is nearest to it, its
-//! niche. Of the last front that does not fit as a whole, solutions of the emptiest niches survive.
+//! Reference points are spread evenly over the unit simplex [Das and Dennis 1998]. Objectives are scaled by a
+//! hyperplane through the extreme points of the front; then each solution belongs to the reference line that is nearest
+//! to it, its niche. Of the last front that does not fit as a whole, solutions of the emptiest niches survive.
 
 use sesame_rng::Stream;
 
@@ -47,8 +47,8 @@ fn das_dennis_count(objectives: usize, partitions: usize, most: usize) -> Option
     })
 }
 
-/// As many reference points as a population of this size can serve: the finest spread of [`das_dennis`], and where it has
-/// no point inside the simplex, a second layer half as large, if that fits too. At least the corners.
+/// As many reference points as a population of this size can serve: the finest spread of [`das_dennis`], and where it
+/// has no point inside the simplex, a second layer half as large, if that fits too. At least the corners.
 pub fn reference_points(objectives: usize, population: usize) -> Vec<Vec<f64>> {
     if objectives < 2 {
         return vec![vec![1.0; objectives]];
@@ -88,8 +88,9 @@ struct Niche {
 }
 
 impl ReferencePoints {
-    /// The `n` survivors (all when there are no more), as positions in ascending order with their ranks. Measured solutions
-    /// have one rank, so that parents are drawn from them at random; others come after them, the least infeasible first.
+    /// The `n` survivors (all when there are no more), as positions in ascending order with their ranks. Measured
+    /// solutions have one rank, so that parents are drawn from them at random; others come after them, the least
+    /// infeasible first.
     pub fn survivors(&mut self, fitness: &[&Fitness], n: usize, stream: &mut Stream) -> Vec<(usize, Rank)> {
         let fronts = fronts(fitness);
         let rank = |front: usize, position: usize| {
@@ -195,8 +196,8 @@ impl ReferencePoints {
         nearest
     }
 
-    /// Of a front that does not fit as a whole, the members that survive: in turn one of the emptiest niche, the nearest to
-    /// its line if the niche is empty, any of its members otherwise.
+    /// Of a front that does not fit as a whole, the members that survive: in turn one of the emptiest niche, the
+    /// nearest to its line if the niche is empty, any of its members otherwise.
     fn fill(
         &self,
         fitness: &[&Fitness],

@@ -1,10 +1,10 @@
 //! Sobol' points: a sequence of points of which every beginning fills the unit box evenly (Sobol' 1967).
 //!
-//! Of the first 2ᵏ points, each of the 2ᵏ equal parts of each dimension holds one, and pairs of dimensions are filled evenly
-//! too. Direction numbers are those of Joe and Kuo (2008, their set of criterion D⁽⁶⁾) for the first 100 dimensions; further
-//! ones, of which they have tables as well, continue with the next primitive polynomials and numbers drawn from the seed:
-//! each is filled as evenly by itself, only pairs of them are left to chance. Points are scrambled as Owen (1995) has it, so that
-//! each seed gives points of its own that are uniform each by itself.
+//! Of the first 2ᵏ points, each of the 2ᵏ equal parts of each dimension holds one, and pairs of dimensions are filled
+//! evenly too. Direction numbers are those of Joe and Kuo (2008, their set of criterion D⁽⁶⁾) for the first 100
+//! dimensions; further ones, of which they have tables as well, continue with the next primitive polynomials and
+//! numbers drawn from the seed: each is filled as evenly by itself, only pairs of them are left to chance. Points are
+//! scrambled as Owen (1995) has it, so that each seed gives points of its own that are uniform each by itself.
 
 use sesame_rng::{derive_seed, keyed_unit};
 
@@ -40,8 +40,8 @@ impl SobolPoints {
         ((f64::from(self.scrambled(point, dimension)) + within) / SCALE).min(1.0 - f64::EPSILON / 2.0)
     }
 
-    /// Flips each bit by a draw for the bits before it: so equal beginnings stay equal, and all halves, quarters and so on
-    /// are exchanged at random.
+    /// Flips each bit by a draw for the bits before it: so equal beginnings stay equal, and all halves, quarters and so
+    /// on are exchanged at random.
     fn scrambled(&self, point: u32, dimension: usize) -> u32 {
         (0..BITS).fold(0, |flips, bit| {
             let before = if bit == 0 { 0 } else { u64::from(point >> (BITS - bit)) };
@@ -111,8 +111,8 @@ fn is_primitive(polynomial: u32) -> bool {
     false
 }
 
-/// The initial numbers of the dimensions after the first, of Joe and Kuo's set D⁽⁶⁾; their polynomials are the primitive ones
-/// in ascending order.
+/// The initial numbers of the dimensions after the first, of Joe and Kuo's set D⁽⁶⁾; their polynomials are the
+/// primitive ones in ascending order.
 #[rustfmt::skip]
 const JOE_KUO: [&[u16]; 99] = [
     &[1], &[1, 3], &[1, 3, 1], &[1, 1, 1], &[1, 1, 3, 3], &[1, 3, 5, 13], &[1, 1, 5, 5, 17], &[1, 1, 5, 5, 5],

@@ -1,8 +1,8 @@
 //! Conditions that switch operations on and off (paper §3.9.2, Table 1): comparisons between condition variables and
 //! whole numbers, joined by `and` and `or`.
 //!
-//! One grammar for conditions written in a known test and for those that a search grows. A condition is a binary tree, so
-//! that trees are varied node by node.
+//! One grammar for conditions written in a known test and for those that a search grows. A condition is a binary tree,
+//! so that trees are varied node by node.
 
 use serde::{Deserialize, Serialize};
 
@@ -74,7 +74,8 @@ impl Comparison {
 pub struct ConditionSpace {
     /// The variables; at least one.
     pub variables: Vec<Variable>,
-    /// The most levels of a condition's tree, from 1 to [`ConditionSpace::MOST_DEPTH`]: a comparison alone is one level.
+    /// The most levels of a condition's tree, from 1 to [`ConditionSpace::MOST_DEPTH`]: a comparison alone is one
+    /// level.
     pub depth: u32,
     /// The least and the greatest whole number that variables are compared with; `lowest <= highest`.
     pub integers: Integers,

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How tests are confirmed: each is run again, the same disturbance with fresh seeds of the simulator, and its fitness is then
-/// what these runs say. Tests that enter the front are, and those that violate a requirement where it is asked for.
+/// How tests are confirmed: each is run again, the same disturbance with fresh seeds of the simulator, and its fitness
+/// is then what these runs say. Tests that enter the front are, and those that violate a requirement where it is asked
+/// for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Confirmation {
     /// How often each is run again; at least 1.

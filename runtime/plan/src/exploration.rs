@@ -19,23 +19,25 @@ pub enum Exploration {
         /// How often a child is mutated again at most.
         tries: u32,
     },
-    /// Construction: some tests are changed as little as may be so that they lie in a feasible cell that needs tests. For
-    /// campaigns by time.
+    /// Construction: some tests are changed as little as may be so that they lie in a feasible cell that needs tests.
+    /// For campaigns by time.
     Construct {
         /// The share of the tests of each generation, in `0..=1`.
         share: f64,
-        /// The share of all cells, in `0..=1`, from which on none is constructed any more; `None` for all feasible ones.
+        /// The share of all cells, in `0..=1`, from which on none is constructed any more; `None` for all feasible
+        /// ones.
         until: Option<f64>,
     },
-    /// Novelty: how far a test is from others counts as one objective more when survivors are chosen. It needs no coverage.
+    /// Novelty: how far a test is from others counts as one objective more when survivors are chosen. It needs no
+    /// coverage.
     Novelty {
         /// How many of the nearest tests count; at least 1.
         neighbours: u32,
         /// The dimensions of distances; at least one.
         over: Vec<Dimension>,
     },
-    /// Prediction: of several candidates for each test the one that would probably fall into a cell that needs tests. For
-    /// campaigns by condition.
+    /// Prediction: of several candidates for each test the one that would probably fall into a cell that needs tests.
+    /// For campaigns by condition.
     Predict {
         /// How many candidates; at least 1.
         candidates: u32,

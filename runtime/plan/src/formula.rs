@@ -1,5 +1,5 @@
-//! Declarative metrics as data. Units are resolved: constants and factors are such that numbers are taken as they are on
-//! the wire.
+//! Declarative metrics as data. Units are resolved: constants and factors are such that numbers are taken as they are
+//! on the wire.
 
 use serde::{Deserialize, Serialize};
 

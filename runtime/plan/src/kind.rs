@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 /// What an operation does to the messages of its topic, with the parameters that a test chooses for it.
 ///
-/// Of the values at an operation's places, only numbers, points, texts and truth values are changed as the kind says; the
-/// generator makes sure that they are of a type that the kind is for. Numbers are in the unit of their field. Results of
-/// whole numbers are rounded to the nearest whole number, halves away from zero, and held inside 64 bits.
+/// Of the values at an operation's places, only numbers, points, texts and truth values are changed as the kind says;
+/// the generator makes sure that they are of a type that the kind is for. Numbers are in the unit of their field.
+/// Results of whole numbers are rounded to the nearest whole number, halves away from zero, and held inside 64 bits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum OperationKind {
@@ -43,11 +43,11 @@ pub enum OperationKind {
         /// By what.
         number: NotFinite,
     },
-    /// Repeats, on each wire, the values that were there last before the operation went on; if none were, the first ones
-    /// after that. With no places: the whole message. No parameters.
+    /// Repeats, on each wire, the values that were there last before the operation went on; if none were, the first
+    /// ones after that. With no places: the whole message. No parameters.
     Freeze,
-    /// Replaces values by those that were there some time ago. With no places: the whole message. One parameter `age` in
-    /// seconds, not negative.
+    /// Replaces values by those that were there some time ago. With no places: the whole message. One parameter `age`
+    /// in seconds, not negative.
     Stale,
     /// Adds to time stamps. One parameter `skew`, in the field's unit.
     ClockSkew,
@@ -170,8 +170,8 @@ pub enum Distribution {
     Fixed,
     /// Uniform over the test's sub-range, drawn anew per message.
     Uniform,
-    /// Normal around the middle of the test's sub-range with a quarter of its width as standard deviation, drawn anew per
-    /// message, and drawn again where it would leave the sub-range.
+    /// Normal around the middle of the test's sub-range with a quarter of its width as standard deviation, drawn anew
+    /// per message, and drawn again where it would leave the sub-range.
     Normal,
 }
 

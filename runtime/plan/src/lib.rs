@@ -5,8 +5,9 @@
 //! generator and runtime share, hence a crate of its own with no logic beyond look-ups.
 //!
 //! Guarantees of every plan that was read: every id is in range, every number is finite, every range has `low <= high`
-//! ([`CampaignPlan::validate`]). Of a plan written by the generator moreover: times are in seconds of simulation time; every other quantity is in the unit its field, metric or topic declares (the unit on
-//! the wire), probabilities are in `0..=1`.
+//! ([`CampaignPlan::validate`]). Of a plan written by the generator moreover: times are in seconds of simulation time;
+//! every other quantity is in the unit its field, metric or topic declares (the unit on the wire), probabilities are in
+//! `0..=1`.
 
 pub mod condition;
 mod confirmation;

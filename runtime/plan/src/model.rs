@@ -50,8 +50,8 @@ id!(
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(remote = "Self")]
 pub struct CampaignPlan {
-    /// [`crate::SCHEMA`] of the generator that wrote the plan. It comes first, so that a plan of another schema is refused
-    /// for that reason.
+    /// [`crate::SCHEMA`] of the generator that wrote the plan. It comes first, so that a plan of another schema is
+    /// refused for that reason.
     #[serde(deserialize_with = "crate::validate::this_schema")]
     pub schema: u32,
     /// Name and version of the generator, for example `sesamec 0.1.0`.
@@ -136,8 +136,8 @@ pub enum Transport {
         program: String,
         /// Its arguments, one by one; no shell reads them.
         arguments: Vec<String>,
-        /// Simulation time of one step, in nanoseconds; positive. `None` for a simulator that runs freely: nobody steps it, so
-        /// equal tests need not give equal results.
+        /// Simulation time of one step, in nanoseconds; positive. `None` for a simulator that runs freely: nobody steps
+        /// it, so equal tests need not give equal results.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         step_ns: Option<u64>,
     },
@@ -255,12 +255,12 @@ pub struct Metric {
     pub initial: Option<f64>,
     /// Where its value comes from.
     pub source: MetricSource,
-    /// The only way in which its value changes during a run, where that is known; `None` where it may go both ways. What a
-    /// hook declares is checked while it runs.
+    /// The only way in which its value changes during a run, where that is known; `None` where it may go both ways.
+    /// What a hook declares is checked while it runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trend: Option<Trend>,
-    /// Whether infinity and NaN are ordinary values of what its hook reads, as in laser scans. Default false, and then not
-    /// written.
+    /// Whether infinity and NaN are ordinary values of what its hook reads, as in laser scans. Default false, and then
+    /// not written.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub accepts_not_finite: bool,
     /// Line of its declaration, from 1.
@@ -395,8 +395,8 @@ pub struct Operation {
     pub kind: OperationKind,
     /// The parameters a test chooses, in the order that [`OperationKind`] documents.
     pub parameters: Vec<Parameter>,
-    /// The time outside of which it is never active (`within`); seconds, `start < end`. Of an offline operation, which is
-    /// never active, the whole run.
+    /// The time outside of which it is never active (`within`); seconds, `start < end`. Of an offline operation, which
+    /// is never active, the whole run.
     pub within: Span,
     /// Operations of a higher priority come first on a message; equal ones in declaration order. Default 0.
     pub priority: i32,

@@ -9,8 +9,8 @@ use crate::{Comparison, Expression, Input, Side};
 /// By how much a run keeps a formula (positive) or breaks it (negative).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Robustness {
-    /// What the signals refer to by position; at least one. Those that are [`crate::Members::Each`] are all of one group:
-    /// then the formula is that of each member, and the least robustness counts.
+    /// What the signals refer to by position; at least one. Those that are [`crate::Members::Each`] are all of one
+    /// group: then the formula is that of each member, and the least robustness counts.
     pub inputs: Vec<Input>,
     /// The signals of the formula, all in one unit; each refers to an input.
     pub signals: Vec<Expression>,
@@ -18,8 +18,8 @@ pub struct Robustness {
     pub formula: Formula,
     /// Where it listens.
     pub side: Side,
-    /// Whether only windows of operators count that lie in the run as a whole; otherwise the end of the run cuts them. Default
-    /// false, and then not written.
+    /// Whether only windows of operators count that lie in the run as a whole; otherwise the end of the run cuts them.
+    /// Default false, and then not written.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub whole_windows: bool,
 }

@@ -23,8 +23,8 @@ pub enum StopRule {
         /// Less likely than this, in `0..=1` and above 0.
         below: f64,
     },
-    /// It has hit nearly all the cells that its tests can reach, or of those it has hit and those it has not that have a
-    /// chance of at least a thousandth per test: an upper bound after Good and Turing.
+    /// It has hit nearly all the cells that its tests can reach, or of those it has hit and those it has not that have
+    /// a chance of at least a thousandth per test: an upper bound after Good and Turing.
     Completeness {
         /// At least this share of them, in `0..=1` and above 0.
         share: f64,

@@ -40,8 +40,8 @@ pub struct Shrinking {
     pub failing: Failing,
     /// The simulator's seed with which it failed.
     pub simulator_seed: u64,
-    /// In how many runs a smaller test has to fail, from 1. The first has the simulator's seed of the test, the others have
-    /// seeds of their own.
+    /// In how many runs a smaller test has to fail, from 1. The first has the simulator's seed of the test, the others
+    /// have seeds of their own.
     pub runs: u32,
     /// The most runs.
     pub evaluations: u32,

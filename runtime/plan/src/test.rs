@@ -37,7 +37,8 @@ pub enum Activation {
         /// Where it ends.
         end: f64,
     },
-    /// From the moment at which a condition holds until the moment at which another does, inside the operation's `within`.
+    /// From the moment at which a condition holds until the moment at which another does, inside the operation's
+    /// `within`.
     Condition {
         /// Switches it on.
         start: Condition,

@@ -1,11 +1,11 @@
 //! Whether a plan is one that the rest of the program can work with.
 //!
-//! A plan that comes from a file may say anything. Reading one therefore ends here: what deserializes is a plan in which
-//! every id is in range, every number finite, every range in order, and every count that is divided by or looped over
-//! positive. Later code indexes with these without asking again.
+//! A plan that comes from a file may say anything. Reading one therefore ends here: what deserializes is a plan in
+//! which every id is in range, every number finite, every range in order, and every count that is divided by or looped
+//! over positive. Later code indexes with these without asking again.
 //!
-//! Whether names inside messages exist and whether the parameters of an operation are those of its kind is asked where they
-//! are looked up, at the start of a run: reports need neither.
+//! Whether names inside messages exist and whether the parameters of an operation are those of its kind is asked where
+//! they are looked up, at the start of a run: reports need neither.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -211,8 +211,8 @@ impl CampaignPlan {
         at("campaign", self.sound_campaign(&self.campaign))
     }
 
-    /// Makes sure that a test is one of this plan: its operations are there, each with a choice for every parameter, and all
-    /// numbers are finite and in order. It need not lie within what the operations permit.
+    /// Makes sure that a test is one of this plan: its operations are there, each with a choice for every parameter,
+    /// and all numbers are finite and in order. It need not lie within what the operations permit.
     pub fn validate_test(&self, test: &Test) -> Result<(), PlanError> {
         each("operations", &test.operations, |it| {
             at("operation", self.has_operation(it.operation))?;

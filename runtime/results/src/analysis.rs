@@ -82,8 +82,8 @@ pub fn campaigns(repositories: &[Repository]) -> Result<Table, RecordError> {
     Ok(dataset)
 }
 
-/// All tests but the reference runs: where each comes from, how it ended, and the value of each metric; of imported ones
-/// also what they were called.
+/// All tests but the reference runs: where each comes from, how it ended, and the value of each metric; of imported
+/// ones also what they were called.
 pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, RecordError> {
     let plan = repository.plan();
     let originals = repository.original_names()?;
@@ -117,12 +117,12 @@ fn operations(plan: &CampaignPlan, test: &ScannedTest) -> String {
     names.join(" ")
 }
 
-/// The tests of a selection that no other of it dominates, by their recorded values, or those of their repetitions where
-/// the campaign confirmed them. Equal tests are all there; `same_as` names the one that stands for them in the campaign's
-/// own fronts. Without a selection these are the tests of the whole file.
+/// The tests of a selection that no other of it dominates, by their recorded values, or those of their repetitions
+/// where the campaign confirmed them. Equal tests are all there; `same_as` names the one that stands for them in the
+/// campaign's own fronts. Without a selection these are the tests of the whole file.
 ///
-/// Where tests were run again, `finding` is what fresh runs show most often (a requirement, `crash` or `timeout`), `confirmed`
-/// is in how many of the `conclusive` runs, of all `repetitions`. From `confirmed_low` to
+/// Where tests were run again, `finding` is what fresh runs show most often (a requirement, `crash` or `timeout`),
+/// `confirmed` is in how many of the `conclusive` runs, of all `repetitions`. From `confirmed_low` to
 /// `confirmed_high` is the 95 % Wilson interval, and `standing` is `confirmed`, `flaky` or `not confirmed`.
 pub fn front(repository: &Repository, selection: &Selection) -> Result<Table, RecordError> {
     let plan = repository.plan();
@@ -176,8 +176,8 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Table, Re
     Ok(dataset)
 }
 
-/// The point of each test in the reduced parameter space, from what was observed. Tests in which no operation was active
-/// are left out.
+/// The point of each test in the reduced parameter space, from what was observed. Tests in which no operation was
+/// active are left out.
 pub fn sspr(
     repository: &Repository,
     selection: &Selection,

@@ -1,8 +1,8 @@
 //! The results repository: what a campaign run leaves behind, in one SQLite file.
 //!
-//! It guarantees: a test is there completely or not at all, even if the process is killed; one process writes at a time;
-//! what is read equals what was written, bit for bit; equal campaigns have equal digests, with any number of workers and
-//! interruptions. The file is meant to be read by others too: its schema is documented in
+//! It guarantees: a test is there completely or not at all, even if the process is killed; one process writes at a
+//! time; what is read equals what was written, bit for bit; equal campaigns have equal digests, with any number of
+//! workers and interruptions. The file is meant to be read by others too: its schema is documented in
 //! the file itself, and its views answer the common questions.
 //!
 //! A [`Recorder`] writes while a campaign runs; a [`Repository`] reads, during a run or after it.

@@ -1,8 +1,8 @@
 //! What a campaign found, for people and build servers: text for a terminal, one page with pictures, JUnit XML.
 //!
 //! Everything is read from the results repository, so reports can be made again at any time. [`summary`], [`list`] and
-//! [`show`] compute the facts, which serialise to JSON as they are. [`summary_text`] and its like render them as text, and
-//! [`page()`] as HTML; both share their tables and sentences.
+//! [`show`] compute the facts, which serialise to JSON as they are. [`summary_text`] and its like render them as text,
+//! and [`page()`] as HTML; both share their tables and sentences.
 
 mod export;
 mod facts;

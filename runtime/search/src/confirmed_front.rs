@@ -1,15 +1,16 @@
 //! A front of confirmed tests only, where a simulator does not always do the same.
 //!
-//! The best of many noisy runs is mostly one that was lucky, and a front keeps the lucky ones. So a test that a generation
-//! would put on the front is run again, with fresh seeds of the simulator, and is from then on what those runs say; the
-//! run that selected it is left out. A test that was only lucky leaves the front by that, those that it had pushed out
-//! come back, and who is new among them is confirmed in turn, until every test on the front is confirmed.
+//! The best of many noisy runs is mostly one that was lucky, and a front keeps the lucky ones. So a test that a
+//! generation would put on the front is run again, with fresh seeds of the simulator, and is from then on what those
+//! runs say; the run that selected it is left out. A test that was only lucky leaves the front by that, those that it
+//! had pushed out come back, and who is new among them is confirmed in turn, until every test on the front is
+//! confirmed.
 //!
 //! Tests that violate a requirement can be confirmed too, wherever they lie: that changes what is known of them, and so
 //! perhaps the front, by the same rule.
 //!
-//! Each test is confirmed once, so that this ends. Only tests of the latest generation ever are: what an earlier one left
-//! behind is dominated by a confirmed test of the front, whose values change no more.
+//! Each test is confirmed once, so that this ends. Only tests of the latest generation ever are: what an earlier one
+//! left behind is dominated by a confirmed test of the front, whose values change no more.
 
 use std::collections::BTreeMap;
 
@@ -58,8 +59,8 @@ impl ConfirmedFront {
         front
     }
 
-    /// The tests that are to be confirmed and are not: those on the front, and those that are wherever they lie. By number;
-    /// none once the generation is settled. A campaign without objectives has no front.
+    /// The tests that are to be confirmed and are not: those on the front, and those that are wherever they lie. By
+    /// number; none once the generation is settled. A campaign without objectives has no front.
     pub fn unconfirmed(&self) -> Vec<u32> {
         let front = self.front();
         let is_on_front = |test: &GenerationTest| {
@@ -90,8 +91,8 @@ impl ConfirmedFront {
 /// One fitness for several runs of a test, each objective for itself.
 ///
 /// A run without objective values (a crash, a timeout, one in which no operation had any effect) reaches nothing: in a
-/// median and a quantile it stands behind all others. A mean is that of the runs that have values, if these are more than
-/// half of all. Where nothing is left, the test is as unfit as the first of the runs that are.
+/// median and a quantile it stands behind all others. A mean is that of the runs that have values, if these are more
+/// than half of all. Where nothing is left, the test is as unfit as the first of the runs that are.
 pub fn aggregate(runs: &[Fitness], by: Statistic) -> Fitness {
     let measured: Vec<&[f64]> = runs.iter().filter_map(Fitness::objectives).collect();
     let unfit = || {

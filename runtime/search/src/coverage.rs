@@ -2,8 +2,8 @@
 //!
 //! A [`Grid`] divides some dimensions into cells of equal width. [`Coverage`] counts the tests that fall into each; it
 //! is the same whether it is fed while a campaign runs or from its results afterwards. Some cells no test can reach (a
-//! long interval has its midpoint in the middle of the window): [`Feasible`] says which can be, so that coverage is told
-//! both over all cells, as in [SESAME 2023], and over those.
+//! long interval has its midpoint in the middle of the window): [`Feasible`] says which can be, so that coverage is
+//! told both over all cells, as in [SESAME 2023], and over those.
 
 mod curve;
 mod feasible;

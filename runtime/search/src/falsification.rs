@@ -1,13 +1,13 @@
 //! Focused falsification of a campaign: [`falsify`](sesame_optimise::falsify) over its tests.
 //!
 //! Tests contain different operations, so they are not vectors. Their distance is measured operation by operation: each
-//! kind of operation that the campaign permits is a component of its own, in which a test is the sum of a bump per operation
-//! of that kind, over where its window lies, how long it is, and its parameters. So a test is near another when it disturbs
-//! the same at about the same time about as strongly, and adding, dropping or exchanging an operation is a step of a certain
-//! length. Candidates come from the best tests by mutation.
+//! kind of operation that the campaign permits is a component of its own, in which a test is the sum of a bump per
+//! operation of that kind, over where its window lies, how long it is, and its parameters. So a test is near another
+//! when it disturbs the same at about the same time about as strongly, and adding, dropping or exchanging an operation
+//! is a step of a certain length. Candidates come from the best tests by mutation.
 //!
-//! Where every test holds the same operations, each once and without a window, and chooses nothing but numbers, tests are
-//! vectors ([vectors]): these are searched as such, and the process alone decides what is tried.
+//! Where every test holds the same operations, each once and without a window, and chooses nothing but numbers, tests
+//! are vectors ([vectors]): these are searched as such, and the process alone decides what is tried.
 
 mod vectors;
 
@@ -193,8 +193,9 @@ impl SearchDomain for TestDomain {
         self.embedded(test, place.number.map_or_else(|| place.parents.clone(), |number| vec![number]))
     }
 
-    /// Half of the tests are not left to expectations: hits and misses of operations make plateaus and jumps that a smooth
-    /// process does not foresee. In turn there are fresh tests, and children of the best as an evolution breeds them.
+    /// Half of the tests are not left to expectations: hits and misses of operations make plateaus and jumps that a
+    /// smooth process does not foresee. In turn there are fresh tests, and children of the best as an evolution breeds
+    /// them.
     fn explore(&self, turn: u32, best: &[&EmbeddedTest], stream: &mut Stream) -> Option<EmbeddedTest> {
         if turn.is_multiple_of(2) {
             return Some(self.random(stream));
@@ -262,8 +263,8 @@ fn chosen(choice: &Choice, parameter_space: &ParameterSpace, coordinates: &mut V
     }
 }
 
-/// How much the bumps of two operations of a kind have in common, 1 for equal ones: a product of Cauchy kernels, which is
-/// positive definite and takes no powers.
+/// How much the bumps of two operations of a kind have in common, 1 for equal ones: a product of Cauchy kernels, which
+/// is positive definite and takes no powers.
 fn overlap(a: &[f64], b: &[f64]) -> f64 {
     let width = WIDTH * WIDTH * a.len().max(1) as f64;
     a.iter().zip(b).map(|(a, b)| 1.0 / (1.0 + (a - b) * (a - b) / width)).product()
@@ -340,8 +341,8 @@ mod tests {
         assert_eq!(resumed.ask(), []);
     }
 
-    /// Prints how many of 20 searches find 40 hits within 80 tests on each of the synthetic robots; nothing is asserted, as
-    /// twenty are few.
+    /// Prints how many of 20 searches find 40 hits within 80 tests on each of the synthetic robots; nothing is
+    /// asserted, as twenty are few.
     #[test]
     #[ignore = "long: 240 searches of up to 80 tests"]
     fn strategies_on_synthetic_robots() {

@@ -20,8 +20,8 @@ impl FixedTests {
         FixedTests { candidates: tests.into_iter().map(candidate).collect(), awaited: 0 }
     }
 
-    /// One test this many times, with equal operation seeds, but another seed of the simulator each time. `seed` is that of
-    /// the run.
+    /// One test this many times, with equal operation seeds, but another seed of the simulator each time. `seed` is
+    /// that of the run.
     pub(crate) fn repeated(test: &Test, times: u32, seed: u64) -> Self {
         let repetition = |repetition: u32| Candidate {
             test: test.clone(),

@@ -1,9 +1,9 @@
 //! Indicators of a search: after each generation, how good its front is and what its tests came to.
 //!
-//! While a campaign runs, it is not known how far its front will get, so hypervolumes are measured from a point that is fixed
-//! early and never moved: of each objective the worst value of the reference run and of the tests up to and including
-//! the first generation with a measured one, and half of the range of these values beyond it. Only finite values
-//! count. It follows from results alone, so a resumed campaign has the same one.
+//! While a campaign runs, it is not known how far its front will get, so hypervolumes are measured from a point that is
+//! fixed early and never moved: of each objective the worst value of the reference run and of the tests up to and
+//! including the first generation with a measured one, and half of the range of these values beyond it. Only finite
+//! values count. It follows from results alone, so a resumed campaign has the same one.
 
 use serde::Serialize;
 
@@ -110,7 +110,8 @@ impl Indicators {
     }
 }
 
-/// The hypervolume of a front up to a point, estimated where an exact one would take too long; `None` where it has no end.
+/// The hypervolume of a front up to a point, estimated where an exact one would take too long; `None` where it has no
+/// end.
 pub fn volume(front: &Front, reference: &[f64]) -> Option<Volume> {
     let points: Vec<&[f64]> = front.members().iter().map(|member| member.objectives.as_slice()).collect();
     let volume = hypervolume::measured(&points, reference, hypervolume::WORK);

@@ -1,8 +1,8 @@
 //! How a campaign's tests are found: strategies that are asked for tests and told their results.
 //!
-//! A [`Strategy`] has no clock, no files and no processes. What it asks for depends on the plan, the seed and what it was
-//! told, so a campaign is resumed by telling a new strategy the recorded results. Randomness comes from a stream per child,
-//! derived from the seed, so nothing depends on the order in which the tests of a generation are run.
+//! A [`Strategy`] has no clock, no files and no processes. What it asks for depends on the plan, the seed and what it
+//! was told, so a campaign is resumed by telling a new strategy the recorded results. Randomness comes from a stream
+//! per child, derived from the seed, so nothing depends on the order in which the tests of a generation are run.
 //!
 //! [`strategy`] gives the strategy of a campaign, [`strategy_of_task`] that of any task of a runner. All draw from one
 //! [`space`] of tests. [`sspr`] reduces a test to a point; [`coverage`] counts in which cells of a grid points lie.

@@ -7,10 +7,11 @@ use sesame_plan::{Bound, CampaignPlan, Requirement, Statistic};
 
 use crate::confirmed_front::aggregate_margin;
 
-/// The margin of each requirement of the plan, in its order. One is violated exactly where the requirement's [`verdict`] is.
+/// The margin of each requirement of the plan, in its order. One is violated exactly where the requirement's
+/// [`verdict`] is.
 ///
-/// A margin is in the unit of the requirement's metric: how far the metric may still move before it breaks the bound, and
-/// negative by how far it has moved beyond. If the verdict is inconclusive, there is none. If a run broke off,
+/// A margin is in the unit of the requirement's metric: how far the metric may still move before it breaks the bound,
+/// and negative by how far it has moved beyond. If the verdict is inconclusive, there is none. If a run broke off,
 /// a violation has the least size that it could have had at the end of the run.
 pub fn margins(plan: &CampaignPlan, observation: &Observation) -> Vec<Margin> {
     let margin = |requirement: &Requirement| {
@@ -29,8 +30,8 @@ pub fn margins(plan: &CampaignPlan, observation: &Observation) -> Vec<Margin> {
     plan.requirements.iter().map(margin).collect()
 }
 
-/// The margin of each requirement over the fresh runs that confirm a test, aggregated as its campaign says. The margin of a
-/// requirement is unknown if too few runs are conclusive.
+/// The margin of each requirement over the fresh runs that confirm a test, aggregated as its campaign says. The margin
+/// of a requirement is unknown if too few runs are conclusive.
 pub fn confirmed_margins(plan: &CampaignPlan, by: Statistic, fresh_runs: &[Observation]) -> Vec<Margin> {
     let runs: Vec<Vec<Margin>> = fresh_runs.iter().map(|run| margins(plan, run)).collect();
     let of = |requirement: usize| {

@@ -1,10 +1,11 @@
-//! Averaging what a search is told of a test with its nearest neighbours, where runs are noisy and repeating them costs too
-//! much.
+//! Averaging what a search is told of a test with its nearest neighbours, where runs are noisy and repeating them costs
+//! too much.
 //!
-//! Tests that lie near each other disturb alike, so their runs are near to repetitions. What the search is told of a test
-//! is the mean, objective by objective, over the test and those of all tests evaluated by the end of its generation that
-//! are nearest to it by the distance of the reduced parameter space [SESAME 2023, equation 1]. It is told once: later
-//! neighbours change nothing that was told. The record, the front and the rules to stop use each test's own values.
+//! Tests that lie near each other disturb alike, so their runs are near to repetitions. What the search is told of a
+//! test is the mean, objective by objective, over the test and those of all tests evaluated by the end of its
+//! generation that are nearest to it by the distance of the reduced parameter space [SESAME 2023, equation 1]. It is
+//! told once: later neighbours change nothing that was told. The record, the front and the rules to stop use each
+//! test's own values.
 //!
 //! All of it depends on results of whole generations, by number, and of neighbours equally far the one with the smaller
 //! number is nearer; so it is the same with any number of workers.
@@ -46,9 +47,9 @@ impl Neighbours {
         Some(Neighbours { count, largest_count, tests: BTreeMap::new() })
     }
 
-    /// Takes the results of a generation, and puts the means in the places of their fitness. `stands_for` is the number of
-    /// the test whose result stands for another: a duplicate is told what its original would be, and is nobody's neighbour.
-    /// A test without objective values, or in which no operation was active, stays as it is.
+    /// Takes the results of a generation, and puts the means in the places of their fitness. `stands_for` is the number
+    /// of the test whose result stands for another: a duplicate is told what its original would be, and is nobody's
+    /// neighbour. A test without objective values, or in which no operation was active, stays as it is.
     pub fn average(&mut self, results: &mut [Evaluated], stands_for: impl Fn(u32) -> u32) {
         for result in results.iter() {
             if let (Some(point), Fitness::Measured(values)) = (&result.point, &result.fitness)

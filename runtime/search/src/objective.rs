@@ -4,7 +4,8 @@ use sesame_base::observation::{Observation, Outcome};
 use sesame_optimise::dominance::{Fitness, Unfit};
 use sesame_plan::{CampaignPlan, Direction, MetricId};
 
-/// The fitness of a run: its objective values in the campaign's order, negated where more is sought; or why it has none.
+/// The fitness of a run: its objective values in the campaign's order, negated where more is sought; or why it has
+/// none.
 pub fn fitness(plan: &CampaignPlan, observation: &Observation) -> Fitness {
     fitness_of(plan, &observation.outcome, |id| observation.metrics.get(id.index())?.value)
 }

@@ -1,10 +1,10 @@
-//! Shrinking a failing test: the fewest operations, then the shortest windows, then the simplest conditions, then the mildest
-//! parameters with which it still fails in the same way.
+//! Shrinking a failing test: the fewest operations, then the shortest windows, then the simplest conditions, then the
+//! mildest parameters with which it still fails in the same way.
 //!
-//! Guarantees: the result fails, or is the original test; it is permitted if the original is; it keeps the operation seeds, so
-//! that the rest of a disturbance is what it was; no single step can shrink it further, unless the evaluations were used up;
-//! and no test is run twice for it. A step is one operation, one side of an `and` or `or` of a condition, one activation by
-//! condition, or [`RESOLUTION`] of the permitted range of a time or a parameter.
+//! Guarantees: the result fails, or is the original test; it is permitted if the original is; it keeps the operation
+//! seeds, so that the rest of a disturbance is what it was; no single step can shrink it further, unless the
+//! evaluations were used up; and no test is run twice for it. A step is one operation, one side of an `and` or `or` of
+//! a condition, one activation by condition, or [`RESOLUTION`] of the permitted range of a time or a parameter.
 //!
 //! Like every [`Strategy`] it is a function of what it was told, so an interrupted run can be resumed.
 
@@ -139,8 +139,8 @@ impl Shrink {
         &self.tried
     }
 
-    /// Positions among those tried of the tests that were gone to so far, the smallest last. Empty where the test that was
-    /// given does not fail, and as long as that is not known.
+    /// Positions among those tried of the tests that were gone to so far, the smallest last. Empty where the test that
+    /// was given does not fail, and as long as that is not known.
     pub fn accepted(&self) -> Vec<usize> {
         let reduced = self.reduced.clone();
         // With nothing more to be run the reduce goes as far as what is known leads.

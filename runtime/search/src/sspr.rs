@@ -2,8 +2,8 @@
 //!
 //! A test is a list of operations with windows and parameters; no two tests have the same shape. The reduction (section
 //! 4.2.1 of the methodology's paper) makes them comparable: when the disturbances were active (T1 to T3), how strong
-//! they were (P1, P2), and how many there were of which class (O0 to O3). Cells of a grid over these dimensions are what
-//! coverage counts, and distances between points are what diversity means.
+//! they were (P1, P2), and how many there were of which class (O0 to O3). Cells of a grid over these dimensions are
+//! what coverage counts, and distances between points are what diversity means.
 //!
 //! The reduction is pure: [`Disturbance`]s in, a [`Point`] out. [`planned`] and [`observed`] make disturbances from a
 //! plan and its tests.
@@ -62,7 +62,8 @@ pub struct Intensity {
 /// Whose formulas are used. New campaigns always use [`Convention::Ours`]; the others reproduce old numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Convention {
-    /// P2 is a standard deviation, O2 counts losses and O3 delays, a value is normalised from the lower end of its range.
+    /// P2 is a standard deviation, O2 counts losses and O3 delays, a value is normalised from the lower end of its
+    /// range.
     #[default]
     Ours,
     /// The original platform's code: P2 is a variance, O2 counts delays and O3 losses, packet loss is taken as the
@@ -87,8 +88,9 @@ impl Point {
     /// The point of these disturbances; `None` if none of them has an interval.
     ///
     /// With the start `s` and end `e` of each interval as shares of its operation's window: T1 is the mean of
-    /// `(s + e) / 2`, T2 the mean of `e - s`, T3 the population standard deviation of `(s + e) / 2`. With the normalised
-    /// parameters of all operations that were active: P1 is their mean, P2 their population standard deviation.
+    /// `(s + e) / 2`, T2 the mean of `e - s`, T3 the population standard deviation of `(s + e) / 2`. With the
+    /// normalised parameters of all operations that were active: P1 is their mean, P2 their population standard
+    /// deviation.
     pub fn from_disturbances(disturbances: &[Disturbance], convention: Convention) -> Option<Point> {
         let active: Vec<&Disturbance> =
             disturbances.iter().filter(|it| !it.intervals.is_empty() && it.window.length() > 0.0).collect();
@@ -170,8 +172,8 @@ pub fn distance(a: &Point, b: &Point, over: &[Dimension], largest_count: f64) ->
     whole.then(|| distance_of_any(a, b, over, largest_count))
 }
 
-/// The same for points that may lack a dimension: where one of two does they are as far apart in it as can be, where both
-/// do not at all. Operations without parameters are unlike any parameter.
+/// The same for points that may lack a dimension: where one of two does they are as far apart in it as can be, where
+/// both do not at all. Operations without parameters are unlike any parameter.
 pub fn distance_of_any(a: &Point, b: &Point, over: &[Dimension], largest_count: f64) -> f64 {
     let mut sum = 0.0;
     for &dimension in over {

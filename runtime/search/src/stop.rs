@@ -2,16 +2,16 @@
 //!
 //! Two of the rules are about cells that no test has hit yet. They use an upper bound, not an estimate:
 //!
-//! - Good and Turing (1953): of n tests, f₁ fell into cells that no other fell into; the next test falls into a new cell
-//!   with a probability M of about f₁ / n. How far n M is from f₁ has a variance of about n M + 2 f₂ (Esty 1983), with f₂
-//!   the number of cells hit twice. So with z standard deviations, n M is at most
-//!   f₁ + z²/2 + z √(f₁ + 2 f₂ + z²/4), which is about z² where all cells were hit often. It is used with a confidence of
-//!   99 %, since it is looked at after every generation and one wrong look is enough.
-//! - What the next test hits with a probability of M at most, cannot be more than 1000 M cells each of which has a chance
-//!   of at least a thousandth. So many are missing at most; and no more than the cells that can be reached at all, where
-//!   those are known, which needs no estimate. Of cells that are hit more rarely no number of tests says how many there
-//!   are. Estimates of the number of cells, such as Chao's (1984), are estimates from below: a rule that goes by one stops
-//!   too early, and the more so the more uneven the cells are.
+//! - Good and Turing (1953): of n tests, f₁ fell into cells that no other fell into; the next test falls into a new
+//!   cell with a probability M of about f₁ / n. How far n M is from f₁ has a variance of about n M + 2 f₂ (Esty 1983),
+//!   with f₂ the number of cells hit twice. So with z standard deviations, n M is at most
+//!   f₁ + z²/2 + z √(f₁ + 2 f₂ + z²/4), which is about z² where all cells were hit often. It is used with a confidence
+//!   of 99 %, since it is looked at after every generation and one wrong look is enough.
+//! - What the next test hits with a probability of M at most, cannot be more than 1000 M cells each of which has a
+//!   chance of at least a thousandth. So many are missing at most; and no more than the cells that can be reached at
+//!   all, where those are known, which needs no estimate. Of cells that are hit more rarely no number of tests says how
+//!   many there are. Estimates of the number of cells, such as Chao's (1984), are estimates from below: a rule that
+//!   goes by one stops too early, and the more so the more uneven the cells are.
 //!
 //! The first assumes that tests are drawn independently. Random search draws so; a search that learns does not, and the
 //! reason to stop says that the bound is biased then.
@@ -191,8 +191,8 @@ impl StopRules {
     }
 
     /// By how much the hypervolume has grown over so many generations, as a share of what it is; `None` so early that
-    /// there are not as many yet, or nothing is on the front. Both fronts are measured from the worst values seen by now.
-    /// A front of one point at the worst of all has no volume, and has not grown.
+    /// there are not as many yet, or nothing is on the front. Both fronts are measured from the worst values seen by
+    /// now. A front of one point at the worst of all has no volume, and has not grown.
     fn growth(&self, generations: usize) -> Option<Growth> {
         let now = self.fronts.back()?;
         let then = &self.fronts[self.fronts.len().checked_sub(generations + 1)?];
@@ -334,8 +334,8 @@ mod tests {
         }
     }
 
-    /// For each distribution and rule the share of the seeds with which what a stop promises is so, and the median of the
-    /// tests that it took.
+    /// For each distribution and rule the share of the seeds with which what a stop promises is so, and the median of
+    /// the tests that it took.
     fn study(rules: &[StopRule], every: u32, seeds: u64) -> Vec<(String, f64, Option<u32>)> {
         let mut rows = Vec::new();
         for (name, chances) in distributions() {

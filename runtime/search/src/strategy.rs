@@ -12,9 +12,9 @@ use crate::sspr::Point;
 
 /// How tests are found, by ask and tell.
 ///
-/// The caller alternates: it asks for a generation, evaluates all of it in any order, and tells the results in the order
-/// asked. The number of tests of all generations together is exactly [`Task::evaluations`](sesame_plan::Task::evaluations);
-/// when a test is shrunk, at most.
+/// The caller alternates: it asks for a generation, evaluates all of it in any order, and tells the results in the
+/// order asked. The number of tests of all generations together is exactly
+/// [`Task::evaluations`](sesame_plan::Task::evaluations); when a test is shrunk, at most.
 pub trait Strategy: Send {
     /// The next generation of tests; empty when the search is over.
     fn ask(&mut self) -> Vec<Candidate>;
@@ -25,7 +25,8 @@ pub trait Strategy: Send {
     /// Takes the reference run, before the first generation is asked.
     fn begin(&mut self, _reference: &Observation) {}
 
-    /// Whether it reads the series of metrics in the runs that it is told. To others the caller may tell runs without them.
+    /// Whether it reads the series of metrics in the runs that it is told. To others the caller may tell runs without
+    /// them.
     fn reads_series(&self) -> bool {
         false
     }
@@ -52,7 +53,8 @@ pub struct Candidate {
     pub generation: u32,
     /// Which known test it is, if known tests are run.
     pub known: Option<KnownTestId>,
-    /// The simulator's seed in its run; `None` for the campaign's own. Equal tests with seeds of their own are each run.
+    /// The simulator's seed in its run; `None` for the campaign's own. Equal tests with seeds of their own are each
+    /// run.
     pub simulator_seed: Option<u64>,
 }
 

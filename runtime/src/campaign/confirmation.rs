@@ -62,8 +62,9 @@ impl ConfirmedSearch {
         self.repeated.all_identical().then(|| DETERMINISTIC_SIMULATOR.to_owned())
     }
 
-    /// Confirms the tests of a generation that would be on the front, or violate a requirement, until all tests on the front
-    /// are confirmed; then gives tests their confirmed fitness and fresh runs. `each` sees the number of runs and the front.
+    /// Confirms the tests of a generation that would be on the front, or violate a requirement, until all tests on the
+    /// front are confirmed; then gives tests their confirmed fitness and fresh runs. `each` sees the number of runs and
+    /// the front.
     pub(super) fn confirm(
         &mut self,
         plan: &CampaignPlan,

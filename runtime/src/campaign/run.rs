@@ -39,8 +39,8 @@ pub enum CampaignEnd {
     Interrupted,
 }
 
-/// Runs the task of a recorder, with the plan of that task, in worker processes and records it; what the recorder already holds is not simulated again. Each worker
-/// gets a folder of its own in `directory`.
+/// Runs the task of a recorder, with the plan of that task, in worker processes and records it; what the recorder
+/// already holds is not simulated again. Each worker gets a folder of its own in `directory`.
 pub fn run_campaign(
     plan: &CampaignPlan,
     recorder: Recorder,

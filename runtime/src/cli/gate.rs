@@ -1,7 +1,7 @@
 //! Gates: what was found decides the exit code.
 //!
-//! Verdicts are those of the summary: if a test was run again, its fresh runs decide, and a finding that none of them shows
-//! closes no gate.
+//! Verdicts are those of the summary: if a test was run again, its fresh runs decide, and a finding that none of them
+//! shows closes no gate.
 
 use std::collections::BTreeSet;
 use std::process::ExitCode;

@@ -96,8 +96,8 @@ pub(super) enum Results {
     Indicators {
         /// A results file, or the folder of a run.
         file: PathBuf,
-        /// The reference point of hypervolumes, a value per objective in its unit, for example `325,0`; if omitted, the one
-        /// that was fixed while the campaign ran.
+        /// The reference point of hypervolumes, a value per objective in its unit, for example `325,0`; if omitted, the
+        /// one that was fixed while the campaign ran.
         #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "VALUES")]
         reference: Vec<f64>,
         #[command(flatten)]

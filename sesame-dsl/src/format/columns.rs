@@ -1,14 +1,14 @@
 //! Columns: words that their author aligned in lines that follow each other.
 //!
-//! Whether a word is in a column is told by the blanks before it: two or more in any of the lines. So the author decides,
-//! and what was aligned once stays aligned when a name grows. How far a column stays away from the longest of what is
-//! before it is the author's too, within reason.
+//! Whether a word is in a column is told by the blanks before it: two or more in any of the lines. So the author
+//! decides, and what was aligned once stays aligned when a name grows. How far a column stays away from the longest of
+//! what is before it is the author's too, within reason.
 
 use super::lines::{Line, Placed};
 use super::tokens::Kind;
 
-/// What can be in a column, in the order in which it stands in a line. A word that comes in another order is in none, so
-/// that one column never moves another that is left of it.
+/// What can be in a column, in the order in which it stands in a line. A word that comes in another order is in none,
+/// so that one column never moves another that is left of it.
 const COLUMNS: &[&str] = &[
     "on",
     "maximise",

@@ -14,7 +14,8 @@ pub struct Campaign {
     pub declaration: Declaration,
     /// The campaign that clauses it does not write come from. They are in their places here.
     pub from: Option<CampaignId>,
-    /// What the search optimises, in written order; each has a direction. Empty exactly for a campaign without a search.
+    /// What the search optimises, in written order; each has a direction. Empty exactly for a campaign without a
+    /// search.
     pub objectives: Vec<MetricId>,
     /// Metrics measured besides the objectives, those of all requirements, and those of expectations.
     pub observed: Vec<MetricId>,

@@ -12,8 +12,8 @@ use super::system::FieldPath;
 pub struct Eddi {
     /// Its name and doc comment.
     pub declaration: Declaration,
-    /// Where it publishes what holds: a topic that carries a `bool` (whether any guarantee holds), an `int` (the integrity
-    /// of the best one) or a `text` (its name).
+    /// Where it publishes what holds: a topic that carries a `bool` (whether any guarantee holds), an `int` (the
+    /// integrity of the best one) or a `text` (its name).
     pub publishes: TopicId,
     /// Guarantees of other monitors that it relies on, in written order.
     pub demands: Vec<Demand>,

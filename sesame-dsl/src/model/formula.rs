@@ -1,7 +1,7 @@
 //! Declarative metrics: what they compute, with units resolved.
 //!
-//! Numbers are in the units of the wire or of a conversion that is part of the expression; so whoever evaluates one needs
-//! no units.
+//! Numbers are in the units of the wire or of a conversion that is part of the expression; so whoever evaluates one
+//! needs no units.
 
 use sesame_plan::{Aggregate, Condition, Members};
 

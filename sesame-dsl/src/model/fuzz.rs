@@ -19,7 +19,8 @@ pub struct Operation {
     pub kind: OperationKind,
     /// The parameters a test chooses, in the order in which a plan has them.
     pub parameters: Vec<Parameter>,
-    /// The time outside of which it is never active, in seconds; `None` is the whole test, from 0 to the campaign's end.
+    /// The time outside of which it is never active, in seconds; `None` is the whole test, from 0 to the campaign's
+    /// end.
     pub within: Option<Range>,
     /// Operations of a higher priority come first on a message; equal ones in declaration order. Default 0.
     pub priority: i32,
@@ -48,8 +49,8 @@ impl Operation {
 pub struct Target {
     /// The topic.
     pub topic: TopicId,
-    /// The values in each message that it changes, in written order, all of one type; none exactly where it acts on whole
-    /// messages.
+    /// The values in each message that it changes, in written order, all of one type; none exactly where it acts on
+    /// whole messages.
     pub places: Vec<Vec<Step>>,
 }
 

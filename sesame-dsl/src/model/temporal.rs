@@ -8,8 +8,8 @@ use super::formula::Input;
 /// By how much a test keeps a temporal formula (positive) or breaks it (negative), in the unit of its comparisons.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Robustness {
-    /// What its signals refer to by position; each once, at least one. Of those that are `each of` a group's members, all
-    /// are of one group: then the formula is that of each member, and the least counts.
+    /// What its signals refer to by position; each once, at least one. Of those that are `each of` a group's members,
+    /// all are of one group: then the formula is that of each member, and the least counts.
     pub inputs: Vec<Input>,
     /// What its comparisons refer to by position, all in one unit; each has an input.
     pub signals: Vec<Expression>,

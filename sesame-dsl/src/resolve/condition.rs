@@ -304,7 +304,8 @@ impl<'a> Resolver<'a> {
         None
     }
 
-    /// Whether a comparison of this variable may go both ways: with a whole number, or with another variable of its unit.
+    /// Whether a comparison of this variable may go both ways: with a whole number, or with another variable of its
+    /// unit.
     fn is_comparable(&self, space: &ConditionSpace, variable: &Variable) -> bool {
         let unit = |variable: &Variable| self.metric_of(variable.metric).unit.as_ref();
         variable.known.meets(space.integers)

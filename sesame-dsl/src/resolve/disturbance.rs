@@ -342,8 +342,8 @@ impl<'a> Resolver<'a> {
         None
     }
 
-    /// The values at the places of a target, all of one topic and one type, which must satisfy `is_for`; `wants` is that
-    /// in words.
+    /// The values at the places of a target, all of one topic and one type, which must satisfy `is_for`; `wants` is
+    /// that in words.
     fn values(
         &mut self,
         target: &'a ast::Target,

@@ -6,8 +6,8 @@ use super::list;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::syntax::ast::{ActivationMode, Campaign, Exploration, ExplorationKind, File};
 
-/// Copies inherited clauses. A clause that a campaign writes replaces the inherited one as a whole; `search`, `repeat` and
-/// `passive` count as one clause here, and clauses of a search are not copied to a campaign without one.
+/// Copies inherited clauses. A clause that a campaign writes replaces the inherited one as a whole; `search`, `repeat`
+/// and `passive` count as one clause here, and clauses of a search are not copied to a campaign without one.
 ///
 /// A base that does not exist is left for resolution to report.
 pub(super) fn inherit(file: &mut File, diagnostics: &mut Vec<Diagnostic>) {

@@ -171,7 +171,8 @@ impl Resolver<'_> {
 
     /// A percentage as a probability: the float nearest to what is written.
     ///
-    /// Dividing the nearest float by 100 would round twice, and a fifth of all probabilities could not be written at all.
+    /// Dividing the nearest float by 100 would round twice, and a fifth of all probabilities could not be written at
+    /// all.
     pub(super) fn probability(&self, quantity: &Quantity, percentage: f64) -> f64 {
         let exact = match &quantity.unit {
             Some(unit) if unit.text == "%" => hundredth(self.text(quantity.span).trim_end_matches('%').trim_end()),

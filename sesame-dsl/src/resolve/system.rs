@@ -93,8 +93,8 @@ impl<'a> Resolver<'a> {
         self.step(step?)
     }
 
-    /// The program and each argument are texts of their own. A path with spaces must begin like `./my robots/`, so that a
-    /// whole command line in one text is recognised.
+    /// The program and each argument are texts of their own. A path with spaces must begin like `./my robots/`, so that
+    /// a whole command line in one text is recognised.
     pub(super) fn program(&mut self, program: &ast::Text) -> Option<String> {
         if program.text.trim().is_empty() {
             return None;

@@ -1,7 +1,7 @@
 //! What a file says, before names mean anything: the grammar's constructs with their spans and doc comments.
 //!
-//! A construct with a syntax error is not here; but the name it was about to declare is kept in [`File::undeclared`], and the
-//! block around it is marked as one with errors, so that one mistake does not look like several.
+//! A construct with a syntax error is not here; but the name it was about to declare is kept in [`File::undeclared`],
+//! and the block around it is marked as one with errors, so that one mistake does not look like several.
 
 mod campaign;
 pub(crate) mod eddi;

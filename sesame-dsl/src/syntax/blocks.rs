@@ -1,7 +1,7 @@
 //! The blocks of the grammar and their members, as one table.
 //!
-//! The parser reads a block by its row. A message about a syntax error takes from it what can stand at a place and which
-//! word was probably meant. A new block is its rules in the grammar and a row here.
+//! The parser reads a block by its row. A message about a syntax error takes from it what can stand at a place and
+//! which word was probably meant. A new block is its rules in the grammar and a row here.
 
 use sesame_grammar::Rule;
 

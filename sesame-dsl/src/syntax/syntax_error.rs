@@ -1,8 +1,8 @@
 //! What is wrong where the grammar gave up, in words.
 //!
-//! pest reports only the first failure of a parse and speaks in rule names. So each swallowed stretch is read once more,
-//! by the rule its first word asks for, or as the continuation of the construct before it; the furthest failure of that
-//! reading is the mistake, and the rules it names are what would fit.
+//! pest reports only the first failure of a parse and speaks in rule names. So each swallowed stretch is read once
+//! more, by the rule its first word asks for, or as the continuation of the construct before it; the furthest failure
+//! of that reading is the mistake, and the rules it names are what would fit.
 
 use pest::error::{ErrorVariant, InputLocation};
 use sesame_grammar::Rule;

@@ -1,9 +1,9 @@
 //! Which requirement the next test targets: a bandit over requirements.
 //!
-//! The reward of a test is the share of its target's lowest margin that it removed, whatever the requirement's unit: 0.75
-//! for lowering it from 20 to 5, 1 for the first violation, 0 for no progress. The bandit chooses by the mean reward of the
-//! latest tests of each requirement, with a bonus for those that were seldom chosen: UCB1 [Auer et al. 2002] over a sliding
-//! window.
+//! The reward of a test is the share of its target's lowest margin that it removed, whatever the requirement's unit:
+//! 0.75 for lowering it from 20 to 5, 1 for the first violation, 0 for no progress. The bandit chooses by the mean
+//! reward of the latest tests of each requirement, with a bonus for those that were seldom chosen: UCB1 [Auer et al.
+//! 2002] over a sliding window.
 
 use super::Margin;
 
@@ -35,8 +35,8 @@ impl Bandit {
         Bandit { arms: vec![Arm::default(); requirements] }
     }
 
-    /// The requirement that the next test targets: one that is not violated yet, as long as there is one; of equally good
-    /// ones, the first. `pending` has the number of tests per requirement that are asked for and not told yet.
+    /// The requirement that the next test targets: one that is not violated yet, as long as there is one; of equally
+    /// good ones, the first. `pending` has the number of tests per requirement that are asked for and not told yet.
     pub(super) fn choose(&self, pending: &[u32]) -> usize {
         let open = self.arms.iter().any(|arm| !arm.violated);
         let pulls = |at: usize| self.arms[at].pulls + pending[at];

@@ -1,8 +1,9 @@
-//! Gaussian process regression: the mean and the standard deviation of a value at a point, from a few dozen values elsewhere.
+//! Gaussian process regression: the mean and the standard deviation of a value at a point, from a few dozen values
+//! elsewhere.
 //!
-//! Ordinary kriging with a Matérn 5/2 correlation [Rasmussen and Williams 2006, sections 2.2 and 4.2]. Of points only their
-//! squared distances are known, in components with a weight each: variables of a vector, kinds of operations of a test.
-//! Weights and noise maximise the likelihood on a coarse grid, with a mild preference for equal weights.
+//! Ordinary kriging with a Matérn 5/2 correlation [Rasmussen and Williams 2006, sections 2.2 and 4.2]. Of points only
+//! their squared distances are known, in components with a weight each: variables of a vector, kinds of operations of a
+//! test. Weights and noise maximise the likelihood on a coarse grid, with a mild preference for equal weights.
 
 /// Squared distances between points, in components.
 #[derive(Debug, Clone)]
@@ -128,7 +129,8 @@ impl GaussianProcess {
         GaussianProcess { weights, noise, factor, alpha, beta, mean, variance, likelihood }
     }
 
-    /// The mean and standard deviation of the value at a point without noise, from its squared distances to each point in turn.
+    /// The mean and standard deviation of the value at a point without noise, from its squared distances to each point
+    /// in turn.
     pub(super) fn predict(&self, distances: &[f64]) -> (f64, f64) {
         let near: Vec<f64> =
             distances.chunks_exact(self.weights.len().max(1)).map(|of| correlation(&self.weights, of)).collect();

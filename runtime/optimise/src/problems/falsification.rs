@@ -2,17 +2,18 @@
 
 use crate::problems::transmission::{self, Transmission};
 
-/// A problem: margins of a vector of numbers in `0..=1`, one per requirement. A vector falsifies it when a margin is 0 or
-/// less.
+/// A problem: margins of a vector of numbers in `0..=1`, one per requirement. A vector falsifies it when a margin is 0
+/// or less.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FalsificationProblem {
     /// Three requirements over three variables, of which one alone can be violated, by 0.07 % of the box. Figures:
     /// Peltomäki and Porres 2022, "Falsification of Multiple Requirements for Cyber-Physical Systems Using Online
     /// Generative Adversarial Networks and Multi-Armed Bandits".
     Mo3d,
-    /// Requirements `AT6a`, `AT6b` and `AT6c` of the automatic transmission of ARCH-COMP (Hoxha, Abbas and Fainekos 2014; Ernst
-    /// et al. 2021), each of which may be violated: throttle and brake are constant for 5 s each, twelve numbers for 30 s.
-    /// The published Simulink model is written anew as differential equations; see [`FalsificationProblem::margins`].
+    /// Requirements `AT6a`, `AT6b` and `AT6c` of the automatic transmission of ARCH-COMP (Hoxha, Abbas and Fainekos
+    /// 2014; Ernst et al. 2021), each of which may be violated: throttle and brake are constant for 5 s each, twelve
+    /// numbers for 30 s. The published Simulink model is written anew as differential equations; see
+    /// [`FalsificationProblem::margins`].
     Transmission,
 }
 
@@ -47,9 +48,9 @@ impl FalsificationProblem {
     /// `Σ ((x - 7)² - cos((x - 7)/2.75))`.
     ///
     /// at6abc: with `ω` the greatest engine speed within 30 s in rpm and `v(t)` the greatest vehicle speed up to `t`
-    /// seconds in miles per hour, the greater of `(ω - 3000)/4800` and `(limit - v(t))/125`, for a limit of 35 at 4 s, of
-    /// 50 at 8 s, and of 65 at 20 s. That is the robustness of "if the engine stays below 3000 rpm, the vehicle stays
-    /// below the limit until then", with both signals divided by the ends of their usual ranges.
+    /// seconds in miles per hour, the greater of `(ω - 3000)/4800` and `(limit - v(t))/125`, for a limit of 35 at 4 s,
+    /// of 50 at 8 s, and of 65 at 20 s. That is the robustness of "if the engine stays below 3000 rpm, the vehicle
+    /// stays below the limit until then", with both signals divided by the ends of their usual ranges.
     pub fn margins(self, x: &[f64]) -> Vec<f64> {
         assert!(x.len() == self.variables(), "a vector has as many numbers as its problem");
         match self {

@@ -74,8 +74,8 @@ impl Problem {
     }
 }
 
-/// DTLZ2 with any number of objectives, at least 2, of more variables than that: the front is the part of the unit sphere
-/// in which all objectives are positive.
+/// DTLZ2 with any number of objectives, at least 2, of more variables than that: the front is the part of the unit
+/// sphere in which all objectives are positive.
 pub fn dtlz2(x: &[f64], objectives: usize) -> Vec<f64> {
     let (angles, others) = x.split_at(objectives - 1);
     let radius = 1.0 + others.iter().map(|x| (x - 0.5) * (x - 0.5)).sum::<f64>();
@@ -106,8 +106,8 @@ pub fn approximate(problem: Problem, population: u32, evaluations: u32, seed: u6
     evolve(settings, problem.variables(), |x| problem.evaluate(x))
 }
 
-/// The objectives of the final population of a run of NSGA-III on [`dtlz2`] with the usual operators and nine variables more
-/// than objectives, as it is usually posed.
+/// The objectives of the final population of a run of NSGA-III on [`dtlz2`] with the usual operators and nine variables
+/// more than objectives, as it is usually posed.
 pub fn approximate_dtlz2(objectives: usize, population: u32, evaluations: u32, seed: u64) -> Vec<Vec<f64>> {
     let settings = Settings { population, evaluations, seed, survival: Survival::ReferencePoints };
     evolve(settings, objectives + 9, |x| dtlz2(x, objectives))

@@ -103,8 +103,8 @@ pub fn polynomial_mutation(x: f64, index: u32, stream: &mut Stream) -> f64 {
     (x + step).clamp(0.0, 1.0)
 }
 
-/// `base` to the whole power `n`, by squaring: multiplications alone are both exact enough and several times faster than
-/// a general power, which would be half of the cost of a whole benchmark.
+/// `base` to the whole power `n`, by squaring: multiplications alone are both exact enough and several times faster
+/// than a general power, which would be half of the cost of a whole benchmark.
 fn power(base: f64, n: u32) -> f64 {
     let (mut result, mut square, mut left) = (1.0, base, n);
     while left > 0 {

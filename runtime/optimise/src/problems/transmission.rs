@@ -1,15 +1,17 @@
 //! The automatic transmission of ARCH-COMP as differential equations: a car with four gears under throttle and brake.
 //!
-//! State: engine speed `n` in rpm, wheel speed `w` in rpm, gear. With the gear's ratio `r`, the speed ratio of the torque
-//! converter is `s = r · 3.23 w / n`; with its capacity `K(s)` and torque ratio `R(s)` from tables,
+//! State: engine speed `n` in rpm, wheel speed `w` in rpm, gear. With the gear's ratio `r`, the speed ratio of the
+//! torque converter is `s = r · 3.23 w / n`; with its capacity `K(s)` and torque ratio `R(s)` from tables,
 //!
-//! - `0.02199 dn/dt = T(throttle, n) - (n / K(s))²`, with the engine's torque `T` from a table, and `n` kept in 600 to 6000,
+//! - `0.02199 dn/dt = T(throttle, n) - (n / K(s))²`, with the engine's torque `T` from a table, and `n` kept in 600 to
+//!   6000,
 //! - `12.0941 dw/dt = 3.23 r R(s) (n / K(s))² - sign(w) (40 + 0.02 v² + brake)`, in ft·lb,
 //! - `v = 2π · 60/5280 · w`, in miles per hour.
 //!
 //! The gear goes up when `v` has been above a threshold of throttle and gear for 0.08 s, and down when below another.
-//! Tables and numbers are those of the published model (The `MathWorks`' demonstration, as ARCH-COMP uses it). Integrated by
-//! Heun's method in steps of 0.01 s, gears decided every 0.04 s; the original takes variable steps, so figures are ours.
+//! Tables and numbers are those of the published model (The `MathWorks`' demonstration, as ARCH-COMP uses it).
+//! Integrated by Heun's method in steps of 0.01 s, gears decided every 0.04 s; the original takes variable steps, so
+//! figures are ours.
 
 /// Pieces of 5 s of throttle and of brake.
 pub(super) const SEGMENTS: usize = 6;

@@ -49,8 +49,8 @@ impl SlidingMinimum {
         self.window.to.is_some()
     }
 
-    /// Tells the rest of the times whose windows are not empty, of a signal that ends here. A window that has an end is whole, and
-    /// told, or does not count.
+    /// Tells the rest of the times whose windows are not empty, of a signal that ends here. A window that has an end is
+    /// whole, and told, or does not count.
     pub(super) fn finish_whole(&mut self, end: i64, out: &mut VecDeque<Piece>) {
         if !self.is_bounded() {
             self.tell(end.saturating_sub(self.window.from), out);

@@ -320,7 +320,8 @@ proptest! {
         prop_assert_eq!(robustness(&formula, &trace, 1), naive(&stretched(&formula, 3.0), &finer));
     }
 
-    // The trace is cut where any of its samples may be the last one heard, and the rest of it is one of many continuations.
+    // The trace is cut where any of its samples may be the last one heard, and the rest of it is one of many
+    // continuations.
     #[test]
     fn no_continuation_leaves_the_reach(formula in any_formula(), trace in any_trace(), cut in 0..60i64) {
         let now = cut.min(trace.end);

@@ -90,8 +90,8 @@ struct Measured {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     runs: Vec<Measured>,
-    /// The point that all hypervolumes are measured from: of each objective its metric's name and the value in its unit.
-    /// Empty without objectives.
+    /// The point that all hypervolumes are measured from: of each objective its metric's name and the value in its
+    /// unit. Empty without objectives.
     pub reference: Vec<(String, f64)>,
     /// Whether coverage is compared: over the grid that was given, or over that of all campaigns, if it is one.
     pub covers: bool,
@@ -99,10 +99,10 @@ pub struct Comparison {
 
 /// Compares runs that have the same objectives.
 ///
-/// All hypervolumes are measured from one point: the one given, a value per objective in its unit, else of each objective
-/// the worst finite value in any test of any run. IGD⁺ is the distance to the joint front, the front of all tests of all
-/// runs, each objective divided by the range that this front has in it. Coverage is that of the given grid, where one test
-/// covers a cell, else of the campaigns' own if all have the same.
+/// All hypervolumes are measured from one point: the one given, a value per objective in its unit, else of each
+/// objective the worst finite value in any test of any run. IGD⁺ is the distance to the joint front, the front of all
+/// tests of all runs, each objective divided by the range that this front has in it. Coverage is that of the given
+/// grid, where one test covers a cell, else of the campaigns' own if all have the same.
 pub fn compare(runs: &[Run], reference: Option<&[f64]>, grid: Option<Grid>) -> Result<Comparison, CompareError> {
     let Some(first) = runs.first() else {
         return Ok(Comparison { runs: Vec::new(), reference: Vec::new(), covers: false });
@@ -338,8 +338,8 @@ impl Comparison {
         dataset
     }
 
-    /// A row for each ordered pair of runs: the share of the second one's front that the first one's covers, Zitzler and
-    /// Thiele's C: points that are equal to one of the first, or dominated by one.
+    /// A row for each ordered pair of runs: the share of the second one's front that the first one's covers, Zitzler
+    /// and Thiele's C: points that are equal to one of the first, or dominated by one.
     pub fn pairs(&self) -> Table {
         let mut dataset = Table::new(["first", "second", "c"].map(str::to_owned));
         for first in &self.runs {

@@ -28,8 +28,8 @@ pub struct ConfirmedTest {
     /// A value per objective by which the front takes the test, where the campaign confirms; `None` where too few
     /// repetitions have one.
     pub values: Option<Vec<f64>>,
-    /// Everything that its first run or a fresh one shows: violated requirements in the space's order, then a crash and a
-    /// timeout.
+    /// Everything that its first run or a fresh one shows: violated requirements in the space's order, then a crash and
+    /// a timeout.
     pub findings: Vec<FindingAgain>,
     /// The standing of its surest finding; `None` without findings, and if all fresh runs are inconclusive.
     pub standing: Option<Standing>,

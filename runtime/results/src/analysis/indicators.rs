@@ -47,8 +47,8 @@ pub struct Indicator {
 pub struct IndicatorAnalysis {
     /// By generation.
     pub generations: Vec<Indicator>,
-    /// The point hypervolumes are measured from: of each objective its metric's name and the value in its unit. Empty where
-    /// there is none.
+    /// The point hypervolumes are measured from: of each objective its metric's name and the value in its unit. Empty
+    /// where there is none.
     pub reference: Vec<(String, f64)>,
     /// Cells there are, where the campaign counts them.
     pub cells: Option<usize>,
@@ -68,7 +68,8 @@ struct Judged {
 /// there is one for each result set: of the front of its members.
 ///
 /// Hypervolumes are measured from the `reference` given, a value per objective in its unit; else from the one that was
-/// fixed while the campaign ran; else, of an imported campaign, from a point found in the same way among all of its tests.
+/// fixed while the campaign ran; else, of an imported campaign, from a point found in the same way among all of its
+/// tests.
 pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<IndicatorAnalysis, RecordError> {
     let plan = repository.plan();
     let objectives = &plan.campaign.objectives;

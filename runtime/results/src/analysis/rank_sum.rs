@@ -1,5 +1,5 @@
-//! Whether one group of runs tends to larger values than another: Mann and Whitney's U, and the effect size of Vargha and
-//! Delaney (2000).
+//! Whether one group of runs tends to larger values than another: Mann and Whitney's U, and the effect size of Vargha
+//! and Delaney (2000).
 
 /// Groups of together so many runs are tested exactly.
 const MOST_EXACT: usize = 60;
@@ -9,13 +9,13 @@ const MOST_EXACT: usize = 60;
 pub struct RankSum {
     /// Mann and Whitney's U of the first group: pairs in which its value is the larger one, ties counting half.
     pub u: f64,
-    /// Vargha and Delaney's A₁₂: the probability that a run of the first group has a larger value than one of the second,
-    /// ties counting half; one half is no difference.
+    /// Vargha and Delaney's A₁₂: the probability that a run of the first group has a larger value than one of the
+    /// second, ties counting half; one half is no difference.
     pub a12: f64,
     /// The two-sided probability of a U at least as far from its mean, if both groups come from one distribution.
     pub p: f64,
-    /// Whether `p` is exact, given the ties there are; else it is by the normal approximation, with correction for ties and
-    /// continuity.
+    /// Whether `p` is exact, given the ties there are; else it is by the normal approximation, with correction for ties
+    /// and continuity.
     pub exact: bool,
 }
 

@@ -19,8 +19,8 @@ pub(super) fn unsigned(row: &Row<'_>, column: usize) -> rusqlite::Result<u64> {
     u64::try_from(count).map_err(|_| rusqlite::Error::IntegralValueOutOfRange(column, count))
 }
 
-/// The five columns of a metric's value from `first` on: value, whether it was set, both ends of its reach, and when it read
-/// what was not finite.
+/// The five columns of a metric's value from `first` on: value, whether it was set, both ends of its reach, and when it
+/// read what was not finite.
 pub(super) fn metric_value(row: &Row<'_>, first: usize) -> rusqlite::Result<MetricValue> {
     Ok(MetricValue {
         value: perhaps_finite(row, first)?,
@@ -59,8 +59,8 @@ pub(super) fn position(row: &Row<'_>, column: usize) -> rusqlite::Result<usize> 
     usize::try_from(count).map_err(|_| rusqlite::Error::IntegralValueOutOfRange(column, i64::MAX))
 }
 
-/// What was chosen for a parameter, from the columns value, low, high, x, y, z and text that begin here; `None` where it
-/// is neither value, range, point nor text.
+/// What was chosen for a parameter, from the columns value, low, high, x, y, z and text that begin here; `None` where
+/// it is neither value, range, point nor text.
 pub(super) fn choice(row: &Row<'_>, first: usize) -> rusqlite::Result<Option<Choice>> {
     let number = |column: usize| perhaps_finite(row, first + column);
     let point = [number(3)?, number(4)?, number(5)?];

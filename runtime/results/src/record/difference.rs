@@ -16,9 +16,9 @@ pub struct Difference {
     pub after: String,
 }
 
-/// All that differs between two runs of a test of this plan, compared bit for bit: how they ended, what each operation did, and
-/// every metric with its series. Wall times and limits of wall time are not compared, nor are warnings, which follow
-/// from the rest.
+/// All that differs between two runs of a test of this plan, compared bit for bit: how they ended, what each operation
+/// did, and every metric with its series. Wall times and limits of wall time are not compared, nor are warnings, which
+/// follow from the rest.
 pub fn differences(plan: &CampaignPlan, test: &Test, before: &Observation, after: &Observation) -> Vec<Difference> {
     let mut found = Differences::default();
     found.compare("the outcome", &outcome(&before.outcome), &outcome(&after.outcome), Clone::clone);

@@ -69,7 +69,8 @@ const CONTENT: &[(&str, &str)] = &[
          standard_error FROM indicators ORDER BY generation",
     ),
     ("reference_point", "SELECT objective, metric, value FROM reference_point ORDER BY objective"),
-    // With another number of workers the campaign's own warnings may arrive in another order, so they are sorted by text.
+    // With another number of workers the campaign's own warnings may arrive in another order, so they are sorted by
+    // text.
     ("events", "SELECT test, text FROM events WHERE kind = 'warning' ORDER BY test, text"),
 ];
 
@@ -84,18 +85,18 @@ const PORTION: usize = 1 << 16;
 
 /// SHA-256 over the canonical content of a results repository, as 64 hexadecimal digits.
 ///
-/// Wall times and limits of wall time, hosts, processes, session notes, paths, and the order of writing are left out. The
-/// rest is hashed in the order of this module's list: for each table its name as a text, then its rows, then the byte
-/// `;`. A row is the byte `(` and the content of its columns: `N` for null, `I` and 8 bytes (little endian) for an integer,
-/// `F` and the 8 bytes of the IEEE 754 double (little endian, zero without sign), `T`, the length in bytes as 8 bytes (little
-/// endian) and the UTF-8 bytes for a text, `B`, the length likewise and the bytes for a blob. Everything is read from the
-/// file each time: no stored hash is used.
+/// Wall times and limits of wall time, hosts, processes, session notes, paths, and the order of writing are left out.
+/// The rest is hashed in the order of this module's list: for each table its name as a text, then its rows, then the
+/// byte `;`. A row is the byte `(` and the content of its columns: `N` for null, `I` and 8 bytes (little endian) for an
+/// integer, `F` and the 8 bytes of the IEEE 754 double (little endian, zero without sign), `T`, the length in bytes as
+/// 8 bytes (little endian) and the UTF-8 bytes for a text, `B`, the length likewise and the bytes for a blob.
+/// Everything is read from the file each time: no stored hash is used.
 ///
 /// The task of a run that is not the campaign is hashed with the plan, which it follows.
 ///
-/// Results of an earlier schema have the digest that their release computed. Names of columns and verdicts are not hashed,
-/// so the content of a run hashes the same in schemas 6 and 7, except for two things: the plan's JSON, and the outcome of a
-/// test without effect, which is `no_effect` in schema 7 and was `void` before.
+/// Results of an earlier schema have the digest that their release computed. Names of columns and verdicts are not
+/// hashed, so the content of a run hashes the same in schemas 6 and 7, except for two things: the plan's JSON, and the
+/// outcome of a test without effect, which is `no_effect` in schema 7 and was `void` before.
 pub(super) fn of_connection(connection: &Connection, version: i64) -> rusqlite::Result<String> {
     // One read transaction, so that a run writing meanwhile is seen at one point.
     let transaction = connection.unchecked_transaction()?;

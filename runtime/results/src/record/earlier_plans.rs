@@ -1,8 +1,8 @@
-//! Plans that earlier releases kept in their results, converted as they are read. The file keeps what it holds, and so its
-//! digest.
+//! Plans that earlier releases kept in their results, converted as they are read. The file keeps what it holds, and so
+//! its digest.
 //!
-//! In plans of schema 1, the commands `known` and `shrink` put what they did in the place of the campaign's search; since
-//! schema 2 this is a [`Task`] beside the plan.
+//! In plans of schema 1, the commands `known` and `shrink` put what they did in the place of the campaign's search;
+//! since schema 2 this is a [`Task`] beside the plan.
 
 use serde::Deserialize;
 use serde_json::{Value, json};

@@ -75,14 +75,15 @@ fn holds_nothing(folder: &Path) -> Result<bool, RecordError> {
 }
 
 /// The folder of the campaign's run whose results were written last, if there is any: the first of those that
-/// [`latest_unfinished`] goes through. Its name begins with its seed: what else was run on the side (regression tests, repetitions)
-/// is looked at when it is asked for.
+/// [`latest_unfinished`] goes through. Its name begins with its seed: what else was run on the side (regression tests,
+/// repetitions) is looked at when it is asked for.
 pub fn latest_folder(results: &Path) -> Result<Option<PathBuf>, RecordError> {
     Ok(latest_first(results)?.into_iter().next())
 }
 
-/// The folder of the campaign's run whose results were written last, of those that are not finished and that no process is
-/// writing, if there is any. Where all that are not finished are being written, the error names the process of the latest.
+/// The folder of the campaign's run whose results were written last, of those that are not finished and that no process
+/// is writing, if there is any. Where all that are not finished are being written, the error names the process of the
+/// latest.
 ///
 /// A run that was written later than it and cannot be read is an error: it may be the one that is meant.
 pub fn latest_unfinished(results: &Path) -> Result<Option<PathBuf>, RecordError> {
@@ -124,8 +125,8 @@ fn latest_first(results: &Path) -> Result<Vec<PathBuf>, RecordError> {
 
 /// When something was last written into the database of a folder, if there is one.
 ///
-/// While a run goes on, and after it was killed, what is new is in the log beside the database. An empty log says nothing:
-/// reading makes one.
+/// While a run goes on, and after it was killed, what is new is in the log beside the database. An empty log says
+/// nothing: reading makes one.
 fn written_at(folder: &Path) -> Option<SystemTime> {
     let written = |name: String| {
         let file = std::fs::metadata(folder.join(name)).ok()?;
@@ -179,7 +180,8 @@ impl Lock {
         Ok(Lock { file, path })
     }
 
-    /// Makes sure that the lock is still where others look for it. Somebody who removes the file lets another process in.
+    /// Makes sure that the lock is still where others look for it. Somebody who removes the file lets another process
+    /// in.
     pub(crate) fn check(&self) -> Result<(), RecordError> {
         let held = self.is_in_place().map_err(|e| RecordError::io("look at the lock", &self.path, e))?;
         if held { Ok(()) } else { Err(RecordError::LockLost { path: self.path.clone() }) }

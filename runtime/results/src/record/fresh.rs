@@ -1,7 +1,8 @@
 //! The verdict of a test that was run again with fresh seeds of the simulator.
 //!
-//! This is the only place that decides it, for requirements as for crashes and timeouts. Only fresh runs count: the run that
-//! selected the test was chosen for what it showed. An inconclusive fresh run speaks neither for nor against a finding.
+//! This is the only place that decides it, for requirements as for crashes and timeouts. Only fresh runs count: the run
+//! that selected the test was chosen for what it showed. An inconclusive fresh run speaks neither for nor against a
+//! finding.
 
 use serde::Serialize;
 
@@ -62,9 +63,10 @@ impl Tally {
 
     /// The verdict of the test, given that of its first run.
     ///
-    /// It violates the requirement if a fresh run does, and satisfies it if some fresh run satisfies it and none violates it.
-    /// If all fresh runs are inconclusive, a violation by the first run stands, since nothing speaks against it, but a
-    /// satisfied requirement becomes inconclusive. A test that was never run again has the verdict of its only run.
+    /// It violates the requirement if a fresh run does, and satisfies it if some fresh run satisfies it and none
+    /// violates it. If all fresh runs are inconclusive, a violation by the first run stands, since nothing speaks
+    /// against it, but a satisfied requirement becomes inconclusive. A test that was never run again has the verdict of
+    /// its only run.
     pub fn verdict(self, first: Verdict) -> Verdict {
         match self {
             Tally { violated: 1.., .. } => Verdict::Violated,

@@ -25,7 +25,8 @@ type Window = (Option<f64>, Option<f64>);
 /// Start condition, end condition, length and times of an activation by condition.
 type Conditions = (Option<String>, Option<String>, Option<f64>, Option<u32>);
 
-/// The longest wall time of a run that is believed, in seconds: thirty years, of which programs can still count multiples.
+/// The longest wall time of a run that is believed, in seconds: thirty years, of which programs can still count
+/// multiples.
 const LONGEST_RUN: f64 = 1e9;
 
 /// Which intervals of an operation a table has.
@@ -49,8 +50,8 @@ impl Repository {
         self.records(number..=number, true)?.pop().ok_or_else(missing)
     }
 
-    /// The tests whose numbers lie in this range, in their order. Without their time series, which are most of what there is
-    /// of a test, reading many at once takes a small part of the time that each takes by itself.
+    /// The tests whose numbers lie in this range, in their order. Without their time series, which are most of what
+    /// there is of a test, reading many at once takes a small part of the time that each takes by itself.
     pub fn records(&self, numbers: RangeInclusive<u32>, series: bool) -> Result<Vec<TestRecord>, RecordError> {
         let within = params![numbers.start(), numbers.end()];
         let heads = self.read(
@@ -125,10 +126,12 @@ impl Repository {
         Ok(records)
     }
 
-    /// The tests whose numbers lie in this range: all tables are in their order, so that they are gone through side by side.
+    /// The tests whose numbers lie in this range: all tables are in their order, so that they are gone through side by
+    /// side.
     fn rows(&self, numbers: RangeInclusive<u32>) -> Result<Vec<TestRow>, RecordError> {
         let failed = |error| RecordError::database("read the results", &self.path, error);
-        // One read transaction, so that a run writing meanwhile is seen at one point; there is one already within others.
+        // One read transaction, so that a run writing meanwhile is seen at one point; there is one already within
+        // others.
         let alone = self.connection.is_autocommit();
         let _transaction = alone.then(|| self.connection.unchecked_transaction()).transpose().map_err(failed)?;
         let damaged = |problem: String| RecordError::damaged(&self.path, problem);
@@ -333,7 +336,8 @@ impl Repository {
                 }))
             },
         )?;
-        // A run that could not report what its operations did has no effects; imported runs have effects without counts.
+        // A run that could not report what its operations did has no effects; imported runs have effects without
+        // counts.
         let mut effects: BTreeMap<u32, Vec<OperationEffect>> = BTreeMap::new();
         for row in rows {
             let of = counted.remove(&row.number).unwrap_or_default();

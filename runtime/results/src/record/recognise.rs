@@ -1,8 +1,9 @@
 //! Whether a database has the tables and views that this program makes.
 //!
-//! The file may come from anywhere, and SQLite executes what its schema says: a view with the name of a table can run for
-//! ever, and a trigger can change what is written. So each table and view is compared with the statement that creates it here,
-//! before it is queried. Anything else that users have added, such as an index or a view of their own, is left alone.
+//! The file may come from anywhere, and SQLite executes what its schema says: a view with the name of a table can run
+//! for ever, and a trigger can change what is written. So each table and view is compared with the statement that
+//! creates it here, before it is queried. Anything else that users have added, such as an index or a view of their own,
+//! is left alone.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -39,8 +40,8 @@ CREATE VIEW series AS
       FROM tests t JOIN change_points c ON c.test = coalesce(t.duplicate_of, t.number) JOIN metrics m ON m.id = c.metric;
 ";
 
-/// Checks all tables and views that do not depend on the campaign, and that there are no triggers. Results may be of any
-/// schema that this release reads.
+/// Checks all tables and views that do not depend on the campaign, and that there are no triggers. Results may be of
+/// any schema that this release reads.
 pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Result<(), RecordError> {
     static CURRENT: OnceLock<Objects> = OnceLock::new();
     static SCHEMA_6: OnceLock<Objects> = OnceLock::new();

@@ -229,8 +229,8 @@ impl Recorder {
             .map_err(|e| RecordError::database("record the coverage", &self.repository.path, e))
     }
 
-    /// Records the indicators after a generation, and the point that hypervolumes are measured from, oriented as a fitness
-    /// is, once there is one; what was recorded for the generation before is replaced.
+    /// Records the indicators after a generation, and the point that hypervolumes are measured from, oriented as a
+    /// fitness is, once there is one; what was recorded for the generation before is replaced.
     pub fn put_indicators(
         &mut self,
         indicators: &GenerationIndicators,

@@ -17,8 +17,9 @@ use crate::record::{
     Event, EventKind, MetricValue, RecordError, Recorder, Repetition, Repository, ScannedTest, Tally, TestRow, Verdict,
 };
 
-/// What the repetitions of a test say of its fitness, by the campaign's way to sum them up; `None` where the campaign does
-/// not confirm, or not all of its repetitions are there. Further ones, which a user asked for later, change nothing.
+/// What the repetitions of a test say of its fitness, by the campaign's way to sum them up; `None` where the campaign
+/// does not confirm, or not all of its repetitions are there. Further ones, which a user asked for later, change
+/// nothing.
 pub fn confirmed_fitness(plan: &CampaignPlan, repetitions: &[Repetition]) -> Option<Fitness> {
     let confirmation = plan.campaign.confirm?;
     let runs: Vec<Fitness> = own(plan, repetitions)?
@@ -104,8 +105,8 @@ impl Judge<'_> {
 }
 
 impl Recorder {
-    /// Records a repetition that has ended, of a test that was committed, and what its hooks warned of: all of it in one
-    /// transaction, or nothing.
+    /// Records a repetition that has ended, of a test that was committed, and what its hooks warned of: all of it in
+    /// one transaction, or nothing.
     pub fn put_repetition(&mut self, repetition: &Repetition, warnings: &[String]) -> Result<(), RecordError> {
         self.check_lock()?;
         let Repetition { test, position, simulator_seed, outcome, end, messages, values } = repetition;

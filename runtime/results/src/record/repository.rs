@@ -86,7 +86,8 @@ impl Repository {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
-    /// Makes the folder for traces, if it is missing. Returns the absolute path of the run's folder, for workers in other folders.
+    /// Makes the folder for traces, if it is missing. Returns the absolute path of the run's folder, for workers in
+    /// other folders.
     pub fn make_trace_folder(&self) -> Result<PathBuf, RecordError> {
         let traces = self.folder().join(TRACES);
         let made = std::fs::create_dir_all(&traces).and_then(|()| std::path::absolute(self.folder()));
@@ -115,16 +116,16 @@ impl Repository {
 
     /// SHA-256 over the canonical content of a results repository, as 64 hexadecimal digits.
     ///
-    /// Wall times and limits of wall time, hosts, processes, session notes, paths, and the order of writing are left out. The
-    /// rest is hashed in the order of this module's list: for each table its name as a text, then its rows, then the byte
-    /// `;`. A row is the byte `(` and the content of its columns: `N` for null, `I` and 8 bytes (little endian) for an integer,
-    /// `F` and the 8 bytes of the IEEE 754 double (little endian, zero without sign), `T`, the length in bytes as 8 bytes (little
-    /// endian) and the UTF-8 bytes for a text, `B`, the length likewise and the bytes for a blob. Everything is read from the
-    /// file each time: no stored hash is used.
+    /// Wall times and limits of wall time, hosts, processes, session notes, paths, and the order of writing are left
+    /// out. The rest is hashed in the order of this module's list: for each table its name as a text, then its rows,
+    /// then the byte `;`. A row is the byte `(` and the content of its columns: `N` for null, `I` and 8 bytes (little
+    /// endian) for an integer, `F` and the 8 bytes of the IEEE 754 double (little endian, zero without sign), `T`, the
+    /// length in bytes as 8 bytes (little endian) and the UTF-8 bytes for a text, `B`, the length likewise and the
+    /// bytes for a blob. Everything is read from the file each time: no stored hash is used.
     ///
-    /// Results of an earlier schema have the digest that their release computed. Names of columns and verdicts are not hashed,
-    /// so the content of a run hashes the same in schemas 6 and 7, except for two things: the plan's JSON, and the outcome of a
-    /// test without effect, which is `no_effect` in schema 7 and was `void` before.
+    /// Results of an earlier schema have the digest that their release computed. Names of columns and verdicts are not
+    /// hashed, so the content of a run hashes the same in schemas 6 and 7, except for two things: the plan's JSON, and
+    /// the outcome of a test without effect, which is `no_effect` in schema 7 and was `void` before.
     pub fn digest(&self) -> Result<String, RecordError> {
         super::digest::of_connection(&self.connection, self.schema)
             .map_err(|e| RecordError::database("read the results", &self.path, e))
@@ -141,8 +142,8 @@ impl Repository {
         self.read("SELECT number FROM tests ORDER BY number", [], |row| row.get(0))
     }
 
-    /// The number of the test that a user calls `T158`, `158`, by the name of a regression test or by its name before it was
-    /// imported, or `reference` (the first reference run).
+    /// The number of the test that a user calls `T158`, `158`, by the name of a regression test or by its name before
+    /// it was imported, or `reference` (the first reference run).
     pub fn find(&self, name: &str) -> Result<u32, RecordError> {
         let found = self.read(
             "SELECT min(number) FROM tests WHERE name = ?1 OR name = 'T' || ?1 OR known_test = ?1 \
@@ -174,8 +175,8 @@ impl Repository {
         Ok(sets)
     }
 
-    /// The sets of results in the same order, without their members but with how many there are: the fronts of thousands
-    /// of generations may have millions.
+    /// The sets of results in the same order, without their members but with how many there are: the fronts of
+    /// thousands of generations may have millions.
     pub fn result_set_sizes(&self) -> Result<Vec<(ResultSet, usize)>, RecordError> {
         self.read(
             "SELECT name, generation, status, coalesce((SELECT max(position) + 1 FROM result_set_members WHERE result_set = name), 0) \
@@ -250,8 +251,8 @@ impl Repository {
         )
     }
 
-    /// The point that the hypervolumes of [`Repository::indicators`] are measured from, a value per objective in its unit;
-    /// `None` where there is none.
+    /// The point that the hypervolumes of [`Repository::indicators`] are measured from, a value per objective in its
+    /// unit; `None` where there is none.
     pub fn reference_point(&self) -> Result<Option<Vec<f64>>, RecordError> {
         let point = self.read("SELECT value FROM reference_point ORDER BY objective", [], |row| finite(row, 0))?;
         let needed = self.plan().campaign.objectives.len();
@@ -303,7 +304,8 @@ impl Repository {
     }
 }
 
-/// The hash of the canonical content of the results in a run's folder, or of a results file, see [`Repository::digest`].
+/// The hash of the canonical content of the results in a run's folder, or of a results file, see
+/// [`Repository::digest`].
 pub fn digest(path: &Path) -> Result<String, RecordError> {
     Repository::open(path)?.digest()
 }

@@ -24,9 +24,9 @@ pub(crate) const APPLICATION_ID: i64 = 0x5345_534D;
 
 pub(super) const DDL: &str = include_str!("schema.sql");
 
-/// The first schema with the standard words for outcomes, verdicts and columns: `no_effect`, `satisfied`, `inconclusive`,
-/// `conclusive`, `operation_seed`. Before, these were `void`, `kept`, `unsaid`, `said` and `draw_seed`. Verdicts are only in
-/// views, which nothing here reads.
+/// The first schema with the standard words for outcomes, verdicts and columns: `no_effect`, `satisfied`,
+/// `inconclusive`, `conclusive`, `operation_seed`. Before, these were `void`, `kept`, `unsaid`, `said` and `draw_seed`.
+/// Verdicts are only in views, which nothing here reads.
 pub(super) const STANDARD_WORDS_SINCE: i64 = 7;
 
 /// The first schema with series in pieces; before, each point was a row.

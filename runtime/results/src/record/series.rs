@@ -1,7 +1,8 @@
-//! Time series as they are stored: in pieces of up to 64 points, 8 bytes a value, from which SQL can still read each point.
+//! Time series as they are stored: in pieces of up to 64 points, 8 bytes a value, from which SQL can still read each
+//! point.
 //!
-//! Series are most of what a campaign records: a row per point took three times the space, and ten times as long to read.
-//! The view `change_points` has such a row per point, computed from the pieces.
+//! Series are most of what a campaign records: a row per point took three times the space, and ten times as long to
+//! read. The view `change_points` has such a row per point, computed from the pieces.
 
 use rusqlite::{Transaction, params};
 
@@ -29,8 +30,8 @@ struct Piece {
     points: usize,
     /// When the first point is, and the length of a tick, in nanoseconds; `None` where times are doubles.
     clock: Option<(i64, i64)>,
-    /// Per point its ticks since the first one, big-endian, all of one width; nothing where they are 0, 1, 2, and so on. Where
-    /// there is no clock, its time as a double, big-endian.
+    /// Per point its ticks since the first one, big-endian, all of one width; nothing where they are 0, 1, 2, and so
+    /// on. Where there is no clock, its time as a double, big-endian.
     times: Vec<u8>,
     /// Per point its value as a double, big-endian.
     numbers: Vec<u8>,
@@ -180,7 +181,8 @@ mod tests {
         ]
     }
 
-    /// Times as a run has them: ascending whole steps, mostly of one length, here and there a gap; and times of any kind.
+    /// Times as a run has them: ascending whole steps, mostly of one length, here and there a gap; and times of any
+    /// kind.
     fn series() -> impl Strategy<Value = Vec<(f64, f64)>> {
         let steps = (0..3_000_000_000_i64, 1..40_000_000_i64, prop::collection::vec((0..20_i64, finite()), 0..200))
             .prop_map(|(start, step, points)| {

@@ -17,11 +17,11 @@ pub fn write_junit(repository: &Repository, path: &Path) -> Result<(), RecordErr
 
 /// A summary as a JUnit test suite.
 ///
-/// Each requirement is a test case: it fails if a test violates it, and is skipped with a reason if none does but some are
-/// inconclusive. Each expectation of a regression test is a test case: it fails if it is violated, and is an error if it is
-/// inconclusive. Each crash and each timeout is an error, and so is each test in which a metric read a number that was not
-/// finite. Tests that were run again count with the verdicts of their fresh runs: a finding of the first run that no fresh
-/// run shows is named, but fails nothing.
+/// Each requirement is a test case: it fails if a test violates it, and is skipped with a reason if none does but some
+/// are inconclusive. Each expectation of a regression test is a test case: it fails if it is violated, and is an error
+/// if it is inconclusive. Each crash and each timeout is an error, and so is each test in which a metric read a number
+/// that was not finite. Tests that were run again count with the verdicts of their fresh runs: a finding of the first
+/// run that no fresh run shows is named, but fails nothing.
 pub fn junit(summary: &Summary) -> String {
     let class = format!("{}.{}", summary.space, summary.campaign);
     let mut cases = Vec::new();

@@ -115,8 +115,8 @@ pub(crate) fn confirmation_sentence(tests: &[ConfirmedTest]) -> Option<String> {
     Some(sentence)
 }
 
-/// How many of these tests are confirmed, flaky and not confirmed, as in `4 confirmed, 1 flaky`; empty for tests without
-/// findings.
+/// How many of these tests are confirmed, flaky and not confirmed, as in `4 confirmed, 1 flaky`; empty for tests
+/// without findings.
 fn standings(tests: &[&ConfirmedTest]) -> String {
     let words = [Standing::Confirmed, Standing::Flaky, Standing::NotConfirmed].into_iter().filter_map(|standing| {
         let count = tests.iter().filter(|test| test.standing == Some(standing)).count();

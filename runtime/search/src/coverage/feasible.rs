@@ -23,17 +23,17 @@ const MARGIN: f64 = 1e-9;
 
 /// The cells of a grid that a test can reach whose run comes to its end.
 ///
-/// What is permitted is taken from the campaign: windows, shortest intervals, ranges and numbers of operations. For each
-/// way to make up a test, timing, intensity and counts do not constrain each other, so that a cell is reached if its
-/// part of each is:
+/// What is permitted is taken from the campaign: windows, shortest intervals, ranges and numbers of operations. For
+/// each way to make up a test, timing, intensity and counts do not constrain each other, so that a cell is reached if
+/// its part of each is:
 /// - an interval of length `l` has its midpoint at least `l / 2` from both ends of its window, so (T1, T2) of several
 ///   lie in a triangle, the mean of theirs;
 /// - inside a cell of T1 and T2, T3 takes all values between a least and a greatest;
 /// - P1 takes all values, and P2 all from 0 to a greatest that depends on P1;
 /// - whole-number parameters take the values they have.
 ///
-/// Copies of one operation whose windows may not overlap are at most as long together as one window; how else they are in
-/// each other's way is left out.
+/// Copies of one operation whose windows may not overlap are at most as long together as one window; how else they are
+/// in each other's way is left out.
 ///
 /// A cell that is only touched, in a point or along an edge, is not feasible: no test falls there but by chance of
 /// probability zero.
@@ -68,8 +68,8 @@ impl Feasible {
         self.reaches.iter().filter(|&&reaches| reaches).count()
     }
 
-    /// Whether exactly these cells are feasible. Otherwise no other cell is, but some of these may not be either: where a
-    /// cell needs several copies of one operation that must not be active at the same time; where
+    /// Whether exactly these cells are feasible. Otherwise no other cell is, but some of these may not be either: where
+    /// a cell needs several copies of one operation that must not be active at the same time; where
     /// T3 is asked for and midpoints in different windows cannot meet, or those windows are many; where P2 is asked for
     /// and only some parameters are whole numbers, or those are very many; or where there are very many kinds of
     /// operations.
@@ -289,8 +289,8 @@ impl Sectors {
         dimensions.iter().any(|dimension| self.axes.contains_key(dimension))
     }
 
-    /// The operations of a campaign that are active during the run; those that the grid cannot tell apart are one. Of each
-    /// kind beside it the operations that are of it.
+    /// The operations of a campaign that are active during the run; those that the grid cannot tell apart are one. Of
+    /// each kind beside it the operations that are of it.
     fn kinds(&self, plan: &CampaignPlan, test_space: &TestSpace) -> (Vec<KindOfOperation>, Vec<Vec<OperationId>>) {
         let timed = self.has(&[Dimension::T1, Dimension::T2, Dimension::T3]);
         let graded = self.has(&[Dimension::P1, Dimension::P2]);

@@ -21,8 +21,8 @@ pub(super) struct Spread {
 /// Vertices tried at most for one greatest spread; beyond, a bound stands in.
 const MOST_VERTICES: usize = 2_000;
 
-/// The extreme standard deviations of midpoints `m` with `|m - centre| <= reach` for each, the sum of those distances at
-/// most `budget`, and the mean of all in `low..=high`.
+/// The extreme standard deviations of midpoints `m` with `|m - centre| <= reach` for each, the sum of those distances
+/// at most `budget`, and the mean of all in `low..=high`.
 ///
 /// The variance is convex, so it is greatest at a vertex of the permitted set. Where the signs of the distances are
 /// given, that set is cut out of a box by the budget and one end of the mean: so at a vertex all midpoints but two at

@@ -1,9 +1,9 @@
 //! Coverage boosting [SESAME 2023, section 4.2.2]: some children are mutated until they lie in a cell that needs tests.
 //!
-//! A boosted child is made like every other. If it is not planned to fall into a cell with too few hits, it is mutated again,
-//! up to a number of tries; the first result that falls into such a cell is taken. If there is none, the child stays as it
-//! first was. The publication does not say what happens then; the original platform keeps the last try, which costs fitness
-//! and gains nothing.
+//! A boosted child is made like every other. If it is not planned to fall into a cell with too few hits, it is mutated
+//! again, up to a number of tries; the first result that falls into such a cell is taken. If there is none, the child
+//! stays as it first was. The publication does not say what happens then; the original platform keeps the last try,
+//! which costs fitness and gains nothing.
 //!
 //! A cell into which an earlier child of the same generation is planned to fall counts as hit already.
 

@@ -1,13 +1,13 @@
 //! Evolution that constructs tests for cells that need them.
 //!
-//! A share of each generation's tests, including the first, are changed as little as possible so that they lie in a feasible
-//! cell with too few hits. They are first made like every other test, by selection, crossover and mutation, so a constructed
-//! test descends from good parents and keeps of them what the cell leaves open. Of the cells that need tests the nearest is
-//! chosen, so that little is changed.
+//! A share of each generation's tests, including the first, are changed as little as possible so that they lie in a
+//! feasible cell with too few hits. They are first made like every other test, by selection, crossover and mutation, so
+//! a constructed test descends from good parents and keeps of them what the cell leaves open. Of the cells that need
+//! tests the nearest is chosen, so that little is changed.
 //!
-//! Two things can fail: a constructed test may miss its cell when it runs (no effect, or a run that broke off), or no test
-//! can be built. Cells with fewer failures come first. After three misses, or five attempts to build without success, each
-//! from another test, a cell is given up. The end of the search reports what was given up and why.
+//! Two things can fail: a constructed test may miss its cell when it runs (no effect, or a run that broke off), or no
+//! test can be built. Cells with fewer failures come first. After three misses, or five attempts to build without
+//! success, each from another test, a cell is given up. The end of the search reports what was given up and why.
 
 pub(crate) mod placement;
 

@@ -1,5 +1,5 @@
-//! MAP-Elites (Mouret and Clune 2015) for several objectives (Pierrot et al. 2022): each cell of the grid keeps the best
-//! tests that fell into it.
+//! MAP-Elites (Mouret and Clune 2015) for several objectives (Pierrot et al. 2022): each cell of the grid keeps the
+//! best tests that fell into it.
 //!
 //! The tests of a cell compete with each other only, so that the search goes on everywhere at once. Where one objective
 //! is sought a cell keeps one test; with several it keeps those that none of its others dominates, of many the ones

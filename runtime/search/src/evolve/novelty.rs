@@ -1,8 +1,9 @@
 //! Novelty as one objective more (Lehman and Stanley 2011; as a second objective, Mouret 2011).
 //!
-//! How novel a test is, is the mean distance [SESAME 2023, equation 1] of its point to those of its nearest neighbours among all
-//! tests so far. NSGA-II chooses its survivors by the campaign's objectives and by novelty together, so that tests unlike the
-//! others stay and breed. Nothing else knows of it: fronts, hypervolumes and results are those of the campaign's objectives.
+//! How novel a test is, is the mean distance [SESAME 2023, equation 1] of its point to those of its nearest neighbours
+//! among all tests so far. NSGA-II chooses its survivors by the campaign's objectives and by novelty together, so that
+//! tests unlike the others stay and breed. Nothing else knows of it: fronts, hypervolumes and results are those of the
+//! campaign's objectives.
 //!
 //! Up to 500 tests novelty is exact. Beyond that, tests nearer to an earlier one than a resolution are left out of the
 //! comparison, and the resolution grows as often as it has to: so what a test costs does not grow with their number.
@@ -123,7 +124,8 @@ impl Archive {
             && self.points.iter().any(|(_, other)| self.measure.distance(point, other) < self.resolution)
     }
 
-    /// The mean distance to the nearest points of other tests; to fewer where there are no more, and 0 where there are none.
+    /// The mean distance to the nearest points of other tests; to fewer where there are no more, and 0 where there are
+    /// none.
     fn novelty(&self, number: u32, point: &Point) -> f64 {
         let others = self.points.iter().filter(|(other, _)| *other != number);
         let mut distances: Vec<f64> = others.map(|(_, other)| self.measure.distance(point, other)).collect();

@@ -1,12 +1,13 @@
 //! Coverage by condition, by prediction.
 //!
-//! Where conditions switch operations, only a run shows when they are active, so a test cannot be placed in a cell. But most
-//! variables of conditions behave the same whether messages are disturbed or not. So a test's conditions are evaluated on the
-//! recorded values of earlier runs, which gives the intervals, and thus the cell, of the test. Of several candidates for a
-//! place in a generation the one that most probably falls into a cell that needs tests is taken.
+//! Where conditions switch operations, only a run shows when they are active, so a test cannot be placed in a cell. But
+//! most variables of conditions behave the same whether messages are disturbed or not. So a test's conditions are
+//! evaluated on the recorded values of earlier runs, which gives the intervals, and thus the cell, of the test. Of
+//! several candidates for a place in a generation the one that most probably falls into a cell that needs tests is
+//! taken.
 //!
-//! Each candidate is predicted from the reference run and from the runs of its parents. The credibility of these two sources
-//! is learned: the share of their predictions that came true, beginning at one half.
+//! Each candidate is predicted from the reference run and from the runs of its parents. The credibility of these two
+//! sources is learned: the share of their predictions that came true, beginning at one half.
 
 use std::collections::VecDeque;
 

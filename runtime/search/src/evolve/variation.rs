@@ -1,9 +1,10 @@
 //! Variation of tests: crossover of their lists of operations, mutation of single operations and of the list.
 //!
-//! A mutated operation draws with a new seed; one that a child has from a parent with that parent's, also if its window had
-//! to give way to another copy. Of copies that come to one child with equal seeds, the later gets a new one: two copies never
-//! draw alike. A child is never one of the tests
-//! asked before in the same campaign (apart from operation seeds), unless [`Rates::tries`] attempts to change it all fail.
+//! A mutated operation draws with a new seed; one that a child has from a parent with that parent's, also if its window
+//! had to give way to another copy. Of copies that come to one child with equal seeds, the later gets a new one: two
+//! copies never draw alike. A child is never one of the tests
+//! asked before in the same campaign (apart from operation seeds), unless [`Rates::tries`] attempts to change it all
+//! fail.
 //!
 //! # Rates
 //!
@@ -31,13 +32,13 @@
 //! # Rates by condition
 //!
 //! The paper's platform regrows a part of a condition in two of three operations and crosses conditions place by place;
-//! how often is best was measured on the same robots with conditions over two positions and a count of parts (population
-//! 10, 210 evaluations, 8 to 16 seeds). With the rates above and conditions that end activations, evolution comes to 0.79
-//! of chance: a condition says little about how long an operation is active, so selection runs into tests of one active
-//! step that hit nothing. Changing conditions twice as often (`window` 0.8) and regrowing half the time (`fresh` 0.5)
-//! gives 1.22; `fresh` 0.8 gives 1.03, and without `exchange` the rates above give 0.59. With lengths of 1 s to 15 s it
-//! gives 1.93. What remains is uneven: by end conditions 1.2 to 2.0 on three robots, and 0.7 on one where two operations
-//! have to meet in a short phase.
+//! how often is best was measured on the same robots with conditions over two positions and a count of parts
+//! (population 10, 210 evaluations, 8 to 16 seeds). With the rates above and conditions that end activations, evolution
+//! comes to 0.79 of chance: a condition says little about how long an operation is active, so selection runs into tests
+//! of one active step that hit nothing. Changing conditions twice as often (`window` 0.8) and regrowing half the time
+//! (`fresh` 0.5) gives 1.22; `fresh` 0.8 gives 1.03, and without `exchange` the rates above give 0.59. With lengths of
+//! 1 s to 15 s it gives 1.93. What remains is uneven: by end conditions 1.2 to 2.0 on three robots, and 0.7 on one
+//! where two operations have to meet in a short phase.
 
 use std::collections::BTreeSet;
 
@@ -56,18 +57,18 @@ use crate::space::test_space::{ActivationSpace, OperationSpace, TestSpace};
 pub struct Rates {
     /// Of each pair: that its lists are crossed.
     pub crossover: f64,
-    /// Of each two operations at the same place in the lists of a pair that was to be crossed: that their start conditions
-    /// exchange parts, and by a draw of their own their end conditions.
+    /// Of each two operations at the same place in the lists of a pair that was to be crossed: that their start
+    /// conditions exchange parts, and by a draw of their own their end conditions.
     pub exchange: f64,
     /// Of each operation: that its window changes, or one of its conditions, or its length.
     pub window: f64,
     /// Of each parameter of each operation: that it changes.
     pub parameter: f64,
-    /// Of each change of a window, length or parameter: that it is drawn anew instead of moved a little. Of each change of a
-    /// condition: that a part of it is grown anew, instead of one sign, number or variable changed.
+    /// Of each change of a window, length or parameter: that it is drawn anew instead of moved a little. Of each change
+    /// of a condition: that a part of it is grown anew, instead of one sign, number or variable changed.
     pub fresh: f64,
-    /// Of each operation: that a fresh instance of another operation takes its place and keeps its window or conditions,
-    /// as far as that is permitted there.
+    /// Of each operation: that a fresh instance of another operation takes its place and keeps its window or
+    /// conditions, as far as that is permitted there.
     pub retarget: f64,
     /// Of each test: that a fresh operation joins it.
     pub add: f64,
@@ -112,7 +113,8 @@ pub struct TestVariation {
     test_space: TestSpace,
     rates: Rates,
     seed: u64,
-    /// All tests made so far, by their [`key`]: whole they would be most of what a search of many tests holds in memory.
+    /// All tests made so far, by their [`key`]: whole they would be most of what a search of many tests holds in
+    /// memory.
     made: BTreeSet<[u64; 2]>,
 }
 
@@ -218,9 +220,9 @@ fn identity(test: &Test) -> Vec<Vec<u64>> {
     operations
 }
 
-/// One-point crossover of two lists: each is cut in two, and the tails are exchanged. The cuts are uniform over all that
-/// leave both children with a permitted number of operations and exchange neither nothing nor everything; `None` when
-/// there are none such. Copies of one operation that come together [settle](TestSpace::settle).
+/// One-point crossover of two lists: each is cut in two, and the tails are exchanged. The cuts are uniform over all
+/// that leave both children with a permitted number of operations and exchange neither nothing nor everything; `None`
+/// when there are none such. Copies of one operation that come together [settle](TestSpace::settle).
 pub(crate) fn crossover([a, b]: [&Test; 2], test_space: &TestSpace, stream: &mut Stream) -> Option<[Test; 2]> {
     let (a, b) = (&a.operations, &b.operations);
     let lengths = test_space.fewest()..=test_space.most();
@@ -245,8 +247,9 @@ pub(crate) fn crossover([a, b]: [&Test; 2], test_space: &TestSpace, stream: &mut
     }))
 }
 
-/// Exchanges parts of conditions between two tests, the children of a crossover or, where there was none, their parents;
-/// start conditions with start conditions, end conditions with end conditions. `None` where neither changed anything.
+/// Exchanges parts of conditions between two tests, the children of a crossover or, where there was none, their
+/// parents; start conditions with start conditions, end conditions with end conditions. `None` where neither changed
+/// anything.
 fn exchange_conditions(
     parents: [&Test; 2],
     crossed: Option<[Test; 2]>,
@@ -338,8 +341,8 @@ fn mutate_operation(
     }
 }
 
-/// Puts a fresh instance of another operation in an operation's place, with the same window or the same conditions where
-/// that one permits them.
+/// Puts a fresh instance of another operation in an operation's place, with the same window or the same conditions
+/// where that one permits them.
 fn retarget(operation: &mut TestOperation, kind: &OperationSpace, stream: &mut Stream) {
     let mut fresh = fresh_operation(kind, stream);
     match (&operation.activation, &kind.activation) {
@@ -373,8 +376,8 @@ fn change_somehow(operation: &mut TestOperation, test_space: &TestSpace, rates: 
     }
 }
 
-/// Changes a window, or one of what takes its place: a start condition, an end condition, a length, each alike; if there
-/// is one to choose.
+/// Changes a window, or one of what takes its place: a start condition, an end condition, a length, each alike; if
+/// there is one to choose.
 fn change_activation(operation: &mut TestOperation, test_space: &TestSpace, rates: &Rates, stream: &mut Stream) {
     let kind = kind_of(operation, test_space);
     match (&mut operation.activation, &kind.activation) {

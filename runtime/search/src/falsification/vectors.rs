@@ -1,8 +1,8 @@
 //! Campaigns whose tests are vectors: every test holds the same operations, each once and without a window, and chooses
 //! nothing but numbers.
 //!
-//! Operations before the start or after the end of a run make such campaigns: a test is then the numbers that they choose.
-//! As nothing is hit or missed in time, a process over these numbers foresees what a test does.
+//! Operations before the start or after the end of a run make such campaigns: a test is then the numbers that they
+//! choose. As nothing is hit or missed in time, a process over these numbers foresees what a test does.
 
 use sesame_plan::{Activation, Choice, Shape, Test, TestOperation};
 use sesame_rng::derive_seed;
@@ -47,8 +47,8 @@ impl Vectors {
         self.variables
     }
 
-    /// The test of a vector of the unit box, as long as there are [variables](Vectors::variables). `number` tells the draws
-    /// of tests apart.
+    /// The test of a vector of the unit box, as long as there are [variables](Vectors::variables). `number` tells the
+    /// draws of tests apart.
     pub(super) fn test(&self, vector: &[f64], number: u64) -> Test {
         assert!(vector.len() == self.variables, "a vector has as many numbers as a test chooses");
         let mut shares = vector.iter().copied();

@@ -9,9 +9,10 @@ use crate::space::parameter_space::ParameterSpace;
 use crate::space::range::Range;
 use crate::space::test_space::{ActivationSpace, TestSpace};
 
-/// The test of these numbers, given by the place of the choice: first how many operations there are and which, then of each
-/// in turn its window's length and place, and its parameters. Numbers that are uniform and independent give the distribution
-/// of [random tests](crate::space::initial). By condition there are no such choices: it is for campaigns by time.
+/// The test of these numbers, given by the place of the choice: first how many operations there are and which, then of
+/// each in turn its window's length and place, and its parameters. Numbers that are uniform and independent give the
+/// distribution of [random tests](crate::space::initial). By condition there are no such choices: it is for campaigns
+/// by time.
 pub(super) fn decoded(test_space: &TestSpace, seed: u64, index: u32, mut number: impl FnMut(usize) -> f64) -> Test {
     let mut next = 0;
     let mut value = || {

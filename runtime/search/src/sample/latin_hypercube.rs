@@ -1,8 +1,8 @@
 //! Latin hypercube sampling (`McKay` et al. 1979): tests spread evenly over each of their choices.
 //!
 //! A baseline like random tests, only that nothing is left to luck along a single choice: of n tests, one has its first
-//! window's length in the shortest n-th part of all lengths, one in the next, and so on; likewise for every other choice
-//! of every operation. Campaigns by condition have no such choices and are not sampled so.
+//! window's length in the shortest n-th part of all lengths, one in the next, and so on; likewise for every other
+//! choice of every operation. Campaigns by condition have no such choices and are not sampled so.
 
 use sesame_plan::Test;
 use sesame_rng::{Stream, derive_seed, keyed_unit};

@@ -7,8 +7,8 @@ use crate::sample::sampled_search::Sampling;
 use crate::space::initial::fresh_test;
 use crate::space::test_space::TestSpace;
 
-/// Independent fresh tests. The nth depends on the seed and n alone, and is the nth of generation 0 of an NSGA-II with the
-/// same seed.
+/// Independent fresh tests. The nth depends on the seed and n alone, and is the nth of generation 0 of an NSGA-II with
+/// the same seed.
 #[derive(Debug, Clone)]
 pub(crate) struct Random {
     test_space: TestSpace,

@@ -78,8 +78,8 @@ impl ShrinkAxis {
         count((to - from).abs() / step)
     }
 
-    /// The test with the axis shrunk by so many steps, from 1 to [`ShrinkAxis::steps`]; the last one is shorter where they do
-    /// not come out even.
+    /// The test with the axis shrunk by so many steps, from 1 to [`ShrinkAxis::steps`]; the last one is shorter where
+    /// they do not come out even.
     pub(super) fn shrink_along(self, space: &ShrinkSpace, test: &Test, steps: u32) -> Test {
         let mut shrunk = test.clone();
         let Some((from, to, step)) = self.bounds(space, test) else { return shrunk };

@@ -1,8 +1,8 @@
 //! The reduction of a test, as a function of which tests are known to fail.
 //!
-//! It is written as if an oracle knew every answer. If an answer is missing, the reduction stops and returns the tests that
-//! have to be run; with their results it starts again from the beginning, and gets further. So it has no state between two
-//! questions, and a resumed reduction is the same reduction.
+//! It is written as if an oracle knew every answer. If an answer is missing, the reduction stops and returns the tests
+//! that have to be run; with their results it starts again from the beginning, and gets further. So it has no state
+//! between two questions, and a resumed reduction is the same reduction.
 
 use sesame_plan::Test;
 
@@ -28,8 +28,8 @@ pub(super) struct Pending {
 /// The result of a reduction.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Reduced {
-    /// Indices of the tests that were accepted, in their order; the last one is the smallest. Empty if the original test
-    /// does not fail.
+    /// Indices of the tests that were accepted, in their order; the last one is the smallest. Empty if the original
+    /// test does not fail.
     pub(super) accepted: Vec<usize>,
     /// Whether every smaller test that is one step away was run and does not fail.
     pub(super) minimal: bool,
@@ -110,8 +110,8 @@ impl<A: Oracle> Reduction<'_, A> {
         Ok(Some(at))
     }
 
-    /// Delta debugging (Zeller and Hildebrandt 2002, ddmin): parts of the operations alone, then all but a part, in ever
-    /// smaller parts.
+    /// Delta debugging (Zeller and Hildebrandt 2002, ddmin): parts of the operations alone, then all but a part, in
+    /// ever smaller parts.
     fn fewer_operations(&mut self) -> Result<(), Pending> {
         let mut parts = 2;
         loop {
@@ -215,8 +215,8 @@ impl<A: Oracle> Reduction<'_, A> {
         tests.collect()
     }
 
-    /// Tries every single step. If one of these tests fails, it is accepted, and the result is true; if none does, the test
-    /// is minimal.
+    /// Tries every single step. If one of these tests fails, it is accepted, and the result is true; if none does, the
+    /// test is minimal.
     fn single_steps(&mut self) -> Result<bool, Pending> {
         let mut tests = Vec::new();
         if self.test.operations.len() > self.space.fewest {

@@ -133,8 +133,8 @@ impl ShrinkSpace {
         }
     }
 
-    /// Simpler conditions of an operation: each `and` or `or` gives way to one of its sides. What the campaign demands of
-    /// conditions they keep, if the operation's own keep it.
+    /// Simpler conditions of an operation: each `and` or `or` gives way to one of its sides. What the campaign demands
+    /// of conditions they keep, if the operation's own keep it.
     pub(super) fn simpler(&self, used: &TestOperation) -> Vec<Activation> {
         let constraints = &self.bounds(used.operation).constraints;
         let may_start = |condition: &Condition| self.allows(condition, constraints);
@@ -217,9 +217,10 @@ fn neutral_value(kind: &OperationKind, parameter: &str) -> Option<f64> {
     }
 }
 
-/// How strong a test is: the sum over its operations, of which each counts from 0 to 1. An operation counts the mean, over
-/// its numbers, of how far each is from where it is mildest, as a share of how far it may be; of a sub-range the end counts
-/// that is farther away, and where no number is milder than another its width. One without such a number counts 1.
+/// How strong a test is: the sum over its operations, of which each counts from 0 to 1. An operation counts the mean,
+/// over its numbers, of how far each is from where it is mildest, as a share of how far it may be; of a sub-range the
+/// end counts that is farther away, and where no number is milder than another its width. One without such a number
+/// counts 1.
 pub fn strength(plan: &CampaignPlan, test: &Test) -> f64 {
     test.operations.iter().map(|used| strength_of(plan, used)).sum()
 }

@@ -1,20 +1,20 @@
 //! Windows of copies of one operation that are never active at the same time.
 //!
 //! Windows of `k` copies are disjoint (one may begin where another ends), each at least as long as a window of the
-//! operation has to be, all inside what is permitted. Two functions make them, and both are continuous in the windows they
-//! begin with as long as those keep their order:
+//! operation has to be, all inside what is permitted. Two functions make them, and both are continuous in the windows
+//! they begin with as long as those keep their order:
 //!
-//! - [`spread`] makes fresh windows of independent ones. All disjoint windows are equally likely then: of `k` windows the
-//!   `2k` ends are independent uniform numbers but for their order, so their ends are sorted and paired. No copy is
+//! - [`spread`] makes fresh windows of independent ones. All disjoint windows are equally likely then: of `k` windows
+//!   the `2k` ends are independent uniform numbers but for their order, so their ends are sorted and paired. No copy is
 //!   likelier to be late or short than another.
-//! - [`nearest`] moves given windows apart, as little as may be: among all disjoint windows in the order of the given ones'
-//!   midpoints it takes those whose ends are nearest to the given ends, by the sum of squares. Two that overlap meet in the
-//!   middle of what they shared; what is disjoint already stays as it is, to the last bit.
+//! - [`nearest`] moves given windows apart, as little as may be: among all disjoint windows in the order of the given
+//!   ones' midpoints it takes those whose ends are nearest to the given ends, by the sum of squares. Two that overlap
+//!   meet in the middle of what they shared; what is disjoint already stays as it is, to the last bit.
 
 use crate::space::range::Range;
 
-/// At most so many copies are in one test: as short as they may be, they fill half of what is permitted. So there is always
-/// room to move.
+/// At most so many copies are in one test: as short as they may be, they fill half of what is permitted. So there is
+/// always room to move.
 pub(crate) const MOST_APART: usize = 500;
 
 /// Windows that are uniform over all disjoint ones, of independent [windows](Range::interval) that are uniform each.
@@ -74,7 +74,8 @@ fn by_midpoint(windows: &[(f64, f64)]) -> Vec<usize> {
     order
 }
 
-/// Gives windows, in this order, these rising ends, which count from the permitted beginning without the shortest lengths.
+/// Gives windows, in this order, these rising ends, which count from the permitted beginning without the shortest
+/// lengths.
 fn place(permitted: Range, windows: &mut [(f64, f64)], order: &[usize], ends: &[f64]) {
     let Range { low, high, shortest, .. } = permitted;
     let mut free = low;

@@ -46,9 +46,9 @@ pub(crate) fn contains(condition: &Condition, constraint: &Constraint) -> bool {
     })
 }
 
-/// A fresh condition; `None` when so many tries give none that is allowed. Its number of levels is uniform over what the
-/// campaign allows, as far as conditions of these levels are allowed (ramped growth): every inner part has one branch as
-/// deep as it can be, and one of any depth below that.
+/// A fresh condition; `None` when so many tries give none that is allowed. Its number of levels is uniform over what
+/// the campaign allows, as far as conditions of these levels are allowed (ramped growth): every inner part has one
+/// branch as deep as it can be, and one of any depth below that.
 pub(crate) fn grown(space: &ConditionSpace, constraints: &[Constraint], stream: &mut Stream) -> Option<Condition> {
     if space.variables.is_empty() || space.depth == 0 {
         return None;
@@ -247,8 +247,8 @@ fn nth_comparison(condition: &mut Condition, at: usize) -> &mut Condition {
     }
 }
 
-/// What tells conditions apart, as numbers: the order of operands of `and` and `or` and their grouping do not, and neither
-/// does the way round in which a comparison is written.
+/// What tells conditions apart, as numbers: the order of operands of `and` and `or` and their grouping do not, and
+/// neither does the way round in which a comparison is written.
 pub(crate) fn identity(condition: &Condition) -> Vec<u64> {
     let side = |operand: Operand| match operand {
         Operand::Variable(metric) => [0, u64::from(metric.0)],

@@ -1,17 +1,17 @@
-//! Fresh tests: what a random search is made of and an evolution begins with. Sobol and Latin hypercube tests are drawn the
-//! same way, along their own numbers.
+//! Fresh tests: what a random search is made of and an evolution begins with. Sobol and Latin hypercube tests are drawn
+//! the same way, along their own numbers.
 //!
 //! The kinds of a fresh test are the operations of the campaign, each included with its own probability; if none is,
 //! one of those with a probability above zero (or of all), each alike. Its length is uniform over what the campaign
-//! permits. In three of four tests, if there are more kinds than places, a random choice of them stays; if there are fewer,
-//! each has its place and the other places are filled with them at random. In the others each place is drawn for itself,
-//! so that every permitted list can come up. A test may hold an operation several times, then, with windows, parameters
-//! and draws of its own each time. Where each operation is there at most once, every test is of the first sort, and one
-//! with fewer kinds than places is shorter, as far as that is permitted.
+//! permits. In three of four tests, if there are more kinds than places, a random choice of them stays; if there are
+//! fewer, each has its place and the other places are filled with them at random. In the others each place is drawn for
+//! itself, so that every permitted list can come up. A test may hold an operation several times, then, with windows,
+//! parameters and draws of its own each time. Where each operation is there at most once, every test is of the first
+//! sort, and one with fewer kinds than places is shorter, as far as that is permitted.
 //!
-//! Windows and sub-ranges are uniform over all feasible pairs of ends, values uniform over their range; windows of copies
-//! that must not overlap are uniform over all [disjoint ones](crate::space::apart). The order of the list is random. Where
-//! conditions switch, start and end are grown independently, and lengths are uniform.
+//! Windows and sub-ranges are uniform over all feasible pairs of ends, values uniform over their range; windows of
+//! copies that must not overlap are uniform over all [disjoint ones](crate::space::apart). The order of the list is
+//! random. Where conditions switch, start and end are grown independently, and lengths are uniform.
 
 use sesame_plan::condition::ConditionEnd;
 use sesame_plan::{Activation, Copies, Test, TestOperation};
@@ -33,8 +33,8 @@ pub fn fresh_test(test_space: &TestSpace, stream: &mut Stream) -> Test {
     test
 }
 
-/// The kinds of operations of a fresh test, in their order, by numbers in `0..1`. Numbers that are uniform and independent
-/// give the distribution that the head of this module states.
+/// The kinds of operations of a fresh test, in their order, by numbers in `0..1`. Numbers that are uniform and
+/// independent give the distribution that the head of this module states.
 pub(crate) fn fresh_kinds<'a>(test_space: &'a TestSpace, number: &mut impl FnMut() -> f64) -> Vec<&'a OperationSpace> {
     let operations = test_space.operations();
     let (fewest, most) = (test_space.fewest(), test_space.most());

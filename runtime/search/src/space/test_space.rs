@@ -1,8 +1,8 @@
 //! The space of a campaign's tests: which operations, how many, when, and how strong.
 //!
 //! Every strategy draws from these tests and from no others. Single operations are made of what [`OperationSpace`]
-//! says; what holds of several copies of one operation, [`TestSpace::settle`] brings about in a test that was put together,
-//! and [`TestSpace::permits_copies`] tells:
+//! says; what holds of several copies of one operation, [`TestSpace::settle`] brings about in a test that was put
+//! together, and [`TestSpace::permits_copies`] tells:
 //!
 //! - no two copies have the same operation seed, so that each has random draws of its own;
 //! - [`Copies::Apart`], by time: their windows are disjoint;
@@ -172,10 +172,10 @@ impl TestSpace {
             })
     }
 
-    /// Makes the copies of each operation in a test what they have to be, and changes nothing else: too many copies leave
-    /// the test, each as likely as the others, and where too few operations remain fresh ones of other kinds come in;
-    /// windows are moved apart to the [nearest](apart::nearest) ones; a copy that draws like an earlier one gets an operation seed
-    /// of its own. A test that is permitted already stays as it is and takes nothing from the stream.
+    /// Makes the copies of each operation in a test what they have to be, and changes nothing else: too many copies
+    /// leave the test, each as likely as the others, and where too few operations remain fresh ones of other kinds come
+    /// in; windows are moved apart to the [nearest](apart::nearest) ones; a copy that draws like an earlier one gets an
+    /// operation seed of its own. A test that is permitted already stays as it is and takes nothing from the stream.
     pub fn settle(&self, test: &mut Test, stream: &mut Stream) {
         for kind in &self.operations {
             let mut copies = places_of(test, kind.operation);
@@ -260,8 +260,8 @@ fn places_of(test: &Test, operation: OperationId) -> Vec<usize> {
     (0..test.operations.len()).filter(|&at| test.operations[at].operation == operation).collect()
 }
 
-/// A start condition and an end condition that are permitted, if there are any. No seed decides them, since a campaign can
-/// be searched with every seed or with none.
+/// A start condition and an end condition that are permitted, if there are any. No seed decides them, since a campaign
+/// can be searched with every seed or with none.
 fn first_conditions(space: &ConditionSpace, constraints: &[Constraint]) -> Option<[Condition; 2]> {
     let first = |constraints: &[Constraint]| {
         (0..FIRST_TRIES).find_map(|at| grown(space, constraints, &mut Stream::derive(0, "first condition", &[at])))

@@ -6,7 +6,8 @@ use crate::space::parameter_space::ParameterSpace;
 use crate::space::test_space::{OperationSpace, TestSpace};
 use crate::sspr::{Class, Window, class_of};
 
-/// The least and the greatest value of a dimension over all tests that a campaign permits; `None` where no test has one.
+/// The least and the greatest value of a dimension over all tests that a campaign permits; `None` where no test has
+/// one.
 ///
 /// These are the ends of each dimension alone: not every combination of them can be had, which is what
 /// [`Feasible`](crate::coverage::Feasible) tells. Where conditions switch operations, any times inside their windows

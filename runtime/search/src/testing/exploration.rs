@@ -64,8 +64,8 @@ fn boosting_covers_cells_earlier_and_construction_nearly_at_once() {
 }
 
 /// Tests on the robot of two signals may hold copies that overlap, as the figures were measured so.
-/// With 81 seeds the ratios are 0.99, 1.09, 1.00 and 0.99. With fewer they scatter: nine seeds of one robot came to 0.78,
-/// so only all robots together are judged.
+/// With 81 seeds the ratios are 0.99, 1.09, 1.00 and 0.99. With fewer they scatter: nine seeds of one robot came to
+/// 0.78, so only all robots together are judged.
 #[test]
 fn construction_does_not_give_up_the_objectives() {
     let ratios = SYNTHETIC_ROBOTS.each_ref().map(|landscape| {

@@ -104,8 +104,8 @@ fn strategies_by_condition_draw_permitted_tests_only() {
     }
 }
 
-/// Also with more operations than places, where `random` repeated none, and `sobol` and `latin_hypercube` did in a quarter
-/// of their tests.
+/// Also with more operations than places, where `random` repeated none, and `sobol` and `latin_hypercube` did in a
+/// quarter of their tests.
 #[test]
 fn fresh_tests_hold_copies_as_often_whatever_draws_them() {
     let evaluations = 2_000;

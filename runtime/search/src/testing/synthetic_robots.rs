@@ -159,8 +159,8 @@ impl SyntheticRobot {
         Requirement { name: "R1".to_owned(), text: String::new(), metric: MetricId(1), bound }
     }
 
-    /// The same campaign with operations switched by conditions over where the robot is in its cycle: how far each of two
-    /// arms is out (which tells most phases, but none alone), and a count of what it has done.
+    /// The same campaign with operations switched by conditions over where the robot is in its cycle: how far each of
+    /// two arms is out (which tells most phases, but none alone), and a count of what it has done.
     pub fn plan_by_condition(&self, search: Search, end: ConditionEnd) -> CampaignPlan {
         let mut plan = self.plan(search);
         for name in ["reach", "turn", "parts"] {
@@ -343,8 +343,8 @@ mod tests {
         assert!(ratios.iter().all(|(_, ratio)| *ratio > 1.1), "{ratios:?}");
     }
 
-    /// On "joint bias" two signals must be out together: often none of the first ten tests hits anything, and evolution then
-    /// has only the active time to go by.
+    /// On "joint bias" two signals must be out together: often none of the first ten tests hits anything, and evolution
+    /// then has only the active time to go by.
     #[test]
     fn evolution_beats_chance_where_conditions_switch_and_one_signal_is_enough() {
         for landscape in [&SYNTHETIC_ROBOTS[0], &SYNTHETIC_ROBOTS[2], &SYNTHETIC_ROBOTS[3]] {

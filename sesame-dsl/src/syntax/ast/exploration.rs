@@ -20,8 +20,8 @@ pub(crate) struct CoverageAxis {
     pub(crate) cells: Count,
 }
 
-/// `boost fixed { … }`, `boost linear { … }`, `construct { … }`, `predict { … }` or `novelty { … }`, with the settings as
-/// written.
+/// `boost fixed { … }`, `boost linear { … }`, `construct { … }`, `predict { … }` or `novelty { … }`, with the settings
+/// as written.
 #[derive(Debug, Clone)]
 pub(crate) struct Exploration {
     pub(crate) span: Span,

@@ -23,8 +23,8 @@ pub(crate) enum FormulaKind {
     Plain(Expression),
 }
 
-/// A number, a point or a condition: which, is for resolution to find out. Chains are flat, so that its depth is that of
-/// its parentheses.
+/// A number, a point or a condition: which, is for resolution to find out. Chains are flat, so that its depth is that
+/// of its parentheses.
 #[derive(Debug)]
 pub(crate) struct Expression {
     pub(crate) kind: ExpressionKind,

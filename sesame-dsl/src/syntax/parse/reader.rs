@@ -49,7 +49,8 @@ pub(super) fn comparison(pair: &Pair<'_>) -> Option<Comparison> {
     })
 }
 
-/// Where a construct's last word ends. pest's own span goes on over the blanks before an optional part that is not there.
+/// Where a construct's last word ends. pest's own span goes on over the blanks before an optional part that is not
+/// there.
 fn end_of(pair: &Pair<'_>) -> usize {
     let last = pair.clone().into_inner().rfind(|inner| inner.as_rule() != Rule::COMMENT);
     match last {
@@ -183,7 +184,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Says that a construct belongs to a later version. Its first word decides where; its rule decides what it is called.
+    /// Says that a construct belongs to a later version. Its first word decides where; its rule decides what it is
+    /// called.
     pub(super) fn unsupported(&mut self, pair: &Pair<'_>) {
         let words = [Rule::k_node, Rule::k_parameter, Rule::kind_name];
         let span = first_of(pair, &words).map_or_else(|| self.keyword_span(pair), |word| self.span(&word));

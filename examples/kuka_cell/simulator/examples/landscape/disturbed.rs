@@ -1,5 +1,5 @@
-//! A run of the cell under joint jitter, and the requirements that it violated. Shared by the sweep beside it and by the
-//! crate's tests.
+//! A run of the cell under joint jitter, and the requirements that it violated. Shared by the sweep beside it and by
+//! the crate's tests.
 
 use kuka_cell_sim::arm::target_topic;
 use kuka_cell_sim::zones::zone_topic;

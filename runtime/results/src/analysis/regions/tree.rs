@@ -1,8 +1,9 @@
 //! A small decision tree over columns of numbers (CART; Breiman, Friedman, Olshen and Stone 1984).
 //!
-//! It guarantees: each split is the one of least Gini impurity among all that leave enough rows on both sides, the first
-//! in the order of columns and thresholds if several are; a split stays only if it is not a chance effect, by Fisher's exact test
-//! at 5 % over all questions that were weighed for it (Bonferroni); the same data give the same tree.
+//! It guarantees: each split is the one of least Gini impurity among all that leave enough rows on both sides, the
+//! first in the order of columns and thresholds if several are; a split stays only if it is not a chance effect, by
+//! Fisher's exact test at 5 % over all questions that were weighed for it (Bonferroni); the same data give the same
+//! tree.
 
 use crate::analysis::statistics::wilson;
 
@@ -14,8 +15,8 @@ pub(super) struct Columns {
     order: Vec<Vec<u32>>,
 }
 
-/// What is asked of a row: whether its number in a column is at most a threshold, or above it. Of a row without a number
-/// neither holds.
+/// What is asked of a row: whether its number in a column is at most a threshold, or above it. Of a row without a
+/// number neither holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Question {
     pub(super) column: usize,

@@ -37,8 +37,8 @@ struct Laid {
 
 impl Table {
     /// As text for a terminal: each line ends in a line feed and in no space, and the last column is wrapped where the
-    /// terminal is too narrow. Control characters are made visible, so that a message of a simulator cannot play with the
-    /// terminal. Pictures are left out.
+    /// terminal is too narrow. Control characters are made visible, so that a message of a simulator cannot play with
+    /// the terminal. Pictures are left out.
     pub fn text(&self, options: TextOptions) -> String {
         let shown = |(_, column): &(usize, &Column)| column.style != Style::Picture;
         let laid = self.columns.iter().enumerate().filter(shown).map(|(at, column)| {

@@ -45,8 +45,8 @@ fn a_run_that_was_killed_keeps_every_committed_test_and_can_be_resumed() {
     assert_eq!(repository.digest().unwrap(), whole, "going on gives what an unbroken run gives");
 }
 
-/// What a kill in the middle of a transaction without write-ahead log leaves behind, as the end of a run has it: half of
-/// the file overwritten, and a journal with what was there before. Gives the database.
+/// What a kill in the middle of a transaction without write-ahead log leaves behind, as the end of a run has it: half
+/// of the file overwritten, and a journal with what was there before. Gives the database.
 fn broken_off(folder: &Path, into: &Path, change: &str) -> std::path::PathBuf {
     let writer = Connection::open(folder.join(DATABASE)).unwrap();
     // With next to no memory pages are written before the commit.

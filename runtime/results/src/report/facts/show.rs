@@ -110,11 +110,11 @@ pub struct OperationReport {
     pub kind: String,
     /// The topic it disturbs; `None` for one that acts before the start or after the end.
     pub topic: Option<String>,
-    /// When it was to be active, in seconds; `None` where conditions decide that, and for one that acts before the start or
-    /// after the end.
+    /// When it was to be active, in seconds; `None` where conditions decide that, and for one that acts before the
+    /// start or after the end.
     pub planned: Option<Span>,
-    /// What switched it on and off, in the words of the language; `None` where a planned window did, and for one that acts
-    /// before the start or after the end.
+    /// What switched it on and off, in the words of the language; `None` where a planned window did, and for one that
+    /// acts before the start or after the end.
     pub conditions: Option<String>,
     /// When it was seen to be active, in seconds; `None` where the run could not report it.
     pub observed: Option<Vec<Span>>,

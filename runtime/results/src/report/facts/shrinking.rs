@@ -48,8 +48,8 @@ pub struct TestSize {
     pub operations: usize,
     /// The same in words.
     pub operations_text: String,
-    /// How long its operations were active in total, in seconds of simulation time, as observed; `None` where the run could
-    /// not report it.
+    /// How long its operations were active in total, in seconds of simulation time, as observed; `None` where the run
+    /// could not report it.
     pub active_time: Option<f64>,
     /// P1 of its run: the mean of its parameters as shares of what is permitted.
     pub intensity: Option<f64>,

@@ -1,6 +1,7 @@
 //! Copies of one operation that acted at the same time: how many, and the sums of their choices.
 //!
-//! This is computed from the observed intervals. Where a campaign keeps copies apart, only regression tests can have any.
+//! This is computed from the observed intervals. Where a campaign keeps copies apart, only regression tests can have
+//! any.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -57,8 +58,8 @@ pub(crate) fn stacked_in(plan: &CampaignPlan, record: &TestRecord) -> Vec<Stacke
     stacked(plan, &record.test, &observed)
 }
 
-/// The operations of a test whose copies acted at the same time, in the plan's order. `observed` are the intervals of each
-/// operation of the test, as far as they are known.
+/// The operations of a test whose copies acted at the same time, in the plan's order. `observed` are the intervals of
+/// each operation of the test, as far as they are known.
 fn stacked(plan: &CampaignPlan, test: &Test, observed: &[&[Span]]) -> Vec<Stacked> {
     let mut copies: BTreeMap<OperationId, Vec<usize>> = BTreeMap::new();
     for (at, used) in test.operations.iter().enumerate().take(observed.len()) {

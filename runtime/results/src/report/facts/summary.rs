@@ -115,8 +115,8 @@ pub struct FrontTest {
     pub violates: Vec<String>,
 }
 
-/// The verdicts of a campaign's tests on a requirement. Duplicates and reference runs are not counted. The verdict of a test
-/// that was run again is that of its fresh runs, see [`Tally::verdict`](crate::record::Tally::verdict).
+/// The verdicts of a campaign's tests on a requirement. Duplicates and reference runs are not counted. The verdict of a
+/// test that was run again is that of its fresh runs, see [`Tally::verdict`](crate::record::Tally::verdict).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RequirementSummary {
     /// Its name.

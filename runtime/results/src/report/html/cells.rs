@@ -94,8 +94,8 @@ struct Place {
     hits: u64,
 }
 
-/// The map of the first two dimensions; a grid of one dimension is a row. What it needs to show others instead lies beside
-/// it, for the page's script.
+/// The map of the first two dimensions; a grid of one dimension is a row. What it needs to show others instead lies
+/// beside it, for the page's script.
 fn map(markup: &mut Markup, plan: &CampaignPlan, coverage: &CoverageSummary, drawn: &[u32]) {
     let axes = &coverage.axes;
     let [x, y] = [axes.first(), axes.get(1)];
@@ -150,8 +150,8 @@ fn map(markup: &mut Markup, plan: &CampaignPlan, coverage: &CoverageSummary, dra
 }
 
 /// All that the map can show, as JSON: axes; per metric that is of interest one way its name, unit and that way; which
-/// cells can be reached, as lengths of runs that begin with those that cannot; and per cell that was hit its number, its
-/// hits, and per metric the worst value with its test. The tests that have a timeline on the page are `drawn`.
+/// cells can be reached, as lengths of runs that begin with those that cannot; and per cell that was hit its number,
+/// its hits, and per metric the worst value with its test. The tests that have a timeline on the page are `drawn`.
 fn map_data(plan: &CampaignPlan, coverage: &CoverageSummary, drawn: &[u32]) -> String {
     let axes: Vec<Value> = coverage
         .axes

@@ -38,8 +38,8 @@ pub(crate) const TRACKING: [(f64, f64); 22] = [
 /// numbers.
 pub(crate) const BOOSTING: (f64, f64) = (110.0, 54.0);
 
-/// Whether a campaign counts the cells of the paper's Table 3, as it does: T1 in [0, 1] and T2 in [0, 0.5], 6 each, P1 in
-/// [0, 1], 3, covered by one test.
+/// Whether a campaign counts the cells of the paper's Table 3, as it does: T1 in [0, 1] and T2 in [0, 0.5], 6 each, P1
+/// in [0, 1], 3, covered by one test.
 pub(crate) fn is_published_grid(coverage: &CoverageSummary) -> bool {
     let axis = |dimension, high, cells| GridAxis { dimension, low: 0.0, high, cells };
     let published = [axis(Dimension::T1, 1.0, 6), axis(Dimension::T2, 0.5, 6), axis(Dimension::P1, 1.0, 3)];

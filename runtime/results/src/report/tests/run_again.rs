@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// The sample's campaign, which confirms by three runs each: some findings come again always, some sometimes, some never.
+/// The sample's campaign, which confirms by three runs each: some findings come again always, some sometimes, some
+/// never.
 fn confirmed() -> (tempfile::TempDir, Repository) {
     use sesame_base::observation::Outcome;
 
@@ -111,8 +112,8 @@ fn the_views_of_findings_agree_with_the_report() {
     assert_eq!(found, told);
 }
 
-/// The results of a test that violates R1 in exactly these of its runs, the first one and fresh ones; `None` is a crash at the
-/// very beginning.
+/// The results of a test that violates R1 in exactly these of its runs, the first one and fresh ones; `None` is a crash
+/// at the very beginning.
 fn run_again(first: bool, fresh: &[Option<bool>]) -> (tempfile::TempDir, Repository) {
     use sesame_base::observation::{MetricObservation, Outcome};
 

@@ -63,7 +63,8 @@ fn found(plan: &CampaignPlan, grid: &Grid, tests: u64) -> BTreeSet<usize> {
     cells
 }
 
-/// Whether a climber finds a test in a cell: it moves what a test chooses until the point's distance to the cell is none.
+/// Whether a climber finds a test in a cell: it moves what a test chooses until the point's distance to the cell is
+/// none.
 fn climbs_into(plan: &CampaignPlan, grid: &Grid, cell: usize) -> bool {
     let test_space = TestSpace::from_plan(plan).unwrap();
     let place = grid.place(cell);

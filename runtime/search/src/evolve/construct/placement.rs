@@ -1,23 +1,26 @@
 //! Construction of tests: the reduction of tests to points, inverted.
 //!
-//! Given a test and a cell, [`CellPlacer::place_in_cell`] changes the test as little as may be so that its point lies in the
-//! cell. The reduction throws away almost everything, so almost everything can stay: how many operations there are unless
-//! the cell counts them, the order of their windows, and of a sub-range its middle, as only its width is counted.
+//! Given a test and a cell, [`CellPlacer::place_in_cell`] changes the test as little as may be so that its point lies
+//! in the cell. The reduction throws away almost everything, so almost everything can stay: how many operations there
+//! are unless the cell counts them, the order of their windows, and of a sub-range its middle, as only its width is
+//! counted.
 //!
-//! 1. *Numbers of operations* (O0 to O3): operations are added, removed or replaced until all are as the cell wants them.
-//! 2. *Timing* (T1 to T3): midpoints first, since they decide how long windows can be. All are moved by one amount until
-//!    T1 is in the cell, and towards the middles of their windows until there is room for lengths as the cell wants them
-//!    (T2); then apart or together until T3 is. Lengths follow, moved by one amount until their mean is in the cell, each
-//!    between the shortest and what its midpoint leaves. What is permitted of midpoints is convex, and where they are
-//!    farthest apart is a vertex of it, as in the computation of feasible cells; so every spread up to that is found.
+//! 1. *Numbers of operations* (O0 to O3): operations are added, removed or replaced until all are as the cell wants
+//!    them.
+//! 2. *Timing* (T1 to T3): midpoints first, since they decide how long windows can be. All are moved by one amount
+//!    until T1 is in the cell, and towards the middles of their windows until there is room for lengths as the cell
+//!    wants them (T2); then apart or together until T3 is. Lengths follow, moved by one amount until their mean is in
+//!    the cell, each between the shortest and what its midpoint leaves. What is permitted of midpoints is convex, and
+//!    where they are farthest apart is a vertex of it, as in the computation of feasible cells; so every spread up to
+//!    that is found.
 //! 3. *Intensity* (P1, P2): likewise with the normalised parameters.
 //!
-//! Where copies of one operation must not be active at the same time, its window is divided among them first, in the order
-//! in which they are: each has a part to itself, and whatever is done inside of those is permitted.
+//! Where copies of one operation must not be active at the same time, its window is divided among them first, in the
+//! order in which they are: each has a part to itself, and whatever is done inside of those is permitted.
 //!
 //! Attempts begin at the test itself; then at what the computation of feasible cells says of the cell, the numbers of
-//! operations of each kind that reach it; the last ones at fresh tests. What comes out is reduced again and kept only if it
-//! lies in the cell, so whole numbers and rounding can cost an attempt but never put a test into another cell.
+//! operations of each kind that reach it; the last ones at fresh tests. What comes out is reduced again and kept only
+//! if it lies in the cell, so whole numbers and rounding can cost an attempt but never put a test into another cell.
 
 mod spread;
 
@@ -297,9 +300,9 @@ impl CellPlacer {
         windows.collect()
     }
 
-    /// Divides the windows of copies among them, in the order in which they lie. First where they are apart already; then
-    /// so that all but one have as much as the cell wants on the side on which it is; then evenly; then as it falls. False
-    /// where they are too many for that.
+    /// Divides the windows of copies among them, in the order in which they lie. First where they are apart already;
+    /// then so that all but one have as much as the cell wants on the side on which it is; then evenly; then as it
+    /// falls. False where they are too many for that.
     fn divide(
         &self,
         windows: &mut [Window],
@@ -382,8 +385,8 @@ impl CellPlacer {
         let n = windows.len() as f64;
         let anything = (f64::NEG_INFINITY, f64::INFINITY);
         let [t1, t2] = [Dimension::T1, Dimension::T2].map(|dimension| demands.of(dimension).unwrap_or(anything));
-        // The longer the intervals, the less room for their midpoints: lengths are as wanted if the midpoints are together
-        // no farther from the middles than this.
+        // The longer the intervals, the less room for their midpoints: lengths are as wanted if the midpoints are
+        // together no farther from the middles than this.
         let shortest = windows.iter().map(|it| it.shortest).sum::<f64>() / n;
         let width = windows.iter().map(|it| it.high - it.low).sum::<f64>() / n;
         let longest = t2.1.min(width);

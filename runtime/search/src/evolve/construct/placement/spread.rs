@@ -1,8 +1,8 @@
 //! Moving numbers, each inside its own bounds, until their mean and their spread are as wanted.
 //!
-//! What is permitted is a convex set: each number in its bounds, the mean in a range, and the distances of the numbers from
-//! the middles of their bounds together within a budget. So between two permitted places all are permitted, and the
-//! spread, which changes steadily on the way, takes every value between those at the ends. Spread as far as can be
+//! What is permitted is a convex set: each number in its bounds, the mean in a range, and the distances of the numbers
+//! from the middles of their bounds together within a budget. So between two permitted places all are permitted, and
+//! the spread, which changes steadily on the way, takes every value between those at the ends. Spread as far as can be
 //! numbers are at vertices of the set, so one is climbed to; as near to each other as can be where all meet.
 
 use sesame_rng::Stream;
@@ -67,8 +67,8 @@ const CLIMB: (usize, usize) = (6, 8);
 /// Moves of single numbers by a step, per number, to mend what rounding did.
 const MENDS: usize = 8;
 
-/// The members moved to where their mean and spread are as wanted, near to where they were; `None` where it was not found.
-/// The stream decides how far inside of what is wanted they end.
+/// The members moved to where their mean and spread are as wanted, near to where they were; `None` where it was not
+/// found. The stream decides how far inside of what is wanted they end.
 pub(super) fn place(members: &[Member], wanted: &Wanted, stream: &mut Stream) -> Option<Vec<f64>> {
     let inside = stream.uniform(DEEP.0, DEEP.1);
     let placed = settle(members, wanted, inside, stream)?;
@@ -143,8 +143,8 @@ impl<'a> FeasibleSet<'a> {
         self.members.iter().zip(numbers).map(|(it, number)| (number - it.middle()).abs()).sum()
     }
 
-    /// A permitted place near these numbers: moved alike until their mean is permitted, then towards the middle as far as
-    /// the budget demands.
+    /// A permitted place near these numbers: moved alike until their mean is permitted, then towards the middle as far
+    /// as the budget demands.
     fn nearest(&self, numbers: &[f64]) -> Vec<f64> {
         let moved = with_mean(self.members, numbers, mean(numbers).max(self.mean.0).min(self.mean.1));
         if self.spent(&moved) <= self.budget {
@@ -162,8 +162,8 @@ impl<'a> FeasibleSet<'a> {
         between(&self.middle, &moved, near)
     }
 
-    /// A permitted place whose spread is at least as great, climbed to from here and from random places; `None` where none
-    /// was found.
+    /// A permitted place whose spread is at least as great, climbed to from here and from random places; `None` where
+    /// none was found.
     fn apart(&self, from: &[f64], least: f64, stream: &mut Stream) -> Option<Vec<f64>> {
         let mut order: Vec<usize> = (0..self.members.len()).collect();
         order.sort_by(|&a, &b| self.members[a].middle().total_cmp(&self.members[b].middle()));
@@ -277,8 +277,8 @@ pub(super) fn with_mean(members: &[Member], now: &[f64], aim: f64) -> Vec<f64> {
     moved(f64::midpoint(low, high))
 }
 
-/// Puts numbers with steps onto them. Those without make up for it where they can; then single steps are taken, those that
-/// bring most, as long as one brings anything.
+/// Puts numbers with steps onto them. Those without make up for it where they can; then single steps are taken, those
+/// that bring most, as long as one brings anything.
 fn stepped(members: &[Member], placed: &[f64], wanted: &Wanted, inside: f64, stream: &mut Stream) -> Vec<f64> {
     let on_step = |it: &Member, step: f64, number: f64| it.clamp(it.low + libm::rint((number - it.low) / step) * step);
     let fixed: Vec<Member> = members

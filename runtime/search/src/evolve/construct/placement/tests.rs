@@ -119,8 +119,8 @@ fn witnessed(plan: &CampaignPlan, grid: &Grid, tests: u64) -> std::collections::
     cells
 }
 
-/// Of the cells that witnesses fall into, every so manieth: those for which no test could be built from five fresh ones, and
-/// how many were tried.
+/// Of the cells that witnesses fall into, every so manieth: those for which no test could be built from five fresh
+/// ones, and how many were tried.
 fn not_built(plan: &CampaignPlan, grid: &Grid, tests: u64, every: usize) -> (Vec<Vec<u32>>, usize, usize) {
     let test_space = TestSpace::from_plan(plan).unwrap();
     let feasible = Feasible::from_plan(plan, grid);
@@ -258,8 +258,8 @@ proptest! {
     #[test]
     fn what_is_constructed_is_permitted_and_lies_in_its_cell(plan in any_timed_plan(), seed: u64) {
         let grid = Grid::parse("T1:0:1:3,T2:0:1:3,P1:0:1:2,O0:0.5:4.5:2").unwrap();
-        // How many cells are reached is for the robots above: windows of a hundredth of a second beside some of a minute,
-        // and whole numbers, leave some a single way to be reached, which attempts need not find.
+        // How many cells are reached is for the robots above: windows of a hundredth of a second beside some of a
+        // minute, and whole numbers, leave some a single way to be reached, which attempts need not find.
         not_reached(&plan, &grid, seed);
     }
 }
