@@ -158,7 +158,7 @@ fn wholes() -> Vec<Whole> {
             asked = search.ask();
         }
         recorder.finish("nothing more to try").unwrap();
-        wholes.push(taken("made smaller", folder.path()));
+        wholes.push(taken("shrunk", folder.path()));
     }
     wholes
 }

@@ -148,6 +148,7 @@ impl Files {
         let (first, rest) = path.split_first()?;
         let base = match first.as_str() {
             "crate" => Module::new(),
+            "self" if rest.first().is_some_and(|part| part == "super") => return self.absolute(module, rest),
             "self" => module.clone(),
             "super" => module[..module.len().checked_sub(1)?].to_vec(),
             child => {
@@ -172,7 +173,7 @@ impl Files {
 
     /// The files that a file names.
     fn named_by(&self, module: &Module) -> BTreeSet<Module> {
-        let mut named = Named { paths: Vec::new() };
+        let mut named = Named { paths: Vec::new(), depth: 0 };
         named.visit_file(&self.sources[module]);
         let absolute = named.paths.iter().filter_map(|path| self.absolute(module, path));
         absolute.map(|path| self.file_of(&path, 0)).filter(|file| file != module).collect()
@@ -226,6 +227,17 @@ fn paths(tree: &syn::UseTree) -> Vec<Vec<String>> {
 /// Collects the paths that code names. A re-export is not a use.
 struct Named {
     paths: Vec<Vec<String>>,
+    /// How many modules inside the file are open: so many times `super` stays in the file.
+    depth: usize,
+}
+
+impl Named {
+    fn add(&mut self, path: Vec<String>) {
+        let ups = path.iter().take_while(|part| *part == "super").count().min(self.depth);
+        let inside = if ups > 0 { vec!["self".to_owned()] } else { Vec::new() };
+        // `self::super` is the file's own parent again.
+        self.paths.push([inside, path[ups..].to_vec()].concat());
+    }
 }
 
 impl<'ast> Visit<'ast> for Named {
@@ -246,15 +258,26 @@ impl<'ast> Visit<'ast> for Named {
         }
     }
 
+    fn visit_item_mod(&mut self, module: &'ast syn::ItemMod) {
+        self.depth += 1;
+        visit::visit_item_mod(self, module);
+        self.depth -= 1;
+    }
+
     fn visit_item_use(&mut self, used: &'ast syn::ItemUse) {
         if matches!(used.vis, syn::Visibility::Inherited) {
-            self.paths.extend(paths(&used.tree));
+            for path in paths(&used.tree) {
+                self.add(path);
+            }
         }
     }
 
+    /// `pub(in super)` says who may use a thing, and uses nothing.
+    fn visit_visibility(&mut self, _: &'ast syn::Visibility) {}
+
     fn visit_path(&mut self, path: &'ast syn::Path) {
         if path.segments.len() > 1 {
-            self.paths.push(path.segments.iter().map(|segment| segment.ident.to_string()).collect());
+            self.add(path.segments.iter().map(|segment| segment.ident.to_string()).collect());
         }
         visit::visit_path(self, path);
     }
@@ -291,7 +314,7 @@ fn a_circle_is_found_through_re_exports_and_not_through_tests() {
     };
     write("lib.rs", "mod a; mod b; mod c;");
     write("a.rs", "mod inner; pub use inner::Thing; pub fn of(_: crate::b::B) {}");
-    write("a/inner.rs", "pub struct Thing;");
+    write("a/inner.rs", "pub struct Thing; mod inside { use super::Thing; }");
     write("b.rs", "use crate::c::C; pub struct B(C);");
     write("c.rs", "pub struct C; #[cfg(test)] mod tests { use crate::a::of; }");
     let circles = || Files::read(folder.path()).circles();

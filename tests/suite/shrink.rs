@@ -1,4 +1,4 @@
-//! Violations that a campaign found, made smaller.
+//! Violations that a campaign found, shrunk.
 
 use std::fmt::Write as _;
 use std::process::Stdio;
@@ -87,7 +87,7 @@ fn violations_that_were_found_get_smaller_and_stay_violations() {
         let kept = way["fails"].as_str().unwrap().trim_start_matches("violates ").replace(" and ", ", ");
         assert!(kept.split(", ").all(|name| violated.contains(&name)), "{kept}: {violated:?}");
         block = way["block"].as_str().unwrap().to_owned();
-        assert!(std::fs::read_to_string(results.folder().join("report.html")).unwrap().contains("made smaller"));
+        assert!(std::fs::read_to_string(results.folder().join("report.html")).unwrap().contains("shrunk"));
     }
     println!("{table}");
 
@@ -116,11 +116,11 @@ fn violations_that_were_found_get_smaller_and_stay_violations() {
     let half = recorded();
     let resumed = runner.run(&["resume", &format!("killed/shrink-{test}")]).expect(0);
     assert!(recorded() > half && resumed.digest() == one);
-    assert!(resumed.out.contains("made smaller") && resumed.out.contains("The way there"), "{}", resumed.out);
+    assert!(resumed.out.contains("shrunk") && resumed.out.contains("Accepted steps"), "{}", resumed.out);
 
     // Nothing smaller is looked for where there is nothing to keep.
     let refused = runner.run(&["shrink", "T0", "--results", "found/42"]).expect(1);
-    assert!(refused.err.contains("T0 disturbs nothing"), "{}", refused.err);
+    assert!(refused.err.contains("T0 has no operations"), "{}", refused.err);
     let refused = runner.run(&["shrink", &test, "--results", "found/42", "--requirement", "R9"]).expect(1);
     assert!(refused.err.contains("does not violate `R9`; it violates "), "{}", refused.err);
     let few = shrunk(&runner, some, "few", &["--evaluations", "3", "--runs", "3"]);

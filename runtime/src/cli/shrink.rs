@@ -157,7 +157,7 @@ mod tests {
         assert_eq!(found("known_jitter", &[]), violation(&[0]));
         assert_eq!(found("known_jitter", &["R1"]), violation(&[0]));
         assert_eq!(found("known_jitter", &["R3"]), Err("T1 does not violate `R3`; it violates R1".to_owned()));
-        assert!(found("reference", &[]).unwrap_err().starts_with("T0 disturbs nothing"));
+        assert!(found("reference", &[]).unwrap_err().starts_with("T0 has no operations"));
         let folder = tempfile::tempdir().unwrap();
         let mut plan = sample::plan();
         plan.requirements[0].bound = sesame_plan::Bound::Below { value: 0.0 };

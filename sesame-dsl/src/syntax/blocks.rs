@@ -142,7 +142,7 @@ pub(super) const BLOCKS: &[Block] = &[
     Block::settings(
         Rule::process_settings,
         "process",
-        &[Member::new(Rule::setting_step, "step"), Member::new(Rule::free_running, "free running")],
+        &[Member::new(Rule::setting_step, "step"), Member::like(Rule::free_running, "free", "free running")],
     ),
     Block::settings(Rule::launch_settings, "launch", &[Member::like(Rule::ready, "ready", "ready when topic")]),
     Block::settings(

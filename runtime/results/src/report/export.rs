@@ -187,7 +187,7 @@ mod tests {
         let named = export(&repository, "T9", Some("worst")).unwrap();
         assert!(named.block.contains("\ntest worst {\n"), "{}", named.block);
         let refused = export(&repository, "reference", None).unwrap_err();
-        assert!(refused.to_string().starts_with("T0 disturbs nothing"), "{refused}");
+        assert!(refused.to_string().starts_with("T0 is a reference run"), "{refused}");
     }
 
     #[test]

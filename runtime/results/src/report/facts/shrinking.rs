@@ -265,7 +265,7 @@ mod tests {
     use crate::record::{Origin, Recorder, TestRecord, sample};
     use crate::report::{TextOptions, page, summary, summary_text};
 
-    /// A test of the sample campaign made smaller, as far as so many runs.
+    /// A test of the sample campaign, shrunk as far as so many runs.
     fn recorded(most: usize) -> (tempfile::TempDir, Repository) {
         let plan = sample::plan();
         let found = sample::records(&plan, 60);
