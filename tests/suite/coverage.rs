@@ -116,7 +116,7 @@ fn analyses_of_a_results_file_say_what_the_campaign_said() {
     assert!(refused(&["tests", "no/such/file"]).contains("no results here"));
     assert!(refused(&["coverage", "--dims", "T3", shown]).contains("no dimension T3"));
     assert!(refused(&["indicators", "--reference", "1,-2,3", shown]).contains("has 3 values for 2 objectives"));
-    assert!(refused(&["compare", shown]).contains("there is one run only"));
+    assert!(refused(&["compare", shown]).contains("there is only one run"));
     let nothing = refused(&["campaigns", tempfile::tempdir().unwrap().path().to_str().unwrap()]);
     assert!(nothing.contains("no results in"), "{nothing}");
 }

@@ -25,6 +25,7 @@ pub mod space;
 pub mod sspr;
 mod stop;
 mod strategy;
+pub mod test_key;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 

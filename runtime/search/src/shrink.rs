@@ -24,6 +24,7 @@ use sesame_base::verdict::fails;
 use sesame_plan::{CampaignPlan, Failing, Shrinking, Test};
 use sesame_rng::derive_seed;
 
+use crate::test_key::TestKey;
 use crate::{Candidate, Evaluated, Strategy};
 
 pub use space::{RESOLUTION, strength};
@@ -87,7 +88,7 @@ pub struct Shrink {
     left: u32,
     tried: Vec<Tried>,
     /// Positions among those tried, by content.
-    known: BTreeMap<String, usize>,
+    known: BTreeMap<TestKey, usize>,
     /// Position of the first test of the generation asked last.
     asked: usize,
     generation: u32,
@@ -161,14 +162,9 @@ impl Shrink {
 
 impl Oracle for Shrink {
     fn find(&self, test: &Test) -> Option<(usize, bool)> {
-        let &at = self.known.get(&content(test))?;
+        let &at = self.known.get(&TestKey::exact(test))?;
         Some((at, self.tried[at].failed? == self.runs))
     }
-}
-
-/// What tells tests apart.
-fn content(test: &Test) -> String {
-    serde_json::to_string(test).unwrap_or_else(|error| unreachable!("a test is plain data: {error}"))
 }
 
 impl Strategy for Shrink {
@@ -190,7 +186,7 @@ impl Strategy for Shrink {
         let mut candidates = Vec::with_capacity(tests.len() * self.runs as usize);
         for test in tests {
             self.left -= 1;
-            self.known.insert(content(&test), self.tried.len());
+            self.known.insert(TestKey::exact(&test), self.tried.len());
             let number = u32::try_from(self.tried.len()).unwrap_or(u32::MAX).saturating_mul(self.runs) + 1;
             self.tried.push(Tried { test: test.clone(), phase, base, failed: None, number });
             candidates.extend((0..self.runs).map(|run| Candidate {

@@ -1,15 +1,13 @@
 //! The tests of a campaign get their numbers, and a test that is equal to an earlier one is recognised.
 
-use std::collections::hash_map::Entry;
-use std::collections::{BTreeMap, HashMap};
-
-use sha2::{Digest as _, Sha256};
+use std::collections::BTreeMap;
 
 use sesame_base::observation::Observation;
 use sesame_plan::Test;
 use sesame_results::record::{Origin, TestRecord};
 use sesame_rng::derive_seed;
 use sesame_search::Candidate;
+use sesame_search::test_key::SeenTests;
 
 /// A test that has its number and is to be run.
 #[derive(Debug)]
@@ -112,28 +110,6 @@ impl Numbering {
         let number = self.next;
         self.next += 1;
         number
-    }
-}
-
-/// The tests of a campaign by their content, so that an equal one is not simulated again. Of each test its hash is
-/// kept: the tests themselves would be most of what a campaign holds in memory.
-#[derive(Debug, Default)]
-struct SeenTests(HashMap<[u8; 16], u32>);
-
-impl SeenTests {
-    /// The number of the first test equal to this one; if there is none, this one is remembered.
-    fn first_equal(&mut self, test: &Test, number: u32) -> Option<u32> {
-        let content = serde_json::to_vec(test).unwrap_or_else(|error| unreachable!("a test is plain data: {error}"));
-        // Half of a SHA-256: of 10^12 tests two have the same by chance once in 10^14 campaigns.
-        let mut hash = [0; 16];
-        hash.copy_from_slice(&Sha256::digest(content)[..16]);
-        match self.0.entry(hash) {
-            Entry::Occupied(first) => Some(*first.get()),
-            Entry::Vacant(place) => {
-                place.insert(number);
-                None
-            }
-        }
     }
 }
 

@@ -141,7 +141,7 @@ pub(super) fn claim_files(runner: &Runner, plan: &CampaignPlan) -> Result<Files,
     let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
     let (files, restored) = ChangedFiles::for_supervisor(&space, may_change)?;
     for path in restored {
-        say(format_args!("note: an earlier run was ended while {} was changed; it is put back", path.display()));
+        say(format_args!("note: an earlier run was ended while {} was changed; it has been restored", path.display()));
     }
     for operation in &plan.operations {
         for parameter in &operation.parameters {

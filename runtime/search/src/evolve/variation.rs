@@ -44,13 +44,14 @@ use std::collections::BTreeSet;
 
 use sesame_optimise::nsga2::{Child, Heritage, Variation};
 use sesame_plan::condition::{Condition, ConditionEnd, ConditionSpace, Constraint};
-use sesame_plan::{Activation, Choice, Test, TestOperation};
-use sesame_rng::{Stream, derive_seed};
+use sesame_plan::{Activation, Test, TestOperation};
+use sesame_rng::Stream;
 
 use crate::space::condition::{self, contains};
 use crate::space::initial::{fresh_operation, fresh_test};
 use crate::space::range::{Range, StepSizes};
 use crate::space::test_space::{ActivationSpace, OperationSpace, TestSpace};
+use crate::test_key::TestKey;
 
 /// How often what is varied. All are probabilities except `steps` and `tries`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,7 +116,7 @@ pub struct TestVariation {
     seed: u64,
     /// All tests made so far, by their [`key`]: whole they would be most of what a search of many tests holds in
     /// memory.
-    made: BTreeSet<[u64; 2]>,
+    made: BTreeSet<TestKey>,
 }
 
 impl TestVariation {
@@ -131,7 +132,7 @@ impl TestVariation {
 
     /// Notes a test that was made elsewhere. False if it was made before.
     pub(crate) fn claim(&mut self, test: &Test) -> bool {
-        self.made.insert(key(test))
+        self.made.insert(TestKey::without_seeds(test))
     }
 }
 
@@ -140,7 +141,7 @@ impl Variation for TestVariation {
 
     fn initial(&mut self, index: u64) -> Test {
         let test = fresh_test(&self.test_space, &mut Stream::derive(self.seed, "initial", &[index]));
-        self.made.insert(key(&test));
+        self.made.insert(TestKey::without_seeds(&test));
         test
     }
 
@@ -162,62 +163,17 @@ impl Variation for TestVariation {
             place += 1;
             mutate(&mut genome, &self.test_space, &self.rates, &mut stream);
             for _ in 0..self.rates.tries {
-                if !self.made.contains(&key(&genome)) {
+                if !self.made.contains(&TestKey::without_seeds(&genome)) {
                     break;
                 }
                 let k = stream.below(genome.operations.len());
                 change_somehow(&mut genome.operations[k], &self.test_space, &self.rates, &mut stream);
                 self.test_space.settle(&mut genome, &mut stream);
             }
-            self.made.insert(key(&genome));
+            self.made.insert(TestKey::without_seeds(&genome));
             Child { genome, heritage }
         })
     }
-}
-
-/// A hash of a test's [`identity`], of 128 bits: two different tests have the same by chance in no campaign.
-fn key(test: &Test) -> [u64; 2] {
-    let numbers = identity(test).into_iter().flat_map(|numbers| [vec![numbers.len() as u64], numbers].concat());
-    let numbers: Vec<u64> = numbers.collect();
-    ["one half of a key", "the other half"].map(|half| derive_seed(0, half, &numbers))
-}
-
-/// What tells two tests apart: their operations in any order, without operation seeds.
-fn identity(test: &Test) -> Vec<Vec<u64>> {
-    let mut operations: Vec<Vec<u64>> = test
-        .operations
-        .iter()
-        .map(|operation| {
-            let mut numbers = vec![u64::from(operation.operation.0)];
-            match &operation.activation {
-                Activation::Time { start, end } => numbers.extend([0, start.to_bits(), end.to_bits()]),
-                Activation::Condition { start, end, times } => {
-                    numbers.extend([1, u64::from(*times)]);
-                    numbers.extend(condition::identity(start));
-                    numbers.extend(condition::identity(end));
-                }
-                Activation::ConditionFor { start, length, times } => {
-                    numbers.extend([2, u64::from(*times), length.to_bits()]);
-                    numbers.extend(condition::identity(start));
-                }
-                Activation::Offline => numbers.push(3),
-            }
-            for choice in &operation.parameters {
-                match choice {
-                    Choice::Value { value } => numbers.push(value.to_bits()),
-                    Choice::Range { low, high } => numbers.extend([low.to_bits(), high.to_bits()]),
-                    Choice::Point { point } => numbers.extend(point.map(f64::to_bits)),
-                    Choice::Text { text } => {
-                        numbers.push(text.len() as u64);
-                        numbers.extend(text.bytes().map(u64::from));
-                    }
-                }
-            }
-            numbers
-        })
-        .collect();
-    operations.sort_unstable();
-    operations
 }
 
 /// One-point crossover of two lists: each is cut in two, and the tails are exchanged. The cuts are uniform over all
@@ -434,6 +390,7 @@ mod tests {
 
     use super::*;
     use crate::space::test_space::tests::{any_plan, broken_rule};
+    use crate::test_key::identity;
     use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     /// Nothing happens.
@@ -603,11 +560,11 @@ mod tests {
         let mut other = tests[0].clone();
         other.operations[0].operation_seed += 1;
         assert_eq!(identity(&other), identity(&tests[0]));
-        assert_eq!(key(&other), key(&tests[0]));
+        assert_eq!(TestKey::without_seeds(&other), TestKey::without_seeds(&tests[0]));
         let Activation::Condition { start, end, .. } = &mut other.operations[0].activation else { panic!("{other:?}") };
         std::mem::swap(start, end);
         assert_ne!(identity(&other), identity(&tests[0]));
-        assert_ne!(key(&other), key(&tests[0]));
+        assert_ne!(TestKey::without_seeds(&other), TestKey::without_seeds(&tests[0]));
     }
 
     #[test]

@@ -44,6 +44,11 @@ fn smallest(shrink: &Shrink) -> Option<&Test> {
     Some(&shrink.tried()[*shrink.accepted().last()?].test)
 }
 
+/// A test as text.
+fn content(test: &Test) -> String {
+    serde_json::to_string(test).unwrap()
+}
+
 /// A number that looks random and is the same for the same test.
 fn scattered(test: &Test, seed: u64) -> f64 {
     let mut sum = seed;
