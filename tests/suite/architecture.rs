@@ -84,6 +84,39 @@ fn an_arrow_that_runs_up_a_missing_crate_and_another_link_are_objected_to() {
     assert_eq!(objections(&listed(&[], &["low"])[..2], &crates), ["new is missing in ARCHITECTURE.md"]);
 }
 
+/// The rooms that ARCHITECTURE.md lists: by crate, the modules in the table.
+fn listed_rooms(text: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let table = text.split("### Rooms of the runtime").nth(1).and_then(|rest| rest.split("## ").next());
+    let mut rooms: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for row in table.expect("ARCHITECTURE.md lists the rooms").lines().filter(|line| line.starts_with("| ")) {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        let modules = cells[2].split(',').map(|name| name.trim().trim_matches('`').to_owned());
+        rooms.entry(cells[1].to_owned()).or_default().extend(modules);
+    }
+    rooms.remove("crate");
+    rooms
+}
+
+/// The modules of a crate that are not for tests.
+fn modules(crate_folder: &Path) -> BTreeSet<String> {
+    let file = syn::parse_file(&fs::read_to_string(crate_folder.join("src/lib.rs")).unwrap()).unwrap();
+    let modules = file.items.into_iter().filter_map(|item| match item {
+        syn::Item::Mod(module) if !module.attrs.iter().any(is_for_tests) => Some(module.ident.to_string()),
+        _ => None,
+    });
+    modules.filter(|name| name != "testing").collect()
+}
+
+#[test]
+fn the_map_lists_each_room_of_the_runtime_and_no_other() {
+    let listed = listed_rooms(&fs::read_to_string(workspace().join("ARCHITECTURE.md")).unwrap());
+    for (name, rooms) in &listed {
+        let folder = if name == "runtime" { "runtime".to_owned() } else { format!("runtime/{name}") };
+        assert_eq!(*rooms, modules(&workspace().join(folder)), "rooms of {name}: ARCHITECTURE.md, and the crate");
+    }
+    assert_eq!(listed.len(), 6, "{listed:?}");
+}
+
 /// A file of a crate as the path of its module.
 type Module = Vec<String>;
 
@@ -224,6 +257,12 @@ fn paths(tree: &syn::UseTree) -> Vec<Vec<String>> {
     }
 }
 
+/// `#[cfg(test)]`, alone or with other conditions.
+fn is_for_tests(attribute: &syn::Attribute) -> bool {
+    matches!(&attribute.meta, syn::Meta::List(list)
+        if list.path.is_ident("cfg") && list.tokens.to_string().split_whitespace().any(|word| word == "test"))
+}
+
 /// Collects the paths that code names. A re-export is not a use.
 struct Named {
     paths: Vec<Vec<String>>,
@@ -232,7 +271,7 @@ struct Named {
 }
 
 impl Named {
-    fn add(&mut self, path: Vec<String>) {
+    fn add(&mut self, path: &[String]) {
         let ups = path.iter().take_while(|part| *part == "super").count().min(self.depth);
         let inside = if ups > 0 { vec!["self".to_owned()] } else { Vec::new() };
         // `self::super` is the file's own parent again.
@@ -249,11 +288,7 @@ impl<'ast> Visit<'ast> for Named {
             syn::Item::Use(used) => &used.attrs[..],
             _ => &[],
         };
-        let for_tests = |attribute: &syn::Attribute| {
-            matches!(&attribute.meta, syn::Meta::List(list)
-                if list.path.is_ident("cfg") && list.tokens.to_string().split_whitespace().any(|word| word == "test"))
-        };
-        if !attributes.iter().any(for_tests) {
+        if !attributes.iter().any(is_for_tests) {
             visit::visit_item(self, item);
         }
     }
@@ -267,7 +302,7 @@ impl<'ast> Visit<'ast> for Named {
     fn visit_item_use(&mut self, used: &'ast syn::ItemUse) {
         if matches!(used.vis, syn::Visibility::Inherited) {
             for path in paths(&used.tree) {
-                self.add(path);
+                self.add(&path);
             }
         }
     }
@@ -277,7 +312,8 @@ impl<'ast> Visit<'ast> for Named {
 
     fn visit_path(&mut self, path: &'ast syn::Path) {
         if path.segments.len() > 1 {
-            self.add(path.segments.iter().map(|segment| segment.ident.to_string()).collect());
+            let path: Vec<String> = path.segments.iter().map(|segment| segment.ident.to_string()).collect();
+            self.add(&path);
         }
         visit::visit_path(self, path);
     }
