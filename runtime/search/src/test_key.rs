@@ -7,8 +7,8 @@ use sesame_rng::derive_seed;
 
 use crate::space::condition;
 
-/// A hash of what tells a test apart from others, of 128 bits: of 10^12 different tests, two have the same by chance once
-/// in 10^14 campaigns. Tests themselves would take many times the memory.
+/// A hash of what tells a test apart from others, of 128 bits: of 10^12 different tests, two have the same by chance
+/// once in 10^14 campaigns. Tests themselves would take many times the memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TestKey([u64; 2]);
 
@@ -21,8 +21,8 @@ impl TestKey {
         TestKey::of([length].into_iter().chain(content.chunks(8).map(number)))
     }
 
-    /// Of a test without operation seeds, its operations in any order, its conditions in any order and grouping: two tests
-    /// that a search need not both try.
+    /// Of a test without operation seeds, its operations in any order, its conditions in any order and grouping: two
+    /// tests that a search need not both try.
     pub(crate) fn without_seeds(test: &Test) -> TestKey {
         let operations = identity(test).into_iter();
         TestKey::of(operations.flat_map(|numbers| [vec![numbers.len() as u64], numbers].concat()))
