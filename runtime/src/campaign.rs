@@ -4,8 +4,8 @@
 //! hangs takes nothing with it. Nothing here depends on how many workers there are: tests are numbered when they are
 //! asked for, and told in that order.
 //!
-//! [`run`] is the campaign, step by step; [`evaluator`] hands its tests to an [`executor`] and records the results;
-//! [`observers`] follow the search; [`events`] tell whoever shows a campaign what happens.
+//! `run` is the campaign, step by step; `evaluator` hands its tests to an `executor` and records the results;
+//! `observers` follow the search; `events` tell whoever shows a campaign what happens.
 
 mod confirmation;
 mod error;

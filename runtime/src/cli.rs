@@ -20,7 +20,7 @@ mod shrink;
 mod terminal;
 mod view;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
@@ -92,7 +92,7 @@ enum Command {
         /// Process id of the worker
         worker: u32,
         /// The file that is told how the simulator ended
-        report: PathBuf,
+        report: std::path::PathBuf,
         /// The simulator's program with its arguments
         #[arg(required = true, last = true)]
         program: Vec<std::ffi::OsString>,

@@ -139,7 +139,7 @@ const LARGE: &[(&str, Expected)] = &[
     ("says_a_line_without_end", Crash("is longer than 16777216 bytes")),
     ("says_an_unknown_field_of_a_megabyte", Crash("unknown field `xxx")),
     ("nests_a_million_lists_in_the_protocol", Crash("is not JSON")),
-    ("publishes_more_than_a_step_may_in_one_line", Crash("makes more than 100000 messages in the step to 0.150 s")),
+    ("publishes_more_than_a_step_may_in_one_line", Crash("has more than 100000 messages in the step to 0.150 s")),
     ("publishes_on_a_topic_with_a_name_of_eight_megabytes", Crash("has a message on `xxx")),
     ("publishes_a_million_lists_for_a_real", Crash("expected real, found a list")),
     ("publishes_a_text_of_eight_megabytes", Completed),

@@ -1,6 +1,6 @@
 //! Focused falsification: find a violation of each requirement within a few dozen simulations.
 //!
-//! Each test targets one requirement, which a [bandit] chooses. A [Gaussian process](gaussian_process) is fitted to the
+//! Each test targets one requirement, which a `bandit` chooses. A Gaussian process is fitted to the
 //! margins of that requirement in all tests so far, and the candidate with the lowest lower confidence bound (mean
 //! minus κ standard deviations) is asked for. κ alternates between 0 and more, so the search both refines and explores.
 //! The first few tests are quasi-random.

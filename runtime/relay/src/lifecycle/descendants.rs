@@ -66,7 +66,7 @@ fn end(processes: Vec<Process>, patience: Duration) -> usize {
     }
 }
 
-/// Ends the processes that [`adopted`] finds, as [`end`] does, until there are none; returns how many remain.
+/// Ends the processes that [`adopted`] finds, as `end` does, until there are none; returns how many remain.
 pub fn end_adopted(is_own: impl Fn(u32) -> bool, patience: Duration) -> usize {
     let started = Instant::now();
     loop {

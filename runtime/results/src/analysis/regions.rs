@@ -1,6 +1,6 @@
 //! Where tests fail: rules over the reduced space and the operations, found by a small decision tree.
 //!
-//! For each requirement that tests violate (and for crashes and timeouts) a [tree](tree) of a few questions divides the
+//! For each requirement that tests violate (and for crashes and timeouts) a tree of a few questions divides the
 //! tests into regions, and says of each how many of its tests fail. The regions of a tree do not overlap, and together
 //! they hold every test that is conclusive about the requirement; tests without effect are among them, duplicates and
 //! reference runs are not.

@@ -174,7 +174,7 @@ impl TestSpace {
 
     /// Makes the copies of each operation in a test what they have to be, and changes nothing else: too many copies
     /// leave the test, each as likely as the others, and where too few operations remain fresh ones of other kinds come
-    /// in; windows are moved apart to the [nearest](apart::nearest) ones; a copy that draws like an earlier one gets an
+    /// in; windows are moved apart to the nearest ones; a copy that draws like an earlier one gets an
     /// operation seed of its own. A test that is permitted already stays as it is and takes nothing from the stream.
     pub fn settle(&self, test: &mut Test, stream: &mut Stream) {
         for kind in &self.operations {
