@@ -40,7 +40,7 @@ pub use sesame_search as search;
 pub use sesame_search::{coverage, sspr};
 
 /// The version of the interface between generated code and this crate.
-pub const GENERATOR_ABI: u32 = 1;
+pub const GENERATOR_ABI: u32 = 2;
 
 /// Fails to compile when generated code was written for another version of the interface.
 #[macro_export]

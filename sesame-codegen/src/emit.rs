@@ -30,7 +30,7 @@ use crate::names;
 use crate::plan::RunnerPlan;
 
 /// The version of the interface between generated code and the runtime that this generator writes for.
-const ABI: u32 = 1;
+const ABI: u32 = 2;
 
 /// What the crates of a space need of the world around them.
 #[derive(Debug, Clone, Default, PartialEq)]
