@@ -95,7 +95,7 @@ fn violations_that_were_found_get_smaller_and_stay_violations() {
     let again = Project::kuka_cell_with("kuka_cell_shrunk_again", &block);
     let name = block.lines().find_map(|line| line.strip_prefix("test ")).unwrap().trim_end_matches(" {");
     let known = again.build("coverage_experiment").run(&["known", name]).expect(0);
-    assert!(known.out.contains("Known tests") && !known.out.contains("no\n"), "{}", known.out);
+    assert!(known.out.contains("Regression tests") && !known.out.contains("no\n"), "{}", known.out);
 
     // The same whatever the number of workers, and whatever happens on the way.
     let some = violations(&runner, 5)[1];
