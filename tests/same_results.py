@@ -76,8 +76,7 @@ def results_of(revision):
         for runner in campaigns(folder, example):
             for seed in SEEDS.get(runner.name, [None]):
                 place = f"same_{seed if seed is not None else 'own'}"
-                found = runner / "results" / place / "results.sqlite"
-                if not found.exists():
+                if not list((runner / "results" / place).rglob("results.sqlite")):
                     seeds = [] if seed is None else ["--seed", seed]
                     options = ["--results", runner / "results" / place, "--fail-on", "nothing"]
                     call("cargo", "run", "--quiet", "--", "run", *seeds, *options, folder=runner)

@@ -50,7 +50,7 @@ pub struct Port(pub(crate) usize);
 /// The simulator's side of the message bus.
 ///
 /// ```
-/// # use sesame_runtime::simulator::{Bus, Port};
+/// # use sesame_relay::simulator::{Bus, Port};
 /// # fn controller(_: f64) -> f64 { 0.0 }
 /// struct Joint { command: Port, target: f64 }
 ///

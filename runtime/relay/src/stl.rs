@@ -99,7 +99,8 @@ pub enum FormulaError {
 /// ```
 /// use sesame_plan::Comparison;
 /// use sesame_plan::stl::{Formula, Interval};
-/// use sesame_runtime::{stl::Monitor, time::SimTime};
+/// use sesame_base::time::SimTime;
+/// use sesame_relay::stl::Monitor;
 ///
 /// let clear = Formula::Predicate { signal: 0, comparison: Comparison::Above, constant: 0.5 };
 /// let always_clear = Formula::Always { interval: Interval::UNBOUNDED, of: Box::new(clear) };
@@ -108,7 +109,7 @@ pub enum FormulaError {
 /// monitor.push(SimTime::from_seconds(1.5), 0, 0.75);
 /// monitor.push(SimTime::from_seconds(3.0), 0, 1.0);
 /// assert_eq!(monitor.finish(SimTime::from_seconds(10.0)), Some(0.25));
-/// # Ok::<(), sesame_runtime::stl::FormulaError>(())
+/// # Ok::<(), sesame_relay::stl::FormulaError>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct Monitor {
