@@ -22,7 +22,11 @@ const HIDDEN: &str = "
 fn a_campaign_that_nobody_hears_ends_before_it_fuzzes_and_names_its_operations() {
     let project = Project::kuka_cell_with("kuka_cell_unheard", HIDDEN);
     let checked = project.sesamec("generate", &["--campaign", "hidden"]).expect(0);
-    assert!(checked.err.contains("operation `hide_zones` has no effect: no node subscribes to `zones`"), "{}", checked.err);
+    assert!(
+        checked.err.contains("operation `hide_zones` has no effect: no node subscribes to `zones`"),
+        "{}",
+        checked.err
+    );
     let runner = project.build("hidden");
     for command in [&["run", "--results", "r"][..], &["resume", "r/1"]] {
         let refused = runner.run(command).expect(1);
