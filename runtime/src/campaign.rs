@@ -5,7 +5,7 @@
 //! asked for, and told in that order.
 //!
 //! `run` is the campaign, step by step; `evaluator` hands its tests to an `executor` and records the results;
-//! `observers` follow the search; `events` tell whoever shows a campaign what happens.
+//! `observers` follow the search; `events` tell listeners what happens.
 
 mod confirmation;
 mod error;

@@ -87,7 +87,7 @@ pub struct Observation {
     pub metrics: Vec<MetricObservation>,
     /// Messages the relay handled.
     pub messages: u64,
-    /// What should be brought to the user's attention; ordered, bounded by whoever writes it.
+    /// What should be brought to the user's attention; in order, and bounded by the relay.
     pub warnings: Vec<String>,
     /// Wall time in seconds spent in the run; never part of the digest.
     pub wall: WallTime,

@@ -1,7 +1,7 @@
 //! The files of a space, as operations before the start and after the end of a run see them.
 //!
-//! This crate reaches no file itself: whoever runs tests passes it an implementation, which decides where files are and
-//! how they are restored.
+//! This crate reaches no file itself: the caller passes an implementation, which decides where files are and how they
+//! are restored.
 
 use std::fmt::Debug;
 use std::path::Path;

@@ -57,7 +57,7 @@ fn to_bound(bound: Bound, x: f64) -> f64 {
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_base::observation::{MetricObservation, Outcome, Reach, WallTime};
+    use sesame_base::observation::{MetricObservation, Outcome, Reach};
     use sesame_plan::{MetricId, Search, Strategy};
 
     use super::*;
@@ -71,16 +71,7 @@ mod tests {
             metric: MetricId(0),
             bound: Bound::AtMost { value: 70.0 },
         }];
-        let observation = Observation {
-            outcome,
-            end: 70.0,
-            operations: Vec::new(),
-            unheard: Vec::new(),
-            metrics: vec![shown],
-            messages: 0,
-            warnings: Vec::new(),
-            wall: WallTime::default(),
-        };
+        let observation = Observation { end: 70.0, metrics: vec![shown], ..Observation::without_run(outcome) };
         margins(&plan, &observation).remove(0)
     }
 

@@ -37,7 +37,7 @@ pub fn in_unit(plan: &CampaignPlan, objective: MetricId, oriented: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use sesame_base::observation::{MetricObservation, WallTime};
+    use sesame_base::observation::MetricObservation;
 
     use sesame_plan::{Search, Strategy};
 
@@ -46,16 +46,7 @@ mod tests {
 
     fn observed(outcome: Outcome, values: &[Option<f64>]) -> Observation {
         let metric = |&value: &Option<f64>| MetricObservation::whole(value, value.is_some(), Vec::new());
-        Observation {
-            outcome,
-            end: 70.0,
-            operations: Vec::new(),
-            unheard: Vec::new(),
-            metrics: values.iter().map(metric).collect(),
-            messages: 0,
-            warnings: Vec::new(),
-            wall: WallTime::default(),
-        }
+        Observation { end: 70.0, metrics: values.iter().map(metric).collect(), ..Observation::without_run(outcome) }
     }
 
     #[test]

@@ -167,20 +167,6 @@ pub(crate) fn hung(observation: &Observation) -> Observation {
     Observation { outcome: Outcome::Timeout { limit: 1.0 }, ..observation.clone() }
 }
 
-/// What a supervisor records of a worker that had to be stopped, or died.
-pub(crate) fn lost(outcome: Outcome) -> Observation {
-    Observation {
-        outcome,
-        end: 0.0,
-        operations: Vec::new(),
-        unheard: Vec::new(),
-        metrics: Vec::new(),
-        messages: 0,
-        warnings: Vec::new(),
-        wall: sesame_base::observation::WallTime::default(),
-    }
-}
-
 /// What the runtime says of a requirement.
 pub(crate) fn said(requirement: &Requirement, observation: &Observation) -> Verdict {
     let value =

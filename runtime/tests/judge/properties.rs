@@ -8,7 +8,7 @@ use sesame_relay::value::{Fields, Record, Value};
 use sesame_results::record::Verdict;
 use sesame_rng::Stream;
 
-use crate::adapter::{self, STEP, declares_trend, hung, lost, said};
+use crate::adapter::{self, STEP, declares_trend, hung, said};
 use crate::case::{Case, topics_of};
 use crate::formulas::{Judged, first_blank, heard as heard_by, judged};
 use crate::hooks::HookKind;
@@ -211,8 +211,8 @@ fn faulty(
     let mut reports = vec![("crash or blanks", observed.clone())];
     if broke_off {
         reports.push(("hang", hung(&observed)));
-        reports.push(("lost worker", lost(Outcome::Timeout { limit: 1.0 })));
-        reports.push(("dead worker", lost(Outcome::Crash { message: "gone".to_owned() })));
+        reports.push(("lost worker", Observation::without_run(Outcome::Timeout { limit: 1.0 })));
+        reports.push(("dead worker", Observation::without_run(Outcome::Crash { message: "gone".to_owned() })));
     }
     for (what, report) in &reports {
         for (requirement, value) in sound {

@@ -1,9 +1,9 @@
 //! Places below a folder, looked at and written to without following any link.
 //!
 //! The folder itself is as the user named it, and may be a link. Below it every part of a path is looked at before it
-//! is used, so that a folder with links in it, from whomever it comes, cannot lead a generation elsewhere. Whoever
-//! could exchange a folder for a link between the look and the write could as well write what is built and run next, so
-//! no more than that is done about it.
+//! is used, so that links in a folder cannot lead a generation elsewhere. A program that could exchange a folder for a
+//! link between the look and the write could also change the code that is built and run next, so nothing more is done
+//! about it.
 
 use std::fs::{self, File, Permissions};
 use std::io::{self, Write as _};

@@ -1,6 +1,6 @@
 //! Declarative metrics: what they compute, with units resolved.
 //!
-//! Numbers are in the units of the wire or of a conversion that is part of the expression; so whoever evaluates one
+//! Numbers are in the units of the wire or of a conversion that is part of the expression; so evaluating one
 //! needs no units.
 
 use sesame_plan::{Aggregate, Condition, Members};

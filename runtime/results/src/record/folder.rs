@@ -51,7 +51,7 @@ fn locked_for_a_beginning(folder: &Path) -> Result<Option<Lock>, RecordError> {
         return Ok(None);
     }
     match Lock::acquire(folder) {
-        // Whoever had it until now may have begun.
+        // The process that held the lock until now may have begun a run.
         Ok(lock) => Ok(holds_nothing(folder)?.then_some(lock)),
         Err(RecordError::Locked { .. }) => Ok(None),
         Err(error) => Err(error),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rusqlite::params;
 
-use sesame_base::observation::{MetricObservation, Observation, Outcome, WallTime};
+use sesame_base::observation::{MetricObservation, Observation, Outcome};
 use sesame_base::test_number::TestNumber;
 use sesame_optimise::dominance::Fitness;
 use sesame_plan::{CampaignPlan, Requirement};
@@ -49,14 +49,10 @@ impl Repetition {
             MetricObservation { value, set, reach, not_finite, series: Vec::new() }
         };
         Observation {
-            outcome: self.outcome.clone(),
             end: self.end,
-            operations: Vec::new(),
-            unheard: Vec::new(),
             metrics: self.values.iter().map(shown).collect(),
             messages: self.messages,
-            warnings: Vec::new(),
-            wall: WallTime::default(),
+            ..Observation::without_run(self.outcome.clone())
         }
     }
 }

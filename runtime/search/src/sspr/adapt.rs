@@ -102,7 +102,7 @@ pub fn observed_point(plan: &CampaignPlan, test: &Test, observation: &Observatio
 
 #[cfg(test)]
 mod tests {
-    use sesame_base::observation::{Counters, OperationEffect, WallTime};
+    use sesame_base::observation::{Counters, OperationEffect};
     use sesame_plan::Dimension;
     use sesame_plan::testing::{operation, plan, test_of, use_of};
 
@@ -120,16 +120,7 @@ mod tests {
         // Thousands of O0 and T1.
         let of = |outcome, first, second| {
             let operations = vec![effect(first, 1.0, 2.0), effect(second, 5.0, 9.0)];
-            let run = Observation {
-                outcome,
-                end: 10.0,
-                operations,
-                unheard: Vec::new(),
-                metrics: Vec::new(),
-                messages: 100,
-                warnings: Vec::new(),
-                wall: WallTime::default(),
-            };
+            let run = Observation { end: 10.0, operations, messages: 100, ..Observation::without_run(outcome) };
             observed_point(&plan, &test, &run).map(|point| {
                 [Dimension::O0, Dimension::T1].map(|it| libm::round(1000.0 * point.get(it).unwrap_or(f64::NAN)))
             })

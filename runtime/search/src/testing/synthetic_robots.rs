@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use sesame_base::activation::Activity;
-use sesame_base::observation::{MetricObservation, Observation, Outcome, WallTime};
+use sesame_base::observation::{MetricObservation, Observation, Outcome};
 use sesame_base::time::SimTime;
 use sesame_optimise::dominance::{Fitness, Unfit};
 use sesame_optimise::front::Front;
@@ -247,14 +247,9 @@ impl SyntheticRobot {
             |metric| (0u32..350).map(|slot| f64::from(slot) * 0.2).map(|t| (t, Self::signal(metric, t))).collect();
         let metrics = (0u32..).map(MetricId).take(plan.metrics.len());
         Observation {
-            outcome: Outcome::Completed,
             end: 70.0,
-            operations: Vec::new(),
-            unheard: Vec::new(),
             metrics: metrics.map(|id| MetricObservation::whole(None, false, series(id))).collect(),
-            messages: 0,
-            warnings: Vec::new(),
-            wall: WallTime::default(),
+            ..Observation::without_run(Outcome::Completed)
         }
     }
 

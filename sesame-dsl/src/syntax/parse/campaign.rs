@@ -81,7 +81,7 @@ impl Reader<'_> {
                     let times = reader.count(&expect_child(&member, Rule::number));
                     campaign.passives.push(Passive { span, times, seed });
                 }
-                other => unreachable!("{other:?} is no member of a campaign"),
+                other => unreachable!("{other:?} is not a member of a campaign"),
             }
         });
         campaign.inherited_errors = campaign.has_errors;

@@ -87,7 +87,7 @@ impl Reader<'_> {
         let mut has_errors = false;
         let mut previous = None;
         let mut opened = None;
-        // Words that are no members, from the first that was not explained yet.
+        // Words that are not members, from the first that was not explained yet.
         let mut stretch: Option<Span> = None;
         for pair in block.clone().into_inner() {
             let rule = pair.as_rule();
