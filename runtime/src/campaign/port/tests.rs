@@ -2,26 +2,52 @@
 
 use std::io::Write as _;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Sender, channel};
 
 use super::*;
 
 /// How long a port waits here.
 const LIMIT: Duration = Duration::from_secs(10);
 
-/// What the worker with the token gets, while strangers do this until it is done, and how long it took.
-fn attacked(attack: impl Fn(SocketAddr, &AtomicBool) + Sync) -> (io::Result<TcpStream>, Duration) {
+/// An attack on a port, as it is seen from both sides.
+struct Attack {
+    address: SocketAddr,
+    begun: Sender<()>,
+    done: AtomicBool,
+}
+
+impl Attack {
+    /// The strangers have connected: now the worker comes.
+    fn begin(&self) {
+        self.begun.send(()).unwrap();
+    }
+
+    fn is_over(&self) -> bool {
+        self.done.load(Ordering::Relaxed)
+    }
+
+    fn wait_until_over(&self) {
+        while !self.is_over() {
+            thread::sleep(Duration::from_millis(10));
+        }
+    }
+}
+
+/// What the worker with the token gets while strangers attack, and how long it took. They connect before the worker
+/// does, however slow the machine is.
+fn attacked(strangers: impl Fn(&Attack) + Sync) -> (io::Result<TcpStream>, Duration) {
     let port = Port::open().unwrap();
     let (address, token) = (port.address().unwrap(), port.token().to_owned());
-    let done = AtomicBool::new(false);
+    let (begun, has_begun) = channel();
+    let attack = Attack { address, begun, done: AtomicBool::new(false) };
     thread::scope(|scope| {
-        scope.spawn(|| attack(address, &done));
-        // The strangers are first.
-        thread::sleep(Duration::from_millis(200));
+        scope.spawn(|| strangers(&attack));
+        has_begun.recv_timeout(Duration::from_secs(60)).expect("the attack begins");
         let worker = scope.spawn(move || connect(address, &Hello { lock_stepped: true, token: Some(token) }));
         let started = Instant::now();
         let accepted = port.accept(LIMIT, &mut || Ok(())).map(|(stream, _)| stream);
         let took = started.elapsed();
-        done.store(true, Ordering::Relaxed);
+        attack.done.store(true, Ordering::Relaxed);
         worker.join().unwrap().unwrap();
         (accepted, took)
     })
@@ -29,43 +55,40 @@ fn attacked(attack: impl Fn(SocketAddr, &AtomicBool) + Sync) -> (io::Result<TcpS
 
 /// The worker's connection is found, and works, before any stranger would have been given up.
 #[track_caller]
-fn survives(attack: impl Fn(SocketAddr, &AtomicBool) + Sync) {
-    let (accepted, took) = attacked(attack);
+fn survives(strangers: impl Fn(&Attack) + Sync) {
+    let (accepted, took) = attacked(strangers);
     accepted.unwrap();
     assert!(took < Duration::from_secs(3), "it took {took:?}");
 }
 
-fn until(done: &AtomicBool) {
-    while !done.load(Ordering::Relaxed) {
-        thread::sleep(Duration::from_millis(10));
-    }
-}
-
 #[test]
 fn silent_connections_hold_up_nobody() {
-    survives(|address, done| {
-        let silent: Vec<_> = (0..40).map(|_| TcpStream::connect(address).unwrap()).collect();
-        until(done);
+    survives(|attack| {
+        let silent: Vec<_> = (0..40).map(|_| TcpStream::connect(attack.address).unwrap()).collect();
+        attack.begin();
+        attack.wait_until_over();
         drop(silent);
     });
 }
 
 #[test]
 fn more_silent_connections_than_are_listened_to_hold_up_nobody() {
-    survives(|address, done| {
+    survives(|attack| {
         // As many as the system queues; the rest waits to be taken.
-        let silent: Vec<_> = (0..100).map(|_| TcpStream::connect(address).unwrap()).collect();
-        until(done);
+        let silent: Vec<_> = (0..100).map(|_| TcpStream::connect(attack.address).unwrap()).collect();
+        attack.begin();
+        attack.wait_until_over();
         drop(silent);
     });
 }
 
 #[test]
 fn a_byte_every_so_often_holds_up_nobody_and_does_not_move_the_deadline() {
-    let slow = |address: SocketAddr, done: &AtomicBool| {
-        let mut stream = TcpStream::connect(address).unwrap();
+    let slow = |attack: &Attack| {
+        let mut stream = TcpStream::connect(attack.address).unwrap();
         stream.write_all(&1000u32.to_le_bytes()).unwrap();
-        while !done.load(Ordering::Relaxed) {
+        attack.begin();
+        while !attack.is_over() {
             stream.write_all(b" ").ok();
             thread::sleep(Duration::from_millis(20));
         }
@@ -73,13 +96,14 @@ fn a_byte_every_so_often_holds_up_nobody_and_does_not_move_the_deadline() {
     survives(slow);
     // Without a worker.
     let port = Port::open().unwrap();
-    let address = port.address().unwrap();
-    let done = AtomicBool::new(false);
+    let (begun, has_begun) = channel();
+    let attack = Attack { address: port.address().unwrap(), begun, done: AtomicBool::new(false) };
     thread::scope(|scope| {
-        scope.spawn(|| slow(address, &done));
+        scope.spawn(|| slow(&attack));
+        has_begun.recv_timeout(Duration::from_secs(60)).expect("the attack begins");
         let started = Instant::now();
         let error = port.accept(Duration::from_millis(500), &mut || Ok(())).unwrap_err();
-        done.store(true, Ordering::Relaxed);
+        attack.done.store(true, Ordering::Relaxed);
         assert_eq!(error.kind(), io::ErrorKind::TimedOut, "{error}");
         assert!(started.elapsed() < Duration::from_secs(2), "{:?}", started.elapsed());
     });
@@ -88,12 +112,13 @@ fn a_byte_every_so_often_holds_up_nobody_and_does_not_move_the_deadline() {
 #[test]
 fn a_frame_of_a_gibibyte_is_refused_by_its_length() {
     let sent = AtomicBool::new(false);
-    survives(|address, done| {
-        let mut stream = TcpStream::connect(address).unwrap();
+    survives(|attack| {
+        let mut stream = TcpStream::connect(attack.address).unwrap();
         stream.write_all(&(1u32 << 30).to_le_bytes()).unwrap();
+        attack.begin();
         let mebibyte = vec![b' '; 1 << 20];
         let mut taken = 0;
-        while taken < 1024 && !done.load(Ordering::Relaxed) && stream.write_all(&mebibyte).is_ok() {
+        while taken < 1024 && !attack.is_over() && stream.write_all(&mebibyte).is_ok() {
             taken += 1;
         }
         // What the system buffers is not in our memory.
@@ -105,14 +130,15 @@ fn a_frame_of_a_gibibyte_is_refused_by_its_length() {
 
 #[test]
 fn what_is_no_greeting_or_has_another_token_is_turned_away() {
-    survives(|address, _| {
+    survives(|attack| {
         let wrong = serde_json::to_vec(&Hello { lock_stepped: true, token: Some("0".repeat(32)) }).unwrap();
         let none = serde_json::to_vec(&Hello { lock_stepped: true, token: None }).unwrap();
         for body in [wrong.as_slice(), &none, b"{}", b"GET / HTTP/1.1\r\n\r\n", &[0; 1024], b""] {
-            let mut stream = TcpStream::connect(address).unwrap();
+            let mut stream = TcpStream::connect(attack.address).unwrap();
             stream.write_all(&u32::try_from(body.len()).unwrap().to_le_bytes()).unwrap();
             stream.write_all(body).unwrap();
         }
+        attack.begin();
     });
 }
 
@@ -177,9 +203,10 @@ while True:
         eprintln!("skipped: no process of another user can be started: {error}");
         return;
     }
-    survives(|address, done| {
-        let mut attacker = of_nobody(ATTACK, &[&address.port().to_string()]).unwrap();
-        until(done);
+    survives(|attack| {
+        let mut attacker = of_nobody(ATTACK, &[&attack.address.port().to_string()]).unwrap();
+        attack.begin();
+        attack.wait_until_over();
         attacker.kill().unwrap();
         attacker.wait().unwrap();
     });
