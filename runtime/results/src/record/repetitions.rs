@@ -12,7 +12,7 @@ use sesame_search as search;
 use sesame_search::aggregate;
 
 use crate::record::columns::{finite, index, metric_value, perhaps_finite, position, unsigned};
-use crate::record::recorder::write_event;
+use crate::record::write_tests::write_event;
 use crate::record::{
     Event, EventKind, MetricValue, RecordError, Recorder, Repetition, Repository, ScannedTest, Tally, TestRow, Verdict,
 };
