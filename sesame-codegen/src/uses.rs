@@ -240,7 +240,7 @@ operation cat on zoness = blackhole
     }
 
     #[test]
-    fn json_is_ascii_whatever_a_file_holds() {
+    fn json_is_ascii_for_any_file() {
         let text = "space s /// \u{202e}🤖\u{1b}[31m\nmetric m minimise { hook on x }";
         let json = explained("m", text).unwrap().1;
         assert!(json.trim_end().chars().all(|c| c.is_ascii() && !c.is_control()), "{json}");

@@ -41,7 +41,7 @@ fn build(name: &str) -> Runner {
 }
 
 #[test]
-fn a_search_stops_where_its_coverage_suffices_whatever_comes_between() {
+fn a_search_stops_at_its_coverage_after_any_interruption() {
     let runner = build("covered");
     let whole = runner.run(&["--results", "whole", "--workers", "2"]).expect(0);
     let repository = Repository::open(&runner.folder.join("whole/3")).unwrap();

@@ -93,7 +93,7 @@ fn undisturbed(runner: &Runner, fault: &str) -> Done {
 }
 
 #[test]
-fn a_system_that_does_not_work_undisturbed_is_not_fuzzed() {
+fn a_system_that_fails_without_disturbance_is_not_fuzzed() {
     let runner = faulty("unready", "harmless");
     for (fault, words) in [
         ("crash", "the reference run is to crash"),
@@ -137,7 +137,7 @@ fn a_simulator_or_hook_that_reads_standard_input_finds_it_empty() {
 }
 
 #[test]
-fn a_requirement_broken_undisturbed_is_a_warning() {
+fn a_requirement_that_the_reference_run_violates_is_a_warning() {
     let runner = faulty("tilted", "harmless");
     let said = undisturbed(&runner, "broken requirement").expect(0);
     let words = "requirement R1 is violated before anything is fuzzed: `highest` is 5";

@@ -343,7 +343,7 @@ fn names<'a>(modes: &[(&'a str, Expected)]) -> Vec<&'a str> {
 }
 
 #[test]
-fn whatever_a_simulator_does_is_the_outcome_of_its_own_test_and_nothing_is_left_of_it() {
+fn each_kind_of_misbehaviour_is_the_outcome_of_its_own_test_and_leaves_no_process() {
     if !shown_here() {
         return;
     }

@@ -279,7 +279,7 @@ fn a_simulator_that_is_killed_each_time_is_a_crash_that_says_so() {
 }
 
 #[test]
-fn an_undisturbed_run_that_is_killed_is_run_again_by_resume() {
+fn a_reference_run_that_is_killed_is_run_again_by_resume() {
     let Some(runner) = breeding("killed_reference", "quiet") else { return };
     let whole = runner.run(&["--results", "whole"]).expect(0).digest();
     let process = start(&runner, &["--results", "results"], "killed undisturbed");
@@ -421,14 +421,14 @@ fn killed_at_random_moments(name: &str, kills: u32) {
 }
 
 #[test]
-fn whoever_is_killed_results_are_the_same_and_nothing_is_left() {
+fn results_are_the_same_after_any_process_is_killed_and_no_process_is_left() {
     killed_at_random_moments("killed_some", 8);
 }
 
 /// `SESAME_KILLS` says how many, if not two hundred.
 #[test]
 #[ignore = "long: two hundred kills"]
-fn whoever_of_two_hundred_is_killed_results_are_the_same_and_nothing_is_left() {
+fn results_are_the_same_after_two_hundred_kills_and_no_process_is_left() {
     let kills = std::env::var("SESAME_KILLS").map_or(200, |text| text.parse().expect("a number of kills"));
     killed_at_random_moments("killed_two_hundred", kills);
 }

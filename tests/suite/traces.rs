@@ -53,7 +53,7 @@ fn number(name: &str) -> u32 {
 }
 
 #[test]
-fn failing_tests_have_traces_whatever_they_failed_of_and_others_have_none() {
+fn failing_tests_have_traces_for_every_cause_of_failure_and_others_have_none() {
     let runner = recording("traced", "all_faults", "record mcap failing");
     runner.run(&["--results", "r", "--timeout", "1", "--fail-on", "nothing"]).expect(0);
     let folder = runner.folder.join("r/3");

@@ -114,7 +114,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_front_is_that_of_the_definition_in_whatever_order_tests_come(
+        fn a_front_is_that_of_the_definition_for_any_order_of_tests(
             population in any_population(),
             seed: u64,
         ) {

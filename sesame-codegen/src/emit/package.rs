@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn features_are_added_to_whatever_the_runtime_is() {
+    fn features_are_added_to_every_kind_of_dependency_on_the_runtime() {
         let with = |runtime: Value| {
             let dependencies = BTreeMap::from([("sesame-runtime".to_owned(), runtime)]);
             with_features(&dependencies, &["a", "b"])["sesame-runtime"].to_string()

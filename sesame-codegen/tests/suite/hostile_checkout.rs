@@ -189,7 +189,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 120, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn whatever_lies_in_the_output_folder_nothing_outside_is_touched_by_generating(
+    fn generating_touches_nothing_outside_any_output_folder(
         traps in prop::collection::vec(trap(), 1..6),
         modes in prop::collection::vec(
             prop::sample::select(&[Mode::Write, Mode::Force, Mode::Check, Mode::CheckForce]), 1..4),

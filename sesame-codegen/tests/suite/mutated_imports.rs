@@ -265,7 +265,7 @@ fn imports(seed: u64, count: usize) -> usize {
 }
 
 #[test]
-fn whatever_is_done_to_a_file_it_is_imported_whole_or_nothing_is_written() {
+fn a_changed_file_is_imported_whole_or_nothing_is_written() {
     let whole = imports(1, 150);
     assert!((50..150).contains(&whole), "{whole} of 150 were imported: there is little to learn from such mutations");
 }

@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn the_digest_covers_repetitions_in_whatever_order_they_ended() {
+    fn the_digest_covers_repetitions_in_any_order_of_completion() {
         let digest = |repetitions: &[Repetition]| {
             let folder = tempfile::tempdir().unwrap();
             repeated(folder.path(), &sample::plan(), repetitions).digest().unwrap()

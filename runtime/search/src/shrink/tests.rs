@@ -117,7 +117,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn whatever_fails_the_smallest_test_fails_is_permitted_and_loses_nothing_by_one_step(
+    fn the_smallest_test_fails_is_permitted_and_cannot_be_shrunk_by_one_step(
         plan in any_plan(), seed: u64, share in 0.05..0.95f64,
     ) {
         let test_space = TestSpace::from_plan(&plan).unwrap();

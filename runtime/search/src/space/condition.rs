@@ -366,7 +366,7 @@ pub(crate) mod tests {
 
     proptest! {
         #[test]
-        fn whatever_is_grown_and_varied_is_of_the_grammar_and_keeps_its_constraints(
+        fn grown_and_varied_conditions_are_of_the_grammar_and_keep_their_constraints(
             space in any_space(), constraints in any_constraints(), seed: u64,
         ) {
             let mut stream = Stream::derive(seed, "test", &[]);
