@@ -22,7 +22,7 @@ use sesame_plan as plan;
 
 use self::id::topic_id;
 use self::operation::custom_operations;
-use self::selection::{Selection, undisturbed};
+use self::selection::{Selection, without_operations};
 use self::system::{message, node, topic, unit};
 use crate::plan::{HookPlan, RunnerPlan};
 
@@ -59,7 +59,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             .map(|&id| selection.operation_of(&space.operations[id], declared))
             .collect(),
         tests: if let model::Search::Passive { .. } = declared.search {
-            vec![undisturbed()]
+            vec![without_operations()]
         } else {
             let tests = selection.tests.iter();
             tests.map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect()

@@ -467,7 +467,7 @@ impl Hostile {
             say(br#"{"publish":[{"topic":"control","value":-1}]}"#);
             let Some(deliver) = order() else { break };
             sleep(self.pause);
-            // What it published itself is no number of a mode.
+            // A message that it published itself is not the number of a mode.
             let mode = deliver.split("\"value\":").nth(1).and_then(|rest| rest.split(['.', '}']).next()?.parse().ok());
             let asked = mode.filter(|_: &usize| !self.acted).map(|mode| {
                 self.acted = true;
@@ -524,7 +524,7 @@ fn live(kind: &str) {
             rustix::process::setsid().ok();
             child("setsid", false).spawn().ok();
         }
-        // For as long as anybody can wait for it.
+        // For longer than any test waits.
         "hare" => {
             rustix::process::setsid().ok();
             sleep(Duration::from_millis(20));

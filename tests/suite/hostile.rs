@@ -234,7 +234,7 @@ fn run(results: &str, modes: &[&str], workers: &str) -> Ran {
             Origin::Known(id) => {
                 outcomes.insert(plan.tests[id.index()].name.clone(), row.outcome);
             }
-            _ => assert_eq!(row.outcome, Outcome::Completed, "undisturbed it does as it should: {}", said.err),
+            _ => assert_eq!(row.outcome, Outcome::Completed, "without disturbance it behaves well: {}", said.err),
         }
     }
     assert_eq!(outcomes.len(), modes.len(), "{}", said.err);

@@ -19,7 +19,7 @@ fn traces(folder: &Path) -> BTreeSet<String> {
     entries
         .map(|entry| {
             let name = entry.unwrap().file_name().into_string().unwrap();
-            name.strip_suffix(".mcap").unwrap_or_else(|| panic!("{name} is no trace")).to_owned()
+            name.strip_suffix(".mcap").unwrap_or_else(|| panic!("{name} is not a trace")).to_owned()
         })
         .collect()
 }

@@ -191,7 +191,7 @@ mod tests {
         for (number, _, fitness) in generation(&(0..=11).collect::<Vec<_>>()) {
             believing.add(number, &fitness);
         }
-        assert_eq!(believing.numbers(), [11], "whoever believes the first run has a front of one");
+        assert_eq!(believing.numbers(), [11], "without confirmation, the front has one test");
 
         // In the same generation, and in a later one.
         let mut together = ConfirmedFront::default();
@@ -265,7 +265,7 @@ mod tests {
         confirming.confirm(2, measured(&[4.0]));
         assert_eq!(confirming.unconfirmed(), [0u32; 0]);
         confirming.begin([(4, 1, measured(&[0.0]))].map(judged));
-        assert_eq!(confirming.unconfirmed(), [0u32; 0], "its first run is no luck to be had again");
+        assert_eq!(confirming.unconfirmed(), [0u32; 0], "its first run was not luck");
         assert_eq!((confirming.front().numbers(), confirming.fitness().next()), (vec![2], Some(&measured(&[5.0]))));
     }
 

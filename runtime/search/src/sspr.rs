@@ -42,7 +42,7 @@ pub struct Disturbance {
     pub class: Class,
     /// Where it may be active at all: what its intervals are shares of, in seconds.
     pub window: Span,
-    /// When it was active, or is to be, in seconds. An operation without an interval is no part of the point.
+    /// When it was active, or is to be, in seconds. An operation without an interval does not contribute to the point.
     pub intervals: Vec<Span>,
     /// Its numeric parameters. Choices among texts are none.
     pub parameters: Vec<Intensity>,

@@ -53,7 +53,7 @@ pub(super) fn cargo_toml(note: &str, package: &str, dependencies: &BTreeMap<Stri
     }
     text.push_str(
         "\n\
-         # The runner is a workspace of its own, whatever folder it lies in.\n\
+         # The runner is a workspace of its own, in any folder.\n\
          [workspace]\n",
     );
     if vendored {

@@ -144,7 +144,7 @@ impl Selection {
 }
 
 /// The test of a campaign that only observes: nothing is intercepted.
-pub(super) fn undisturbed() -> plan::KnownTest {
+pub(super) fn without_operations() -> plan::KnownTest {
     plan::KnownTest {
         name: "undisturbed".to_owned(),
         doc: String::new(),

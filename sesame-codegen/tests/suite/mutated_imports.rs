@@ -130,7 +130,7 @@ fn mutated(draws: &mut Draws) -> Vec<u8> {
     let mut text = WHOLE.to_owned();
     for _ in 0..=draws.below(3) {
         match draws.below(12) {
-            // Bytes, whatever they were.
+            // Any bytes.
             0 => {
                 let mut bytes = text.into_bytes();
                 let at = draws.below(bytes.len());

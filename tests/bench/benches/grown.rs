@@ -65,7 +65,7 @@ fn watched(runner: &Runner, arguments: &[&str], results: &Path) -> Took {
     Took { time: begun.elapsed(), running, most }
 }
 
-/// Takes away the last test, the undisturbed run in the end, so that `resume` has all but that to walk through.
+/// Removes the last test, which is the final reference run, so that `resume` goes through all others.
 fn unfinish(results: &Path) {
     let open = Connection::open(results.join("results.sqlite")).expect("the results can be opened");
     open.pragma_update(None, "foreign_keys", false).expect("it can be set");

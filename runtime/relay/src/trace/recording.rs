@@ -369,7 +369,7 @@ impl Feeder<'_> {
             let outcome = text(ending, "outcome");
             end = match ending.get("end_s") {
                 Some(end) if matches!(outcome.as_str(), "completed" | "no_effect" | "void") => {
-                    let seconds = end.parse().map_err(|_| damaged("its end is no number"))?;
+                    let seconds = end.parse().map_err(|_| damaged("its end is not a number"))?;
                     Some(SimTime::from_seconds(seconds).max(self.now))
                 }
                 // Hooks are not told of the end of a run that failed.

@@ -160,7 +160,7 @@ fn numbers(dataset: &Table, column: &str) -> Vec<Option<f64>> {
         Datum::Missing => None,
         Datum::Real(number) | Datum::Lone(number) => Some(number),
         Datum::Whole(number) => Some(number as f64),
-        ref other => panic!("{other:?} is no number"),
+        ref other => panic!("{other:?} is not a number"),
     };
     dataset.rows().iter().map(number).collect()
 }

@@ -1,10 +1,9 @@
 //! Variation of tests: crossover of their lists of operations, mutation of single operations and of the list.
 //!
-//! A mutated operation draws with a new seed; one that a child has from a parent with that parent's, also if its window
-//! had to give way to another copy. Of copies that come to one child with equal seeds, the later gets a new one: two
-//! copies never draw alike. A child is never one of the tests
-//! asked before in the same campaign (apart from operation seeds), unless [`Rates::tries`] attempts to change it all
-//! fail.
+//! A mutated operation has a new operation seed. An operation that a child inherits unchanged keeps its seed, even if its
+//! window was moved to make room for another copy. If a child inherits copies with equal seeds, the later one gets a new
+//! seed, so that two copies never draw the same random numbers. A child never equals an earlier test of the campaign
+//! (apart from operation seeds), unless all [`Rates::tries`] attempts to change it fail.
 
 mod crossover;
 mod mutation;
@@ -33,8 +32,7 @@ pub struct TestVariation {
     test_space: TestSpace,
     rates: Rates,
     seed: u64,
-    /// All tests made so far, by their [`key`]: whole they would be most of what a search of many tests holds in
-    /// memory.
+    /// The keys of all tests made so far: the tests themselves would take most of the memory of a long search.
     made: BTreeSet<TestKey>,
 }
 

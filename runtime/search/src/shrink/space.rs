@@ -66,7 +66,7 @@ impl ShrinkSpace {
                     let step = if range.integer { libm::round(step).max(1.0) } else { step };
                     let end =
                         neutral_value(&operation.kind, &parameter.name).map(|end| end.clamp(range.low, range.high));
-                    // A value that is no stronger than another is left as it is.
+                    // A value that is not stronger than another is left as it is.
                     let known = end.is_some() || shape == Shape::Range;
                     (known && !range.is_fixed()).then_some(NeutralValue { end, step })
                 };
@@ -190,7 +190,7 @@ fn simplified(condition: &Condition) -> Vec<Condition> {
 /// | burst loss `leave` | 1: a burst that ends at once |
 /// | rate limit | the highest rate |
 /// | duplicate | one copy |
-/// | custom | 0, as far as anybody can know |
+/// | custom | 0, since its effect is unknown |
 /// | random absolute, stuck at | none: of a sub-range only a narrower one is milder |
 fn neutral_value(kind: &OperationKind, parameter: &str) -> Option<f64> {
     match kind {

@@ -88,7 +88,7 @@ fn grown(before: &Test, after: &Test) -> Option<String> {
     None
 }
 
-/// Every test that is one step smaller, in whatever order.
+/// Every test that is one step smaller, in any order.
 fn one_step_smaller(space: &ShrinkSpace, test: &Test) -> Vec<Test> {
     let mut found = Vec::new();
     if test.operations.len() > space.fewest {
@@ -137,7 +137,7 @@ proptest! {
         let found = smallest(&shrink).unwrap();
         prop_assert!(fails(found, 7) && shrink.is_minimal());
         for smaller in one_step_smaller(&shrink.space, found) {
-            prop_assert!(!fails(&smaller, 7), "{:?} can be made smaller: {:?}", found, smaller);
+            prop_assert!(!fails(&smaller, 7), "{:?} can be shrunk: {:?}", found, smaller);
         }
         // A search gives every test as many activations as there may be; fewer are permitted too.
         let with_all_times = |mut test: Test| {

@@ -1,11 +1,11 @@
-//! How often what of a test is varied.
+//! How often each part of a test is varied.
 //!
 //! # Rates
 //!
 //! Chosen on four synthetic robots with hidden phases of vulnerability, hits to be maximised and active time minimised.
-//! What counts is the hypervolume of the final front, as a multiple of random search's with the same budget (geometric
-//! mean over the robots; 200 seeds with population 10 and 210 evaluations, 60 seeds with 20 and 1000). The default
-//! reaches 1.51 and 1.70. Of each rate, the default and what other values do to that:
+//! The measure is the hypervolume of the final front relative to that of random search with the same budget (geometric
+//! mean over the robots; 200 seeds with population 10 and 210 evaluations, 60 seeds with 20 and 1000). The default rates
+//! reach 1.51 and 1.70. The table lists for each rate the default, and the measure with other values:
 //!
 //! | rate        | default    | population 10, 210 evaluations   | population 20, 1000 evaluations  |
 //! |-------------|------------|----------------------------------|----------------------------------|
@@ -19,20 +19,21 @@
 //! | `drop`      | 0.2        | 0: 1.49, 0.5: 1.47               | 0: 1.67, 0.5: 1.64               |
 //! | `steps`     | 0.01, 0.2  | 0.01, 0.05: 1.44; 0.1, 0.5: 1.50 | 0.01, 0.05: 1.64; 0.1, 0.5: 1.66 |
 //!
-//! Growth has to be much likelier than loss: selection for little active time empties lists and shortens windows by
-//! itself, and without a steady supply of operations a small population ends among short tests that hit nothing. With
-//! `add` 0.1, `duplicate` 0.05 and `drop` 0.15 it comes to 0.92 and 1.08: worse than chance on the smaller budget.
+//! Operations must be added much more often than removed: selection for little active time already empties lists and
+//! shortens windows, and without a steady supply of operations a small population ends in short tests that hit nothing.
+//! With `add` 0.1, `duplicate` 0.05 and `drop` 0.15 the measure is 0.92 and 1.08: worse than random search on the smaller
+//! budget.
 //!
 //! # Rates by condition
 //!
-//! The paper's platform regrows a part of a condition in two of three operations and crosses conditions place by place;
-//! how often is best was measured on the same robots with conditions over two positions and a count of parts
-//! (population 10, 210 evaluations, 8 to 16 seeds). With the rates above and conditions that end activations, evolution
-//! comes to 0.79 of chance: a condition says little about how long an operation is active, so selection runs into tests
-//! of one active step that hit nothing. Changing conditions twice as often (`window` 0.8) and regrowing half the time
-//! (`fresh` 0.5) gives 1.22; `fresh` 0.8 gives 1.03, and without `exchange` the rates above give 0.59. With lengths of
-//! 1 s to 15 s it gives 1.93. What remains is uneven: by end conditions 1.2 to 2.0 on three robots, and 0.7 on one
-//! where two operations have to meet in a short phase.
+//! The paper's platform regrows a part of a condition in two of three operations and crosses conditions position by
+//! position. The best rates were measured on the same robots with conditions over two positions and a count of parts
+//! (population 10, 210 evaluations, 8 to 16 seeds). With the rates above and end conditions, evolution reaches 0.79 of
+//! random search: a condition hardly determines how long an operation is active, so selection converges to tests of one
+//! active step that hit nothing. Changing conditions twice as often (`window` 0.8) and regrowing half of them (`fresh`
+//! 0.5) gives 1.22; `fresh` 0.8 gives 1.03, and without `exchange` the rates above give 0.59. With lengths of 1 s to
+//! 15 s, they give 1.93. Results differ between robots: with end conditions 1.2 to 2.0 on three of them, and 0.7 on one
+//! where two operations have to act in the same short phase.
 
 use crate::space::range::StepSizes;
 
