@@ -263,12 +263,13 @@ mod tests {
         assert_eq!(grown.plan.metrics[2].initial, Some(0.0));
         insta::assert_snapshot!(serde_json::to_string_pretty(&grown.plan.campaign.activation).unwrap());
         insta::assert_snapshot!(serde_json::to_string_pretty(&grown.plan.tests[0].test).unwrap());
-        let constraints: Vec<usize> = grown.plan.operations.iter().map(|it| it.constraints.len()).collect();
+        let constraints: Vec<usize> =
+            grown.plan.operations.iter().map(|operation| operation.constraints.len()).collect();
         assert_eq!(constraints, [0, 0, 2]);
         let read: plan::CampaignPlan = serde_json::from_str(&serde_json::to_string(&grown.plan).unwrap()).unwrap();
         assert_eq!(read, grown.plan);
         let by_time = lower(&space, space.campaign("look").unwrap(), "cell.sesame", "sesamec 0.0.0");
-        assert!(by_time.plan.operations.iter().all(|it| it.constraints.is_empty()));
+        assert!(by_time.plan.operations.iter().all(|operation| operation.constraints.is_empty()));
         let names: Vec<&str> = by_time.plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
         assert_eq!(names, ["collisions", "near", "time"], "the known test is in this plan too");
     }

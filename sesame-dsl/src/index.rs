@@ -153,8 +153,10 @@ impl Index {
         let Definition { kind, full_span: Span { file, lo, hi }, .. } = *self.definition(of);
         let mut scopes = vec![of];
         if matches!(kind, Kind::Topic | Kind::Field) {
-            let inside =
-                self.references.iter().filter(|it| it.span.file == file && lo <= it.span.lo && it.span.hi <= hi);
+            let inside = self
+                .references
+                .iter()
+                .filter(|reference| reference.span.file == file && lo <= reference.span.lo && reference.span.hi <= hi);
             let messages = inside.filter_map(|reference| reference.target);
             scopes.extend(messages.filter(|&id| self.definition(id).kind == Kind::Message));
         }

@@ -230,7 +230,7 @@ fn tried(text: &str) -> BTreeSet<u64> {
     let (file, analysis) = has_a_sound_answer(text);
     let suggestions = analysis.diagnostics.iter().take(3).flat_map(|found| &found.suggestions);
     // An imported file may have mistakes too; a suggestion for those does not change this text.
-    for suggestion in suggestions.filter(|it| it.edits.iter().all(|(span, _)| span.file == file)) {
+    for suggestion in suggestions.filter(|suggestion| suggestion.edits.iter().all(|(span, _)| span.file == file)) {
         let mut edits = suggestion.edits.clone();
         edits.sort_by_key(|(span, _)| std::cmp::Reverse(span.lo));
         let mut mended = text.to_owned();

@@ -21,7 +21,8 @@ use sesame_tests::{Done, Project, Runner, workspace};
 
 /// The runner of a campaign on the simulator that starts others; `None`, with the reason, without a Python.
 fn breeding(name: &str, campaign: &str) -> Option<Runner> {
-    let found = std::process::Command::new("python3").arg("--version").output().is_ok_and(|it| it.status.success());
+    let found =
+        std::process::Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success());
     assert!(found || std::env::var_os("CI").is_none(), "python3 is needed");
     if !found {
         eprintln!("skipped: there is no python3 here");

@@ -81,8 +81,10 @@ fn violations_that_were_found_get_smaller_and_stay_violations() {
         let violated: Vec<&str> = plan
             .requirements
             .iter()
-            .filter(|it| verdict(it.bound, &row.outcome, row.value(it.metric)) == Verdict::Violated)
-            .map(|it| it.name.as_str())
+            .filter(|requirement| {
+                verdict(requirement.bound, &row.outcome, row.value(requirement.metric)) == Verdict::Violated
+            })
+            .map(|requirement| requirement.name.as_str())
             .collect();
         let kept = way["fails"].as_str().unwrap().trim_start_matches("violates ").replace(" and ", ", ");
         assert!(kept.split(", ").all(|name| violated.contains(&name)), "{kept}: {violated:?}");

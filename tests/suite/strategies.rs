@@ -180,6 +180,7 @@ fn interval(differences: &[f64]) -> (f64, f64) {
     };
     let n = differences.len() as f64;
     let mean = differences.iter().sum::<f64>() / n;
-    let variance = differences.iter().map(|it| (it - mean) * (it - mean)).sum::<f64>() / (n - 1.0);
+    let variance =
+        differences.iter().map(|difference| (difference - mean) * (difference - mean)).sum::<f64>() / (n - 1.0);
     (mean, quantile * (variance / n).sqrt())
 }

@@ -110,7 +110,7 @@ fn a_hook_that_is_changed_is_compared_with_what_was_recorded() {
     runner.run(&["--results", "r", "--seed", "5", "--evaluations", "10"]).expect(0);
     let trace = runner.folder.join("r/5/traces/T3.mcap");
     let unchanged = fed(&runner, &trace, 0);
-    assert!(unchanged["metrics"].as_array().unwrap().iter().all(|it| it["sameness"] == "equal"), "{unchanged}");
+    assert!(unchanged["metrics"].as_array().unwrap().iter().all(|metric| metric["sameness"] == "equal"), "{unchanged}");
 
     let hook = project.runners.join("hooks/collision_occurrence.rs");
     let text = fs::read_to_string(&hook).unwrap();
@@ -123,8 +123,12 @@ fn a_hook_that_is_changed_is_compared_with_what_was_recorded() {
         let trace = runner.folder.join(format!("r/5/traces/{name}.mcap"));
         let said = runner.run(&["replay-recording", trace.to_str().unwrap(), "--format", "json"]);
         let fed: Value = serde_json::from_str(&said.out).unwrap();
-        let metric =
-            fed["metrics"].as_array().unwrap().iter().find(|it| it["metric"] == "collision_occurrence").unwrap();
+        let metric = fed["metrics"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|metric| metric["metric"] == "collision_occurrence")
+            .unwrap();
         let (now, recorded) = (metric["now"]["value"].as_f64().unwrap(), metric["recorded"].as_f64().unwrap());
         assert_eq!(now, recorded * 2.0, "{fed}");
         assert_eq!(said.code, Some(if recorded > 0.0 { 3 } else { 0 }), "{fed}");

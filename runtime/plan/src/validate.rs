@@ -87,15 +87,15 @@ impl CampaignPlan {
             each("publishes", &node.publishes, |&id| self.has_topic(id))?;
             each("subscribes", &node.subscribes, |&id| self.has_topic(id))
         })?;
-        at("metrics", distinct(self.metrics.iter().map(|it| &it.name)))?;
+        at("metrics", distinct(self.metrics.iter().map(|metric| &metric.name)))?;
         each("metrics", &self.metrics, |metric| self.sound_metric(metric))?;
-        at("requirements", distinct(self.requirements.iter().map(|it| &it.name)))?;
+        at("requirements", distinct(self.requirements.iter().map(|requirement| &requirement.name)))?;
         each("requirements", &self.requirements, |requirement| {
             at("name", name(&requirement.name))?;
             at("metric", self.has_metric(requirement.metric))?;
             at("bound", bound(requirement.bound))
         })?;
-        at("operations", distinct(self.operations.iter().map(|it| &it.name)))?;
+        at("operations", distinct(self.operations.iter().map(|operation| &operation.name)))?;
         each("operations", &self.operations, |operation| self.sound_operation(operation))?;
         each("tests", &self.tests, |test| self.sound_known_test(test))?;
         at("campaign", self.sound_campaign(&self.campaign))
@@ -104,14 +104,14 @@ impl CampaignPlan {
     /// Makes sure that a test is one of this plan: its operations are there, each with a choice for every parameter,
     /// and all numbers are finite and in order. It need not lie within what the operations permit.
     pub fn validate_test(&self, test: &Test) -> Result<(), PlanError> {
-        each("operations", &test.operations, |it| {
-            at("operation", self.has_operation(it.operation))?;
-            let operation = self.operation(it.operation);
-            at("activation", self.sound_activation(&it.activation, operation))?;
-            let (needed, chosen) = (operation.parameters.len(), it.parameters.len());
+        each("operations", &test.operations, |used| {
+            at("operation", self.has_operation(used.operation))?;
+            let operation = self.operation(used.operation);
+            at("activation", self.sound_activation(&used.activation, operation))?;
+            let (needed, chosen) = (operation.parameters.len(), used.parameters.len());
             at("parameters", require(needed == chosen, || format!("there are {chosen} instead of {needed}")))?;
             let mut domains = operation.parameters.iter().map(|parameter| &parameter.domain);
-            each("parameters", &it.parameters, |choice| domains.next().map_or(Ok(()), |domain| fits(choice, domain)))
+            each("parameters", &used.parameters, |choice| domains.next().map_or(Ok(()), |domain| fits(choice, domain)))
         })
     }
 
@@ -174,7 +174,7 @@ impl CampaignPlan {
         if let OperationKind::RandomText { texts } = &operation.kind {
             at("kind.texts", filled(texts))?;
         }
-        at("parameters", distinct(operation.parameters.iter().map(|it| &it.name)))?;
+        at("parameters", distinct(operation.parameters.iter().map(|parameter| &parameter.name)))?;
         each("parameters", &operation.parameters, |parameter| {
             at("name", name(&parameter.name))?;
             unit(parameter.unit.as_ref())?;

@@ -120,19 +120,20 @@ pub fn aggregate(runs: &[Fitness], by: Statistic) -> Fitness {
         Statistic::Quantile { share } => at(reached_by(share, runs.len()) - 1, objective),
     };
     let values: Option<Vec<f64>> =
-        (0..objectives).map(|objective| value(objective).filter(|it| !it.is_nan())).collect();
+        (0..objectives).map(|objective| value(objective).filter(|number| !number.is_nan())).collect();
     values.map_or_else(unfit, Fitness::Measured)
 }
 
 /// One margin for several runs of a test: aggregated like an objective that is minimised, so a quantile is the
 /// margin that this share of the runs reach or go below. It counts as a violation if such a run violates.
 pub(crate) fn aggregate_margin(runs: &[Margin], by: Statistic) -> Margin {
-    let value = |run: &Margin| run.value.map_or(Fitness::Unfit(Unfit::Unmeasured), |it| Fitness::Measured(vec![it]));
+    let value =
+        |run: &Margin| run.value.map_or(Fitness::Unfit(Unfit::Unmeasured), |number| Fitness::Measured(vec![number]));
     let values: Vec<Fitness> = runs.iter().map(value).collect();
     let value = aggregate(&values, by).objectives().map(|values| values[0]);
     // On the edge itself a bound decides, and so the runs that are there know.
     let on_edge = |it: f64| it == 0.0 && runs.iter().any(|run| run.value == Some(0.0) && run.violated);
-    Margin { value, violated: value.is_some_and(|it| it < 0.0 || on_edge(it)) }
+    Margin { value, violated: value.is_some_and(|margin| margin < 0.0 || on_edge(margin)) }
 }
 
 /// The least number of runs that are at least this share of all; 1 or more.

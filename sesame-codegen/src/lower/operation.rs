@@ -59,7 +59,11 @@ pub(super) fn custom_operations(space: &Space) -> Vec<OperationPlan> {
             line: operation.declaration.line,
             topic: operation.topic().map(topic_id),
             moment: *when,
-            parameters: operation.parameters.iter().map(|it| (parameter(it), it.doc.clone())).collect(),
+            parameters: operation
+                .parameters
+                .iter()
+                .map(|declared| (parameter(declared), declared.doc.clone()))
+                .collect(),
         }),
         _ => None,
     });

@@ -32,14 +32,21 @@ impl Selection {
             }
         };
         let fits = |test: &model::Test| {
-            test.operations.iter().all(|it| operations.contains(&it.operation) && begins(it) < campaign.end_after)
+            test.operations
+                .iter()
+                .all(|operation| operations.contains(&operation.operation) && begins(operation) < campaign.end_after)
         };
         let tests: Vec<model::TestId> = space.tests.iter().filter(|(_, test)| fits(test)).map(|(id, _)| id).collect();
         // A test holds an operation at least, so a campaign that only observes has none of them.
         let mut metrics: Vec<model::MetricId> = campaign.objectives.clone();
         metrics.extend(&campaign.observed);
         metrics.extend(space.requirements.values().map(|requirement| requirement.metric));
-        metrics.extend(condition_space(campaign).into_iter().flat_map(|it| &it.variables).map(|it| it.metric));
+        metrics.extend(
+            condition_space(campaign)
+                .into_iter()
+                .flat_map(|conditions| &conditions.variables)
+                .map(|variable| variable.metric),
+        );
         for operation in tests.iter().flat_map(|&test| &space.tests[test].operations) {
             operation.activation.conditions().for_each(|condition| condition.metrics_into(&mut metrics));
         }
@@ -77,13 +84,13 @@ impl Selection {
     }
 
     pub(super) fn test(&self, space: &Space, test: &model::Test, end_after: f64) -> plan::KnownTest {
-        let operations = test.operations.iter().map(|it| {
-            let within = within(&space.operations[it.operation], end_after);
+        let operations = test.operations.iter().map(|operation| {
+            let within = within(&space.operations[operation.operation], end_after);
             plan::TestOperation {
-                operation: self.operation(it.operation),
-                activation: self.activation(&it.activation, within.end),
-                parameters: it.choices.clone(),
-                operation_seed: it.draw_seed,
+                operation: self.operation(operation.operation),
+                activation: self.activation(&operation.activation, within.end),
+                parameters: operation.choices.clone(),
+                operation_seed: operation.draw_seed,
             }
         });
         let expectations = test

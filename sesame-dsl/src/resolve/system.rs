@@ -155,7 +155,8 @@ impl<'a> Resolver<'a> {
                 if let Type::Message(id) = other
                     && let Some(message) = self.system.messages[id.index()].as_ref()
                 {
-                    let numbers = message.fields.iter().filter(|it| matches!(it.ty, Type::Int(_) | Type::Real(_)));
+                    let numbers =
+                        message.fields.iter().filter(|field| matches!(field.ty, Type::Int(_) | Type::Real(_)));
                     for field in numbers.take(3) {
                         let name = &field.declaration.name;
                         diagnostic =

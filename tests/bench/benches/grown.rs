@@ -103,7 +103,7 @@ fn main() {
         unfinish(&results);
         let resume = watched(&runner, &["resume", "--workers", "1", shown], &results);
         assert_eq!(runner.run(&["digest", "--results", shown]).expect(0).out, whole, "resuming gives what was there");
-        let [resumed, reported, digested] = [resume, report, digest].map(|it| it.time.as_secs_f64());
+        let [resumed, reported, digested] = [resume, report, digest].map(|measured| measured.time.as_secs_f64());
         println!(
             "| {count} | {:.1} MB | {resumed:.2} s | {reported:.2} s | {digested:.2} s | {} MB | {} MB |",
             size as f64 / 1e6,

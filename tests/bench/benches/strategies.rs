@@ -60,8 +60,8 @@ fn observe(plan: &CampaignPlan, number: u32, operations: &[sesame_plan::TestOper
     let mut touched = 0.0;
     let effects = operations
         .iter()
-        .map(|it| {
-            let interval = if let Activation::Time { start, end } = it.activation {
+        .map(|operation| {
+            let interval = if let Activation::Time { start, end } = operation.activation {
                 Span { start, end }
             } else {
                 let start = stream.uniform(0.0, 500.0);

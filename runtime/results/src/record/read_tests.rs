@@ -434,8 +434,9 @@ impl Repository {
         numbers: &RangeInclusive<u32>,
         mut row: impl FnMut(&Row<'_>) -> rusqlite::Result<T>,
     ) -> Result<BTreeMap<u32, Vec<T>>, RecordError> {
-        let rows =
-            self.read(sql, params![numbers.start(), numbers.end()], |it| Ok((it.get::<_, u32>(0)?, row(it)?)))?;
+        let rows = self.read(sql, params![numbers.start(), numbers.end()], |columns| {
+            Ok((columns.get::<_, u32>(0)?, row(columns)?))
+        })?;
         let mut found: BTreeMap<u32, Vec<T>> = BTreeMap::new();
         for (number, row) in rows {
             found.entry(number).or_default().push(row);

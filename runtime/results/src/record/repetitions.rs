@@ -260,7 +260,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut written = every_outcome();
         let repository = repeated(folder.path(), &sample::plan(), &written);
-        written.sort_by_key(|it| (it.test, it.position));
+        written.sort_by_key(|repetition| (repetition.test, repetition.position));
         let read: Vec<Repetition> = repository.repetitions().unwrap().into_values().flatten().collect();
         assert_eq!(read, written);
         assert_eq!(repository.tests().unwrap().len(), 22);
@@ -279,15 +279,15 @@ mod tests {
         let whole = digest(&written);
         assert_eq!(digest(&backwards), whole);
         let changes: [fn(&mut Repetition); 9] = [
-            |it| it.simulator_seed -= 9,
-            |it| it.outcome = Outcome::Completed,
-            |it| it.end = it.end.next_up(),
-            |it| it.messages += 1,
-            |it| it.values[1].value = it.values[1].value.map(f64::next_up),
-            |it| it.values[1].set = false,
-            |it| it.values[1].reach.low = None,
-            |it| it.values[1].reach.high = it.values[1].reach.high.map(f64::next_up),
-            |it| it.values[1].not_finite = Some(1.5),
+            |repetition| repetition.simulator_seed -= 9,
+            |repetition| repetition.outcome = Outcome::Completed,
+            |repetition| repetition.end = repetition.end.next_up(),
+            |repetition| repetition.messages += 1,
+            |repetition| repetition.values[1].value = repetition.values[1].value.map(f64::next_up),
+            |repetition| repetition.values[1].set = false,
+            |repetition| repetition.values[1].reach.low = None,
+            |repetition| repetition.values[1].reach.high = repetition.values[1].reach.high.map(f64::next_up),
+            |repetition| repetition.values[1].not_finite = Some(1.5),
         ];
         for (at, change) in changes.into_iter().enumerate() {
             let mut changed = written.clone();

@@ -61,9 +61,9 @@ impl ScannedTest {
         let disturbances: Vec<Disturbance> = self
             .operations
             .iter()
-            .map(|it| {
-                let intervals = if it.acted { it.intervals.clone() } else { Vec::new() };
-                disturbance(plan, it.operation, &it.choices, intervals)
+            .map(|operation| {
+                let intervals = if operation.acted { operation.intervals.clone() } else { Vec::new() };
+                disturbance(plan, operation.operation, &operation.choices, intervals)
             })
             .collect();
         Point::from_disturbances(&disturbances, convention)
@@ -216,8 +216,12 @@ mod tests {
                         _ => None,
                     },
                     choices: it.parameters.clone(),
-                    intervals: record.observation.operations.get(at).map_or(Vec::new(), |it| it.intervals.clone()),
-                    acted: record.observation.operations.get(at).is_none_or(|it| it.counters.any_effect()),
+                    intervals: record
+                        .observation
+                        .operations
+                        .get(at)
+                        .map_or(Vec::new(), |effect| effect.intervals.clone()),
+                    acted: record.observation.operations.get(at).is_none_or(|effect| effect.counters.any_effect()),
                 })
                 .collect();
             assert_eq!(test.operations, operations);

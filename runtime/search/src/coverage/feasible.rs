@@ -378,8 +378,8 @@ impl Sectors {
         let count: usize = windows.iter().map(|(_, count)| count).sum();
         let n = count as f64;
         let mean = |value: fn(&Window) -> f64| windows.iter().map(|(it, n)| value(it) * *n as f64).sum::<f64>() / n;
-        let centre = mean(|it| f64::midpoint(it.start, it.end));
-        let (width, shortest) = (mean(|it| it.end - it.start), mean(|it| it.shortest));
+        let centre = mean(|window| f64::midpoint(window.start, window.end));
+        let (width, shortest) = (mean(|window| window.end - window.start), mean(|window| window.shortest));
         // With conditions, intervals can be anywhere in the windows, so the means can be those of any part of them.
         let reached_by_any = (
             windows.iter().map(|(it, _)| it.start).fold(f64::INFINITY, f64::min),

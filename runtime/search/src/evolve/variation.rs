@@ -170,7 +170,7 @@ mod tests {
                 match before.operations.iter().find(|old| old.operation_seed == operation.operation_seed) {
                     // Only a window that gives way to another copy's changes alone.
                     Some(old) => {
-                        let copies = after.operations.iter().filter(|it| it.operation == operation.operation).count();
+                        let copies = after.operations.iter().filter(|other| other.operation == operation.operation).count();
                         let kept = TestOperation { activation: old.activation.clone(), ..operation.clone() };
                         let gives_way = plan.campaign.copies == Copies::Apart && copies > 1;
                         prop_assert_eq!(old, if gives_way { &kept } else { operation });
@@ -225,17 +225,20 @@ mod tests {
             assert!(children.iter().all(|child| child.heritage == Heritage::Both));
             let operations = |tests: [&Test; 2]| {
                 let all = tests.into_iter().flat_map(|test| &test.operations);
-                let mut all: Vec<_> =
-                    all.map(|it| (it.operation_seed, it.operation, format!("{:?}", it.parameters))).collect();
+                let mut all: Vec<_> = all
+                    .map(|operation| {
+                        (operation.operation_seed, operation.operation, format!("{:?}", operation.parameters))
+                    })
+                    .collect();
                 all.sort();
                 all
             };
             let [a, b] = &parents;
             assert_eq!(operations([&children[0].genome, &children[1].genome]), operations([a, b]));
             let before: Vec<&Activation> =
-                [a, b].iter().flat_map(|it| &it.operations).map(|it| &it.activation).collect();
+                [a, b].iter().flat_map(|test| &test.operations).map(|operation| &operation.activation).collect();
             let new = children.iter().flat_map(|child| &child.genome.operations);
-            unlike += u32::from(new.filter(|it| !before.contains(&&it.activation)).count() >= 1);
+            unlike += u32::from(new.filter(|operation| !before.contains(&&operation.activation)).count() >= 1);
         }
         // Now and then conditions are exchanged whole.
         assert!(unlike >= 45, "{unlike} of 50 pairs");

@@ -143,13 +143,13 @@ impl ShrinkSpace {
             Activation::Time { .. } | Activation::Offline => Vec::new(),
             Activation::ConditionFor { start, length, times } => {
                 let demanding = may_start(start);
-                let starts = simplified(start).into_iter().filter(|it| !demanding || may_start(it));
+                let starts = simplified(start).into_iter().filter(|condition| !demanding || may_start(condition));
                 starts.map(|start| Activation::ConditionFor { start, length: *length, times: *times }).collect()
             }
             Activation::Condition { start, end, times } => {
                 let (demanding_start, demanding_end) = (may_start(start), may_end(end));
-                let starts = simplified(start).into_iter().filter(|it| !demanding_start || may_start(it));
-                let ends = simplified(end).into_iter().filter(|it| !demanding_end || may_end(it));
+                let starts = simplified(start).into_iter().filter(|condition| !demanding_start || may_start(condition));
+                let ends = simplified(end).into_iter().filter(|condition| !demanding_end || may_end(condition));
                 let with_start = starts.map(|start| Activation::Condition { start, end: end.clone(), times: *times });
                 let with_end = ends.map(|end| Activation::Condition { start: start.clone(), end, times: *times });
                 with_start.chain(with_end).collect()

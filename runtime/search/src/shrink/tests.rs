@@ -62,7 +62,7 @@ fn scattered(test: &Test, seed: u64) -> f64 {
 fn grown(before: &Test, after: &Test) -> Option<String> {
     let mut left = before.operations.iter();
     for used in &after.operations {
-        let was = left.find(|it| it.operation_seed == used.operation_seed && it.operation == used.operation)?;
+        let was = left.find(|old| old.operation_seed == used.operation_seed && old.operation == used.operation)?;
         let inside = match (&was.activation, &used.activation) {
             (Activation::Time { start: a, end: b }, Activation::Time { start, end }) => {
                 a <= start && start < end && end <= b
@@ -350,7 +350,7 @@ fn a_condition_loses_what_does_not_matter_and_activations_get_fewer_and_shorter(
     original.operations[0].activation = Activation::ConditionFor { start, length: 12.0, times: 3 };
     let shrink = shrunk(Shrink::new(&plan, shrinking(original, 1, 500)), |test, _| {
         let Activation::ConditionFor { start, length, times } = &test.operations[0].activation else { panic!() };
-        sesame_base::condition::mentions(start, &|it| it == sesame_base::condition::testing::variable(4))
+        sesame_base::condition::mentions(start, &|metric| metric == sesame_base::condition::testing::variable(4))
             && *length > 4.0
             && *times > 1
     });

@@ -25,7 +25,8 @@ pub(crate) fn is_allowed(condition: &Condition, space: &ConditionSpace, constrai
 
 /// Whether every comparison of two variables is of variables of one unit.
 fn of_one_unit(condition: &Condition, space: &ConditionSpace) -> bool {
-    let unit = |metric| space.variables.iter().find(|variable| variable.metric == metric).map(|it| &it.unit);
+    let unit =
+        |metric| space.variables.iter().find(|variable| variable.metric == metric).map(|variable| &variable.unit);
     match condition {
         Condition::Compare { left: Operand::Variable(left), right: Operand::Variable(right), .. } => {
             unit(*left) == unit(*right)

@@ -39,8 +39,8 @@ fn not_reached(plan: &CampaignPlan, grid: &Grid, seed: u64) -> (Vec<Vec<u32>>, u
 
 /// Whether copies of one operation are active at the same time.
 fn overlaps(test: &Test) -> bool {
-    let windows = test.operations.iter().filter_map(|it| match it.activation {
-        Activation::Time { start, end } => Some((it.operation, start, end)),
+    let windows = test.operations.iter().filter_map(|operation| match operation.activation {
+        Activation::Time { start, end } => Some((operation.operation, start, end)),
         _ => None,
     });
     let windows: Vec<(OperationId, f64, f64)> = windows.collect();
@@ -70,7 +70,7 @@ fn twelve_operations() -> CampaignPlan {
             }
             if at == 6
                 && let Some(Domain::Number { low, high, integer, .. }) =
-                    operation.parameters.first_mut().map(|it| &mut it.domain)
+                    operation.parameters.first_mut().map(|parameter| &mut parameter.domain)
             {
                 (*low, *high, *integer) = (0.0, 20.0, true);
             }
@@ -237,7 +237,7 @@ fn a_test_in_the_cell_changes_little_and_other_tests_keep_middles_and_numbers() 
         let test = fresh_test(&test_space, &mut stream);
         let cell = (0..grid.len()).filter(|&cell| feasible.reaches(cell)).nth(stream.below(feasible.count())).unwrap();
         let built = placer.place_in_cell(&test, cell, &plan, &mut stream).unwrap();
-        let kinds = |test: &Test| test.operations.iter().map(|it| it.operation).collect::<Vec<_>>();
+        let kinds = |test: &Test| test.operations.iter().map(|operation| operation.operation).collect::<Vec<_>>();
         assert_eq!(kinds(&built), kinds(&test), "the cell does not count operations");
         for (before, after) in test.operations.iter().zip(&built.operations) {
             let [Choice::Range { low: a, high: b }, Choice::Range { low: c, high: d }] =
