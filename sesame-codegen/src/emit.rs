@@ -157,7 +157,9 @@ fn readme_hooks(runner: &RunnerPlan, used: bool) -> Vec<ReadmeHook> {
     let operations = runner.operations.iter().filter(|operation| !used || runner.applies(operation));
     metrics
         .map(|hook| entry("metric", &hook.metric, &hook.source, hook.line, &hook.doc))
-        .chain(operations.map(|it| entry("operation", &it.operation, &it.source, it.line, &it.doc)))
+        .chain(operations.map(|operation| {
+            entry("operation", &operation.operation, &operation.source, operation.line, &operation.doc)
+        }))
         .collect()
 }
 

@@ -28,7 +28,7 @@ pub struct File {
 }
 
 impl File {
-    /// Its contents as text. What is no text, such as a vendored mesh, is shown as far as it can be.
+    /// Its contents as text. What is not text, such as a vendored mesh, is shown as far as possible.
     pub fn text(&self) -> Cow<'_, str> {
         String::from_utf8_lossy(&self.contents)
     }

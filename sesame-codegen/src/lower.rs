@@ -12,14 +12,19 @@
 mod condition;
 mod formula;
 mod id;
+mod operation;
 mod robustness;
+mod selection;
+mod system;
 
-use sesame_dsl::model::{self, CampaignId, Id as _, Space};
-use sesame_dsl::units::Unit;
+use sesame_dsl::model::{self, CampaignId, Space};
 use sesame_plan as plan;
 
-use self::id::{raw, topic_id};
-use crate::plan::{HookPlan, OperationPlan, RunnerPlan};
+use self::id::topic_id;
+use self::operation::custom_operations;
+use self::selection::{Selection, without_operations};
+use self::system::{message, node, topic, unit};
+use crate::plan::{HookPlan, RunnerPlan};
 
 /// The plan of a campaign's runner. `source` is the `.sesame` file's name without its folder, `generator` the name and
 /// version of what generates.
@@ -54,7 +59,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             .map(|&id| selection.operation_of(&space.operations[id], declared))
             .collect(),
         tests: if let model::Search::Passive { .. } = declared.search {
-            vec![undisturbed()]
+            vec![without_operations()]
         } else {
             let tests = selection.tests.iter();
             tests.map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect()
@@ -62,187 +67,6 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
         campaign: selection.campaign(space, declared),
     };
     RunnerPlan { plan, hooks: hooks(space), operations: custom_operations(space), simulator_crate, system_file }
-}
-
-/// The parts of a space that are in a campaign's plan, in declaration order: a position here is the id there.
-struct Selection {
-    metrics: Vec<model::MetricId>,
-    operations: Vec<model::OperationId>,
-    tests: Vec<model::TestId>,
-}
-
-impl Selection {
-    fn of(space: &Space, campaign: &model::Campaign) -> Self {
-        let mut operations: Vec<model::OperationId> = match &campaign.search {
-            model::Search::Strategy { template, .. } => template.operations.clone(),
-            model::Search::Repeat { test, .. } => {
-                space.tests[*test].operations.iter().map(|operation| operation.operation).collect()
-            }
-            model::Search::Passive { .. } => Vec::new(),
-        };
-        operations.sort();
-        operations.dedup();
-        let begins = |it: &model::TestOperation| match &it.activation {
-            model::Activation::Window(window) => window.low,
-            model::Activation::Offline => 0.0,
-            model::Activation::Condition { .. } => {
-                space.operations[it.operation].within.map_or(0.0, |within| within.low)
-            }
-        };
-        let fits = |test: &model::Test| {
-            test.operations.iter().all(|it| operations.contains(&it.operation) && begins(it) < campaign.end_after)
-        };
-        let tests: Vec<model::TestId> = space.tests.iter().filter(|(_, test)| fits(test)).map(|(id, _)| id).collect();
-        // A test holds an operation at least, so a campaign that only observes has none of them.
-        let mut metrics: Vec<model::MetricId> = campaign.objectives.clone();
-        metrics.extend(&campaign.observed);
-        metrics.extend(space.requirements.values().map(|requirement| requirement.metric));
-        metrics.extend(condition_space(campaign).into_iter().flat_map(|it| &it.variables).map(|it| it.metric));
-        for operation in tests.iter().flat_map(|&test| &space.tests[test].operations) {
-            operation.activation.conditions().for_each(|condition| condition.metrics_into(&mut metrics));
-        }
-        let expectations = tests.iter().flat_map(|&test| &space.tests[test].expectations);
-        metrics.extend(expectations.map(|expectation| expectation.metric));
-        metrics.sort();
-        metrics.dedup();
-        Selection { metrics, operations, tests }
-    }
-
-    fn metric(&self, id: model::MetricId) -> plan::MetricId {
-        plan::MetricId(position(&self.metrics, id))
-    }
-
-    fn operation(&self, id: model::OperationId) -> plan::OperationId {
-        plan::OperationId(position(&self.operations, id))
-    }
-
-    /// An operation, with its constraints where conditions are grown: elsewhere they say nothing.
-    fn operation_of(&self, declared: &model::Operation, campaign: &model::Campaign) -> plan::Operation {
-        let constraints = match condition_space(campaign) {
-            Some(_) => declared.constraints.iter().map(|constraint| self.constraint(constraint)).collect(),
-            None => Vec::new(),
-        };
-        operation(declared, campaign.end_after, constraints)
-    }
-
-    fn requirement(&self, requirement: &model::Requirement) -> plan::Requirement {
-        plan::Requirement {
-            name: requirement.declaration.name.clone(),
-            text: requirement.text.clone(),
-            metric: self.metric(requirement.metric),
-            bound: requirement.bound,
-        }
-    }
-
-    fn test(&self, space: &Space, test: &model::Test, end_after: f64) -> plan::KnownTest {
-        let operations = test.operations.iter().map(|it| {
-            let within = within(&space.operations[it.operation], end_after);
-            plan::TestOperation {
-                operation: self.operation(it.operation),
-                activation: self.activation(&it.activation, within.end),
-                parameters: it.choices.clone(),
-                operation_seed: it.draw_seed,
-            }
-        });
-        let expectations = test
-            .expectations
-            .iter()
-            .map(|expectation| plan::Expectation { metric: self.metric(expectation.metric), bound: expectation.bound });
-        plan::KnownTest {
-            name: test.declaration.name.clone(),
-            doc: test.declaration.doc.clone(),
-            test: plan::Test { operations: operations.collect() },
-            expectations: expectations.collect(),
-        }
-    }
-
-    fn campaign(&self, space: &Space, campaign: &model::Campaign) -> plan::Campaign {
-        // A search that is to stop at a coverage goes on until then or until its failsafe.
-        let failsafe = campaign.coverage.as_ref().and_then(|coverage| coverage.failsafe);
-        let (search, (operations, count)) = match &campaign.search {
-            model::Search::Strategy { template, strategy, evaluations } => {
-                (plan::Search::new(*strategy, failsafe.unwrap_or(*evaluations)), held(template))
-            }
-            model::Search::Repeat { test, times } => {
-                let held = space.tests[*test].operations.len();
-                let held = u32::try_from(held).expect("a file holds fewer than 2^32 operations");
-                (
-                    plan::Search::Repeat { test: plan::KnownTestId(position(&self.tests, *test)), times: *times },
-                    (&self.operations, plan::Count { min: held, max: held }),
-                )
-            }
-            model::Search::Passive { times } => (
-                plan::Search::Repeat { test: plan::KnownTestId(0), times: *times },
-                (&self.operations, plan::Count { min: 0, max: 0 }),
-            ),
-        };
-        plan::Campaign {
-            name: campaign.declaration.name.clone(),
-            doc: campaign.declaration.doc.clone(),
-            objectives: campaign.objectives.iter().map(|&id| self.metric(id)).collect(),
-            operations: operations.iter().map(|&id| self.operation(id)).collect(),
-            count,
-            copies: copies(space, campaign),
-            activation: match template(campaign) {
-                Some(template) => self.activation_mode(space, &template.activation),
-                // A repeated test brings its own.
-                None => plan::ActivationMode::Time,
-            },
-            search,
-            coverage: campaign.coverage.as_ref().map(coverage),
-            exploration: campaign.exploration.clone(),
-            confirm: campaign.confirm,
-            neighbours: campaign.neighbours,
-            stop: campaign.stop.clone(),
-            seed: campaign.seed,
-            end_after: campaign.end_after,
-            record: campaign.record,
-        }
-    }
-}
-
-/// The test of a campaign that only observes: nothing is intercepted.
-fn undisturbed() -> plan::KnownTest {
-    plan::KnownTest {
-        name: "undisturbed".to_owned(),
-        doc: String::new(),
-        test: plan::Test { operations: Vec::new() },
-        expectations: Vec::new(),
-    }
-}
-
-/// What the tests of a search hold; `None` for a campaign that repeats.
-fn template(campaign: &model::Campaign) -> Option<&model::TestTemplate> {
-    campaign.search.template()
-}
-
-/// Which operations the tests of a search hold, and how many.
-fn held(template: &model::TestTemplate) -> (&Vec<model::OperationId>, plan::Count) {
-    (&template.operations, plan::Count { min: template.min, max: template.max })
-}
-
-/// What holds of several copies of one operation in a campaign's tests. A known test that a campaign repeats is run as
-/// tests of the space's searches are: its copies may act together where those of all of them may.
-fn copies(space: &Space, campaign: &model::Campaign) -> plan::Copies {
-    match template(campaign) {
-        Some(template) => template.copies,
-        None if space.copies_may_overlap() => plan::Copies::MayOverlap,
-        None => plan::Copies::Apart,
-    }
-}
-
-/// What a campaign grows conditions from, if it does.
-fn condition_space(campaign: &model::Campaign) -> Option<&model::condition::ConditionSpace> {
-    match &template(campaign)?.activation {
-        model::ActivationMode::Time => None,
-        model::ActivationMode::Condition(space) => Some(space),
-    }
-}
-
-/// The position of a selected item. The selection holds everything that is asked for, by its construction.
-fn position<I: Copy + Eq>(selected: &[I], id: I) -> u32 {
-    let position = selected.iter().position(|&selected| selected == id).expect("the plan holds what its parts mention");
-    u32::try_from(position).expect("a file holds fewer than 2^32 declarations")
 }
 
 fn hooks(space: &Space) -> Vec<HookPlan> {
@@ -262,80 +86,6 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
         | model::MetricSource::Formula(_) => None,
     });
     hooks.collect()
-}
-
-fn custom_operations(space: &Space) -> Vec<OperationPlan> {
-    let operations = space.operations.values().filter_map(|operation| match &operation.kind {
-        model::OperationKind::Custom { moment: when } => Some(OperationPlan {
-            operation: operation.declaration.name.clone(),
-            doc: operation.declaration.doc.clone(),
-            source: space.file_of(&operation.declaration).to_owned(),
-            line: operation.declaration.line,
-            topic: operation.topic().map(topic_id),
-            moment: *when,
-            parameters: operation.parameters.iter().map(|it| (parameter(it), it.doc.clone())).collect(),
-        }),
-        _ => None,
-    });
-    operations.collect()
-}
-
-fn parameter(parameter: &model::Parameter) -> plan::Parameter {
-    plan::Parameter {
-        name: parameter.name.clone(),
-        unit: unit(parameter.unit.as_ref()),
-        domain: match &parameter.domain {
-            model::Domain::Number { range, shape, integer } => {
-                plan::Domain::Number { low: range.low, high: range.high, shape: *shape, integer: *integer }
-            }
-            model::Domain::Point { low, high } => plan::Domain::Point { low: *low, high: *high },
-            model::Domain::Texts(texts) => plan::Domain::Texts { texts: texts.clone() },
-            model::Domain::Files(files) => plan::Domain::Files { files: files.clone() },
-        },
-    }
-}
-
-fn message(message: &model::Message) -> plan::MessageType {
-    let fields = message.fields.iter().map(|field| plan::Field {
-        name: field.declaration.name.clone(),
-        doc: field.declaration.doc.clone(),
-        ty: ty(&field.ty),
-    });
-    plan::MessageType {
-        name: message.declaration.name.clone(),
-        doc: message.declaration.doc.clone(),
-        fields: fields.collect(),
-    }
-}
-
-fn ty(of: &model::Type) -> plan::Type {
-    match of {
-        model::Type::Bool => plan::Type::Bool,
-        model::Type::Int(it) => plan::Type::Int { unit: unit(it.as_ref()) },
-        model::Type::Real(it) => plan::Type::Real { unit: unit(it.as_ref()) },
-        model::Type::Text => plan::Type::Text,
-        model::Type::Point(it) => plan::Type::Point { unit: unit(it.as_ref()) },
-        model::Type::List(of) => plan::Type::List { of: Box::new(ty(of)) },
-        model::Type::Message(id) => plan::Type::Message { id: plan::MessageId(raw(id.index())) },
-    }
-}
-
-fn topic(topic: &model::Topic) -> plan::Topic {
-    plan::Topic {
-        name: topic.declaration.name.clone(),
-        doc: topic.declaration.doc.clone(),
-        paths: topic.paths.clone(),
-        ty: ty(&topic.ty),
-    }
-}
-
-fn node(node: &model::Node) -> plan::Node {
-    plan::Node {
-        name: node.declaration.name.clone(),
-        doc: node.declaration.doc.clone(),
-        publishes: node.publishes.iter().map(|&id| topic_id(id)).collect(),
-        subscribes: node.subscribes.iter().map(|&id| topic_id(id)).collect(),
-    }
 }
 
 /// The only way in which the value of a metric changes during a run, where its formula or the declaration of its hook
@@ -378,48 +128,6 @@ fn metric(metric: &model::Metric) -> plan::Metric {
         },
         line: metric.declaration.line,
     }
-}
-
-fn operation(
-    operation: &model::Operation,
-    end_after: f64,
-    constraints: Vec<plan::condition::Constraint>,
-) -> plan::Operation {
-    plan::Operation {
-        name: operation.declaration.name.clone(),
-        doc: operation.declaration.doc.clone(),
-        topic: operation.topic().map(topic_id),
-        places: operation.target.iter().flat_map(|target| &target.places).cloned().collect(),
-        kind: operation.kind.clone(),
-        parameters: operation.parameters.iter().map(parameter).collect(),
-        within: within(operation, end_after),
-        priority: operation.priority,
-        inclusion: operation.inclusion,
-        timed: operation.timed,
-        constraints,
-    }
-}
-
-fn coverage(coverage: &model::Coverage) -> plan::CoverageGoal {
-    let axes = coverage.axes.iter().map(|axis| plan::GridAxis {
-        dimension: axis.dimension,
-        low: axis.range.low,
-        high: axis.range.high,
-        cells: axis.cells,
-    });
-    plan::CoverageGoal { axes: axes.collect(), hits: coverage.hits, stop_at: coverage.stop_at }
-}
-
-/// The window of an operation; one without `within` may be active during the whole test.
-fn within(operation: &model::Operation, end_after: f64) -> plan::Span {
-    match operation.within {
-        Some(window) => plan::Span { start: window.low, end: window.high },
-        None => plan::Span { start: 0.0, end: end_after },
-    }
-}
-
-fn unit(unit: Option<&Unit>) -> Option<String> {
-    unit.map(|unit| unit.text().to_owned())
 }
 
 #[cfg(test)]
@@ -555,12 +263,13 @@ mod tests {
         assert_eq!(grown.plan.metrics[2].initial, Some(0.0));
         insta::assert_snapshot!(serde_json::to_string_pretty(&grown.plan.campaign.activation).unwrap());
         insta::assert_snapshot!(serde_json::to_string_pretty(&grown.plan.tests[0].test).unwrap());
-        let constraints: Vec<usize> = grown.plan.operations.iter().map(|it| it.constraints.len()).collect();
+        let constraints: Vec<usize> =
+            grown.plan.operations.iter().map(|operation| operation.constraints.len()).collect();
         assert_eq!(constraints, [0, 0, 2]);
         let read: plan::CampaignPlan = serde_json::from_str(&serde_json::to_string(&grown.plan).unwrap()).unwrap();
         assert_eq!(read, grown.plan);
         let by_time = lower(&space, space.campaign("look").unwrap(), "cell.sesame", "sesamec 0.0.0");
-        assert!(by_time.plan.operations.iter().all(|it| it.constraints.is_empty()));
+        assert!(by_time.plan.operations.iter().all(|operation| operation.constraints.is_empty()));
         let names: Vec<&str> = by_time.plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
         assert_eq!(names, ["collisions", "near", "time"], "the known test is in this plan too");
     }

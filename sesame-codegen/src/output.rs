@@ -4,7 +4,7 @@
 //! Files that would come out the same are not touched, others are written beside their place and renamed into it, and
 //! a tree's manifest comes last. A user's file is never written twice and never deleted.
 //!
-//! Nothing outside the output folder is read, written or removed, whatever lies in it: no link in it is followed.
+//! Nothing outside the output folder is read, written or removed: no link in it is followed.
 
 mod manifest;
 mod place;
@@ -479,7 +479,7 @@ fn is_inside(path: &str) -> bool {
         && Path::new(path).components().all(|part| matches!(part, Component::Normal(_)))
 }
 
-/// A unified diff; `None` when one of the two is no text.
+/// A unified diff; `None` if one of the two is not text.
 fn diff((old_name, old): (&str, &[u8]), (new_name, new): (&str, &[u8])) -> Option<String> {
     let (old, new) = (std::str::from_utf8(old).ok()?, std::str::from_utf8(new).ok()?);
     Some(TextDiff::from_lines(old, new).unified_diff().header(old_name, new_name).context_radius(2).to_string())

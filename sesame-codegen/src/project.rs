@@ -75,7 +75,7 @@ fn simulator_manifest(name: &str, runtime: &Value) -> String {
          [dependencies]\n\
          sesame-runtime = {runtime}\n\
          \n\
-         # A crate of its own, whatever workspace the project lies in.\n\
+         # A crate of its own, even if the project lies in a workspace.\n\
          [workspace]\n"
     )
 }

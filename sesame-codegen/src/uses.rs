@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use sesame_dsl::diagnostic::shortened;
 use sesame_dsl::index::{Definition, DefinitionId, Index};
+use sesame_dsl::place::Place;
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 
@@ -148,33 +149,9 @@ struct Within {
     name: String,
 }
 
-/// As in the JSON of diagnostics, and the column in units of UTF-16 besides.
-#[derive(Serialize)]
-struct Place<'a> {
-    file: &'a str,
-    start: Position,
-    end: Position,
-}
-
-#[derive(Serialize)]
-struct Position {
-    byte: u32,
-    line: u32,
-    column: u32,
-    utf16_column: u32,
-}
-
 /// A definition and its uses as one JSON object, in ASCII and on one line.
 pub fn json(sources: &SourceMap, index: &Index, id: DefinitionId) -> String {
-    let at = |span: Span| {
-        let file = sources.file(span.file);
-        let position = |byte| {
-            let at = file.position(byte);
-            let utf16_column = file.position_utf16(byte).column;
-            Position { byte, line: at.line, column: at.column, utf16_column }
-        };
-        Place { file: file.name(), start: position(span.lo), end: position(span.hi) }
-    };
+    let at = |span| Place::with_utf16(sources, span);
     let definition = index.definition(id);
     let explained = Explained {
         kind: definition.kind.word(),
@@ -263,7 +240,7 @@ operation cat on zoness = blackhole
     }
 
     #[test]
-    fn json_is_ascii_whatever_a_file_holds() {
+    fn json_is_ascii_for_any_file() {
         let text = "space s /// \u{202e}🤖\u{1b}[31m\nmetric m minimise { hook on x }";
         let json = explained("m", text).unwrap().1;
         assert!(json.trim_end().chars().all(|c| c.is_ascii() && !c.is_control()), "{json}");

@@ -1,4 +1,4 @@
-//! The formatter: one layout for a file, whatever its author's.
+//! The formatter: one layout for all files.
 //!
 //! It works on words and signs and on where items and members of blocks begin, not on the kinds of constructs: a
 //! construct that is new to the grammar is laid out by the same few rules. These are:

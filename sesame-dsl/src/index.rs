@@ -45,7 +45,7 @@ pub struct Definition {
 pub struct Reference {
     /// Where the name stands.
     pub span: Span,
-    /// What it stands for: the first definition of the name, of whatever kind. `None` if there is none.
+    /// What it stands for: the first definition of the name, of any kind. `None` if there is none.
     pub target: Option<DefinitionId>,
     /// The declaration that mentions it.
     pub within: DefinitionId,
@@ -131,7 +131,7 @@ impl Index {
 
     /// The definitions that a name can stand for, in the order of declarations. `owner.name` is what belongs to an
     /// owner, or the field of what a topic carries; a name alone is that of a declaration of the space, if there is
-    /// one, else of whatever belongs to one.
+    /// one, otherwise of anything that belongs to one.
     pub fn find(&self, name: &str) -> Vec<DefinitionId> {
         let ids = || (0..self.definitions.len()).map(DefinitionId);
         if let Some((owner, member)) = name.rsplit_once('.') {
@@ -153,8 +153,10 @@ impl Index {
         let Definition { kind, full_span: Span { file, lo, hi }, .. } = *self.definition(of);
         let mut scopes = vec![of];
         if matches!(kind, Kind::Topic | Kind::Field) {
-            let inside =
-                self.references.iter().filter(|it| it.span.file == file && lo <= it.span.lo && it.span.hi <= hi);
+            let inside = self
+                .references
+                .iter()
+                .filter(|reference| reference.span.file == file && lo <= reference.span.lo && reference.span.hi <= hi);
             let messages = inside.filter_map(|reference| reference.target);
             scopes.extend(messages.filter(|&id| self.definition(id).kind == Kind::Message));
         }

@@ -9,6 +9,7 @@ pub mod format;
 mod import;
 pub mod index;
 pub mod model;
+pub mod place;
 mod resolve;
 mod similar;
 pub mod source;

@@ -27,11 +27,13 @@ mod formula;
 mod fuzz;
 mod inherit;
 mod lifecycle;
+mod message_types;
 mod metrics;
 mod nodes;
 mod physical;
 mod quantity;
 mod robustness;
+mod simulator;
 mod stop;
 mod system;
 

@@ -98,7 +98,8 @@ fn codes_are_unique_and_sorted_and_found_in_any_case() {
 fn ten_mistakes_give_ten_diagnostics_at_once() {
     let text = include_str!("bad/ten_mistakes.sesame");
     let (sources, analysis) = analyse_text("ten_mistakes", text);
-    let lines: Vec<u32> = analysis.diagnostics.iter().map(|it| sources.position(it.span).line).collect();
+    let lines: Vec<u32> =
+        analysis.diagnostics.iter().map(|diagnostic| sources.position(diagnostic.span).line).collect();
     // Each mistake is marked in the file by a comment on its line.
     let marked: Vec<u32> =
         (1..).zip(text.lines()).filter(|(_, line)| line.contains("// mistake")).map(|(n, _)| n).collect();

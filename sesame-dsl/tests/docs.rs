@@ -96,7 +96,8 @@ fn check(text: &str) -> (Vec<(String, bool)>, String) {
     });
     let analysis = analyse(&sources, file);
     let codes = analysis.diagnostics.iter();
-    let codes = codes.map(|it| (it.code.text().to_owned(), it.severity() == Severity::Error)).collect();
+    let codes =
+        codes.map(|diagnostic| (diagnostic.code.text().to_owned(), diagnostic.severity() == Severity::Error)).collect();
     (codes, render::human(&analysis.diagnostics, &sources, false))
 }
 
@@ -236,7 +237,7 @@ fn every_link_inside_the_project_leads_somewhere() {
             if let Some(fragment) = fragment {
                 let text = std::fs::read_to_string(&file).expect("only pages have headings");
                 let headings = text.lines().filter(|line| line.starts_with('#'));
-                assert!(headings.map(anchor).any(|it| it == fragment), "{page}: no heading for `{target}`");
+                assert!(headings.map(anchor).any(|heading| heading == fragment), "{page}: no heading for `{target}`");
             }
             followed += 1;
         }

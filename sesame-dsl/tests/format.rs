@@ -112,8 +112,8 @@ fn every_file_keeps_its_meaning_and_comments_and_is_formatted_once_for_all() {
     }
 }
 
-/// A construct that no file of the corpus has was never formatted by any test: whoever adds one to the grammar adds it
-/// to the corpus, too.
+/// No test formats a construct that is missing in the corpus: if you add one to the grammar, add it to the corpus,
+/// too.
 #[test]
 fn every_construct_of_the_grammar_is_in_a_file_that_is_formatted() {
     let mut seen = BTreeSet::new();

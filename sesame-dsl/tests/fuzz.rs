@@ -3,7 +3,7 @@
 //!
 //! Files of the corpus are mutated, by words and by bytes. What gives an answer of a kind that was not seen before is
 //! kept and mutated further, so the search gets ever deeper into the language. It runs in a process of its own with a
-//! limit of memory, which says what it is at before it tries it: so the text that ended it is known, whatever the end.
+//! limit of memory, which says what it is at before it tries it: so the text that ended it is always known.
 //!
 //! `SESAME_FUZZ_MINUTES` says how long (1 if not said), `SESAME_FUZZ_SEED` which mutations, `SESAME_FUZZ_KEEP` a folder
 //! for what is kept: all of it in `kept`, in `worth_keeping` what would make the corpus better.
@@ -229,8 +229,8 @@ fn kinds(analysis: &Analysis) -> BTreeSet<u64> {
 fn tried(text: &str) -> BTreeSet<u64> {
     let (file, analysis) = has_a_sound_answer(text);
     let suggestions = analysis.diagnostics.iter().take(3).flat_map(|found| &found.suggestions);
-    // An imported file may have mistakes as well; what mends those is no change of this text.
-    for suggestion in suggestions.filter(|it| it.edits.iter().all(|(span, _)| span.file == file)) {
+    // An imported file may have mistakes too; a suggestion for those does not change this text.
+    for suggestion in suggestions.filter(|suggestion| suggestion.edits.iter().all(|(span, _)| span.file == file)) {
         let mut edits = suggestion.edits.clone();
         edits.sort_by_key(|(span, _)| std::cmp::Reverse(span.lo));
         let mut mended = text.to_owned();

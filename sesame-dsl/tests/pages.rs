@@ -74,7 +74,7 @@ fn the_wrong_example_of_a_page_gives_its_code_and_the_right_one_nothing() {
     let mut failures: Vec<String> = Vec::new();
     for (code, page) in CODES {
         let others = |found: &Vec<&'static str>| {
-            found.iter().copied().filter(|it| *it != code.text() && !LEFT_OUT.contains(it)).collect::<Vec<_>>()
+            found.iter().copied().filter(|other| *other != code.text() && !LEFT_OUT.contains(other)).collect::<Vec<_>>()
         };
         let (found, said) = codes(example(page, "Wrong"));
         if !found.contains(&code.text()) || !others(&found).is_empty() {

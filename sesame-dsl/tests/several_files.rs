@@ -65,7 +65,7 @@ fn an_imported_system_is_as_if_it_stood_here() {
     assert_eq!((space.file_of(&high.declaration), high.declaration.line), ("shared/cell.sesame", 11));
     let campaign = &space.campaigns.values().next().unwrap().declaration;
     assert_eq!((space.file_of(campaign), campaign.line), ("demo.sesame", 3));
-    assert_eq!(said(&files), "", "what an import has more than is used is no mistake");
+    assert_eq!(said(&files), "", "unused declarations of an import are not reported");
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn a_file_that_two_others_import_is_there_once_and_before_them() {
     read.sort();
     assert_eq!(read, ["a.sesame", "b/b.sesame", "cell.sesame"], "each is read once");
     let space = analysis.model.unwrap();
-    let names: Vec<&str> = space.operations.values().map(|it| it.declaration.name.as_str()).collect();
+    let names: Vec<&str> = space.operations.values().map(|operation| operation.declaration.name.as_str()).collect();
     assert_eq!(names, ["jitter", "unused", "a", "b"]);
 }
 
@@ -234,7 +234,7 @@ fn conditions_traces_and_custom_operations_come_from_imports_and_other_campaigns
             panic!("{name} searches")
         };
         let ActivationMode::Condition(grown) = &template.activation else { panic!("{name} grows conditions") };
-        let names = grown.variables.iter().map(|it| space.metrics[it.metric].declaration.name.as_str());
+        let names = grown.variables.iter().map(|variable| space.metrics[variable.metric].declaration.name.as_str());
         names.collect::<Vec<_>>()
     };
     assert_eq!((variables("more"), variables("all")), (vec!["high", "near"], vec!["gap", "near"]));

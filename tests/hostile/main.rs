@@ -184,8 +184,8 @@ const MODES: &[(&str, Act)] = &[
     ("ends_twice", Says(b"{\"done\":{\"ended\":true}}\n{\"done\":{\"ended\":true}}")),
     (
         "answers_twice_at_the_end",
-        Does(|it| {
-            it.at_the_end = Some(|_| {
+        Does(|hostile| {
+            hostile.at_the_end = Some(|_| {
                 say(DONE.as_bytes());
                 say(DONE.as_bytes());
             });
@@ -193,20 +193,20 @@ const MODES: &[(&str, Act)] = &[
     ),
     (
         "speaks_long_after_its_last_answer",
-        Does(|it| {
-            it.at_the_end = Some(|_| {
+        Does(|hostile| {
+            hostile.at_the_end = Some(|_| {
                 say(DONE.as_bytes());
                 sleep(Duration::from_millis(400));
                 say(DONE.as_bytes());
             });
         }),
     ),
-    ("answers_the_next_reset_wrongly", Does(|it| it.at_reset = Some(|_| say(DONE.as_bytes())))),
-    ("exits_at_the_next_reset", Does(|it| it.at_reset = Some(|_| exit(9)))),
+    ("answers_the_next_reset_wrongly", Does(|hostile| hostile.at_reset = Some(|_| say(DONE.as_bytes())))),
+    ("exits_at_the_next_reset", Does(|hostile| hostile.at_reset = Some(|_| exit(9)))),
     (
         "exits_after_its_last_answer",
-        Does(|it| {
-            it.at_the_end = Some(|_| {
+        Does(|hostile| {
+            hostile.at_the_end = Some(|_| {
                 say(DONE.as_bytes());
                 exit(7);
             });
@@ -287,7 +287,7 @@ const MODES: &[(&str, Act)] = &[
         }),
     ),
     ("never_answers", Instead(|_| sleep(LIFE))),
-    ("answers_late", Does(|it| it.pause = Duration::from_millis(600))),
+    ("answers_late", Does(|hostile| hostile.pause = Duration::from_millis(600))),
     (
         "never_reads",
         Instead(|_| {
@@ -385,18 +385,18 @@ const MODES: &[(&str, Act)] = &[
             }
         }),
     ),
-    ("ignores_the_end_of_its_input", Does(|it| it.after_input = Some(|| sleep(LIFE)))),
+    ("ignores_the_end_of_its_input", Does(|hostile| hostile.after_input = Some(|| sleep(LIFE)))),
     (
         "holds_its_own_input_open",
-        Does(|it| {
-            it.held = fs::File::options().write(true).open("/proc/self/fd/0").ok();
-            it.after_input = Some(|| sleep(LIFE));
+        Does(|hostile| {
+            hostile.held = fs::File::options().write(true).open("/proc/self/fd/0").ok();
+            hostile.after_input = Some(|| sleep(LIFE));
         }),
     ),
     (
         "says_bye_after_the_end_of_its_input",
-        Does(|it| {
-            it.after_input = Some(|| {
+        Does(|hostile| {
+            hostile.after_input = Some(|| {
                 let folder = PathBuf::from(std::env::var_os("SESAME_WORKER_FOLDER").unwrap_or_default());
                 sleep(Duration::from_millis(300));
                 fs::write(folder.join("bye"), "bye").ok();
@@ -421,7 +421,7 @@ const MODES: &[(&str, Act)] = &[
             }
         }),
     ),
-    ("takes_much_memory", Does(|it| it.memory = vec![1; 200 << 20])),
+    ("takes_much_memory", Does(|hostile| hostile.memory = vec![1; 200 << 20])),
 ];
 
 fn main() {
@@ -467,7 +467,7 @@ impl Hostile {
             say(br#"{"publish":[{"topic":"control","value":-1}]}"#);
             let Some(deliver) = order() else { break };
             sleep(self.pause);
-            // What it published itself is no number of a mode.
+            // A message that it published itself is not the number of a mode.
             let mode = deliver.split("\"value\":").nth(1).and_then(|rest| rest.split(['.', '}']).next()?.parse().ok());
             let asked = mode.filter(|_: &usize| !self.acted).map(|mode| {
                 self.acted = true;
@@ -524,7 +524,7 @@ fn live(kind: &str) {
             rustix::process::setsid().ok();
             child("setsid", false).spawn().ok();
         }
-        // For as long as anybody can wait for it.
+        // For longer than any test waits.
         "hare" => {
             rustix::process::setsid().ok();
             sleep(Duration::from_millis(20));

@@ -4,7 +4,7 @@ use std::fs;
 
 use sesame_tests::{Project, workspace};
 
-/// A crate that takes long to build, whatever was built before.
+/// A crate that takes long to build even if its dependencies are built.
 const SLOW: &str = "fn main() { std::thread::sleep(std::time::Duration::from_secs(8)) }";
 
 #[test]

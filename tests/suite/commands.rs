@@ -174,7 +174,8 @@ fn a_report_is_made_anew_also_of_an_unfinished_run() {
     assert_eq!(fs::read(runner.folder.join("page.html")).unwrap(), page);
     let told = json(&told);
     assert_eq!((&told["seed"], &told["digest"]), (&5.into(), &digest.trim().into()));
-    let violated = told["requirements"].as_array().unwrap().iter().any(|it| it["violated"].as_u64() > Some(0));
+    let violated =
+        told["requirements"].as_array().unwrap().iter().any(|requirement| requirement["violated"].as_u64() > Some(0));
     let code = if violated { 3 } else { 0 };
     runner.run(&["report", "--results", "r/5", "--fail-on", "violation"]).expect(code);
 

@@ -36,7 +36,7 @@ fn conditions(records: &[TestRecord]) -> Vec<&Condition> {
         .collect()
 }
 
-/// What holds of every run by condition, whatever ends an activation.
+/// What holds of every run by condition, for each way to end an activation.
 fn holds_together(space: &ConditionSpace, records: &[TestRecord]) {
     for condition in conditions(records) {
         assert!(depth(condition) <= space.depth, "{condition:?}");

@@ -61,9 +61,9 @@ fn a_front_is_of_confirmed_tests_and_says_how_often_each_finding_came_again() {
         let number = u32::try_from(test["number"].as_u64().unwrap()).unwrap();
         let first = rows[number as usize].verdict(requirement) == Verdict::Violated;
         let said: Vec<Verdict> = repetitions[&number].iter().map(|run| run.verdict(requirement)).collect();
-        let count = |wanted| said.iter().filter(|&&it| it == wanted).count();
+        let count = |wanted| said.iter().filter(|&&verdict| verdict == wanted).count();
         let (violated, kept) = (count(Verdict::Violated), count(Verdict::Satisfied));
-        let finding = test["findings"].as_array().unwrap().iter().find(|it| it["finding"] == "R1");
+        let finding = test["findings"].as_array().unwrap().iter().find(|finding| finding["finding"] == "R1");
         assert_eq!(finding.is_some(), first || violated > 0, "T{number}");
         let Some(finding) = finding else { continue };
         assert_eq!(finding["first"], first);
@@ -219,8 +219,8 @@ fn repetitions_survive_a_kill_and_come_out_the_same_with_any_number_of_workers()
         let patience = Instant::now();
         let recorded = || {
             Repository::open(&folder)
-                .and_then(|it| it.repetitions())
-                .map_or(0, |it| it.values().map(Vec::len).sum::<usize>())
+                .and_then(|repository| repository.repetitions())
+                .map_or(0, |repetitions| repetitions.values().map(Vec::len).sum::<usize>())
         };
         while recorded() < least {
             assert!(patience.elapsed() < Duration::from_secs(60), "no {least} repetitions after a minute");
@@ -305,8 +305,10 @@ impl Believed {
         self.runs += rows.len() + repetitions.values().map(Vec::len).sum::<usize>() - JUDGES * front.len();
         for test in front {
             let row = &rows[test.number as usize];
-            let violated: Vec<_> = plan.requirements.iter().filter(|it| row.verdict(it) == Verdict::Violated).collect();
-            let violates = |run: &&Repetition| violated.iter().all(|it| run.verdict(it) == Verdict::Violated);
+            let violated: Vec<_> =
+                plan.requirements.iter().filter(|requirement| row.verdict(requirement) == Verdict::Violated).collect();
+            let violates =
+                |run: &&Repetition| violated.iter().all(|requirement| run.verdict(requirement) == Verdict::Violated);
             let runs = &repetitions[&test.number];
             let (own, judges) = runs.split_at(runs.len() - JUDGES);
             if violated.is_empty() || !believes(own.len(), own.iter().filter(violates).count()) {

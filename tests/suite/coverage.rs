@@ -41,7 +41,7 @@ fn build(name: &str) -> Runner {
 }
 
 #[test]
-fn a_search_stops_where_its_coverage_suffices_whatever_comes_between() {
+fn a_search_stops_at_its_coverage_after_any_interruption() {
     let runner = build("covered");
     let whole = runner.run(&["--results", "whole", "--workers", "2"]).expect(0);
     let repository = Repository::open(&runner.folder.join("whole/3")).unwrap();
@@ -53,7 +53,7 @@ fn a_search_stops_where_its_coverage_suffices_whatever_comes_between() {
     assert!(generations[..generations.len() - 1].iter().all(|earlier| earlier.covered < 29));
     assert!(last.evaluations > 60 && last.evaluations < 500, "{last:?}: past `evaluations`, before `failsafe`");
     assert!(last.evaluations.is_multiple_of(50), "after whole generations");
-    // The search, and an undisturbed run before and after it.
+    // The search, and a reference run before and after it.
     assert_eq!(repository.tests().unwrap().len(), last.evaluations as usize + 2);
     assert!(whole.out.contains(&format!("{} of 48 cells covered", last.covered)), "{}", whole.out);
 

@@ -1,4 +1,4 @@
-//! Custom operations: hooks in a generated runner, and files that are put back whatever happens.
+//! Custom operations: hooks in a generated runner, and files that are restored after every kind of end.
 
 use std::fs;
 use std::os::unix::process::CommandExt as _;
@@ -116,11 +116,11 @@ fn hooks_change_drop_and_inject_and_files_are_put_back() {
     let counted =
         |seen, changed, dropped, injected| Counters { seen, changed, dropped, injected, ..Counters::default() };
 
-    let undisturbed = metric("reference", "arrived");
+    let before = metric("reference", "arrived");
     assert_eq!(counters("moved"), counted(3, 3, 0, 6), "active for three messages, two made up for each");
-    assert_eq!((metric("moved", "arrived"), metric("moved", "farthest")), (undisturbed + 6.0, 1.5));
+    assert_eq!((metric("moved", "arrived"), metric("moved", "farthest")), (before + 6.0, 1.5));
     assert_eq!(counters("dropped"), counted(3, 0, 3, 0));
-    assert_eq!(metric("dropped", "arrived"), undisturbed - 3.0);
+    assert_eq!(metric("dropped", "arrived"), before - 3.0);
     assert_eq!(counters("scattered"), counted(3, 3, 0, 3));
     let farthest = metric("scattered", "farthest");
     assert!(farthest > 0.0 && farthest < 1.0, "{farthest}");
@@ -153,7 +153,7 @@ fn hooks_change_drop_and_inject_and_files_are_put_back() {
     let left = detail("leaving");
     assert!(left.contains("operation `spoil`: `../elsewhere.txt` is not a file below"), "{left}");
 
-    // The undisturbed run at the end saw what the one at the start did.
+    // The reference run at the end saw the same as the one at the start.
     assert!(repository.events().unwrap().iter().all(|event| !event.text.contains("does not start afresh")));
     let shown = runner.run(&["show", "moved", "--results", "results/known"]).expect(0).out;
     assert!(shown.contains("copies 2, shift (1.5, 0.0, 0.0) m, way move"), "{shown}");

@@ -54,7 +54,7 @@ fn declarative_metrics_need_no_hooks_and_hear_both_sides_of_the_relay() {
         all.insert("never".to_owned(), (7.0, false));
         all
     };
-    assert_eq!(values(0), expected(100.0, 0.5), "undisturbed");
+    assert_eq!(values(0), expected(100.0, 0.5), "without disturbance");
     assert_eq!(values(1), expected(80.0, 1.5), "a fifth is cut, and a tenth lifted by 2 m");
     assert_eq!(values(2), values(1), "and again");
 }

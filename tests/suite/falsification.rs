@@ -260,13 +260,13 @@ fn run(problem: FalsificationProblem, plan: &CampaignPlan, test: &Test) -> (f64,
         return (0.0, problem.margins(&vector));
     }
     // What a signal is at a time: of several operations on it the last one decides.
-    let signal = |topic: usize, undisturbed: f64, time: f64| {
+    let signal = |topic: usize, default: f64, time: f64| {
         let on = |operation: &&TestOperation| {
             let Activation::Time { start, end } = operation.activation else { panic!("by time") };
             let of = plan.operation(operation.operation).topic.unwrap().index();
             of == topic && start <= time && time < end
         };
-        test.operations.iter().rfind(on).map_or(undisturbed, |operation| unit(chosen(operation)[0]))
+        test.operations.iter().rfind(on).map_or(default, |operation| unit(chosen(operation)[0]))
     };
     let length = |operation: &TestOperation| match operation.activation {
         Activation::Time { start, end } => end - start,
@@ -277,9 +277,8 @@ fn run(problem: FalsificationProblem, plan: &CampaignPlan, test: &Test) -> (f64,
         let at = |step: u32| problem.margins(&[0, 1, 2].map(|topic| signal(topic, 0.5, f64::from(step) / 10.0)));
         (0..300).map(at).reduce(|a, b| a.iter().zip(b).map(|(a, b)| a.min(b)).collect()).unwrap()
     } else {
-        let pieces = |topic, undisturbed| (0..6).map(move |piece| (topic, undisturbed, 5.0 * f64::from(piece) + 2.5));
-        let all =
-            pieces(0, 0.5).chain(pieces(1, 0.0)).map(|(topic, undisturbed, time)| signal(topic, undisturbed, time));
+        let pieces = |topic, default| (0..6).map(move |piece| (topic, default, 5.0 * f64::from(piece) + 2.5));
+        let all = pieces(0, 0.5).chain(pieces(1, 0.0)).map(|(topic, default, time)| signal(topic, default, time));
         problem.margins(&all.collect::<Vec<f64>>())
     };
     (active, margins)
@@ -367,7 +366,7 @@ fn runners_search_so_with_any_number_of_workers() {
         let runner = project.build(campaign);
         let whole = runner.run(&["--results", "whole", "--workers", "2"]).expect(0);
         let repository = Repository::open(&runner.folder.join("whole/3")).unwrap();
-        // The search, and an undisturbed run before and after it.
+        // The search, and a reference run before and after it.
         assert_eq!(repository.tests().unwrap().len(), 26, "{campaign}");
         assert_eq!(runner.run(&["--results", "alone", "--workers", "1"]).expect(0).digest(), whole.digest());
         if campaign == "falsifying" {

@@ -40,7 +40,7 @@ fn every_fault_is_the_outcome_of_its_test_and_the_campaign_goes_on() {
     for row in repository.tests().unwrap() {
         let fault = match row.origin {
             Origin::Search => plan.operation(row.test.operations[0].operation).name.clone(),
-            _ => "undisturbed".to_owned(),
+            _ => "none".to_owned(),
         };
         // An operation may end before the first message reaches it.
         if row.outcome != Outcome::NoEffect {
@@ -48,7 +48,7 @@ fn every_fault_is_the_outcome_of_its_test_and_the_campaign_goes_on() {
         }
     }
     let expected = BTreeMap::from([
-        ("undisturbed", ("completed", "")),
+        ("none", ("completed", "")),
         ("do_nothing", ("completed", "")),
         ("do_hook_nan", ("completed", "")),
         ("do_panic", ("crash", "the simulator was disturbed at ")),
@@ -87,13 +87,13 @@ fn every_fault_is_the_outcome_of_its_test_and_the_campaign_goes_on() {
     assert_eq!(one.digest(), said.digest());
 }
 
-/// A run of the harmless campaign in which the simulator has this fault without being disturbed.
-fn undisturbed(runner: &Runner, fault: &str) -> Done {
+/// A run of the harmless campaign in which the simulator has this fault also without disturbance.
+fn with_faulty_reference_run(runner: &Runner, fault: &str) -> Done {
     sesame_tests::done(runner.command(&["--results", fault]).env("FAULT", fault))
 }
 
 #[test]
-fn a_system_that_does_not_work_undisturbed_is_not_fuzzed() {
+fn a_system_that_fails_without_disturbance_is_not_fuzzed() {
     let runner = faulty("unready", "harmless");
     for (fault, words) in [
         ("crash", "the reference run is to crash"),
@@ -101,7 +101,7 @@ fn a_system_that_does_not_work_undisturbed_is_not_fuzzed() {
         ("flood", "it publishes more than 100000 messages in the step to 0.010 s"),
         ("wrong type", "a message on `faulty/level` is not of its declared type: "),
     ] {
-        let said = undisturbed(&runner, fault).expect(1);
+        let said = with_faulty_reference_run(&runner, fault).expect(1);
         assert!(said.err.contains("the reference run failed: "), "{}", said.err);
         assert!(said.err.contains(words), "{}", said.err);
         assert!(said.err.contains("nothing was fuzzed"), "{}", said.err);
@@ -116,7 +116,7 @@ fn a_system_that_does_not_work_undisturbed_is_not_fuzzed() {
 #[test]
 fn a_run_that_the_simulator_ends_early_is_complete_at_its_own_end() {
     let runner = faulty("brief", "harmless");
-    let said = undisturbed(&runner, "early end").expect(0);
+    let said = with_faulty_reference_run(&runner, "early end").expect(0);
     let repository = Repository::open(&runner.folder.join("early end/3")).unwrap();
     let rows = repository.tests().unwrap();
     assert_eq!(rows.len(), 62, "{}", said.out);
@@ -137,9 +137,9 @@ fn a_simulator_or_hook_that_reads_standard_input_finds_it_empty() {
 }
 
 #[test]
-fn a_requirement_broken_undisturbed_is_a_warning() {
+fn a_requirement_that_the_reference_run_violates_is_a_warning() {
     let runner = faulty("tilted", "harmless");
-    let said = undisturbed(&runner, "broken requirement").expect(0);
+    let said = with_faulty_reference_run(&runner, "broken requirement").expect(0);
     let words = "requirement R1 is violated before anything is fuzzed: `highest` is 5";
     assert!(said.out.contains(words), "{}", said.out);
     let repository = Repository::open(&runner.folder.join("broken requirement/3")).unwrap();

@@ -8,7 +8,8 @@ use sesame_tests::{Project, workspace};
 
 #[test]
 fn equal_tests_of_a_free_running_simulator_are_simulated_again_and_a_replay_may_differ() {
-    let found = std::process::Command::new("python3").arg("--version").output().is_ok_and(|it| it.status.success());
+    let found =
+        std::process::Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success());
     assert!(found || std::env::var_os("CI").is_none(), "python3 is needed");
     if !found {
         eprintln!("skipped: there is no python3 here");

@@ -234,7 +234,7 @@ fn run(results: &str, modes: &[&str], workers: &str) -> Ran {
             Origin::Known(id) => {
                 outcomes.insert(plan.tests[id.index()].name.clone(), row.outcome);
             }
-            _ => assert_eq!(row.outcome, Outcome::Completed, "undisturbed it does as it should: {}", said.err),
+            _ => assert_eq!(row.outcome, Outcome::Completed, "without disturbance it behaves well: {}", said.err),
         }
     }
     assert_eq!(outcomes.len(), modes.len(), "{}", said.err);
@@ -343,7 +343,7 @@ fn names<'a>(modes: &[(&'a str, Expected)]) -> Vec<&'a str> {
 }
 
 #[test]
-fn whatever_a_simulator_does_is_the_outcome_of_its_own_test_and_nothing_is_left_of_it() {
+fn each_kind_of_misbehaviour_is_the_outcome_of_its_own_test_and_leaves_no_process() {
     if !shown_here() {
         return;
     }

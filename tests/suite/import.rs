@@ -136,7 +136,7 @@ fn the_originals_reduced_tests_and_their_ranks_come_out_of_the_imported_results(
     let names = repository.original_names().unwrap();
     let tests = repository.tests().unwrap();
     // Rank of each test by collisions, ascending; equal ones in the order of their numbers.
-    let collisions = repository.plan().metrics.iter().position(|it| it.name == "collisionOccurance").unwrap();
+    let collisions = repository.plan().metrics.iter().position(|metric| metric.name == "collisionOccurance").unwrap();
     let mut order: Vec<usize> = (0..tests.len()).collect();
     order.sort_by(|&a, &b| {
         let value = |at: usize| tests[at].values[collisions].value.unwrap();
@@ -149,7 +149,7 @@ fn the_originals_reduced_tests_and_their_ranks_come_out_of_the_imported_results(
         for (written, computed) in expected[2..11].iter().zip(&found[1..]) {
             farthest = farthest.max((written.parse::<f64>().unwrap() - computed.parse::<f64>().unwrap()).abs());
         }
-        let rank = order.iter().position(|&it| it == at).unwrap();
+        let rank = order.iter().position(|&other| other == at).unwrap();
         let quality: f64 = expected[11].parse().unwrap();
         farthest = farthest.max((quality - rank as f64 / 220.0).abs());
     }
@@ -234,7 +234,7 @@ fn an_imported_search_has_indicators_of_its_sets() {
     }
     let last = analysis.generations.last().unwrap();
     assert_eq!((last.evaluations, last.igd_plus), (Some(220), Some(0.0)));
-    let volumes: Vec<f64> = analysis.generations.iter().map(|it| it.hypervolume.unwrap()).collect();
+    let volumes: Vec<f64> = analysis.generations.iter().map(|generation| generation.hypervolume.unwrap()).collect();
     assert!(volumes.is_sorted() && volumes[0] < last.hypervolume.unwrap(), "{volumes:?}");
 }
 

@@ -63,7 +63,7 @@ fn recorded(folder: &Path) -> usize {
     Repository::open(folder).and_then(|repository| repository.tests()).map_or(0, |tests| tests.len())
 }
 
-/// The worker processes of a runner's program that are alive, whoever started them.
+/// The worker processes of a runner's program that are alive, of all supervisors.
 fn workers(runner: &Runner) -> Vec<Pid> {
     let wanted = format!("{} worker ", runner.program.display());
     processes().into_iter().filter(|(_, words)| words.starts_with(&wanted)).map(|(pid, _)| Pid::from_raw(pid)).collect()
@@ -98,8 +98,8 @@ fn no_worker_is_left(runner: &Runner) {
     }
 }
 
-fn undisturbed(runner: &Runner) -> String {
-    runner.run(&["--results", "undisturbed"]).expect(0).digest()
+fn uninterrupted(runner: &Runner) -> String {
+    runner.run(&["--results", "uninterrupted"]).expect(0).digest()
 }
 
 fn resumed(runner: &Runner, results: &str) -> String {
@@ -112,7 +112,7 @@ fn resumed(runner: &Runner, results: &str) -> String {
 #[test]
 fn ctrl_c_stops_in_good_order_and_resume_gives_what_an_unbroken_run_gives() {
     let runner = faulty("stopped", "harmless");
-    let whole = undisturbed(&runner);
+    let whole = uninterrupted(&runner);
     for (at, tests) in [1, 7, 30].into_iter().enumerate() {
         let results = format!("stopped{at}");
         let mut running = Running::start(&runner, &results, "2");
@@ -230,7 +230,7 @@ fn killed_at(runner: &Runner, victim: Victim, moment: f64, whole: &str, takes: D
 
 fn killed_at_random_moments(name: &str, moments: u32) {
     let runner = faulty(name, "harmless");
-    let whole = undisturbed(&runner);
+    let whole = uninterrupted(&runner);
     let started = Instant::now();
     let (status, said) = Running::start(&runner, "slow", "2").ended();
     assert!(status.success(), "{}", said.err);
@@ -269,7 +269,7 @@ fn a_run_killed_at_a_hundred_moments_loses_nothing_that_cannot_be_taken_up_again
 #[test]
 fn a_killed_worker_leaves_no_trace_in_results_but_a_note() {
     let runner = faulty("worker_killed", "harmless");
-    let whole = undisturbed(&runner);
+    let whole = uninterrupted(&runner);
     let mut running = Running::start(&runner, "results", "1");
     running.until_recorded(5);
     let [worker] = workers(&runner)[..] else { panic!("there is one worker") };

@@ -21,7 +21,8 @@ use sesame_tests::{Done, Project, Runner, workspace};
 
 /// The runner of a campaign on the simulator that starts others; `None`, with the reason, without a Python.
 fn breeding(name: &str, campaign: &str) -> Option<Runner> {
-    let found = std::process::Command::new("python3").arg("--version").output().is_ok_and(|it| it.status.success());
+    let found =
+        std::process::Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success());
     assert!(found || std::env::var_os("CI").is_none(), "python3 is needed");
     if !found {
         eprintln!("skipped: there is no python3 here");
@@ -279,10 +280,10 @@ fn a_simulator_that_is_killed_each_time_is_a_crash_that_says_so() {
 }
 
 #[test]
-fn an_undisturbed_run_that_is_killed_is_run_again_by_resume() {
+fn a_reference_run_that_is_killed_is_run_again_by_resume() {
     let Some(runner) = breeding("killed_reference", "quiet") else { return };
     let whole = runner.run(&["--results", "whole"]).expect(0).digest();
-    let process = start(&runner, &["--results", "results"], "killed undisturbed");
+    let process = start(&runner, &["--results", "results"], "killed without disturbance");
     let said = Done::of(&process.wait_with_output().unwrap()).expect(1);
     for part in ["killed twice", "T0 is not recorded", "`resume` runs it again", "--workers"] {
         assert!(said.err.contains(part), "{part}: {}", said.err);
@@ -325,7 +326,7 @@ struct Work {
 impl Work {
     /// Measures it.
     fn of(runner: &Runner, into: &str, arguments: &dyn Fn(&str) -> Vec<String>, name: &str) -> Work {
-        let words = arguments("undisturbed");
+        let words = arguments("uninterrupted");
         let started = Instant::now();
         let process = start(runner, &words.iter().map(String::as_str).collect::<Vec<_>>(), "");
         let said = Done::of(&process.wait_with_output().unwrap()).expect(0);
@@ -386,14 +387,14 @@ fn killed_at_random_moments(name: &str, kills: u32) {
     let campaign =
         |into: &str| ["--results", into, "--workers", "2", "--fail-on", "nothing"].map(str::to_owned).to_vec();
     let campaign = Work::of(&runner, "killed", &campaign, "3");
-    let repository = Repository::open(&runner.folder.join("undisturbed/3")).unwrap();
+    let repository = Repository::open(&runner.folder.join("uninterrupted/3")).unwrap();
     let requirement = &repository.plan().requirements[0];
     let rows = repository.tests().unwrap();
     let violating = rows.iter().filter(|row| row.verdict(requirement) == Verdict::Violated);
     let largest = violating.max_by_key(|row| row.test.operations.len()).expect("some tests violate");
     let test = format!("T{}", largest.number);
     let smaller = |into: &str| {
-        ["shrink", &test, "--results", "undisturbed/3", "--into", into, "--workers", "2", "--fail-on", "nothing"]
+        ["shrink", &test, "--results", "uninterrupted/3", "--into", into, "--workers", "2", "--fail-on", "nothing"]
             .map(str::to_owned)
             .to_vec()
     };
@@ -415,20 +416,20 @@ fn killed_at_random_moments(name: &str, kills: u32) {
         })
         .unwrap();
     let hits = hits.into_inner();
-    // A run's last part is writing its page, when there is no worker and no simulator any more.
+    // In its last part, a run writes its page, without workers and simulators.
     let middle = hits.iter().filter(|(_, tests)| tests.is_some_and(|tests| tests > 0)).count();
     assert!(2 * middle > hits.len(), "most kills are in the middle of a run: {hits:?}");
 }
 
 #[test]
-fn whoever_is_killed_results_are_the_same_and_nothing_is_left() {
+fn results_are_the_same_after_any_process_is_killed_and_no_process_is_left() {
     killed_at_random_moments("killed_some", 8);
 }
 
 /// `SESAME_KILLS` says how many, if not two hundred.
 #[test]
 #[ignore = "long: two hundred kills"]
-fn whoever_of_two_hundred_is_killed_results_are_the_same_and_nothing_is_left() {
+fn results_are_the_same_after_two_hundred_kills_and_no_process_is_left() {
     let kills = std::env::var("SESAME_KILLS").map_or(200, |text| text.parse().expect("a number of kills"));
     killed_at_random_moments("killed_two_hundred", kills);
 }

@@ -35,7 +35,7 @@ fn the_first_command_finds_a_front_and_the_same_one_each_time() {
     assert!(front.iter().any(|(_, collisions)| *collisions >= 5.0), "{front:?}");
     assert!(front.iter().any(|(_, collisions)| *collisions <= 1.0), "{front:?}");
     let repository = Repository::open(&folder).unwrap();
-    assert_eq!(repository.tests().unwrap().len(), 212, "210 tests between two undisturbed runs");
+    assert_eq!(repository.tests().unwrap().len(), 212, "210 tests between two reference runs");
     assert!(repository.events().unwrap().is_empty(), "nothing is wrong with the cell: {:?}", repository.events());
     for (row, collisions) in &front {
         assert!(first.out.contains(&format!("T{}", row.number)), "{collisions}: {}", first.out);

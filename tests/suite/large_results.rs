@@ -110,7 +110,7 @@ fn record(plan: &CampaignPlan, permitted: &TestSpace, number: u32) -> TestRecord
         observation: Observation {
             outcome: if number % 50 == 7 { Outcome::NoEffect } else { Outcome::Completed },
             end: 100.0,
-            operations: test.operations.iter().map(|it| effect(&it.activation)).collect(),
+            operations: test.operations.iter().map(|operation| effect(&operation.activation)).collect(),
             unheard: Vec::new(),
             metrics: values(objectives, number, &mut stream).map(metric).to_vec(),
             messages: 10_000,
@@ -229,7 +229,7 @@ fn each_analysis_of_100_000_tests_takes_less_than_500_mb() {
         for arguments in asked {
             let arguments = [arguments, &["--format", "csv"]].concat();
             let took = analysis(sesamec, &arguments);
-            let named: Vec<&str> = arguments.iter().copied().filter(|it| !it.contains('/')).collect();
+            let named: Vec<&str> = arguments.iter().copied().filter(|argument| !argument.contains('/')).collect();
             let named = named[..named.len() - 2].join(" ");
             println!("{named:<28} {:>6.2} s {:>6} kB {:>7} lines", took.time.as_secs_f64(), took.memory, took.lines);
             assert!(took.lines > 1, "{named} said nothing");

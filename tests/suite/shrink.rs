@@ -38,7 +38,7 @@ fn shrunk(runner: &Runner, test: u32, into: &str, more: &[&str]) -> Value {
 }
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 #[test]
@@ -81,8 +81,10 @@ fn violations_that_were_found_get_smaller_and_stay_violations() {
         let violated: Vec<&str> = plan
             .requirements
             .iter()
-            .filter(|it| verdict(it.bound, &row.outcome, row.value(it.metric)) == Verdict::Violated)
-            .map(|it| it.name.as_str())
+            .filter(|requirement| {
+                verdict(requirement.bound, &row.outcome, row.value(requirement.metric)) == Verdict::Violated
+            })
+            .map(|requirement| requirement.name.as_str())
             .collect();
         let kept = way["fails"].as_str().unwrap().trim_start_matches("violates ").replace(" and ", ", ");
         assert!(kept.split(", ").all(|name| violated.contains(&name)), "{kept}: {violated:?}");
@@ -97,7 +99,7 @@ fn violations_that_were_found_get_smaller_and_stay_violations() {
     let known = again.build("coverage_experiment").run(&["known", name]).expect(0);
     assert!(known.out.contains("Regression tests") && !known.out.contains("no\n"), "{}", known.out);
 
-    // The same whatever the number of workers, and whatever happens on the way.
+    // The same for any number of workers, and after any interruption.
     let some = violations(&runner, 5)[1];
     let digest = |said: &Value| said["digest"].as_str().unwrap().to_owned();
     let one = digest(&shrunk(&runner, some, "one", &["--workers", "1"]));

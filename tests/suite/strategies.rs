@@ -60,7 +60,7 @@ fn run(runner: &Runner, campaign: &str, seed: u32) -> Ran {
     let repository = Repository::open(&folder).unwrap();
     let plan = repository.plan();
     let mut front = Front::default();
-    // The undisturbed runs before and after are no tests of the search.
+    // The reference runs before and after are not tests of the search.
     let tests = repository.tests().unwrap();
     let tests = &tests[1..tests.len() - 1];
     for row in tests {
@@ -180,6 +180,7 @@ fn interval(differences: &[f64]) -> (f64, f64) {
     };
     let n = differences.len() as f64;
     let mean = differences.iter().sum::<f64>() / n;
-    let variance = differences.iter().map(|it| (it - mean) * (it - mean)).sum::<f64>() / (n - 1.0);
+    let variance =
+        differences.iter().map(|difference| (difference - mean) * (difference - mean)).sum::<f64>() / (n - 1.0);
     (mean, quantile * (variance / n).sqrt())
 }

@@ -154,7 +154,7 @@ fn a_plan_with_one_altered_digit_is_refused_by_everybody_with_the_place_in_it() 
 }
 
 #[test]
-fn whatever_is_done_to_a_file_it_is_read_or_refused() {
+fn results_with_changed_bytes_are_read_or_refused() {
     let runner = faulty("scribbled", "harmless");
     let run = unfinished(&runner);
     let length = fs::metadata(runner.folder.join(run).join("results.sqlite")).unwrap().len();

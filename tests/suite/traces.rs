@@ -19,7 +19,7 @@ fn traces(folder: &Path) -> BTreeSet<String> {
     entries
         .map(|entry| {
             let name = entry.unwrap().file_name().into_string().unwrap();
-            name.strip_suffix(".mcap").unwrap_or_else(|| panic!("{name} is no trace")).to_owned()
+            name.strip_suffix(".mcap").unwrap_or_else(|| panic!("{name} is not a trace")).to_owned()
         })
         .collect()
 }
@@ -53,7 +53,7 @@ fn number(name: &str) -> u32 {
 }
 
 #[test]
-fn failing_tests_have_traces_whatever_they_failed_of_and_others_have_none() {
+fn failing_tests_have_traces_for_every_cause_of_failure_and_others_have_none() {
     let runner = recording("traced", "all_faults", "record mcap failing");
     runner.run(&["--results", "r", "--timeout", "1", "--fail-on", "nothing"]).expect(0);
     let folder = runner.folder.join("r/3");
@@ -110,7 +110,7 @@ fn a_hook_that_is_changed_is_compared_with_what_was_recorded() {
     runner.run(&["--results", "r", "--seed", "5", "--evaluations", "10"]).expect(0);
     let trace = runner.folder.join("r/5/traces/T3.mcap");
     let unchanged = fed(&runner, &trace, 0);
-    assert!(unchanged["metrics"].as_array().unwrap().iter().all(|it| it["sameness"] == "equal"), "{unchanged}");
+    assert!(unchanged["metrics"].as_array().unwrap().iter().all(|metric| metric["sameness"] == "equal"), "{unchanged}");
 
     let hook = project.runners.join("hooks/collision_occurrence.rs");
     let text = fs::read_to_string(&hook).unwrap();
@@ -123,8 +123,12 @@ fn a_hook_that_is_changed_is_compared_with_what_was_recorded() {
         let trace = runner.folder.join(format!("r/5/traces/{name}.mcap"));
         let said = runner.run(&["replay-recording", trace.to_str().unwrap(), "--format", "json"]);
         let fed: Value = serde_json::from_str(&said.out).unwrap();
-        let metric =
-            fed["metrics"].as_array().unwrap().iter().find(|it| it["metric"] == "collision_occurrence").unwrap();
+        let metric = fed["metrics"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|metric| metric["metric"] == "collision_occurrence")
+            .unwrap();
         let (now, recorded) = (metric["now"]["value"].as_f64().unwrap(), metric["recorded"].as_f64().unwrap());
         assert_eq!(now, recorded * 2.0, "{fed}");
         assert_eq!(said.code, Some(if recorded > 0.0 { 3 } else { 0 }), "{fed}");

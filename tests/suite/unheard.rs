@@ -1,4 +1,4 @@
-//! Campaigns whose operations nobody hears: they end before they fuzz, and say why.
+//! Campaigns in which no node subscribes to the disturbed topics: they end before they fuzz, and say why.
 
 use sesame_base::observation::Outcome;
 use sesame_results::record::{EventKind, Repository};
@@ -35,7 +35,7 @@ fn a_campaign_that_nobody_hears_ends_before_it_fuzzes_and_names_its_operations()
         }
     }
     let refused = Repository::open(&runner.folder.join("r/1")).unwrap();
-    assert_eq!(refused.tests().unwrap().len(), 1, "only the undisturbed run");
+    assert_eq!(refused.tests().unwrap().len(), 1, "only the reference run");
     drop(refused);
 
     let vain = runner.run(&["resume", "r/1", "--allow-unheard"]).expect(3);

@@ -46,7 +46,7 @@ fn crates() -> Vec<Crate> {
         let package = &parsed(&manifest)["package"];
         let name = package["name"].as_str().expect("a package has a name").to_owned();
         let described =
-            package.get("description").and_then(toml::Value::as_str).is_some_and(|it| !it.trim().is_empty());
+            package.get("description").and_then(toml::Value::as_str).is_some_and(|text| !text.trim().is_empty());
         Crate { name, manifest, described }
     };
     members.iter().map(member).collect()

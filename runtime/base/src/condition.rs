@@ -64,6 +64,9 @@ mod tests {
     fn a_comparison_is_one_level() {
         let condition = and(above(0, 1.0), or(above(1, 1.0), and(below(0, 1.0), below(1, 1.0))));
         assert_eq!((depth(&above(0, 1.0)), depth(&condition)), (1, 4));
-        assert!(mentions(&condition, &|it| it == variable(1)) && !mentions(&condition, &|it| it == variable(2)));
+        assert!(
+            mentions(&condition, &|metric| metric == variable(1))
+                && !mentions(&condition, &|metric| metric == variable(2))
+        );
     }
 }

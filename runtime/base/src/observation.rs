@@ -33,7 +33,7 @@ pub enum Outcome {
 const CAUSE_BYTES: usize = 4096;
 
 impl Outcome {
-    /// A crash for this cause. One that is longer than anybody reads, as simulators and panics may have it, is
+    /// A crash for this cause. A very long one, which simulators and panics can produce, is
     /// shortened, and says by how much.
     pub fn crash(mut cause: String) -> Self {
         if cause.len() > CAUSE_BYTES {

@@ -3,7 +3,7 @@
 use crate::dominance::{Fitness, dominates_in_all, lexicographic};
 
 /// The non-dominated tests so far. Every evaluated test counts, not only a population's survivors. Of tests with the
-/// same objective values the one with the smallest number stands for all; so the front is the same whatever the order
+/// same objective values the one with the smallest number stands for all; so the front does not depend on the order
 /// in which they were added. Tests without measured objectives are never on it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Front {
@@ -114,7 +114,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_front_is_that_of_the_definition_in_whatever_order_tests_come(
+        fn a_front_is_that_of_the_definition_for_any_order_of_tests(
             population in any_population(),
             seed: u64,
         ) {

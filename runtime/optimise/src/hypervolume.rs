@@ -1,17 +1,17 @@
 //! Hypervolume: the volume that a set of points dominates up to a reference point, all objectives minimised.
 //!
-//! Exact: sweeps for two and three objectives (the latter after Beume et al. 2009); for more WFG (While, Bradstreet and
-//! Barone 2012): the volume of a set is the sum of what each point dominates alone among those after it. Points are
-//! taken in the order of their last objective, the worst first, so all that the later ones dominate of a point's box
-//! has the box's own height, and each step of the recursion has one objective less. Dominated points are left out at
-//! each step, which is what makes it fast.
+//! Exact volumes are computed by sweeps for two and three objectives (the latter after Beume et al. 2009), and by WFG
+//! for more (While, Bradstreet and Barone 2012): the volume of a set is the sum over its points of the volume that a
+//! point dominates and no later point does. Points are sorted by their last objective, the worst first, so the part of
+//! a point's box that later points dominate has the height of the whole box, and each step of the recursion has one
+//! objective less. Each step leaves dominated points out, which makes the algorithm fast.
 //!
-//! The work still grows exponentially in the number of objectives. [`measured`] therefore counts it, and beyond a bound
-//! on that count estimates the volume from random samples: either of the box around all points, of which the dominated
-//! share is counted, or (Karp and Luby 1983) of the boxes of single points, each with a probability in proportion to
-//! its volume, of which one over the number of boxes that hold a sample is averaged. The first is good where much is
-//! dominated, the second does not fail where little is; some first samples decide between them. Neither count nor draws
-//! depend on the machine: equal sets have equal volumes, estimated or not.
+//! The work still grows exponentially in the number of objectives. [`measured`] therefore counts it, and beyond a limit
+//! estimates the volume from random samples in one of two ways: samples from the bounding box of all points, of which
+//! the dominated share is counted; or (Karp and Luby 1983) samples from the boxes of single points, each box with a
+//! probability in proportion to its volume, with the mean of 1 / k for a sample in k boxes. The first way is good where
+//! much of the box is dominated, the second also where little is; a pilot sample decides between them. Neither the
+//! count nor the samples depend on the machine: equal sets have equal volumes, estimated or not.
 
 use std::cmp::Ordering;
 
@@ -19,18 +19,18 @@ use sesame_rng::Stream;
 
 use crate::dominance::{ascending, lexicographic};
 
-/// Coordinates that an exact computation reads or writes at most before the volume is estimated instead: some tenths of
-/// a second.
+/// The most coordinates that an exact computation reads or writes before the volume is estimated instead: a few tenths
+/// of a second.
 pub const WORK: u64 = 60_000_000;
 
-/// Coordinates that an estimate compares at most.
+/// The most coordinates that an estimate compares.
 const ESTIMATING_WORK: u64 = 80_000_000;
 /// Samples of an estimate, at least and at most.
 const SAMPLES: (u64, u64) = (4_000, 100_000);
-/// A share of growth that a sample of `n` without any growth leaves possible, times `n`: with more, such a sample has a
-/// probability of less than 5 %.
+/// If a sample of `n` shows no growth, the upper bound of the share of growth, times `n`: with a greater share, such a
+/// sample has a probability of less than 5 % (the rule of three).
 const UNSEEN: f64 = 3.0;
-/// Of a normal distribution 5 % lie farther above the mean than so many standard deviations.
+/// The 95th percentile of the standard normal distribution.
 const ONE_SIDED: f64 = 1.645;
 
 /// A hypervolume.
@@ -42,18 +42,18 @@ pub struct Volume {
     pub error: Option<f64>,
 }
 
-/// By how much a set of points dominates more than another, as a share of what it dominates.
+/// How much more a set of points dominates than another, as a share of the volume that it dominates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Growth {
     /// The share, in `0..=1`, or an estimate of it.
     pub share: f64,
-    /// Of an estimate, what the share is at most with a probability of about 95 %.
+    /// Of an estimate, an upper bound of the share with a confidence of about 95 %.
     pub at_most: Option<f64>,
 }
 
-/// The volume dominated by the points and bounded by the reference, exact however long it takes. A point counts only
-/// where it is below the reference in every objective. The reference must be finite, the points free of NaN and as long
-/// as it; with no objectives at all the volume is 0.
+/// The volume dominated by the points and bounded by the reference, always exact, however long it takes. A point counts
+/// only if it is below the reference in every objective. The reference must be finite, and the points must be as long as
+/// the reference and free of NaN; without objectives the volume is 0.
 pub fn hypervolume(points: &[&[f64]], reference: &[f64]) -> f64 {
     measured(points, reference, u64::MAX).value
 }
@@ -73,8 +73,8 @@ pub fn measured(points: &[&[f64]], reference: &[f64], work: u64) -> Volume {
     }
 }
 
-/// How much more the points of `now` dominate than those of `then`, of which each is dominated by one of `now` or among
-/// them; 0 where `now` dominates nothing or has no end. Work is bounded as in [`measured`].
+/// How much more the points of `now` dominate than those of `then`, each of which must be in `now` or dominated by a point
+/// of `now`; 0 if `now` dominates nothing or an infinite volume. Work is bounded as in [`measured`].
 pub fn growth(now: &[&[f64]], then: &[&[f64]], reference: &[f64], work: u64) -> Growth {
     let exact = |share| Growth { share, at_most: None };
     let (Some(now), Some(then)) = (inside(now, reference), inside(then, reference)) else { return exact(0.0) };
@@ -91,7 +91,7 @@ pub fn growth(now: &[&[f64]], then: &[&[f64]], reference: &[f64], work: u64) -> 
     }
 }
 
-/// The points below the reference; `None` where one of them has no end.
+/// The points below the reference; `None` if one of them is infinite.
 fn inside(points: &[&[f64]], reference: &[f64]) -> Option<Vec<Vec<f64>>> {
     assert!(reference.iter().all(|bound| bound.is_finite()), "a hypervolume has a finite reference point");
     let points: Vec<Vec<f64>> = points
@@ -103,7 +103,7 @@ fn inside(points: &[&[f64]], reference: &[f64]) -> Option<Vec<Vec<f64>>> {
     (!points.iter().flatten().any(|x| x.is_infinite())).then_some(points)
 }
 
-/// Exact computation as long as there is work left.
+/// An exact computation that stops when its work is spent.
 struct Counted {
     left: u64,
 }
@@ -114,7 +114,7 @@ impl Counted {
         Some(())
     }
 
-    /// The volume that points dominate, all inside the reference and finite.
+    /// The volume that points dominate, all of which are finite and below the reference.
     fn volume(&mut self, points: Vec<Vec<f64>>, reference: &[f64]) -> Option<f64> {
         let [.., _, _, _, _] = *reference else { return Some(swept(points, reference)) };
         let mut set = Set { objectives: reference.len(), values: Vec::new() };
@@ -125,7 +125,7 @@ impl Counted {
         self.sliced(&mut set, reference)
     }
 
-    /// As [`Counted::volume`], of points of which none dominates another.
+    /// As [`Counted::volume`], for points of which none dominates another.
     fn sliced(&mut self, set: &mut Set, reference: &[f64]) -> Option<f64> {
         let objectives = reference.len();
         let own = |point: &[f64]| extent(point, reference);
@@ -142,9 +142,12 @@ impl Counted {
             _ => {}
         }
         if objectives == 3 {
-            // A sweep sorts, so it costs somewhat more than reading all.
+            // A sweep sorts, so it costs more than reading all points.
             self.spend(6 * rows)?;
-            return Some(swept_space(set.values.chunks(3).map(|it| [it[0], it[1], it[2]]).collect(), reference));
+            return Some(swept_space(
+                set.values.chunks(3).map(|point| [point[0], point[1], point[2]]).collect(),
+                reference,
+            ));
         }
         set.worst_last_first();
         let (last, below) = (objectives - 1, &reference[..objectives - 1]);
@@ -154,8 +157,8 @@ impl Counted {
         for at in 0..rows {
             let point = &set.values[at * objectives..][..objectives];
             let own = extent(&point[..last], below);
-            // What the later points dominate of this one's box: their corners moved into it. They are no worse in the
-            // last objective, so all of these have the height of the box.
+            // The part of this point's box that later points dominate: their corners are moved into it. Later points
+            // are at least as good in the last objective, so these boxes have the height of the whole box.
             limited.values.clear();
             for other in set.values[(at + 1) * objectives..].chunks(objectives) {
                 corner.clear();
@@ -169,7 +172,7 @@ impl Counted {
     }
 }
 
-/// Rows that are sorted in place at most.
+/// Up to this number, rows are sorted in place.
 const FEW: usize = 12;
 
 /// Points of which none dominates or equals another, row by row.
@@ -179,13 +182,13 @@ struct Set {
 }
 
 impl Set {
-    /// Adds a point unless another dominates or equals it, and removes those that it dominates. Says with how many it
-    /// was compared.
+    /// Adds a point unless another dominates or equals it, and removes those that it dominates. Returns the number of
+    /// comparisons.
     fn add(&mut self, point: &[f64]) -> usize {
         let wide = self.objectives;
         let rows = self.values.len() / wide;
         if let Some(at) = self.values.chunks(wide).position(|other| holds(other, point)) {
-            // Those that dominate one point dominate many.
+            // A point that dominates one other often dominates many, so it is moved to the front.
             if at > 0 {
                 let (front, rest) = self.values.split_at_mut(at * wide);
                 front[..wide].swap_with_slice(&mut rest[..wide]);
@@ -214,7 +217,7 @@ impl Set {
             self.values = rows.concat();
             return;
         }
-        // Most sets are of a few points, which are sorted in place.
+        // Most sets have few points, which are sorted in place.
         for at in 1..rows {
             let point = &self.values[at * wide..][..wide];
             let place = self.values.chunks(wide).take(at).position(|other| worse(point, other) == Ordering::Less);
@@ -225,7 +228,7 @@ impl Set {
     }
 }
 
-/// The volume of any points with three objectives at most.
+/// The volume of any points with at most three objectives.
 fn swept(mut points: Vec<Vec<f64>>, reference: &[f64]) -> f64 {
     match *reference {
         [] => 0.0,
@@ -246,7 +249,7 @@ fn swept(mut points: Vec<Vec<f64>>, reference: &[f64]) -> f64 {
     }
 }
 
-/// As [`swept`], of three objectives: a plane moves up the third one, and the area dominated below it only grows.
+/// As [`swept`], for three objectives: a plane moves up the third one, and the area dominated below it only grows.
 fn swept_space(mut points: Vec<[f64; 3]>, reference: &[f64]) -> f64 {
     let (right, top, end) = (reference[0], reference[1], reference[2]);
     points.sort_by(|a, b| ascending(a[2], b[2]).then_with(|| lexicographic(a, b)));
@@ -263,14 +266,14 @@ fn swept_space(mut points: Vec<[f64; 3]>, reference: &[f64]) -> f64 {
 
 /// The area that points in the plane dominate up to a corner.
 struct Stairs {
-    /// The points that no other dominates: the first coordinate ascends, the second descends.
+    /// The nondominated points: the first coordinate ascends, the second descends.
     steps: Vec<(f64, f64)>,
     right: f64,
     top: f64,
 }
 
 impl Stairs {
-    /// Adds a point, and tells by how much the area has grown.
+    /// Adds a point, and returns the growth of the area.
     fn add(&mut self, x: f64, y: f64) -> f64 {
         let beyond = self.steps.partition_point(|step| step.0 <= x);
         let mut ceiling = beyond.checked_sub(1).map_or(self.top, |before| self.steps[before].1);
@@ -291,13 +294,13 @@ impl Stairs {
     }
 }
 
-/// The boxes that points dominate, to be drawn from.
+/// The boxes that points dominate, from which samples are drawn.
 struct Boxes<'a> {
     points: Vec<&'a [f64]>,
     reference: &'a [f64],
     /// The best value of each objective.
     ideal: Vec<f64>,
-    /// The volumes of the boxes up to and including each.
+    /// The cumulative volumes of the boxes.
     upto: Vec<f64>,
 }
 
@@ -306,12 +309,12 @@ struct Boxes<'a> {
 enum Drawn {
     /// From the boxes, each with a probability in proportion to its volume; a sample in k boxes weighs 1 / k.
     FromBoxes,
-    /// From the one box around all of them; a sample that none holds weighs nothing.
+    /// From the bounding box of all of them; a sample in none of the boxes weighs 0, any other 1.
     FromAround,
 }
 
 impl<'a> Boxes<'a> {
-    /// The boxes of points inside the reference, at least one.
+    /// The boxes of points below the reference, of which there must be one.
     fn of(points: &'a [Vec<f64>], reference: &'a [f64]) -> Boxes<'a> {
         let mut points: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
         points.sort_by(|a, b| lexicographic(a, b));
@@ -326,7 +329,7 @@ impl<'a> Boxes<'a> {
         Boxes { upto: volumes.collect(), points, reference, ideal }
     }
 
-    /// The volume that samples are drawn from.
+    /// The volume from which samples are drawn.
     fn whole(&self, drawn: Drawn) -> f64 {
         match drawn {
             Drawn::FromBoxes => self.upto.last().copied().unwrap_or_default(),
@@ -334,7 +337,8 @@ impl<'a> Boxes<'a> {
         }
     }
 
-    /// Samples with their weights. Boxes are chosen at even steps through their volumes, from a random beginning.
+    /// Draws samples and passes them on with their weights. Boxes are chosen at even steps through their cumulative
+    /// volumes, from a random start.
     fn sample(&self, drawn: Drawn, count: u64, purpose: &str, each: &mut dyn FnMut(f64, &[f64])) {
         let mut stream = Stream::derive(0, purpose, &[self.reference.len() as u64, self.points.len() as u64]);
         let begin = stream.unit();
@@ -360,7 +364,7 @@ impl<'a> Boxes<'a> {
         }
     }
 
-    /// The way to draw that scatters less, as far as some first samples tell, and how many samples to draw.
+    /// The way to draw that has the smaller variance according to a pilot sample, and how many samples to draw.
     fn best_way(&self) -> (Drawn, u64) {
         let count = ESTIMATING_WORK / (self.points.len() * self.reference.len()) as u64;
         let (mut sum, mut squares) = (0.0, 0.0);
@@ -370,7 +374,7 @@ impl<'a> Boxes<'a> {
         });
         let n = SAMPLES.0 as f64;
         let share = (sum / n * self.whole(Drawn::FromBoxes) / self.whole(Drawn::FromAround)).min(1.0);
-        // Of one sample, the variance in shares of the squared mean.
+        // The variance of one sample, divided by the squared mean.
         let (from_boxes, from_around) = (squares * n / (sum * sum) - 1.0, (1.0 - share) / share);
         let drawn = if from_around < from_boxes { Drawn::FromAround } else { Drawn::FromBoxes };
         (drawn, count.clamp(SAMPLES.0, SAMPLES.1))
@@ -389,7 +393,7 @@ impl<'a> Boxes<'a> {
         Volume { value: whole * mean, error: Some(whole * libm::sqrt(variance / n)) }
     }
 
-    /// The share of the boxes' volume that points dominate nothing of.
+    /// The share of the boxes' volume that the points of `then` do not dominate.
     fn growth(&self, then: &[Vec<f64>]) -> Growth {
         let (drawn, count) = self.best_way();
         let (mut all, mut new, mut all_squared, mut new_squared) = (0.0, 0.0, 0.0, 0.0);
@@ -405,7 +409,7 @@ impl<'a> Boxes<'a> {
             return Growth { share: 1.0, at_most: Some(1.0) };
         }
         let share = new / all;
-        // The variance of a ratio of two means, of which the first is a part of the second.
+        // The variance of a ratio of two means, where the numerator is a part of the denominator.
         let variance = (new_squared * (1.0 - 2.0 * share) + share * share * all_squared).max(0.0) / (all * all);
         let at_most = (share + ONE_SIDED * libm::sqrt(variance)).max(UNSEEN / all);
         Growth { share, at_most: Some(at_most.min(1.0)) }
@@ -428,7 +432,7 @@ mod tests {
 
     use super::*;
 
-    /// Inclusion and exclusion over all subsets: the volume of a union of boxes by definition.
+    /// The volume of a union of boxes by inclusion and exclusion over all subsets.
     fn naive(points: &[&[f64]], reference: &[f64]) -> f64 {
         (1u32..1 << points.len())
             .map(|subset| {
@@ -461,7 +465,7 @@ mod tests {
         }
     }
 
-    /// Points on a sphere around the reference's far corner: none dominates another.
+    /// Points on a sphere around the origin, of which none dominates another.
     fn sphere(objectives: usize, count: usize, seed: u64) -> Vec<Vec<f64>> {
         let mut stream = Stream::derive(seed, "sphere", &[]);
         let point = |_| {
@@ -476,7 +480,7 @@ mod tests {
         points.iter().map(Vec::as_slice).collect()
     }
 
-    /// The recursion over exclusive volumes without slices, orders or sweeps.
+    /// The recursion over exclusive volumes, without slices, sorting or sweeps.
     fn plain(points: &[Vec<f64>], reference: &[f64]) -> f64 {
         let mut total = 0.0;
         for (at, point) in points.iter().enumerate() {
@@ -485,14 +489,14 @@ mod tests {
             limited.sort_by(|a, b| lexicographic(a, b));
             limited.dedup();
             let all = limited.clone();
-            limited.retain(|it| !all.iter().any(|other| other != it && holds(other, it)));
+            limited.retain(|point| !all.iter().any(|other| other != point && holds(other, point)));
             total += extent(point, reference) - plain(&limited, reference);
         }
         total
     }
 
     #[test]
-    fn slicing_by_objectives_changes_no_volume() {
+    fn slicing_by_objectives_does_not_change_the_volume() {
         for (objectives, count) in [(3, 60), (4, 40), (5, 24), (6, 16), (7, 12)] {
             let points = sphere(objectives, count, 3);
             let reference = vec![1.1; objectives];
@@ -502,8 +506,8 @@ mod tests {
     }
 
     #[test]
-    fn what_would_take_too_much_work_is_estimated_with_its_standard_error() {
-        // The first points fill much of their box, the second nearly nothing of it, so both ways to draw are used.
+    fn a_volume_that_takes_too_much_work_is_estimated_with_its_standard_error() {
+        // The first sets dominate much of their bounding box, the last one almost nothing, so both ways to draw are used.
         let far: Vec<Vec<f64>> = (0..6).map(|at| (0..6).map(|k| if k == at { 0.0 } else { 0.98 }).collect()).collect();
         for points in [sphere(6, 30, 1), sphere(5, 60, 2), far] {
             let reference = vec![1.0; points[0].len()];
@@ -523,13 +527,13 @@ mod tests {
         let points = sphere(8, 200, 1);
         let mut counted = Counted { left: WORK / 100 };
         assert_eq!(counted.volume(points.clone(), &[1.1; 8]), None);
-        // With three objectives there is no bound.
+        // With three objectives, work is not limited.
         let flat = sphere(3, 500, 1);
         assert_eq!(measured(&slices(&flat), &[1.1; 3], 0).error, None);
     }
 
     #[test]
-    fn growth_is_the_share_that_is_new_and_an_estimate_of_it_says_how_much_it_may_be() {
+    fn growth_is_the_share_of_new_volume_and_an_estimate_has_an_upper_bound() {
         let points = sphere(5, 40, 9);
         let reference = vec![1.1; 5];
         for kept in [1, 20, 35, 39] {
@@ -547,7 +551,7 @@ mod tests {
     }
 
     #[test]
-    fn infinite_points_have_infinite_or_no_volume() {
+    fn infinite_points_have_an_infinite_volume_or_none() {
         let below: &[f64] = &[f64::NEG_INFINITY, 0.0];
         let above: &[f64] = &[f64::INFINITY, 0.0];
         let inside: &[f64] = &[0.0, 0.0];

@@ -113,7 +113,7 @@ mod tests {
         let close = |value: Option<f64>, expected: f64| (value.unwrap() - expected).abs() < 1e-12;
         assert!(close(igd_plus(&[&[4.0, 2.0]], &front), 1.0));
         assert!(close(igd_plus(&[&[5.0, 6.0]], &front), f64::midpoint(libm::sqrt(10.0), libm::sqrt(17.0))));
-        // What is better than the front is no way from it, where IGD would punish it.
+        // A point better than the front has the distance 0; IGD would penalise it.
         assert_eq!(igd_plus(&[&[1.0, 1.0]], &front), Some(0.0));
         assert_eq!(igd_plus(&[], &front), None);
         assert_eq!(igd_plus(&[&[1.0, 1.0]], &[]), None);

@@ -127,7 +127,7 @@ impl ReferencePoints {
             self.ideal = vec![f64::INFINITY; objectives];
             self.worst = vec![f64::NEG_INFINITY; objectives];
         }
-        for values in fitness.iter().filter_map(|it| it.objectives()) {
+        for values in fitness.iter().filter_map(|fitness| fitness.objectives()) {
             for (at, &value) in values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
                 self.ideal[at] = self.ideal[at].min(value);
                 self.worst[at] = self.worst[at].max(value);
@@ -358,8 +358,8 @@ mod tests {
                     }
                     // The first of an empty niche is the nearest, so of those taken one is at least as near.
                     if was_empty(lost.point) && count(lost.point) > 0 {
-                        let of_niche = chosen.iter().map(niche).filter(|it| it.point == lost.point);
-                        prop_assert!(of_niche.map(|it| it.distance).fold(f64::INFINITY, f64::min) <= lost.distance);
+                        let of_niche = chosen.iter().map(niche).filter(|other| other.point == lost.point);
+                        prop_assert!(of_niche.map(|member| member.distance).fold(f64::INFINITY, f64::min) <= lost.distance);
                     }
                 }
                 break;

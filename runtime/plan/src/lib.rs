@@ -9,30 +9,40 @@
 //! every other quantity is in the unit its field, metric or topic declares (the unit on the wire), probabilities are in
 //! `0..=1`.
 
+mod campaign;
 pub mod condition;
 mod confirmation;
 mod coverage;
 mod exploration;
 mod formula;
+mod id;
 mod kind;
+mod metric;
 mod model;
+mod operation;
 mod search;
 pub mod stl;
 mod stop;
+mod system;
 mod task;
 mod test;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 mod validate;
 
+pub use campaign::*;
 pub use confirmation::*;
 pub use coverage::*;
 pub use exploration::*;
 pub use formula::*;
+pub use id::*;
 pub use kind::*;
+pub use metric::*;
 pub use model::*;
+pub use operation::*;
 pub use search::*;
 pub use stop::*;
+pub use system::*;
 pub use task::*;
 pub use test::*;
 pub use validate::PlanError;

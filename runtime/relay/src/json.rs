@@ -264,7 +264,7 @@ mod tests {
     fn what_json_has_no_number_for_is_a_text_in_place_of_a_real() {
         assert!(matches!(read(&REAL, r#""NaN""#), Ok(Value::Real(x)) if x.is_nan()));
         assert_eq!(
-            read(&POINT, r#"[0, "Infinity", "-Infinity"]"#).map(|it| written(&it)).unwrap(),
+            read(&POINT, r#"[0, "Infinity", "-Infinity"]"#).map(|value| written(&value)).unwrap(),
             r#"[0.0,"Infinity","-Infinity"]"#
         );
         assert_eq!(written(&Value::Real(f64::NAN)), r#""NaN""#);

@@ -14,55 +14,30 @@
 //! A change of a message is an effect only if its wire has a receiver: a subscriber, or an outbound metric. Changes on
 //! other wires are counted separately.
 
+mod exchange;
 mod fuzzing_time;
 mod listener;
+mod pass;
 mod release;
+mod stage;
 
 use release::{Held, ReleaseQueue, Why};
+use stage::Stage;
 
 use sesame_base::activation::{Activity, Edge, TICK};
 use sesame_base::observation::{Counters, OperationEffect};
 use sesame_base::time::SimTime;
 use sesame_plan::condition::Operand;
-use sesame_plan::{CampaignPlan, Copies, Drain, Moment, OperationId, Side, Span, Test, TopicId};
+use sesame_plan::{CampaignPlan, Copies, Drain, Moment, Side, Span, Test, TopicId};
 
 use crate::files::SpaceFiles;
-use crate::fuzz::{Action, ChoiceError, Disturbance, KeyedRng, MessageContext, OperationEntry, RunContext};
+use crate::fuzz::{ChoiceError, Disturbance, KeyedRng, OperationEntry, RunContext};
 use crate::metric::Metrics;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
+pub use exchange::{Delivery, Exchange};
 pub use listener::{Listener, MessageRef, OperationEvent};
-
-/// A message that is to reach its subscribers now.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Delivery {
-    /// On which wire.
-    pub wire: Wire,
-    /// What.
-    pub value: Value,
-}
-
-/// The relay as a transport sees it.
-pub trait Exchange {
-    /// The wires that it knows; messages of other topics do not go through it.
-    fn wires(&self) -> &WireTable;
-    /// Whether messages of this wire must pass through it, because an operation may disturb them.
-    fn intercepts(&self, wire: Wire) -> bool;
-    /// From now on the simulator subscribes to this wire, so changes of its messages are effects.
-    fn subscribed(&mut self, wire: Wire);
-    /// Simulation time is `now` from here on; it never goes back.
-    fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>);
-    /// A message was published at `now`.
-    fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>);
-    /// The next moment at which the relay has something to do even without a message: a held message is due, or an
-    /// operation may be switched. Until then, advancing time has no effect. `None` if only a message can cause
-    /// anything.
-    ///
-    /// A transport that does not step its simulator waits until this moment or until the next message, whichever is
-    /// first. A message may change the moment.
-    fn next_due(&self) -> Option<SimTime>;
-}
 
 /// The most messages that operations may hold back at once; beyond it, the oldest is released early, with a warning.
 pub const HELD_LIMIT: usize = 100_000;
@@ -123,45 +98,6 @@ enum Phase {
     Running,
     /// Nothing is delivered any more.
     Over,
-}
-
-/// One operation of the test.
-struct Stage {
-    operation: OperationId,
-    name: String,
-    disturbance: Disturbance,
-    /// Whether it observes messages while it is inactive.
-    observes_inactive: bool,
-    holds_order: bool,
-    activity: Activity,
-    /// When it last became active.
-    since: SimTime,
-    operation_seed: u64,
-    /// Whether it counts in `fuzzing_time()`.
-    timed: bool,
-    /// Since when it holds messages back without being active.
-    tail_since: Option<SimTime>,
-    /// Earlier intervals of that kind.
-    tails: Vec<(SimTime, SimTime)>,
-    counters: Counters,
-    first_touch: Option<SimTime>,
-    last_touch: Option<SimTime>,
-}
-
-impl Stage {
-    /// Counts an action on this many messages on a wire with or without a receiver.
-    fn count(&mut self, heard: bool, now: SimTime, messages: u64, count: impl FnOnce(&mut Counters) -> &mut u64) {
-        if messages == 0 {
-            return;
-        }
-        if !heard {
-            self.counters.unheard += messages;
-            return;
-        }
-        *count(&mut self.counters) += messages;
-        self.first_touch.get_or_insert(now);
-        self.last_touch = Some(now);
-    }
 }
 
 impl<'a> Relay<'a> {
@@ -251,6 +187,25 @@ impl<'a> Relay<'a> {
     pub(crate) fn received_everywhere(mut self) -> Self {
         self.heard.fill(true);
         self
+    }
+
+    /// Calls the custom operations of the test before the start, or those after the end, ordered by priority and
+    /// declaration. The error says which operation failed, and why.
+    pub fn before_or_after_run(&mut self, moment: Moment, files: &mut dyn SpaceFiles) -> Result<(), String> {
+        for at in self.order.clone() {
+            let stage = &mut self.operations[at];
+            let Disturbance::Custom(custom) = &mut stage.disturbance else { continue };
+            if custom.moment != moment {
+                continue;
+            }
+            let mut ctx = RunContext::new(files, KeyedRng::new(stage.operation_seed, 0, 0));
+            custom.hook.before_or_after_run(&mut ctx);
+            stage.counters.side_effects += ctx.side_effects;
+            if let Some(failure) = ctx.failure {
+                return Err(format!("operation `{}`: {failure}", stage.name));
+            }
+        }
+        Ok(())
     }
 
     fn tell(&mut self, now: SimTime, operation: usize, event: OperationEvent) {
@@ -473,153 +428,6 @@ impl<'a> Relay<'a> {
         }
         if self.queue.holds(at) > 0 {
             self.operations[at].tail_since = Some(now);
-        }
-    }
-
-    /// Takes a message through the rest of its pipeline.
-    fn pass(&mut self, now: SimTime, mut message: Held, deliveries: &mut Vec<Delivery>) {
-        while let Some(&(at, member)) = self.pipelines[message.wire.index()].get(message.next_stage) {
-            message.next_stage += 1;
-            let heard = self.heard[message.wire.index()];
-            let stage = &mut self.operations[at];
-            let queued_until = if stage.holds_order { self.queue.last_release(at, message.wire) } else { None };
-            let active = stage.activity.is_active();
-            if active {
-                stage.counters.seen += 1;
-            } else if stage.observes_inactive {
-                stage.disturbance.observe(now, member, &message.value);
-            }
-            if active && matches!(stage.disturbance, Disturbance::Custom(_)) {
-                return self.pass_custom(now, at, member, message, deliveries);
-            }
-            let action = if active {
-                let draws = KeyedRng::new(stage.operation_seed, member, message.index);
-                let context = MessageContext { now, active: now - stage.since, member, draws };
-                stage.disturbance.apply(context, &mut message.value)
-            } else {
-                Action::Unchanged
-            };
-            if let Action::Duplicated(copies) = action {
-                return self.pass_copies(now, at, message, copies, deliveries);
-            }
-            let release = match action {
-                Action::Delayed(delay) => now + delay,
-                _ => now,
-            }
-            .max(queued_until.unwrap_or(now));
-            if action == Action::Dropped {
-                stage.count(heard, now, 1, |counters| &mut counters.dropped);
-                self.tell(now, at, OperationEvent::Dropped(message.message_ref()));
-                return;
-            }
-            if action == Action::Changed {
-                stage.count(heard, now, 1, |counters| &mut counters.changed);
-                self.tell(now, at, OperationEvent::Changed(message.message_ref()));
-            }
-            if release > now {
-                let stage = &mut self.operations[at];
-                let why = match (heard, active) {
-                    (false, _) => Why::Unheard,
-                    (true, true) => Why::Delayed,
-                    (true, false) => Why::Queued,
-                };
-                stage.count(
-                    heard,
-                    now,
-                    1,
-                    |counters| if active { &mut counters.delayed } else { &mut counters.queued },
-                );
-                self.tell(now, at, OperationEvent::Delayed(message.message_ref(), release));
-                self.queue.push(release, at, why, message);
-                if self.queue.len() > HELD_LIMIT {
-                    self.overflowed = true;
-                    if let Some(oldest) = self.release() {
-                        self.pass(now, oldest, deliveries);
-                    }
-                }
-                return;
-            }
-        }
-        if self.phase != Phase::Over {
-            self.metrics.delivered(now, message.wire, message.published, &message.value);
-            for tap in &mut self.taps {
-                tap.delivered(now, message.wire, message.published, &message.value);
-            }
-        }
-        deliveries.push(Delivery { wire: message.wire, value: message.value });
-    }
-}
-
-/// Custom operations.
-impl Relay<'_> {
-    /// Calls the custom operations of the test before the start, or those after the end, ordered by priority and
-    /// declaration. The error says which operation failed, and why.
-    pub fn before_or_after_run(&mut self, moment: Moment, files: &mut dyn SpaceFiles) -> Result<(), String> {
-        for at in self.order.clone() {
-            let stage = &mut self.operations[at];
-            let Disturbance::Custom(custom) = &mut stage.disturbance else { continue };
-            if custom.moment != moment {
-                continue;
-            }
-            let mut ctx = RunContext::new(files, KeyedRng::new(stage.operation_seed, 0, 0));
-            custom.hook.before_or_after_run(&mut ctx);
-            stage.counters.side_effects += ctx.side_effects;
-            if let Some(failure) = ctx.failure {
-                return Err(format!("operation `{}`: {failure}", stage.name));
-            }
-        }
-        Ok(())
-    }
-
-    /// Takes a message through a custom operation and on, followed by the messages that the operation injects.
-    fn pass_custom(&mut self, now: SimTime, at: usize, member: u64, mut message: Held, deliveries: &mut Vec<Delivery>) {
-        let heard = self.heard[message.wire.index()];
-        let stage = &mut self.operations[at];
-        let Disturbance::Custom(custom) = &mut stage.disturbance else {
-            unreachable!("only custom operations come here")
-        };
-        let draws = KeyedRng::new(stage.operation_seed, member, message.index);
-        let call = custom.on_message(now, self.wires.path(message.wire), draws, &mut message.value);
-        stage.count(heard, now, call.injected.len() as u64, |counters| &mut counters.injected);
-        stage.count(heard, now, u64::from(call.changed && !call.dropped), |counters| &mut counters.changed);
-        stage.count(heard, now, u64::from(call.dropped), |counters| &mut counters.dropped);
-        if call.dropped {
-            self.tell(now, at, OperationEvent::Dropped(message.message_ref()));
-        } else if call.changed {
-            self.tell(now, at, OperationEvent::Changed(message.message_ref()));
-        }
-        for _ in &call.injected {
-            self.tell(now, at, OperationEvent::Injected(message.message_ref()));
-        }
-        let injected = (0u64..).zip(call.injected);
-        let injected: Vec<Held> = injected.map(|(number, value)| message.beside(at, number, value)).collect();
-        if !call.dropped {
-            self.pass(now, message, deliveries);
-        }
-        for message in injected {
-            self.pass(now, message, deliveries);
-        }
-    }
-}
-
-/// Copies of messages.
-impl Relay<'_> {
-    /// Takes a message on, followed by its copies: as many as the operation makes, up to the limit of one event.
-    fn pass_copies(&mut self, now: SimTime, at: usize, message: Held, copies: u32, deliveries: &mut Vec<Delivery>) {
-        let room = COPIES_LIMIT - self.copies;
-        self.flooded |= copies > room;
-        let copies = copies.min(room);
-        self.copies += copies;
-        let heard = self.heard[message.wire.index()];
-        self.operations[at].count(heard, now, u64::from(copies), |counters| &mut counters.injected);
-        let made: Vec<Held> =
-            (0..u64::from(copies)).map(|number| message.beside(at, number, message.value.clone())).collect();
-        for copy in &made {
-            self.tell(now, at, OperationEvent::Injected(copy.message_ref()));
-        }
-        self.pass(now, message, deliveries);
-        for copy in made {
-            self.pass(now, copy, deliveries);
         }
     }
 }

@@ -113,7 +113,8 @@ pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, Re
 
 /// A test's operations in its order, apart by spaces.
 fn operations(plan: &CampaignPlan, test: &ScannedTest) -> String {
-    let names: Vec<&str> = test.operations.iter().map(|it| plan.operation(it.operation).name.as_str()).collect();
+    let names: Vec<&str> =
+        test.operations.iter().map(|operation| plan.operation(operation.operation).name.as_str()).collect();
     names.join(" ")
 }
 
@@ -168,7 +169,9 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Table, Re
             of.map_or(Datum::Missing, |test| Datum::count(test.repetitions)),
             Datum::real(ends.map(|[low, _]| low)),
             Datum::real(ends.map(|[_, high]| high)),
-            surest.and_then(|finding| finding.standing).map_or(Datum::Missing, |it| Datum::Text(it.words().to_owned())),
+            surest
+                .and_then(|finding| finding.standing)
+                .map_or(Datum::Missing, |standing| Datum::Text(standing.words().to_owned())),
         ];
         let came_again = came_again.into_iter().take(again.len());
         dataset.row([Datum::test(*number)].into_iter().chain(values).chain([same]).chain(came_again));

@@ -29,6 +29,7 @@ mod series;
 mod series_views;
 #[cfg(test)]
 mod tests;
+mod write_tests;
 
 use serde::Serialize;
 

@@ -120,19 +120,20 @@ pub fn aggregate(runs: &[Fitness], by: Statistic) -> Fitness {
         Statistic::Quantile { share } => at(reached_by(share, runs.len()) - 1, objective),
     };
     let values: Option<Vec<f64>> =
-        (0..objectives).map(|objective| value(objective).filter(|it| !it.is_nan())).collect();
+        (0..objectives).map(|objective| value(objective).filter(|number| !number.is_nan())).collect();
     values.map_or_else(unfit, Fitness::Measured)
 }
 
 /// One margin for several runs of a test: aggregated like an objective that is minimised, so a quantile is the
 /// margin that this share of the runs reach or go below. It counts as a violation if such a run violates.
 pub(crate) fn aggregate_margin(runs: &[Margin], by: Statistic) -> Margin {
-    let value = |run: &Margin| run.value.map_or(Fitness::Unfit(Unfit::Unmeasured), |it| Fitness::Measured(vec![it]));
+    let value =
+        |run: &Margin| run.value.map_or(Fitness::Unfit(Unfit::Unmeasured), |number| Fitness::Measured(vec![number]));
     let values: Vec<Fitness> = runs.iter().map(value).collect();
     let value = aggregate(&values, by).objectives().map(|values| values[0]);
     // On the edge itself a bound decides, and so the runs that are there know.
     let on_edge = |it: f64| it == 0.0 && runs.iter().any(|run| run.value == Some(0.0) && run.violated);
-    Margin { value, violated: value.is_some_and(|it| it < 0.0 || on_edge(it)) }
+    Margin { value, violated: value.is_some_and(|margin| margin < 0.0 || on_edge(margin)) }
 }
 
 /// The least number of runs that are at least this share of all; 1 or more.
@@ -191,7 +192,7 @@ mod tests {
         for (number, _, fitness) in generation(&(0..=11).collect::<Vec<_>>()) {
             believing.add(number, &fitness);
         }
-        assert_eq!(believing.numbers(), [11], "whoever believes the first run has a front of one");
+        assert_eq!(believing.numbers(), [11], "without confirmation, the front has one test");
 
         // In the same generation, and in a later one.
         let mut together = ConfirmedFront::default();
@@ -265,7 +266,7 @@ mod tests {
         confirming.confirm(2, measured(&[4.0]));
         assert_eq!(confirming.unconfirmed(), [0u32; 0]);
         confirming.begin([(4, 1, measured(&[0.0]))].map(judged));
-        assert_eq!(confirming.unconfirmed(), [0u32; 0], "its first run is no luck to be had again");
+        assert_eq!(confirming.unconfirmed(), [0u32; 0], "its first run was not luck");
         assert_eq!((confirming.front().numbers(), confirming.fitness().next()), (vec![2], Some(&measured(&[5.0]))));
     }
 

@@ -5,7 +5,7 @@ use sesame_rng::derive_seed;
 
 use crate::{Candidate, Evaluated, Strategy};
 
-/// Tests that are run in one generation, whatever their results are.
+/// Tests that are run in one generation, independently of their results.
 #[derive(Debug, Clone)]
 pub(crate) struct FixedTests {
     candidates: Vec<Candidate>,

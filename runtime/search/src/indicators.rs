@@ -58,8 +58,8 @@ pub struct Indicators {
 
 impl Indicators {
     /// Before the first generation, after the reference run, of which an import has none.
-    pub fn new(undisturbed: Option<&Fitness>) -> Indicators {
-        let early = undisturbed.and_then(Fitness::objectives).map(<[f64]>::to_vec).into_iter().collect();
+    pub fn new(reference_run: Option<&Fitness>) -> Indicators {
+        let early = reference_run.and_then(Fitness::objectives).map(<[f64]>::to_vec).into_iter().collect();
         Indicators { early, ..Indicators::default() }
     }
 

@@ -125,7 +125,7 @@ mod tests {
                     (a, b) => f64::from(u8::from(a.is_some() != b.is_some())),
                 };
                 let most = f64::from(plan.campaign.count.max);
-                let counts = [Dimension::O1, Dimension::O2, Dimension::O3].map(|it| apart(it) / most);
+                let counts = [Dimension::O1, Dimension::O2, Dimension::O3].map(|dimension| apart(dimension) / most);
                 let [t1, t2, t3, p1, p2] =
                     [Dimension::T1, Dimension::T2, Dimension::T3, Dimension::P1, Dimension::P2].map(apart);
                 let far = [t1, t2, t3, p1, p2].iter().chain(&counts).fold(0.0, |sum, it| sum + it * it);
@@ -134,7 +134,7 @@ mod tests {
             })
             .collect();
         others.sort_by(|a, b| (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap());
-        let nearest: Vec<&[f64]> = others.iter().take(count).map(|it| it.2).collect();
+        let nearest: Vec<&[f64]> = others.iter().take(count).map(|other| other.2).collect();
         let own = of.fitness.objectives().unwrap();
         let mean =
             |at: usize| nearest.iter().fold(own[at], |sum, values| sum + values[at]) / (nearest.len() + 1) as f64;

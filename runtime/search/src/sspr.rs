@@ -42,7 +42,7 @@ pub struct Disturbance {
     pub class: Class,
     /// Where it may be active at all: what its intervals are shares of, in seconds.
     pub window: Span,
-    /// When it was active, or is to be, in seconds. An operation without an interval is no part of the point.
+    /// When it was active, or is to be, in seconds. An operation without an interval does not contribute to the point.
     pub intervals: Vec<Span>,
     /// Its numeric parameters. Choices among texts are none.
     pub parameters: Vec<Intensity>,
@@ -92,12 +92,16 @@ impl Point {
     /// normalised parameters of all operations that were active: P1 is their mean, P2 their population standard
     /// deviation.
     pub fn from_disturbances(disturbances: &[Disturbance], convention: Convention) -> Option<Point> {
-        let active: Vec<&Disturbance> =
-            disturbances.iter().filter(|it| !it.intervals.is_empty() && it.window.length() > 0.0).collect();
+        let active: Vec<&Disturbance> = disturbances
+            .iter()
+            .filter(|disturbance| !disturbance.intervals.is_empty() && disturbance.window.length() > 0.0)
+            .collect();
         let share = |of: &Disturbance, time: f64| (time - of.window.start) / of.window.length();
         let shares: Vec<(f64, f64)> = active
             .iter()
-            .flat_map(|&of| of.intervals.iter().map(move |it| (share(of, it.start), share(of, it.end))))
+            .flat_map(|&of| {
+                of.intervals.iter().map(move |interval| (share(of, interval.start), share(of, interval.end)))
+            })
             .collect();
         if shares.is_empty() {
             return None;
@@ -106,7 +110,7 @@ impl Point {
         let lengths: Vec<f64> = shares.iter().map(|(start, end)| end - start).collect();
         let parameters: Vec<f64> = active
             .iter()
-            .flat_map(|of| of.parameters.iter().filter_map(|it| it.normalised(of.class, convention)))
+            .flat_map(|of| of.parameters.iter().filter_map(|parameter| parameter.normalised(of.class, convention)))
             .collect();
         let intensity = (!parameters.is_empty()).then(|| {
             let variance = variance(&parameters);

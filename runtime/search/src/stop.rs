@@ -520,14 +520,14 @@ mod tests {
                    rules.tell(std::slice::from_ref(&result));
                    all.push(result);
                }
-               let worst = |at: usize| all.iter().map(|it| match &it.fitness {
+               let worst = |at: usize| all.iter().map(|test| match &test.fitness {
                    Fitness::Measured(objectives) => objectives[at],
                    _ => unreachable!("all are measured"),
                }).fold(f64::NEG_INFINITY, f64::max);
                let reference = [worst(0), worst(1)];
                let volume = |tests: &[Evaluated]| {
-                   let front = Front::from_tests(tests.iter().map(|it| (it.number, &it.fitness)));
-                   let points: Vec<&[f64]> = front.members().iter().map(|it| it.objectives.as_slice()).collect();
+                   let front = Front::from_tests(tests.iter().map(|test| (test.number, &test.fitness)));
+                   let points: Vec<&[f64]> = front.members().iter().map(|member| member.objectives.as_slice()).collect();
                    hypervolume::hypervolume(&points, &reference)
                };
                let (now, then) = (volume(&all), volume(&all[..6 - generations]));

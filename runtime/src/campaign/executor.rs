@@ -44,7 +44,7 @@ pub struct Job {
 pub struct TraceRequest {
     /// The file it is to be, in a folder that exists.
     pub file: PathBuf,
-    /// Whether to keep it whatever the outcome.
+    /// Whether to keep it for every outcome.
     pub keep: Recorded,
 }
 

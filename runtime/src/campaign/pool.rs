@@ -96,7 +96,7 @@ impl Executor for Pool {
 }
 
 impl Drop for Pool {
-    /// Stops the workers, whatever they do.
+    /// Stops the workers, also while they run tests.
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         self.jobs = None;

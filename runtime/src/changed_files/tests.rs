@@ -168,7 +168,7 @@ proptest::proptest! {
                 Trap::Link { at, to } => {
                     let (at, to) = (space.join(at), all.path().join(to));
                     // Only what the trap itself made may be in its way.
-                    if fs::symlink_metadata(&at).is_ok_and(|it| it.is_dir()) && at.starts_with(&space) {
+                    if fs::symlink_metadata(&at).is_ok_and(|metadata| metadata.is_dir()) && at.starts_with(&space) {
                         fs::remove_dir_all(&at).unwrap();
                     }
                     drop(std::os::unix::fs::symlink(to, at));
@@ -180,7 +180,7 @@ proptest::proptest! {
                 }
                 Trap::Entry { number, path, existed, original } => {
                     let folder = space.join(FOLDER);
-                    if fs::symlink_metadata(&folder).is_ok_and(|it| it.is_dir()) {
+                    if fs::symlink_metadata(&folder).is_ok_and(|metadata| metadata.is_dir()) {
                         let entry = Entry { path: path.replace("ABSOLUTE", absolute).into(), existed };
                         let entry = serde_json::to_vec(&entry).unwrap();
                         let made = File::create_new(folder.join(format!("{number}.json")));

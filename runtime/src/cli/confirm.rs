@@ -115,7 +115,8 @@ pub(super) fn confirm(
 /// The tests that violate a requirement and were run once only, by number; none of a duplicate.
 fn run_once(repository: &Repository) -> Result<Vec<u32>, Failure> {
     let (plan, repetitions) = (repository.plan(), repository.repetitions()?);
-    let violates = |row: &TestRow| plan.requirements.iter().any(|it| row.verdict(it) == Verdict::Violated);
+    let violates =
+        |row: &TestRow| plan.requirements.iter().any(|requirement| row.verdict(requirement) == Verdict::Violated);
     let counts = |row: &&TestRow| row.origin != Origin::Reference && row.duplicate_of.is_none();
     let rows = repository.tests()?;
     let once = rows.iter().filter(counts).filter(|row| !repetitions.contains_key(&row.number) && violates(row));

@@ -59,7 +59,9 @@ impl Gate {
         let mut objections = Vec::new();
         if asked(Finding::Violation) {
             let broken = summary.requirements.iter().filter(|requirement| requirement.violated > 0);
-            objections.extend(broken.map(|it| format!("{} is violated in {}", it.requirement, tests(it.violated))));
+            objections.extend(broken.map(|requirement| {
+                format!("{} is violated in {}", requirement.requirement, tests(requirement.violated))
+            }));
             objections.extend(expectations(summary, Verdict::Violated, "is violated"));
         }
         for (finding, word) in [(Finding::Crash, "crash"), (Finding::Timeout, "timeout")] {
@@ -73,8 +75,9 @@ impl Gate {
         }
         if asked(Finding::Inconclusive) {
             let open = summary.requirements.iter().filter(|requirement| requirement.inconclusive > 0);
-            objections
-                .extend(open.map(|it| format!("{} is inconclusive in {}", it.requirement, tests(it.inconclusive))));
+            objections.extend(open.map(|requirement| {
+                format!("{} is inconclusive in {}", requirement.requirement, tests(requirement.inconclusive))
+            }));
             objections.extend(expectations(summary, Verdict::Inconclusive, "is inconclusive"));
         }
         if matches!(task, Task::Known { .. }) {
@@ -100,19 +103,22 @@ fn tests(count: usize) -> String {
 
 /// Tests that ended in one of these ways, where that stands.
 fn broken_off(summary: &Summary, words: &[&str]) -> BTreeSet<TestNumber> {
-    let found = summary.failures.iter().filter(|it| words.contains(&it.outcome.as_str()) && it.stands());
+    let found = summary.failures.iter().filter(|failure| words.contains(&failure.outcome.as_str()) && failure.stands());
     found.map(|failure| failure.test).collect()
 }
 
 fn expectations<'a>(summary: &'a Summary, verdict: Verdict, what: &'a str) -> impl Iterator<Item = String> + 'a {
-    let found = summary.expectations.iter().filter(move |it| it.verdict == verdict);
-    found.map(move |it| format!("the expectation of `{}` about {} {what}", it.known_test, it.metric))
+    let found = summary.expectations.iter().filter(move |expectation| expectation.verdict == verdict);
+    found.map(move |expectation| {
+        format!("the expectation of `{}` about {} {what}", expectation.known_test, expectation.metric)
+    })
 }
 
 /// Regression tests must end, and as expected: an inconclusive expectation is not as expected.
 fn not_as_expected(summary: &Summary) -> Vec<String> {
     let failed = summary.failures.iter().filter(|failure| failure.stands());
-    let mut objections: Vec<String> = failed.map(|it| format!("{} ended by {}", it.test, it.outcome)).collect();
+    let mut objections: Vec<String> =
+        failed.map(|failure| format!("{} ended by {}", failure.test, failure.outcome)).collect();
     objections.extend(expectations(summary, Verdict::Violated, "is violated"));
     objections.extend(expectations(summary, Verdict::Inconclusive, "is inconclusive"));
     objections
@@ -178,13 +184,13 @@ mod tests {
         let (clean, plan) = found();
         assert_eq!(objections(&[Finding::Any], &clean, &plan), [""; 0]);
         let changes: [Change; 5] = [
-            (Finding::Violation, |it| it.requirements[0].violated = 2),
-            (Finding::Crash, |it| it.failures.push(crash(2))),
-            (Finding::Timeout, |it| it.failures.push(Failure { outcome: "timeout".to_owned(), ..crash(3) })),
-            (Finding::NotFinite, |it| {
-                it.not_finite.push(NotFinite { test: TestNumber(4), at: 1.0, metrics: vec!["speed".to_owned()] });
+            (Finding::Violation, |summary| summary.requirements[0].violated = 2),
+            (Finding::Crash, |summary| summary.failures.push(crash(2))),
+            (Finding::Timeout, |summary| summary.failures.push(Failure { outcome: "timeout".to_owned(), ..crash(3) })),
+            (Finding::NotFinite, |summary| {
+                summary.not_finite.push(NotFinite { test: TestNumber(4), at: 1.0, metrics: vec!["speed".to_owned()] });
             }),
-            (Finding::Inconclusive, |it| it.requirements[1].inconclusive = 1),
+            (Finding::Inconclusive, |summary| summary.requirements[1].inconclusive = 1),
         ];
         for (at, (finding, change)) in changes.iter().enumerate() {
             let mut summary = clean.clone();

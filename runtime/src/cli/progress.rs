@@ -87,7 +87,7 @@ impl<'a> Display<'a> {
         }
         for (worst, &id) in self.worst.iter().zip(&self.plan.campaign.objectives) {
             let metric = self.plan.metric(id);
-            // The least fuzzing time is no news.
+            // The least fuzzing time is not worth a line.
             if matches!(metric.source, MetricSource::FuzzingTime) {
                 continue;
             }

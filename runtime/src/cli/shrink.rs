@@ -106,8 +106,11 @@ pub(super) fn failing(repository: &Repository, record: &TestRecord, wanted: &[St
              keep; `list` shows which tests violate what"
         )));
     }
-    let chosen: Vec<RequirementId> =
-        violated.iter().copied().filter(|id| wanted.is_empty() || wanted.iter().any(|it| it == named(id))).collect();
+    let chosen: Vec<RequirementId> = violated
+        .iter()
+        .copied()
+        .filter(|id| wanted.is_empty() || wanted.iter().any(|name| name == named(id)))
+        .collect();
     // What needs no disturbance says nothing about one.
     let reference = match repository.tests()?.iter().find(|row| row.origin == Origin::Reference) {
         Some(row) => self::violated(plan, &repository.test(row.number)?.observation),

@@ -21,7 +21,7 @@ pub(super) enum Format {
 }
 
 /// Says a line on standard error: progress, notes, warnings, errors. A full disk under a log, a reader that has gone
-/// away or a connection that is lost is no reason to end a run, so a line that cannot be written is dropped.
+/// away or a lost connection must not end a run, so a line that cannot be written is dropped.
 pub(super) fn say(line: fmt::Arguments<'_>) {
     // In one piece, so that it stays whole beside what other processes write to the same log.
     io::stderr().write_all(format!("{line}\n").as_bytes()).ok();

@@ -375,6 +375,6 @@ fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode, s
 /// Whether a space declares what a hook is of, for example ``metric `speed` ``.
 fn declares(space: &RunnerPlan, of: &str) -> bool {
     let metrics = space.hooks.iter().map(|hook| format!("metric `{}`", hook.metric));
-    let operations = space.operations.iter().map(|it| format!("operation `{}`", it.operation));
+    let operations = space.operations.iter().map(|operation| format!("operation `{}`", operation.operation));
     metrics.chain(operations).any(|declared| declared == of)
 }

@@ -19,7 +19,7 @@ const MOST_NOTES: usize = 40;
 pub(super) fn import(shell: Shell, language: &Language, file: &Path, out: &Path) -> anyhow::Result<ExitCode> {
     let opened = input::open(file).map_err(|error| anyhow!("{}: cannot be read: {error}", file.display()))?;
     let mut imported = Imported::read(file, opened)?;
-    // A stem as it is would be a path that anybody may have written.
+    // The stem comes from outside, so it is not used as a path unchanged.
     let stem: String = file
         .file_stem()
         .unwrap_or_default()

@@ -68,7 +68,8 @@ impl Metadata {
     /// The packages that a build of the root takes, itself included: names by id. Those that only tests need are not
     /// among them.
     fn needed(self) -> BTreeMap<String, String> {
-        let mut names: BTreeMap<String, String> = self.packages.into_iter().map(|it| (it.id, it.name)).collect();
+        let mut names: BTreeMap<String, String> =
+            self.packages.into_iter().map(|package| (package.id, package.name)).collect();
         let nodes: BTreeMap<&str, &Node> = self.resolve.nodes.iter().map(|node| (node.id.as_str(), node)).collect();
         let mut needed: BTreeSet<&str> = BTreeSet::new();
         let mut open: Vec<&str> = self.resolve.root.as_deref().into_iter().collect();

@@ -68,7 +68,7 @@ impl Shell {
         }
         let what = what.to_string();
         let text = format!("\r\x1b[K{} {}", self.painted("1;36", &format!("{verb:>10}")), visible(&what));
-        // A terminal that is gone is no reason to stop.
+        // A closed terminal must not end the program.
         let _ = io::stderr().write_all(text.as_bytes());
     }
 

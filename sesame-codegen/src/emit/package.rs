@@ -53,7 +53,7 @@ pub(super) fn cargo_toml(note: &str, package: &str, dependencies: &BTreeMap<Stri
     }
     text.push_str(
         "\n\
-         # The runner is a workspace of its own, whatever folder it lies in.\n\
+         # The runner is a workspace of its own, in any folder.\n\
          [workspace]\n",
     );
     if vendored {
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn features_are_added_to_whatever_the_runtime_is() {
+    fn features_are_added_to_every_kind_of_dependency_on_the_runtime() {
         let with = |runtime: Value| {
             let dependencies = BTreeMap::from([("sesame-runtime".to_owned(), runtime)]);
             with_features(&dependencies, &["a", "b"])["sesame-runtime"].to_string()

@@ -122,7 +122,7 @@ pub(super) fn problems(plans: &[RunnerPlan], dependencies: &BTreeMap<String, tom
     let first = || plans.iter().take(1);
     let hooks = || {
         let metrics = first().flat_map(|runner| &runner.hooks).map(|hook| hook.metric.as_str());
-        metrics.chain(first().flat_map(|runner| &runner.operations).map(|it| it.operation.as_str()))
+        metrics.chain(first().flat_map(|runner| &runner.operations).map(|operation| operation.operation.as_str()))
     };
     let what = if first().any(|runner| !runner.operations.is_empty()) { "metric or operation" } else { "metric" };
     let mut shared = shared_names(what, hooks(), names::snake);

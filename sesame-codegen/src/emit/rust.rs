@@ -42,7 +42,7 @@ pub(super) fn as_format(text: &str) -> String {
 }
 
 /// A generated file: its header, then its items as prettyplease sets them. That it parses is an invariant of this
-/// crate, whatever the names in the space.
+/// crate, for any names in the space.
 pub(super) fn file(header: &str, items: TokenStream) -> String {
     let file = syn::parse2(items).expect("generated Rust parses, since every name and text goes through quote");
     // In comments they are escaped already, and in a literal the escape means the same sign.

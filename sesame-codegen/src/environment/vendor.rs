@@ -232,7 +232,7 @@ fn inherited(own: &Value, workspace: Value) -> Value {
     Value::Table(merged)
 }
 
-/// Lets a dependency be on a crate in a folder, whatever it was on.
+/// Replaces the source of a dependency by a folder.
 fn lead_to(value: &mut Value, path: &str) {
     let mut table = match std::mem::replace(value, Value::from("")) {
         Value::Table(table) => table,

@@ -5,7 +5,8 @@ use sesame_dsl::model::condition as from;
 use sesame_plan as plan;
 use sesame_plan::condition as to;
 
-use super::Selection;
+use super::selection::Selection;
+use super::system::unit;
 
 impl Selection {
     /// When an operation of a known test is active. Nothing is active after the end, so a window cut there is the same
@@ -68,7 +69,7 @@ impl Selection {
         let bound = |bound: f64| bound.is_finite().then_some(bound);
         let variables = space.variables.iter().map(|variable| to::Variable {
             metric: self.metric(variable.metric),
-            unit: super::unit(measured.metrics[variable.metric].unit.as_ref()),
+            unit: unit(measured.metrics[variable.metric].unit.as_ref()),
             low: bound(variable.known.low),
             high: bound(variable.known.high),
         });

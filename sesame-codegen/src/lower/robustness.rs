@@ -59,7 +59,7 @@ mod tests {
                 let ((left, a), (right, b)) = (signals(left), signals(right));
                 ([left, right].concat(), a.max(b) + 1)
             }
-            _ => panic!("{of:?} is no chain"),
+            _ => panic!("{of:?} is not a chain"),
         }
     }
 

@@ -129,7 +129,7 @@ pub(super) fn put(path: &Path, contents: &[u8], permissions: Option<Permissions>
         .and_then(|()| permissions.map_or(Ok(()), |permissions| file.set_permissions(permissions)))
         .and_then(|()| fs::rename(&temporary, path));
     written.map_err(|cause| {
-        // What is left of it is of no use; the first error is the one to hear of.
+        // The rest of it is useless; the first error is reported.
         drop(fs::remove_file(&temporary));
         Error::Io { action: "write", path: path.to_owned(), cause }
     })

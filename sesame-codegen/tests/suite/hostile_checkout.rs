@@ -1,5 +1,5 @@
-//! A project from somebody else, with links and manifests made to lead a generation elsewhere: whatever lies in the
-//! output folder, nothing outside of it is touched.
+//! A project from outside, with links and manifests made to lead a generation elsewhere: nothing outside of the output
+//! folder is touched.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -189,7 +189,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 120, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn whatever_lies_in_the_output_folder_nothing_outside_is_touched_by_generating(
+    fn generating_touches_nothing_outside_any_output_folder(
         traps in prop::collection::vec(trap(), 1..6),
         modes in prop::collection::vec(
             prop::sample::select(&[Mode::Write, Mode::Force, Mode::Check, Mode::CheckForce]), 1..4),
@@ -238,7 +238,7 @@ fn links_and_manifests_that_lead_outside_are_refused_or_replaced_and_never_follo
     generate(Mode::Write).unwrap();
     assert!(fs::symlink_metadata(out.join("day/Cargo.toml")).unwrap().is_file());
 
-    // A generated file that is a link: edited by hand for all anybody knows, replaced by force, and its text is not
+    // A generated file that is a link: which counts as edited by hand, replaced by force, and its text is not
     // shown.
     clear(&out.join("day/Cargo.toml"));
     symlink(&victim, out.join("day/Cargo.toml")).unwrap();

@@ -130,7 +130,7 @@ fn mutated(draws: &mut Draws) -> Vec<u8> {
     let mut text = WHOLE.to_owned();
     for _ in 0..=draws.below(3) {
         match draws.below(12) {
-            // Bytes, whatever they were.
+            // Any bytes.
             0 => {
                 let mut bytes = text.into_bytes();
                 let at = draws.below(bytes.len());
@@ -265,7 +265,7 @@ fn imports(seed: u64, count: usize) -> usize {
 }
 
 #[test]
-fn whatever_is_done_to_a_file_it_is_imported_whole_or_nothing_is_written() {
+fn a_changed_file_is_imported_whole_or_nothing_is_written() {
     let whole = imports(1, 150);
     assert!((50..150).contains(&whole), "{whole} of 150 were imported: there is little to learn from such mutations");
 }

@@ -267,7 +267,7 @@ fn an_element_without_an_end_is_refused() {
 }
 
 #[test]
-fn whatever_bytes_are_in_a_file_it_is_imported_or_refused() {
+fn a_file_of_any_bytes_is_imported_or_refused() {
     use proptest::prelude::*;
     let words = whole().into_bytes();
     let config = ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() };

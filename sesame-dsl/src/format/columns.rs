@@ -146,7 +146,7 @@ fn align_at(group: &mut [Line<'_>], positions: &[Option<usize>]) {
     if blanks().all(|blanks| blanks < 2) {
         return;
     }
-    // A line on its own is no column, and has nothing to be kept away from.
+    // A single line is not a column, and needs no space for others.
     let gap = if rows.len() > 1 { blanks().min().unwrap_or(1).clamp(1, WIDEST_GAP) } else { 1 };
     let widths: Vec<usize> = rows.iter().map(|&(row, at)| width(&group[row].tokens[..at])).collect();
     let widest = widths.iter().copied().max().unwrap_or(0);

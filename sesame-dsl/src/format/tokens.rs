@@ -57,7 +57,7 @@ impl Token<'_> {
         self.kind == Kind::Sign && self.text == sign
     }
 
-    /// Whether it ends its line, whatever follows.
+    /// Whether it always ends its line.
     pub(super) fn is_comment(&self) -> bool {
         matches!(self.kind, Kind::Doc | Kind::Comment)
     }

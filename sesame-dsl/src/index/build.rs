@@ -38,14 +38,18 @@ pub(crate) fn index(merged: &Merged) -> Index {
         indexer.declare(Kind::Space, head);
     }
     let systems: Vec<_> = systems.iter().map(|system| (system, indexer.declare_system(system))).collect();
-    let metrics: Vec<_> = metrics.iter().map(|it| (it, indexer.declare(Kind::Metric, &it.head))).collect();
-    let requirements: Vec<_> =
-        requirements.iter().map(|it| (it, indexer.declare(Kind::Requirement, &it.head))).collect();
-    let operations: Vec<_> = operations.iter().map(|it| (it, indexer.declare_operation(it))).collect();
-    let tests: Vec<_> = tests.iter().map(|it| (it, indexer.declare(Kind::Test, &it.head))).collect();
-    let campaigns: Vec<_> = campaigns.iter().map(|it| (it, indexer.declare(Kind::Campaign, &it.head))).collect();
-    let eddis: Vec<_> = eddis.iter().map(|it| (it, indexer.declare_eddi(it))).collect();
-    let physicals: Vec<_> = physicals.iter().map(|it| (it, indexer.declare_physical(it))).collect();
+    let metrics: Vec<_> = metrics.iter().map(|metric| (metric, indexer.declare(Kind::Metric, &metric.head))).collect();
+    let requirements: Vec<_> = requirements
+        .iter()
+        .map(|requirement| (requirement, indexer.declare(Kind::Requirement, &requirement.head)))
+        .collect();
+    let operations: Vec<_> =
+        operations.iter().map(|operation| (operation, indexer.declare_operation(operation))).collect();
+    let tests: Vec<_> = tests.iter().map(|test| (test, indexer.declare(Kind::Test, &test.head))).collect();
+    let campaigns: Vec<_> =
+        campaigns.iter().map(|campaign| (campaign, indexer.declare(Kind::Campaign, &campaign.head))).collect();
+    let eddis: Vec<_> = eddis.iter().map(|eddi| (eddi, indexer.declare_eddi(eddi))).collect();
+    let physicals: Vec<_> = physicals.iter().map(|physical| (physical, indexer.declare_physical(physical))).collect();
     indexer.settle(&merged.ranks);
 
     for (system, ids) in &systems {
@@ -137,7 +141,7 @@ impl<'a> Indexer<'a> {
 
     fn declare_system(&mut self, system: &'a System) -> SystemIds {
         let System { simulators, messages, topics, nodes, .. } = system;
-        let simulators = simulators.iter().map(|it| self.declare(Kind::Simulator, &it.head)).collect();
+        let simulators = simulators.iter().map(|simulator| self.declare(Kind::Simulator, &simulator.head)).collect();
         let mut message_ids = Vec::new();
         for message in messages {
             let id = self.declare(Kind::Message, &message.head);
@@ -153,7 +157,7 @@ impl<'a> Indexer<'a> {
             self.types.insert(id, &topic.ty);
             topic_ids.push(id);
         }
-        let nodes = nodes.iter().map(|it| self.declare(Kind::Node, &it.head)).collect();
+        let nodes = nodes.iter().map(|node| self.declare(Kind::Node, &node.head)).collect();
         SystemIds { simulators, messages: message_ids, topics: topic_ids, nodes }
     }
 
@@ -172,9 +176,9 @@ impl<'a> Indexer<'a> {
     fn declare_eddi(&mut self, eddi: &'a Eddi) -> DefinitionId {
         let Eddi { head, publishes: _, demands, evidence, guarantees, otherwise, has_errors: _ } = eddi;
         let id = self.declare(Kind::Monitor, head);
-        let demands = demands.iter().map(|it| (Kind::Demand, &it.head));
-        let evidence = evidence.iter().map(|it| (Kind::Evidence, &it.head));
-        let guarantees = guarantees.iter().map(|it| (Kind::Guarantee, &it.head));
+        let demands = demands.iter().map(|demand| (Kind::Demand, &demand.head));
+        let evidence = evidence.iter().map(|item| (Kind::Evidence, &item.head));
+        let guarantees = guarantees.iter().map(|guarantee| (Kind::Guarantee, &guarantee.head));
         let otherwise = otherwise.iter().map(|(_, it)| (Kind::Guarantee, &it.head));
         for (kind, head) in demands.chain(evidence).chain(guarantees).chain(otherwise) {
             self.declare_member(kind, head, id);
@@ -443,7 +447,9 @@ impl<'a> Indexer<'a> {
                 self.refer(demand.head.name.span, guarantee, id);
             }
         }
-        for expression in evidence.iter().map(|it| &it.condition).chain(guarantees.iter().map(|it| &it.gate)) {
+        for expression in
+            evidence.iter().map(|item| &item.condition).chain(guarantees.iter().map(|guarantee| &guarantee.gate))
+        {
             self.expression(expression, id);
         }
         for (path, _) in otherwise.iter().filter_map(|(_, it)| it.mitigation.as_ref()) {

@@ -86,7 +86,7 @@ impl ValueRange {
             Comparison::Below if self.low >= other.high => Some(false),
             Comparison::Above => other.outcome(Comparison::Below, self),
             Comparison::Equal if self.high < other.low || other.high < self.low => Some(false),
-            // Where they meet and one is no single number, another choice makes them differ.
+            // Where they meet and one is not a single number, another choice makes them differ.
             Comparison::Equal if self.low == self.high && other.low == other.high => Some(true),
             Comparison::Below | Comparison::Equal => None,
         }

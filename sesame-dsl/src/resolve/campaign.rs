@@ -165,7 +165,7 @@ impl<'a> Resolver<'a> {
         end_after: Option<f64>,
         activation: Option<ActivationMode>,
     ) -> Option<TestTemplate> {
-        let spans: Vec<Span> = campaign.operations.iter().map(|it| it.span).collect();
+        let spans: Vec<Span> = campaign.operations.iter().map(|operation| operation.span).collect();
         self.at_most_one(&spans, "operations");
         let Some(operations) = campaign.operations.first() else {
             if campaign.repeats.is_empty()
@@ -352,7 +352,8 @@ impl<'a> Resolver<'a> {
             // A condition may hold at any time: only the permitted window is known beforehand.
             let (span, window) = match (&operation.activation, &written.activation) {
                 (Activation::Window(window), ast::Activation::Window(written)) => (written.span, *window),
-                _ => match self.operations[operation.operation.index()].as_ref().and_then(|it| it.within) {
+                _ => match self.operations[operation.operation.index()].as_ref().and_then(|operation| operation.within)
+                {
                     Some(within) if within.low >= end => (written.operation.span, within),
                     _ => continue,
                 },

@@ -41,17 +41,17 @@ impl<'a> Resolver<'a> {
         let mut add = |kind, kind_heads: Vec<&'a Head>| {
             heads.extend(kind_heads.into_iter().enumerate().map(|(index, head)| (kind, index, head)));
         };
-        add(Kind::Simulator, self.simulators().map(|it| &it.head).collect());
-        add(Kind::Message, self.ast_messages().map(|it| &it.head).collect());
-        add(Kind::Topic, self.ast_topics().map(|it| &it.head).collect());
-        add(Kind::Node, self.ast_nodes().map(|it| &it.head).collect());
-        add(Kind::Metric, file.metrics.iter().map(|it| &it.head).collect());
-        add(Kind::Requirement, file.requirements.iter().map(|it| &it.head).collect());
-        add(Kind::Operation, file.operations.iter().map(|it| &it.head).collect());
-        add(Kind::Test, file.tests.iter().map(|it| &it.head).collect());
-        add(Kind::Campaign, file.campaigns.iter().map(|it| &it.head).collect());
-        add(Kind::Monitor, file.eddis.iter().map(|it| &it.head).collect());
-        add(Kind::Lab, file.physicals.iter().map(|it| &it.head).collect());
+        add(Kind::Simulator, self.simulators().map(|simulator| &simulator.head).collect());
+        add(Kind::Message, self.ast_messages().map(|message| &message.head).collect());
+        add(Kind::Topic, self.ast_topics().map(|topic| &topic.head).collect());
+        add(Kind::Node, self.ast_nodes().map(|node| &node.head).collect());
+        add(Kind::Metric, file.metrics.iter().map(|metric| &metric.head).collect());
+        add(Kind::Requirement, file.requirements.iter().map(|requirement| &requirement.head).collect());
+        add(Kind::Operation, file.operations.iter().map(|operation| &operation.head).collect());
+        add(Kind::Test, file.tests.iter().map(|test| &test.head).collect());
+        add(Kind::Campaign, file.campaigns.iter().map(|campaign| &campaign.head).collect());
+        add(Kind::Monitor, file.eddis.iter().map(|eddi| &eddi.head).collect());
+        add(Kind::Lab, file.physicals.iter().map(|physical| &physical.head).collect());
         heads
     }
 

@@ -261,7 +261,11 @@ impl<'a> Resolver<'a> {
         let found = self.find_all(&by.variables, Kind::Metric);
         let mut variables = Some(Vec::new());
         for (name, range) in by.variables.iter().zip(&by.ranges) {
-            let index = self.names.get(name.text.as_str()).filter(|it| it.kind == Kind::Metric).map(|it| it.index);
+            let index = self
+                .names
+                .get(name.text.as_str())
+                .filter(|definition| definition.kind == Kind::Metric)
+                .map(|definition| definition.index);
             let variable = index.and_then(|index| self.variable(name, MetricId::from_index(index), range.as_ref()));
             match (&mut variables, variable) {
                 (Some(variables), Some(variable)) => variables.push(variable),
@@ -515,10 +519,10 @@ fn never_negative(expression: &Expression) -> bool {
 
 /// The fewest comparisons that contain these: a comparison has at most two variables, or a variable and a number.
 fn comparisons_needed(constraints: &[Constraint]) -> usize {
-    let variables = constraints.iter().filter(|it| matches!(it, Constraint::Variable(_))).count();
+    let variables = constraints.iter().filter(|constraint| matches!(constraint, Constraint::Variable(_))).count();
     let mut bounds: Vec<Integers> = constraints
         .iter()
-        .filter_map(|it| match it {
+        .filter_map(|constraint| match constraint {
             Constraint::Integer(bounds) => Some(*bounds),
             Constraint::Variable(_) => None,
         })

@@ -82,7 +82,7 @@ impl<'a> Resolver<'a> {
         let mut members: Members<'a> = BTreeMap::new();
         let demands = eddi.demands.iter().enumerate().map(|(at, it)| (&it.head.name, Member::Demand(at)));
         let evidence = eddi.evidence.iter().enumerate().map(|(at, it)| (&it.head.name, Member::Evidence(at)));
-        let states = eddi.guarantees.iter().map(|it| &it.head.name);
+        let states = eddi.guarantees.iter().map(|guarantee| &guarantee.head.name);
         let states = states.chain(eddi.otherwise.iter().map(|(_, it)| &it.head.name));
         let mut all: Vec<_> = demands.chain(evidence).chain(states.map(|name| (name, Member::State))).collect();
         all.sort_by_key(|(name, _)| name.span);
@@ -102,7 +102,8 @@ impl<'a> Resolver<'a> {
         let name = &demand.head.name;
         let index = self.find(&demand.eddi, Kind::Monitor)?;
         let other = &self.file.eddis[index];
-        let guarantees: Vec<&str> = other.guarantees.iter().map(|it| it.head.name.text.as_str()).collect();
+        let guarantees: Vec<&str> =
+            other.guarantees.iter().map(|guarantee| guarantee.head.name.text.as_str()).collect();
         if !guarantees.contains(&name.text.as_str()) && !other.has_errors {
             let title = format!("monitor `{}` has no guarantee named `{}`", demand.eddi.text, name.text);
             let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title)

@@ -109,7 +109,8 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
             child.coverages.clone_from(&base.coverages);
         }
         if child.explorations.is_empty() {
-            child.explorations = base.explorations.iter().filter(|it| suits(it, child)).cloned().collect();
+            child.explorations =
+                base.explorations.iter().filter(|exploration| suits(exploration, child)).cloned().collect();
         }
         if child.confirms.is_empty() {
             child.confirms.clone_from(&base.confirms);
@@ -123,7 +124,8 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
 /// Whether a campaign can explore like its base. Explorations change an evolution, and except for novelty each works
 /// either on time windows or on conditions. If the base itself does not fit, that is reported there.
 fn suits(exploration: &Exploration, child: &Campaign) -> bool {
-    let evolves = child.searches.iter().all(|search| search.strategy.is_none_or(|it| it.properties().explores));
+    let evolves =
+        child.searches.iter().all(|search| search.strategy.is_none_or(|strategy| strategy.properties().explores));
     let by_condition = child.activates.iter().any(|(_, mode)| matches!(mode, ActivationMode::Condition(_)));
     let novel = exploration.kind == ExplorationKind::Novelty;
     evolves && (novel || by_condition == (exploration.kind == ExplorationKind::Predict))

@@ -1,23 +1,15 @@
-//! Message types, topics, nodes, the simulator.
+//! Topics and nodes of the system, and the fields that paths into messages lead to.
 
 use std::collections::{BTreeMap, HashSet};
 use std::hash::Hash;
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, Id as _, MessageId, Simulator, TopicId, Transport, Type};
+use crate::model::{self, Id as _, Simulator, TopicId, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
-use crate::syntax::ast::{self, Name, TypeKind};
+use crate::syntax::ast::{self, Name};
 use crate::units::{Dimension, Unit, dimension};
-
-/// How a simulator's program moves on in time.
-enum Pace {
-    /// When it is told to, by this much.
-    LockStepped { step_ns: u64 },
-    /// By its own clock.
-    FreeRunning,
-}
 
 impl<'a> Resolver<'a> {
     pub(super) fn ast_messages(&self) -> impl Iterator<Item = &'a ast::Message> + use<'a> {
@@ -39,339 +31,6 @@ impl<'a> Resolver<'a> {
         self.nodes();
         simulator
     }
-
-    // ----- the simulator
-
-    fn simulator(&mut self, simulator: &'a ast::Simulator) -> Option<Simulator> {
-        let name = &simulator.head.name;
-        let transport = match simulator.transport.as_ref()? {
-            ast::Transport::InProcess(in_process) => {
-                let path = self.rust_path(&in_process.path);
-                let folder = self.single(&in_process.crates, "crate");
-                let step_ns = self.step_of(name, &in_process.steps, in_process.has_errors);
-                let crate_folder = folder.map(|folder| folder.text.clone());
-                Transport::InProcess { path: path?, crate_folder, step_ns: step_ns? }
-            }
-            ast::Transport::Process(process) => {
-                let program = self.program(&process.program);
-                let pace = self.pace_of(name, process);
-                // Empty texts were reported where they were read.
-                let arguments = process.arguments.iter().map(|argument| argument.text.clone()).collect();
-                let step_ns = match pace? {
-                    Pace::LockStepped { step_ns } => Some(step_ns),
-                    Pace::FreeRunning => None,
-                };
-                Transport::Process { program: program?, arguments, step_ns }
-            }
-        };
-        Some(Simulator { declaration: self.declaration(&simulator.head), transport })
-    }
-
-    /// How a program moves on in time; nothing if that is not clear.
-    fn pace_of(&mut self, name: &Name, process: &'a ast::Process) -> Option<Pace> {
-        let Some((free, ())) = process.free_running.first() else {
-            let step_ns = self.step_of(name, &process.steps, process.has_errors)?;
-            return Some(Pace::LockStepped { step_ns });
-        };
-        self.single(&process.free_running, "free running");
-        if let Some((step, _)) = process.steps.first() {
-            let title = "a simulator that runs freely has no step".to_owned();
-            let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, *step, title)
-                .label("remove `step`, or `free running`")
-                .secondary(*free, "it runs freely");
-            self.report(diagnostic);
-            return None;
-        }
-        Some(Pace::FreeRunning)
-    }
-
-    fn step_of(&mut self, name: &Name, steps: &'a [(Span, ast::Quantity)], has_errors: bool) -> Option<u64> {
-        let step = self.single(steps, "step");
-        if step.is_none() && !has_errors {
-            self.missing(name, "its step size", "step 20ms");
-        }
-        self.step(step?)
-    }
-
-    /// The program and each argument are texts of their own. A path with spaces must begin like `./my robots/`, so that
-    /// a whole command line in one text is recognised.
-    pub(super) fn program(&mut self, program: &ast::Text) -> Option<String> {
-        if program.text.trim().is_empty() {
-            return None;
-        }
-        let first = program.text.split_whitespace().next().unwrap_or_default();
-        if !program.text.contains(char::is_whitespace) || first.contains('/') {
-            return Some(program.text.clone());
-        }
-        let parts: Vec<String> = program.text.split_whitespace().map(|part| format!("\"{part}\"")).collect();
-        let title = format!("`{}` is not a program", program.text);
-        let diagnostic = Diagnostic::new(Code::BAD_PATH, program.span, title)
-            .label("write the program and each argument as a text of its own; no shell splits them")
-            .suggest("split the command into a program and its arguments", program.span, parts.join(" "));
-        self.report(diagnostic);
-        None
-    }
-
-    fn rust_path(&mut self, path: &ast::Text) -> Option<String> {
-        if path.text.trim().is_empty() {
-            return None;
-        }
-        let identifier = |part: &str| {
-            part.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
-                && part.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
-                && !matches!(part, "self" | "Self" | "super" | "crate" | "_")
-        };
-        let parts: Vec<&str> = path.text.split("::").collect();
-        if parts.len() >= 2 && parts.iter().all(|part| identifier(part)) {
-            return Some(path.text.clone());
-        }
-        let title = format!("`{}` is not the path of a Rust type", path.text);
-        let diagnostic = Diagnostic::new(Code::BAD_PATH, path.span, title)
-            .label("expected a crate and a type, for example `kuka_cell_sim::Cell`");
-        self.report(diagnostic);
-        None
-    }
-
-    fn step(&mut self, step: &ast::Quantity) -> Option<u64> {
-        let nanoseconds = Unit::parse("ns").expect("`ns` is in the table");
-        let seconds = Unit::seconds();
-        self.value(step, Some(&seconds), "a step size")?;
-        let unit = step.unit.as_ref().and_then(|unit| Unit::parse(&unit.text).ok())?;
-        let value = unit.convert(step.value, &nanoseconds);
-        // A whole number of nanoseconds in decimals may differ from it by a rounding error.
-        let rounded = value.round();
-        if (1.0..=3.6e12).contains(&rounded) && (value - rounded).abs() <= rounded * 1e-12 {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "it is whole and in 1..=3.6e12"
-            )]
-            return Some(rounded as u64);
-        }
-        let title = format!("`{}` is not a valid step size", self.text(step.span));
-        let label = "expected a whole number of nanoseconds from 1ns to 1h";
-        self.report(Diagnostic::new(Code::OUT_OF_RANGE, step.span, title).label(label));
-        None
-    }
-
-    // ----- messages
-
-    fn messages(&mut self) {
-        let messages: Vec<&'a ast::Message> = self.ast_messages().collect();
-        let (order, cyclic) = self.topological_order(&messages);
-        self.system.message_ids = vec![MessageId::from_index(0); messages.len()];
-        for (id, &index) in order.iter().enumerate() {
-            self.system.message_ids[index] = MessageId::from_index(id);
-        }
-        // The number of values of each message, by its id.
-        let mut values: Vec<u64> = Vec::new();
-        for &index in &order {
-            let message = self.message(messages[index]).filter(|_| !cyclic[index]);
-            let held = message.iter().flat_map(|message| &message.fields);
-            let count = held.map(|field| values_in(&field.ty, &values)).fold(0, u64::saturating_add);
-            values.push(count);
-            if count > MAX_VALUES {
-                self.too_many_values(messages[index], message.as_ref(), count, &values);
-            }
-            self.system.messages.push(message.filter(|_| count <= MAX_VALUES));
-        }
-    }
-
-    /// Reports a message that is too large, unless a message in it is too large and was reported.
-    fn too_many_values(
-        &mut self,
-        message: &ast::Message,
-        resolved: Option<&model::Message>,
-        count: u64,
-        values: &[u64],
-    ) {
-        let fields = resolved.map_or(&[][..], |message| &message.fields);
-        if fields.iter().any(|field| values_in(&field.ty, values) > MAX_VALUES) {
-            return;
-        }
-        let name = &message.head.name;
-        let title = format!("message `{}` has {count} values, but the limit is {MAX_VALUES}", name.text);
-        let mut diagnostic = Diagnostic::new(Code::LARGE_MESSAGE, name.span, title)
-            .label("including the values of the messages in it")
-            .note("a list counts as one of its elements");
-        let largest = fields.iter().max_by_key(|field| values_in(&field.ty, values));
-        if let Some(field) = largest
-            && values_in(&field.ty, values) > 1
-        {
-            let of = values_in(&field.ty, values);
-            diagnostic = diagnostic.secondary(field.declaration.span, format!("this field alone has {of} values"));
-        }
-        self.report(diagnostic);
-    }
-
-    /// Positions of messages such that each comes after those it contains, and which of them contain themselves.
-    fn topological_order(&mut self, messages: &[&'a ast::Message]) -> (Vec<usize>, Vec<bool>) {
-        #[derive(Clone, Copy, PartialEq)]
-        enum Mark {
-            New,
-            Open,
-            Done,
-        }
-        // Contained messages by position, with the place of the mention. Unknown names are reported where types are.
-        let contained: Vec<Vec<(usize, Span)>> = messages
-            .iter()
-            .map(|message| {
-                let names = message.fields.iter().filter_map(|field| message_name(&field.ty));
-                names
-                    .filter_map(|name| {
-                        let definition = self.names.get(name.text.as_str())?;
-                        (definition.kind == Kind::Message).then_some((definition.index, name.span))
-                    })
-                    .collect()
-            })
-            .collect();
-        let mut marks = vec![Mark::New; messages.len()];
-        let mut cyclic = vec![false; messages.len()];
-        let mut order = Vec::new();
-        for root in 0..messages.len() {
-            if marks[root] != Mark::New {
-                continue;
-            }
-            // An explicit stack: a chain of messages may be as long as the file.
-            marks[root] = Mark::Open;
-            let mut stack = vec![(root, 0)];
-            while let Some((message, next)) = stack.pop() {
-                let Some(&(inner, mention)) = contained[message].get(next) else {
-                    marks[message] = Mark::Done;
-                    order.push(message);
-                    continue;
-                };
-                stack.push((message, next + 1));
-                match marks[inner] {
-                    Mark::Done => {}
-                    Mark::New => {
-                        marks[inner] = Mark::Open;
-                        stack.push((inner, 0));
-                    }
-                    Mark::Open => {
-                        let start = stack.iter().position(|&(open, _)| open == inner).unwrap_or(0);
-                        let cycle: Vec<usize> = stack[start..].iter().map(|&(open, _)| open).collect();
-                        for &member in &cycle {
-                            cyclic[member] = true;
-                        }
-                        self.recursive(messages, &cycle, mention);
-                    }
-                }
-            }
-        }
-        (order, cyclic)
-    }
-
-    fn recursive(&mut self, messages: &[&'a ast::Message], cycle: &[usize], mention: Span) {
-        let name = |index: usize| &messages[index].head.name;
-        let first = name(cycle[0]);
-        let title = if cycle.len() == 1 {
-            format!("message `{}` contains itself", first.text)
-        } else {
-            let through: Vec<&str> = cycle.iter().skip(1).map(|&index| name(index).text.as_str()).collect();
-            format!("message `{}` contains itself through {}", first.text, super::list(&through))
-        };
-        let diagnostic = Diagnostic::new(Code::RECURSIVE_MESSAGE, mention, title)
-            .label("a value of this type would be infinite")
-            .secondary(first.span, "declared here");
-        self.report(diagnostic);
-    }
-
-    fn message(&mut self, message: &'a ast::Message) -> Option<model::Message> {
-        let mut first: BTreeMap<&str, Span> = BTreeMap::new();
-        let mut fields = Vec::new();
-        let mut complete = !message.has_errors;
-        for field in &message.fields {
-            let name = &field.head.name;
-            if let Some(&before) = first.get(name.text.as_str()) {
-                let title = format!("field `{}` of `{}` is defined twice", name.text, message.head.name.text);
-                self.defined_twice(title, name.span, before);
-                complete = false;
-            }
-            first.entry(&name.text).or_insert(name.span);
-            match self.type_of(&field.ty) {
-                Some(ty) => fields.push(model::Field { declaration: self.declaration(&field.head), ty }),
-                None => complete = false,
-            }
-        }
-        if message.fields.is_empty() && !message.has_errors {
-            self.missing(&message.head.name, "a field", "level: real[mm]");
-            complete = false;
-        }
-        complete.then(|| model::Message { declaration: self.declaration(&message.head), fields })
-    }
-
-    pub(super) fn type_of(&mut self, ty: &'a ast::Type) -> Option<Type> {
-        let unit = match &ty.unit {
-            Some(name) => Some(self.unit(name)?),
-            None => None,
-        };
-        let without_unit = |resolver: &mut Self, found: Type| match &ty.unit {
-            None => Some(found),
-            Some(unit) => {
-                let title = format!("`{}` cannot have a unit", resolver.text(ty.span));
-                let brackets = Span { lo: unit.span.lo - 1, hi: unit.span.hi + 1, ..unit.span };
-                let diagnostic = Diagnostic::new(Code::WRONG_TYPE, unit.span, title)
-                    .label("only `int`, `real` and `point` can have a unit")
-                    .suggest("remove the unit", brackets, "");
-                resolver.report(diagnostic);
-                None
-            }
-        };
-        match &ty.kind {
-            TypeKind::Bool => without_unit(self, Type::Bool),
-            TypeKind::Text => without_unit(self, Type::Text),
-            TypeKind::Int => Some(Type::Int(unit)),
-            TypeKind::Real => Some(Type::Real(unit)),
-            TypeKind::Point => Some(Type::Point(unit)),
-            TypeKind::List(of) => Some(Type::List(Box::new(self.type_of(of)?))),
-            TypeKind::Message(name) => {
-                let index = self.find_type(name)?;
-                without_unit(self, Type::Message(self.system.message_ids[index]))
-            }
-        }
-    }
-
-    fn find_type(&mut self, name: &'a Name) -> Option<usize> {
-        const SCALARS: [&str; 5] = ["bool", "int", "real", "text", "point"];
-        const ELSEWHERE: [(&str, &str); 9] = [
-            ("float", "real"),
-            ("double", "real"),
-            ("number", "real"),
-            ("f64", "real"),
-            ("integer", "int"),
-            ("i64", "int"),
-            ("string", "text"),
-            ("String", "text"),
-            ("boolean", "bool"),
-        ];
-        if self.names.contains_key(name.text.as_str()) || self.silent.contains(name.text.as_str()) {
-            return self.find(name, Kind::Message);
-        }
-        self.silent.insert(&name.text);
-        if self.file.incomplete {
-            return None;
-        }
-        let comparable = self.compared.more(self.names.len());
-        let messages = if comparable { self.names_of(Kind::Message) } else { Vec::new() };
-        let similar = ELSEWHERE
-            .iter()
-            .find(|(word, _)| *word == name.text)
-            .map(|(_, meant)| *meant)
-            .or_else(|| most_similar(&name.text, messages.iter().copied().chain(SCALARS)));
-        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, format!("no type named `{}`", name.text))
-            .label("not a built-in type and not a message of this space");
-        diagnostic = match similar {
-            Some(similar) => diagnostic.did_you_mean(name.span, similar),
-            None => diagnostic.note(
-                "the types are `bool`, `int`, `real`, `text`, `point`, `list of …` and the messages of this space",
-            ),
-        };
-        self.report(diagnostic);
-        None
-    }
-
-    // ----- topics and nodes
 
     fn topics(&mut self) {
         let mut paths: BTreeMap<String, Span> = BTreeMap::new();
@@ -435,8 +94,6 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    // ----- fields
-
     /// What a path refers to: its topic, and the type at its end. `None` was reported, here or before.
     pub(super) fn field(&mut self, path: &'a ast::Path) -> Option<(model::FieldPath, Type)> {
         let index = self.find(&path.topic, Kind::Topic)?;
@@ -498,7 +155,8 @@ impl<'a> Resolver<'a> {
                 if let Type::Message(id) = other
                     && let Some(message) = self.system.messages[id.index()].as_ref()
                 {
-                    let numbers = message.fields.iter().filter(|it| matches!(it.ty, Type::Int(_) | Type::Real(_)));
+                    let numbers =
+                        message.fields.iter().filter(|field| matches!(field.ty, Type::Int(_) | Type::Real(_)));
                     for field in numbers.take(3) {
                         let name = &field.declaration.name;
                         diagnostic =
@@ -509,29 +167,6 @@ impl<'a> Resolver<'a> {
                 None
             }
         }
-    }
-}
-
-/// The most values that a message may have: a runner represents each message as one Rust value.
-const MAX_VALUES: u64 = 10_000;
-
-/// The number of values of a type, given those of messages by their ids.
-fn values_in(ty: &Type, messages: &[u64]) -> u64 {
-    match ty {
-        Type::Bool | Type::Int(_) | Type::Real(_) | Type::Text => 1,
-        Type::Point(_) => 3,
-        Type::List(of) => values_in(of, messages),
-        // Messages that contain themselves have no order, and were reported.
-        Type::Message(id) => messages.get(id.index()).copied().unwrap_or(0),
-    }
-}
-
-/// The message a type mentions, inside of lists too.
-fn message_name(ty: &ast::Type) -> Option<&Name> {
-    match &ty.kind {
-        TypeKind::Message(name) => Some(name),
-        TypeKind::List(of) => message_name(of),
-        _ => None,
     }
 }
 

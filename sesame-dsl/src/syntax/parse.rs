@@ -93,7 +93,7 @@ impl Reader<'_> {
                 let physical = reader.physical(&item);
                 reader.out.physicals.push(physical);
             }
-            other => unreachable!("{other:?} is no declaration"),
+            other => unreachable!("{other:?} is not a declaration"),
         });
         self.out.has_errors |= has_errors;
     }

@@ -115,7 +115,7 @@ pub const COVERS: &str = "packages.txt";
 ///
 /// # Errors
 ///
-/// When the folder is no database, or an advisory in it cannot be read: one that is not understood is not left out.
+/// If the folder is not a database, or an advisory in it cannot be read: an unreadable advisory is never skipped.
 pub fn read(folder: &Path, packages: &[Package]) -> Result<Database, AuditError> {
     let crates = folder.join("crates");
     if !crates.is_dir() {

@@ -18,7 +18,7 @@ use agreed::Agreed;
 use licence::Licences;
 use locked::Package;
 
-/// Why the audit itself could not be done. It never passes for want of what it compares with.
+/// Why the audit itself could not be done. It never passes because something to compare with is missing.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AuditError {
@@ -38,8 +38,8 @@ pub enum AuditError {
         /// What is wrong with it.
         why: String,
     },
-    /// The folder is no checkout of an advisory database.
-    #[error("{} is no advisory database: it has no folder `crates`", path.display())]
+    /// The folder is not a checkout of an advisory database.
+    #[error("{} is not an advisory database: it has no folder `crates`", path.display())]
     NoDatabase {
         /// The folder.
         path: PathBuf,

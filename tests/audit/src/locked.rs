@@ -20,7 +20,7 @@ pub struct Package {
 ///
 /// # Errors
 ///
-/// When the text is no lock file.
+/// If the text is not a lock file.
 pub fn packages(lock: &str) -> Result<Vec<Package>, AuditError> {
     #[derive(Deserialize)]
     struct Lock {

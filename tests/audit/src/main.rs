@@ -23,7 +23,7 @@ fn main() -> anyhow::Result<()> {
 fn date(checkout: &str) -> anyhow::Result<String> {
     // Else git would tell of a repository around it.
     if !Path::new(checkout).join(".git").exists() {
-        bail!("{checkout} is no checkout: it has no `.git`");
+        bail!("{checkout} is not a checkout: it has no `.git`");
     }
     let git = Command::new("git")
         .args(["-C", checkout, "log", "-1", "--format=%cs"])

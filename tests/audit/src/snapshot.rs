@@ -1,4 +1,4 @@
-//! The advisories that the project keeps for want of a network: facts only, in RustSec's format.
+//! The advisories that the project keeps for audits without a network: facts only, in RustSec's format.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;

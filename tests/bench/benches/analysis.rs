@@ -19,8 +19,8 @@ use sesame_search::sspr::Convention;
 fn record(permitted: &TestSpace, metrics: usize, number: u32) -> TestRecord {
     let mut stream = Stream::derive(1, "bench", &[u64::from(number)]);
     let test = fresh_test(permitted, &mut stream);
-    let operations = test.operations.iter().map(|it| {
-        let Activation::Time { start, end } = it.activation else { unreachable!("a campaign by time") };
+    let operations = test.operations.iter().map(|operation| {
+        let Activation::Time { start, end } = operation.activation else { unreachable!("a campaign by time") };
         let counters = Counters { seen: 100, changed: 100, ..Counters::default() };
         let touches = (Some(start), Some(end));
         OperationEffect {

@@ -65,7 +65,7 @@ fn watched(runner: &Runner, arguments: &[&str], results: &Path) -> Took {
     Took { time: begun.elapsed(), running, most }
 }
 
-/// Takes away the last test, the undisturbed run in the end, so that `resume` has all but that to walk through.
+/// Removes the last test, which is the final reference run, so that `resume` goes through all others.
 fn unfinish(results: &Path) {
     let open = Connection::open(results.join("results.sqlite")).expect("the results can be opened");
     open.pragma_update(None, "foreign_keys", false).expect("it can be set");
@@ -103,7 +103,7 @@ fn main() {
         unfinish(&results);
         let resume = watched(&runner, &["resume", "--workers", "1", shown], &results);
         assert_eq!(runner.run(&["digest", "--results", shown]).expect(0).out, whole, "resuming gives what was there");
-        let [resumed, reported, digested] = [resume, report, digest].map(|it| it.time.as_secs_f64());
+        let [resumed, reported, digested] = [resume, report, digest].map(|measured| measured.time.as_secs_f64());
         println!(
             "| {count} | {:.1} MB | {resumed:.2} s | {reported:.2} s | {digested:.2} s | {} MB | {} MB |",
             size as f64 / 1e6,

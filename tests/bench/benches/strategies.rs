@@ -60,8 +60,8 @@ fn observe(plan: &CampaignPlan, number: u32, operations: &[sesame_plan::TestOper
     let mut touched = 0.0;
     let effects = operations
         .iter()
-        .map(|it| {
-            let interval = if let Activation::Time { start, end } = it.activation {
+        .map(|operation| {
+            let interval = if let Activation::Time { start, end } = operation.activation {
                 Span { start, end }
             } else {
                 let start = stream.uniform(0.0, 500.0);
@@ -161,7 +161,7 @@ fn main() {
     for (name, search, exploration) in strategies {
         let row = counts.iter().map(|&count| {
             let plan = plan(search(count), exploration.clone());
-            // Of five, the quickest is the one least disturbed by whatever else the machine does; one that takes long
+            // Of five, the quickest is the one least disturbed by other work of the machine; one that takes long
             // is disturbed little.
             let first = spent(&plan);
             let more = if measured && first < Duration::from_secs(1) { 4 } else { 0 };

@@ -340,7 +340,7 @@ impl Space {
                         names.into_iter().map(|name| self.parameter(name)).collect();
                     let declared: Vec<String> =
                         parameters.iter().map(|(name, domain, _)| format!("  {name}: {domain}\n")).collect();
-                    let moment_word = moment.map_or(String::new(), |it| format!("{it} "));
+                    let moment_word = moment.map_or(String::new(), |moment| format!("{moment} "));
                     let source = format!("custom {moment_word}{{\n{}}}", declared.concat());
                     let parameters = parameters.into_iter().map(|(name, _, choice)| (name, choice)).collect();
                     (topic, source, Kind::Custom { parameters, moment })

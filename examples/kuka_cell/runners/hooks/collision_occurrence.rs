@@ -6,7 +6,7 @@ use crate::generated::messages::SafetyZone;
 use crate::generated::metrics::CollisionOccurrenceHook;
 use sesame_runtime::metric::Context;
 
-/// Counts at most once in 0.2 s, whatever the rate of messages and the number of zones ([SESAME 2023, Figure 12]).
+/// Counts at most once in 0.2 s, at any rate of messages and for any number of zones ([SESAME 2023, Figure 12]).
 #[derive(Default)]
 pub struct CollisionOccurrence;
 

@@ -33,7 +33,7 @@ fn assert_during(times: &[f64], span: (f64, f64), what: &str) {
 }
 
 #[test]
-fn undisturbed_it_keeps_all_requirements_with_a_margin() {
+fn without_disturbance_it_satisfies_all_requirements_with_a_margin() {
     let bench = run::<Cell>(0, &[]);
     let outcome = outcome(&bench);
     assert_eq!(outcome.collisions, 0);
@@ -191,7 +191,7 @@ fn targets_that_are_no_numbers_are_not_taken() {
 }
 
 #[test]
-fn joints_keep_their_ranges_and_speeds_whatever_they_are_told() {
+fn joints_keep_their_ranges_and_speeds_for_any_command() {
     for absurd in [1e9, -1e9] {
         let tamper = move |_: SimTime, name: &str, value| {
             Some(if name.starts_with("joints/") { Value::Real(absurd) } else { value })
@@ -228,7 +228,7 @@ fn everything<S: Simulator>(bench: &Bench<S>) -> Vec<(String, Vec<Published>)> {
 }
 
 #[test]
-fn the_same_disturbance_gives_the_same_run_whatever_the_seed() {
+fn the_same_disturbance_gives_the_same_run_for_every_seed() {
     let jitter = [Jitter { link: 0, offset: (-0.3, 0.3), window: (3.0, 60.0) }];
     let run = |seed| everything(&run::<Cell>(seed, &jitter));
     assert!(run(1) == run(1));

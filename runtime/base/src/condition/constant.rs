@@ -213,7 +213,7 @@ mod tests {
 
     proptest! {
         // Numbers are whole and from 0 to 5, so that quarters hold a value between any two of them for each of three
-        // variables: whatever can be told apart, the samples tell apart.
+        // variables: the samples distinguish all values that differ for the condition.
         #[test]
         fn constants_are_those_of_all_values(
             condition in any_condition(3),

@@ -1,6 +1,6 @@
 //! Which requirement the next test targets: a bandit over requirements.
 //!
-//! The reward of a test is the share of its target's lowest margin that it removed, whatever the requirement's unit:
+//! The reward of a test is the share of its target's lowest margin that it removed, in any unit:
 //! 0.75 for lowering it from 20 to 5, 1 for the first violation, 0 for no progress. The bandit chooses by the mean
 //! reward of the latest tests of each requirement, with a bonus for those that were seldom chosen: UCB1 [Auer et al.
 //! 2002] over a sliding window.

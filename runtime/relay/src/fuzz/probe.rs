@@ -19,7 +19,7 @@ pub fn unimplemented_operations(plan: &CampaignPlan, hooks: &[OperationEntry]) -
     let found = custom_operations(plan)
         .filter(|(_, moment, operation)| {
             let Some(entry) = hooks.iter().find(|entry| entry.operation == operation.name) else { return false };
-            let choices: Vec<Choice> = operation.parameters.iter().map(|it| first(&it.domain)).collect();
+            let choices: Vec<Choice> = operation.parameters.iter().map(|parameter| first(&parameter.domain)).collect();
             let topic = operation.topic.map(|topic| plan.topic(topic));
             let path = topic.and_then(|topic| topic.paths.first()).map_or("", String::as_str);
             let mut call = MessageCall::new(SimTime::ZERO, path, KeyedRng::new(0, 0, 0));

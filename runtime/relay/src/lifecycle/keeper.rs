@@ -1,7 +1,7 @@
 //! A program's keeper: a process between worker and program which ensures that no process of the program remains,
 //! whichever of them ends first. Linux only.
 //!
-//! It becomes the parent of every process below the program whose own parent ends, whatever its session. It waits until
+//! It becomes the parent of every process below the program whose own parent ends, in any session. It waits until
 //! the program has exited, or until the program's input is closed: by the worker, or because the worker has ended. In
 //! that case the program has its time to exit by itself. Then the keeper ends all remaining processes, reports how the
 //! program ended, and exits. If the keeper is killed, the system ends the program, and the program's children become

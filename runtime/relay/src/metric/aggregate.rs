@@ -129,7 +129,8 @@ impl<'p> FormulaState<'p> {
         if !matches!(self.formula.aggregate, Aggregate::Duration { .. }) {
             return;
         }
-        for tally in std::iter::once(&mut self.common.tally).chain(self.keys.values_mut().map(|it| &mut it.tally)) {
+        for tally in std::iter::once(&mut self.common.tally).chain(self.keys.values_mut().map(|keyed| &mut keyed.tally))
+        {
             if tally.holds_since.is_some() {
                 tally.hold(context.now, false);
             }

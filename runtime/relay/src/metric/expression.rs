@@ -17,8 +17,8 @@ pub(super) fn number(of: &Expression, inputs: &[Held]) -> f64 {
         }
         Expression::Divide { value, by } => number(value, inputs) / number(by, inputs),
         Expression::Absolute(of) => number(of, inputs).abs(),
-        Expression::Min(of) => of.iter().map(|it| number(it, inputs)).reduce(least).unwrap_or(f64::NAN),
-        Expression::Max(of) => of.iter().map(|it| number(it, inputs)).reduce(greatest).unwrap_or(f64::NAN),
+        Expression::Min(of) => of.iter().map(|operand| number(operand, inputs)).reduce(least).unwrap_or(f64::NAN),
+        Expression::Max(of) => of.iter().map(|operand| number(operand, inputs)).reduce(greatest).unwrap_or(f64::NAN),
         Expression::Distance { from, to, scale } => {
             let [from, to] = [from, to].map(|at| inputs[*at as usize]);
             let square = |axis: usize| {

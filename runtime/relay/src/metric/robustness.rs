@@ -112,7 +112,7 @@ impl<'p> RobustnessState<'p> {
             if let Some(monitor) = instance.monitor.take() {
                 // A formula without a trace says nothing about the run.
                 let robustness = monitor.finish(end);
-                instance.said = robustness.map(|it| Said { robustness, reach: (it, it) });
+                instance.said = robustness.map(|value| Said { robustness, reach: (value, value) });
             }
         }
         self.set(context);
@@ -148,7 +148,7 @@ impl<'p> RobustnessState<'p> {
         };
         let (low, high) = (ends(|reach| reach.0), ends(|reach| reach.1));
         let with_unset =
-            |end: Option<f64>, join: fn(f64, f64) -> f64| end.map(|end| unset.map_or(end, |it| join(end, it)));
+            |end: Option<f64>, join: fn(f64, f64) -> f64| end.map(|end| unset.map_or(end, |value| join(end, value)));
         Reach { low: with_unset(low, f64::min), high: with_unset(high, f64::max) }
     }
 }

@@ -212,7 +212,7 @@ fn plainly(plan: &CampaignPlan, test: &[TestOperation], events: &[Event]) -> Vec
             }
             let active: i64 = plain
                 .iter()
-                .flat_map(|it| it.intervals.iter().copied().chain(it.on.map(|on| (on, t))))
+                .flat_map(|operation| operation.intervals.iter().copied().chain(operation.on.map(|on| (on, t))))
                 .map(|(a, b)| b - a)
                 .sum();
             values.insert(MetricId(0), nanos(active));
@@ -243,8 +243,9 @@ fn plainly(plan: &CampaignPlan, test: &[TestOperation], events: &[Event]) -> Vec
                     other => panic!("{other:?} is not by condition"),
                 };
                 let blocked = plan.campaign.copies == Copies::Apart
-                    && (0..test.len())
-                        .any(|it| it != at && test[it].operation == test[at].operation && plain[it].on.is_some());
+                    && (0..test.len()).any(|other| {
+                        other != at && test[other].operation == test[at].operation && plain[other].on.is_some()
+                    });
                 let it = &mut plain[at];
                 it.history.push(begins);
                 let stretch = it.history.iter().rev().take_while(|begins| **begins).count();
@@ -256,7 +257,9 @@ fn plainly(plan: &CampaignPlan, test: &[TestOperation], events: &[Event]) -> Vec
             }
         }
     }
-    let spans = plain.into_iter().map(|it| it.intervals.into_iter().chain(it.on.map(|on| (on, END))).collect());
+    let spans = plain
+        .into_iter()
+        .map(|operation| operation.intervals.into_iter().chain(operation.on.map(|on| (on, END))).collect());
     spans.collect()
 }
 

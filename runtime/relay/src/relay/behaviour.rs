@@ -42,7 +42,7 @@ fn relayed(
         for (_, path, value) in messages.iter().filter(|(time, ..)| *time == tenth) {
             relay.message(now, wires.find(path).unwrap(), value.clone(), &mut out);
         }
-        delivered.extend(out.into_iter().map(|it| (tenth, wires.path(it.wire).to_owned(), it.value)));
+        delivered.extend(out.into_iter().map(|delivery| (tenth, wires.path(delivery.wire).to_owned(), delivery.value)));
     }
     (delivered, relay.finish(SimTime::from_seconds(10.0)))
 }

@@ -7,7 +7,8 @@ use sesame_base::time::SimTime;
 use sesame_plan::condition::{Condition, Operand};
 use sesame_plan::{Activation, CampaignPlan, MetricId, MetricSource, Span, Test};
 
-use crate::relay::{Relay, Stage};
+use crate::relay::Relay;
+use crate::relay::stage::Stage;
 
 impl Stage {
     /// How long it has been active or held messages back until now.

@@ -293,7 +293,9 @@ fn relayed(payload: Payload, case: &Case, switch: Switch) -> (Vec<(u32, Value)>,
         if tenth < MESSAGES {
             relay.message(now, payload_wire, payload.message(tenth), &mut out);
         }
-        delivered.extend(out.into_iter().filter(|it| it.wire == payload_wire).map(|it| (tenth, it.value)));
+        delivered.extend(
+            out.into_iter().filter(|delivery| delivery.wire == payload_wire).map(|delivery| (tenth, delivery.value)),
+        );
     }
     (delivered, relay.finish(SimTime::from_seconds(10.0)))
 }

@@ -449,7 +449,7 @@ fn conditions_over_active_time_see_it_grow() {
     assert_eq!(
         intervals(&finished, 0),
         [(1.0, 1.950_000_001)],
-        "to the nanosecond, whatever steps the simulator takes"
+        "to the nanosecond, for every step size of the simulator"
     );
 }
 

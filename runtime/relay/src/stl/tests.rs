@@ -332,7 +332,7 @@ proptest! {
                 monitor.push(SimTime::from_nanos(time), signal, value);
             }
             let (least, greatest) = monitor.reach(SimTime::from_nanos(now));
-            // What is infinite is no value, but nothing was said.
+            // An infinite robustness is not a value, but no bound was given.
             if let Some(value) = naive_by(&formula, &trace, whole) {
                 prop_assert!((least..=greatest).contains(&value), "{value} of [{least}, {greatest}] at {now}, {whole}");
             }

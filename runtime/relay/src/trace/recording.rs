@@ -369,7 +369,7 @@ impl Feeder<'_> {
             let outcome = text(ending, "outcome");
             end = match ending.get("end_s") {
                 Some(end) if matches!(outcome.as_str(), "completed" | "no_effect" | "void") => {
-                    let seconds = end.parse().map_err(|_| damaged("its end is no number"))?;
+                    let seconds = end.parse().map_err(|_| damaged("its end is not a number"))?;
                     Some(SimTime::from_seconds(seconds).max(self.now))
                 }
                 // Hooks are not told of the end of a run that failed.
@@ -422,7 +422,8 @@ fn timed(subject: &BTreeMap<String, String>, effects: &str) -> serde_json::Resul
     let declared: Recorded<Declared> = serde_json::from_str(entry("plan"))?;
     let test: Recorded<Use> = serde_json::from_str(entry("definition"))?;
     let effects: Vec<OperationEffect> = serde_json::from_str(effects)?;
-    let counts = |id: OperationId| declared.operations.get(id.index()).is_none_or(|it| it.timed != Some(false));
+    let counts =
+        |id: OperationId| declared.operations.get(id.index()).is_none_or(|operation| operation.timed != Some(false));
     let counted = test.operations.iter().zip(effects).filter(|(used, _)| counts(used.operation));
     Ok(counted.flat_map(|(_, effect)| effect.busy().collect::<Vec<_>>()).collect())
 }

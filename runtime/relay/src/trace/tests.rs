@@ -396,7 +396,7 @@ fn all_are_fed_or_refused(numbers: std::ops::Range<u64>) {
 }
 
 #[test]
-fn whatever_is_done_to_a_recording_it_is_fed_or_refused() {
+fn a_changed_recording_is_fed_or_refused() {
     all_are_fed_or_refused(0..500);
 }
 

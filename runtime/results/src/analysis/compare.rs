@@ -148,7 +148,7 @@ pub fn compare(runs: &[Run], reference: Option<&[f64]>, grid: Option<Grid>) -> R
     let fitness: Vec<Fitness> = measured
         .iter()
         .flat_map(|run| run.front.members())
-        .map(|it| Fitness::Measured(it.objectives.clone()))
+        .map(|member| Fitness::Measured(member.objectives.clone()))
         .collect();
     let joint = Front::from_tests((0..).zip(&fitness));
     let distance = IgdPlus::to(joint.members().iter().map(|member| member.objectives.as_slice()));
@@ -321,7 +321,7 @@ impl Comparison {
             for (at, (group, runs)) in groups.iter().enumerate() {
                 let values = values(runs);
                 let compared = if at == 0 { None } else { rank_sum(&values, &first) };
-                let way = compared.map(|it| if it.exact { "exact" } else { "normal approximation" });
+                let way = compared.map(|comparison| if comparison.exact { "exact" } else { "normal approximation" });
                 dataset.row([
                     Datum::Text(name.to_owned()),
                     Datum::Text((*group).to_owned()),
@@ -329,8 +329,8 @@ impl Comparison {
                     Datum::lone(quantile(&values, 0.25)),
                     Datum::lone(quantile(&values, 0.5)),
                     Datum::lone(quantile(&values, 0.75)),
-                    Datum::real(compared.map(|it| it.a12)),
-                    Datum::lone(compared.map(|it| it.p)),
+                    Datum::real(compared.map(|comparison| comparison.a12)),
+                    Datum::lone(compared.map(|comparison| comparison.p)),
                     way.map_or(Datum::Missing, |way| Datum::Text(way.to_owned())),
                 ]);
             }

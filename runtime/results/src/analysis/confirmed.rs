@@ -74,7 +74,7 @@ impl FindingAgain {
         let silent = plural(self.inconclusive, "run inconclusive", "runs inconclusive");
         let Some(interval) = self.interval else { return silent };
         let mut words = rate(self.again, self.conclusive, interval);
-        if let Some(standing) = self.standing.filter(|&it| it != Standing::Confirmed) {
+        if let Some(standing) = self.standing.filter(|&standing| standing != Standing::Confirmed) {
             let _ = write!(words, " {}", standing.words());
         }
         if !self.first {

@@ -116,17 +116,17 @@ pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<
     let (generations, reference) = if ran {
         let mut generations: Vec<Indicator> = recorded
             .iter()
-            .map(|it| Indicator {
+            .map(|generation| Indicator {
                 set: None,
-                generation: Some(it.generation),
-                evaluations: Some(it.evaluations),
-                unique: Some(it.unique),
-                no_effect: Some(it.no_effect),
-                crashes: Some(it.crashes),
-                timeouts: Some(it.timeouts),
-                front: it.front,
-                hypervolume: if given.is_some() { None } else { it.hypervolume },
-                standard_error: if given.is_some() { None } else { it.standard_error },
+                generation: Some(generation.generation),
+                evaluations: Some(generation.evaluations),
+                unique: Some(generation.unique),
+                no_effect: Some(generation.no_effect),
+                crashes: Some(generation.crashes),
+                timeouts: Some(generation.timeouts),
+                front: generation.front,
+                hypervolume: if given.is_some() { None } else { generation.hypervolume },
+                standard_error: if given.is_some() { None } else { generation.standard_error },
                 igd_plus: None,
                 covered: None,
             })
@@ -251,7 +251,7 @@ fn evaluations_of(set: &ResultSet, tests: usize) -> Option<u32> {
 impl IndicatorAnalysis {
     /// A row for each generation.
     pub fn dataset(&self) -> Table {
-        let imported = self.generations.iter().any(|it| it.set.is_some());
+        let imported = self.generations.iter().any(|generation| generation.set.is_some());
         let head = if imported { vec!["set"] } else { Vec::new() };
         let counts = ["generation", "evaluations", "unique", "no_effect", "crashes", "timeouts", "front"];
         let measures = ["hypervolume", "standard_error", "igd_plus"];

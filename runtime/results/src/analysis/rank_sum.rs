@@ -10,7 +10,7 @@ pub struct RankSum {
     /// Mann and Whitney's U of the first group: pairs in which its value is the larger one, ties counting half.
     pub u: f64,
     /// Vargha and Delaney's A₁₂: the probability that a run of the first group has a larger value than one of the
-    /// second, ties counting half; one half is no difference.
+    /// second, ties counting half; one half means no difference.
     pub a12: f64,
     /// The two-sided probability of a U at least as far from its mean, if both groups come from one distribution.
     pub p: f64,

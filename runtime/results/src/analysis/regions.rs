@@ -122,9 +122,9 @@ fn found(
     depth: u32,
 ) -> Result<Vec<Regions>, RecordError> {
     let plan = repository.plan();
-    let whatever = asked.is_empty();
-    let gathered = gather(repository, selection, if whatever { targets(plan) } else { asked })?;
-    let found = gathered.labels.iter().filter(|(_, labels)| !whatever || labels.contains(&Some(true)));
+    let any = asked.is_empty();
+    let gathered = gather(repository, selection, if any { targets(plan) } else { asked })?;
+    let found = gathered.labels.iter().filter(|(_, labels)| !any || labels.contains(&Some(true)));
     let found = found.map(|(target, labels)| {
         let count = labels.iter().flatten().count();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]

@@ -160,7 +160,7 @@ fn numbers(dataset: &Table, column: &str) -> Vec<Option<f64>> {
         Datum::Missing => None,
         Datum::Real(number) | Datum::Lone(number) => Some(number),
         Datum::Whole(number) => Some(number as f64),
-        ref other => panic!("{other:?} is no number"),
+        ref other => panic!("{other:?} is not a number"),
     };
     dataset.rows().iter().map(number).collect()
 }
@@ -172,7 +172,7 @@ fn indicators_are_those_recorded_and_end_on_the_front() {
     let dataset = analysis.dataset();
     let recorded = repository.indicators().unwrap();
     assert_eq!(recorded.len(), 7);
-    let volumes: Vec<Option<f64>> = recorded.iter().map(|it| it.hypervolume).collect();
+    let volumes: Vec<Option<f64>> = recorded.iter().map(|generation| generation.hypervolume).collect();
     assert_eq!(numbers(&dataset, "hypervolume"), volumes);
     assert!(volumes.is_sorted() && volumes[0] < volumes[6], "{volumes:?}");
     let distances = numbers(&dataset, "igd_plus");

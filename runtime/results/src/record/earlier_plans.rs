@@ -112,7 +112,7 @@ mod tests {
         }
         let (plan, task) = converted(&json!({ "kind": "repeat", "test": 0, "times": 7 }));
         assert_eq!(plan.campaign.search, Search::Repeat { test: KnownTestId(0), times: 7 });
-        assert_eq!(task.repeated(&plan).map(|it| (it.name, it.times)), Some(("known_jitter", 7)));
+        assert_eq!(task.repeated(&plan).map(|repeated| (repeated.name, repeated.times)), Some(("known_jitter", 7)));
     }
 
     #[test]

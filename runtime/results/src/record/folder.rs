@@ -92,7 +92,7 @@ pub fn latest_unfinished(results: &Path) -> Result<Option<PathBuf>, RecordError>
         if Repository::open(&folder)?.campaign().stop.is_some() {
             continue;
         }
-        // The lock is let go at once: asking must not keep anybody from writing.
+        // The lock is released at once: a query must not prevent others from writing.
         match Lock::acquire(&folder) {
             Ok(_) => return Ok(Some(folder)),
             Err(error @ RecordError::Locked { .. }) => at_work = at_work.or(Some(error)),
@@ -139,7 +139,7 @@ fn written_at(folder: &Path) -> Option<SystemTime> {
 
 fn can_be_resumed(folder: &Path) -> bool {
     let open = Repository::open(folder).is_ok_and(|repository| repository.campaign().stop.is_none());
-    // The lock is let go at once: asking must not keep anybody from writing.
+    // The lock is released at once: a query must not prevent others from writing.
     open && Lock::acquire(folder).is_ok()
 }
 

@@ -29,6 +29,22 @@ type Conditions = (Option<String>, Option<String>, Option<f64>, Option<u32>);
 /// multiples.
 const LONGEST_RUN: f64 = 1e9;
 
+/// The columns of a test's row that every reader of tests needs, in the order that [`Repository::head`] expects.
+pub(super) const HEAD: &str =
+    "number, origin, known_test, generation, outcome, outcome_detail, time_limit_s, duplicate_of";
+
+/// How many columns [`HEAD`] has.
+const HEAD_COLUMNS: usize = 8;
+
+/// What the columns of [`HEAD`] say of a test.
+pub(super) struct Head {
+    pub(super) number: u32,
+    pub(super) origin: Origin,
+    pub(super) generation: Option<u32>,
+    pub(super) outcome: Outcome,
+    pub(super) duplicate_of: Option<u32>,
+}
+
 /// Which intervals of an operation a table has.
 type SpansOf = fn(&mut OperationEffect) -> &mut Vec<Span>;
 
@@ -149,10 +165,8 @@ impl Repository {
             "SELECT test, metric, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values \
              WHERE test BETWEEN ?1 AND ?2 ORDER BY test, metric",
         )?;
-        let mut tests = prepare(
-            "SELECT number, origin, known_test, generation, outcome, outcome_detail, time_limit_s, end_s, duplicate_of \
-             FROM tests WHERE number BETWEEN ?1 AND ?2 ORDER BY number",
-        )?;
+        let mut tests =
+            prepare(&format!("SELECT {HEAD}, end_s FROM tests WHERE number BETWEEN ?1 AND ?2 ORDER BY number"))?;
         let mut operations =
             Cursor::over(operations.query(within).map_err(failed)?, |row| -> rusqlite::Result<OperationColumns> {
                 let window = (perhaps_finite(row, 4)?, perhaps_finite(row, 5)?);
@@ -172,15 +186,9 @@ impl Repository {
         let mut found = Vec::new();
         let mut rows = tests.query(within).map_err(failed)?;
         while let Some(row) = rows.next().map_err(failed)? {
-            let number: u32 = row.get(0).map_err(failed)?;
+            let Head { number, origin, generation, outcome, duplicate_of } = self.head(row)?;
+            let end = finite(row, HEAD_COLUMNS).map_err(failed)?;
             let this = TestNumber(number);
-            let head = || -> rusqlite::Result<_> {
-                let origin: (String, Option<String>) = (row.get(1)?, row.get(2)?);
-                let outcome: (String, Option<String>, Option<f64>) =
-                    (row.get(4)?, row.get(5)?, perhaps_finite(row, 6)?);
-                Ok((origin, row.get(3)?, outcome, finite(row, 7)?, row.get(8)?))
-            };
-            let ((origin, known), generation, (outcome, detail, limit), end, duplicate_of) = head().map_err(failed)?;
             let mut chosen: BTreeMap<usize, Vec<Choice>> = BTreeMap::new();
             for (at, position, choice) in choices.of(number).map_err(failed)? {
                 let choice = choice.ok_or_else(|| {
@@ -218,16 +226,7 @@ impl Repository {
             used.shrink_to_fit();
             let test = Test { operations: used };
             self.fitting(number, &test, measured.len())?;
-            found.push(TestRow {
-                number,
-                origin: self.origin(&origin, known.as_deref())?,
-                generation,
-                test,
-                outcome: self.outcome(&outcome, detail, limit)?,
-                end,
-                duplicate_of,
-                values: measured,
-            });
+            found.push(TestRow { number, origin, generation, test, outcome, end, duplicate_of, values: measured });
         }
         let orphans = [operations.orphan(), choices.orphan(), values.orphan()];
         match orphans.into_iter().flatten().min() {
@@ -235,6 +234,24 @@ impl Repository {
             Some(orphan) if numbers.start() < numbers.end() => Err(self.without_test(orphan)),
             _ => Ok(found),
         }
+    }
+
+    /// Reads a row that begins with the columns of [`HEAD`].
+    pub(super) fn head(&self, row: &Row<'_>) -> Result<Head, RecordError> {
+        let columns = || -> rusqlite::Result<_> {
+            let origin: (String, Option<String>) = (row.get(1)?, row.get(2)?);
+            let outcome: (String, Option<String>, Option<f64>) = (row.get(4)?, row.get(5)?, perhaps_finite(row, 6)?);
+            Ok((row.get(0)?, origin, row.get(3)?, outcome, row.get(7)?))
+        };
+        let (number, (origin, known), generation, (outcome, detail, limit), duplicate_of) =
+            columns().map_err(|e| RecordError::database("read the results", &self.path, e))?;
+        Ok(Head {
+            number,
+            origin: self.origin(&origin, known.as_deref())?,
+            generation,
+            outcome: self.outcome(&outcome, detail, limit)?,
+            duplicate_of,
+        })
     }
 
     /// The plan's operations by name, as tests have them.
@@ -377,7 +394,7 @@ impl Repository {
         Ok(effects)
     }
 
-    pub(super) fn origin(&self, origin: &str, known: Option<&str>) -> Result<Origin, RecordError> {
+    fn origin(&self, origin: &str, known: Option<&str>) -> Result<Origin, RecordError> {
         match (origin, known) {
             ("reference", None) => Ok(Origin::Reference),
             ("search", None) => Ok(Origin::Search),
@@ -417,8 +434,9 @@ impl Repository {
         numbers: &RangeInclusive<u32>,
         mut row: impl FnMut(&Row<'_>) -> rusqlite::Result<T>,
     ) -> Result<BTreeMap<u32, Vec<T>>, RecordError> {
-        let rows =
-            self.read(sql, params![numbers.start(), numbers.end()], |it| Ok((it.get::<_, u32>(0)?, row(it)?)))?;
+        let rows = self.read(sql, params![numbers.start(), numbers.end()], |columns| {
+            Ok((columns.get::<_, u32>(0)?, row(columns)?))
+        })?;
         let mut found: BTreeMap<u32, Vec<T>> = BTreeMap::new();
         for (number, row) in rows {
             found.entry(number).or_default().push(row);

@@ -12,7 +12,7 @@ use sesame_search as search;
 use sesame_search::aggregate;
 
 use crate::record::columns::{finite, index, metric_value, perhaps_finite, position, unsigned};
-use crate::record::recorder::write_event;
+use crate::record::write_tests::write_event;
 use crate::record::{
     Event, EventKind, MetricValue, RecordError, Recorder, Repetition, Repository, ScannedTest, Tally, TestRow, Verdict,
 };
@@ -260,7 +260,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut written = every_outcome();
         let repository = repeated(folder.path(), &sample::plan(), &written);
-        written.sort_by_key(|it| (it.test, it.position));
+        written.sort_by_key(|repetition| (repetition.test, repetition.position));
         let read: Vec<Repetition> = repository.repetitions().unwrap().into_values().flatten().collect();
         assert_eq!(read, written);
         assert_eq!(repository.tests().unwrap().len(), 22);
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn the_digest_covers_repetitions_in_whatever_order_they_ended() {
+    fn the_digest_covers_repetitions_in_any_order_of_completion() {
         let digest = |repetitions: &[Repetition]| {
             let folder = tempfile::tempdir().unwrap();
             repeated(folder.path(), &sample::plan(), repetitions).digest().unwrap()
@@ -279,15 +279,15 @@ mod tests {
         let whole = digest(&written);
         assert_eq!(digest(&backwards), whole);
         let changes: [fn(&mut Repetition); 9] = [
-            |it| it.simulator_seed -= 9,
-            |it| it.outcome = Outcome::Completed,
-            |it| it.end = it.end.next_up(),
-            |it| it.messages += 1,
-            |it| it.values[1].value = it.values[1].value.map(f64::next_up),
-            |it| it.values[1].set = false,
-            |it| it.values[1].reach.low = None,
-            |it| it.values[1].reach.high = it.values[1].reach.high.map(f64::next_up),
-            |it| it.values[1].not_finite = Some(1.5),
+            |repetition| repetition.simulator_seed -= 9,
+            |repetition| repetition.outcome = Outcome::Completed,
+            |repetition| repetition.end = repetition.end.next_up(),
+            |repetition| repetition.messages += 1,
+            |repetition| repetition.values[1].value = repetition.values[1].value.map(f64::next_up),
+            |repetition| repetition.values[1].set = false,
+            |repetition| repetition.values[1].reach.low = None,
+            |repetition| repetition.values[1].reach.high = repetition.values[1].reach.high.map(f64::next_up),
+            |repetition| repetition.values[1].not_finite = Some(1.5),
         ];
         for (at, change) in changes.into_iter().enumerate() {
             let mut changed = written.clone();

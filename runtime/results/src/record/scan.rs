@@ -8,6 +8,7 @@ use sesame_search::sspr::{Convention, Disturbance, Point, disturbance};
 
 use crate::record::columns::{choice, metric_value, perhaps_finite, position, span};
 use crate::record::cursor::Cursor;
+use crate::record::read_tests::{HEAD, Head};
 use crate::record::{MetricValue, Origin, RecordError, Repository};
 
 /// One test as analyses see it: its operations, when they acted, and the results; without time series.
@@ -60,9 +61,9 @@ impl ScannedTest {
         let disturbances: Vec<Disturbance> = self
             .operations
             .iter()
-            .map(|it| {
-                let intervals = if it.acted { it.intervals.clone() } else { Vec::new() };
-                disturbance(plan, it.operation, &it.choices, intervals)
+            .map(|operation| {
+                let intervals = if operation.acted { operation.intervals.clone() } else { Vec::new() };
+                disturbance(plan, operation.operation, &operation.choices, intervals)
             })
             .collect();
         Point::from_disturbances(&disturbances, convention)
@@ -105,10 +106,7 @@ impl Repository {
             "SELECT test, metric, value, is_set, reach_low, reach_high, not_finite_s FROM metric_values \
              ORDER BY test, metric",
         )?;
-        let mut tests = prepare(
-            "SELECT number, origin, known_test, generation, outcome, outcome_detail, time_limit_s, duplicate_of \
-             FROM tests ORDER BY number",
-        )?;
+        let mut tests = prepare(&format!("SELECT {HEAD} FROM tests ORDER BY number"))?;
         let mut operations =
             Cursor::over(operations.query([]).map_err(failed)?, |row| -> rusqlite::Result<PlannedRow> {
                 let (start, end) = (perhaps_finite(row, 3)?, perhaps_finite(row, 4)?);
@@ -130,20 +128,13 @@ impl Repository {
         let ids = self.operation_ids();
         let mut rows = tests.query([]).map_err(failed)?;
         while let Some(row) = rows.next().map_err(failed)? {
-            let number: u32 = row.get(0).map_err(failed)?;
+            let Head { number, origin, generation, outcome, duplicate_of } = self.head(row)?;
             let this = TestNumber(number);
-            let head = || -> rusqlite::Result<_> {
-                let origin: (String, Option<String>) = (row.get(1)?, row.get(2)?);
-                let outcome: (String, Option<String>, Option<f64>) =
-                    (row.get(4)?, row.get(5)?, perhaps_finite(row, 6)?);
-                Ok((origin, row.get(3)?, outcome, row.get(7)?))
-            };
-            let ((origin, known), generation, (outcome, detail, limit), duplicate_of) = head().map_err(failed)?;
             let mut test = ScannedTest {
                 number,
-                origin: self.origin(&origin, known.as_deref())?,
+                origin,
                 generation,
-                outcome: self.outcome(&outcome, detail, limit)?,
+                outcome,
                 duplicate_of,
                 operations: Vec::new(),
                 values: Vec::new(),
@@ -225,8 +216,12 @@ mod tests {
                         _ => None,
                     },
                     choices: it.parameters.clone(),
-                    intervals: record.observation.operations.get(at).map_or(Vec::new(), |it| it.intervals.clone()),
-                    acted: record.observation.operations.get(at).is_none_or(|it| it.counters.any_effect()),
+                    intervals: record
+                        .observation
+                        .operations
+                        .get(at)
+                        .map_or(Vec::new(), |effect| effect.intervals.clone()),
+                    acted: record.observation.operations.get(at).is_none_or(|effect| effect.counters.any_effect()),
                 })
                 .collect();
             assert_eq!(test.operations, operations);

@@ -236,7 +236,7 @@ mod tests {
         }
 
         #[test]
-        fn whatever_a_piece_was_changed_into_it_is_read_or_refused(
+        fn a_changed_piece_is_read_or_refused(
             points in 0..4_usize,
             clock in prop::option::of((any::<i64>(), any::<i64>())),
             times in prop::collection::vec(any::<u8>(), 0..33),

@@ -12,43 +12,43 @@ use crate::space::range::Range;
 use crate::space::test_space::{ActivationSpace, TestSpace};
 use crate::sspr::{Class, Window, class_of};
 
-/// Ways to make up a test of operations that differ, at most; beyond, every cell counts as feasible.
+/// The most distinct ways to compose a test of operations; beyond it, every cell counts as feasible.
 const MOST_MIXTURES: usize = 20_000;
-/// Sums of whole-number parameters listed at most; beyond, all between them count as reachable.
+/// The most sums of integer parameters that are listed; beyond it, all values between them count as reachable.
 const MOST_SUMS: usize = 20_000;
-/// Ways to make up a test remembered per cell, at most.
+/// The most ways to compose a test that are remembered per cell.
 const WAYS: usize = 6;
-/// Cells that only touch what can be reached, in a point or along an edge, are not reached: this much is needed.
+/// How far the reachable values must extend into a cell; a cell that they only touch, in a point or along an edge, is
+/// not reached.
 const MARGIN: f64 = 1e-9;
 
-/// The cells of a grid that a test can reach whose run comes to its end.
+/// The cells of a grid that a test can reach if its run is completed.
 ///
-/// What is permitted is taken from the campaign: windows, shortest intervals, ranges and numbers of operations. For
-/// each way to make up a test, timing, intensity and counts do not constrain each other, so that a cell is reached if
-/// its part of each is:
-/// - an interval of length `l` has its midpoint at least `l / 2` from both ends of its window, so (T1, T2) of several
-///   lie in a triangle, the mean of theirs;
-/// - inside a cell of T1 and T2, T3 takes all values between a least and a greatest;
-/// - P1 takes all values, and P2 all from 0 to a greatest that depends on P1;
-/// - whole-number parameters take the values they have.
+/// The campaign declares what is permitted: windows, shortest intervals, ranges and numbers of operations. For each way
+/// to compose a test, timing, intensity and counts do not constrain each other, so a cell is reached if its timing, its
+/// intensity and its counts are:
+/// - an interval of length `l` has its midpoint at least `l / 2` from both ends of its window, so (T1, T2) of one
+///   interval lies in a triangle, and that of several in the mean of their triangles;
+/// - inside a cell of T1 and T2, T3 takes all values between a minimum and a maximum;
+/// - P1 takes all values, and P2 all from 0 to a maximum that depends on P1;
+/// - integer parameters take their possible values.
 ///
-/// Copies of one operation whose windows may not overlap are at most as long together as one window; how else they are
-/// in each other's way is left out.
+/// Copies of one operation whose windows may not overlap are together at most as long as one window; other constraints
+/// between them are ignored.
 ///
-/// A cell that is only touched, in a point or along an edge, is not feasible: no test falls there but by chance of
-/// probability zero.
+/// A cell that is only touched, in a point or along an edge, is not feasible: the probability of a test there is zero.
 ///
-/// Copies of one operation that must not be active at the same time reach less than this says. A cell that only tests
-/// with copies reach counts as feasible; then the computation says that it is not exact.
+/// Since those other constraints are ignored, a cell that only tests with copies reach counts as feasible although it
+/// may not be; then the computation says that it is not exact.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Feasible {
     reaches: Vec<bool>,
     exact: bool,
-    /// Operations that the grid cannot tell apart.
+    /// Kinds of operations: those of one kind are the same for the grid.
     kinds: Vec<Vec<OperationId>>,
-    /// Ways to make up a test: how many operations of each kind.
+    /// Ways to compose a test: how many operations of each kind.
     mixtures: Vec<Vec<usize>>,
-    /// Per cell some mixtures that reach it, the surest first.
+    /// Per cell some mixtures that reach it, the most certain first.
     ways: Vec<Vec<u32>>,
 }
 
@@ -68,17 +68,17 @@ impl Feasible {
         self.reaches.iter().filter(|&&reaches| reaches).count()
     }
 
-    /// Whether exactly these cells are feasible. Otherwise no other cell is, but some of these may not be either: where
-    /// a cell needs several copies of one operation that must not be active at the same time; where
-    /// T3 is asked for and midpoints in different windows cannot meet, or those windows are many; where P2 is asked for
-    /// and only some parameters are whole numbers, or those are very many; or where there are very many kinds of
-    /// operations.
+    /// Whether exactly these cells are feasible. Otherwise no other cell is feasible, and some of these may not be either:
+    /// - where a cell needs several copies of one operation that must not be active at the same time;
+    /// - where the grid has T3, and midpoints in different windows cannot meet, or there are many such windows;
+    /// - where the grid has P2, and only some parameters are integers, or they have very many values;
+    /// - where there are very many kinds of operations.
     pub fn is_exact(&self) -> bool {
         self.exact
     }
 
-    /// Ways to make up a test that reach a cell, the surest first: operations that the grid cannot tell apart, with how
-    /// many of them a test has. Some of all, and none where every cell counts as feasible.
+    /// Some of the ways to compose a test that reach a cell, the most certain first: kinds of operations, each with how
+    /// many of them the test has. There are none where every cell counts as feasible.
     pub(crate) fn ways(&self, cell: usize) -> impl Iterator<Item = Vec<(&[OperationId], usize)>> {
         let mixtures = self.ways.get(cell).into_iter().flatten().map(|&way| &self.mixtures[way as usize]);
         mixtures.map(|mixture| {
@@ -95,24 +95,24 @@ impl Feasible {
         Feasible::compute(plan, grid, one_interval_each, margin)
     }
 
-    /// `one_interval_each`: every operation of a test is active once. Otherwise any number of times, or never.
+    /// With `one_interval_each`, every operation of a test is active once; otherwise any number of times, or never.
     fn compute(plan: &CampaignPlan, grid: &Grid, one_interval_each: bool, margin: f64) -> Feasible {
         let reaches = vec![true; grid.len()];
         let all = Feasible { reaches, exact: false, kinds: Vec::new(), mixtures: Vec::new(), ways: Vec::new() };
         let Ok(test_space) = TestSpace::from_plan(plan) else { return all };
         let sectors = Sectors::of(grid, one_interval_each, margin);
         let (kinds, operations) = sectors.kinds(plan, &test_space);
-        // Operations beside the run are no part of the point and may take the place of others.
-        let offline = test_space.operations().iter().any(|it| it.activation == ActivationSpace::Offline);
+        // Offline operations do not contribute to the point, and may replace others.
+        let offline = test_space.operations().iter().any(|operation| operation.activation == ActivationSpace::Offline);
         let fewest = if one_interval_each && !offline { test_space.fewest() } else { 1 };
         let Some(mut mixtures) = mixtures(kinds.len(), fewest, test_space.most()) else { return all };
 
-        // Where tests hold copies of one operation, and these constrain each other.
+        // Whether a test has copies of one operation, which may constrain each other.
         let crowded = |mixture: &[usize]| mixture.iter().zip(&operations).any(|(count, kind)| *count > kind.len());
         match plan.campaign.copies {
             Copies::MayOverlap => {}
             Copies::Once => mixtures.retain(|mixture| !crowded(mixture)),
-            // Of ways that are alike the first stands for all: the one without copies.
+            // The first of several equal ways is kept: the one without copies.
             Copies::Apart => mixtures.sort_by_key(|mixture| crowded(mixture)),
         }
         let apart = one_interval_each
@@ -126,7 +126,7 @@ impl Feasible {
         let mut done = BTreeSet::new();
         let mut different = Vec::new();
         for mixture in mixtures {
-            // Windows of copies that lie apart have only one window's length together: so many windows are whole.
+            // Disjoint copies share one window, so only so many windows count with their whole length.
             let whole: Vec<usize> =
                 mixture.iter().zip(&operations).map(|(&n, kind)| if apart { n.min(kind.len()) } else { n }).collect();
             let by_window = [&mixture, &whole].map(|counts| counted(counts, &window_of, windows.len()));
@@ -136,7 +136,7 @@ impl Feasible {
                 continue;
             }
             let timing = timings.entry(by_window.clone()).or_insert_with_key(|[counts, whole]| {
-                let lengths = windows.iter().zip(whole).map(|(it, &n)| (it.end - it.start) * n as f64);
+                let lengths = windows.iter().zip(whole).map(|(window, &n)| (window.end - window.start) * n as f64);
                 sectors.timing(&paired(&windows, counts), lengths.sum())
             });
             let intensity = intensities
@@ -146,9 +146,9 @@ impl Feasible {
             different.push((rank, mixture, by_window, by_parameters, numbers));
         }
 
-        // The surest ways first, so that they are the ones remembered.
+        // The most certain ways come first, so that they are remembered.
         different.sort_by_key(|(rank, ..)| *rank);
-        // What one way reaches for certain settles a cell, whatever is not known of the others.
+        // A cell that one way reaches for certain is certain, even if other ways to it are not.
         let mut certain = vec![false; grid.len()];
         let mut reaches = vec![false; grid.len()];
         let mut ways = Ways { kept: vec![Vec::new(); grid.len()], met: vec![(0, 0, 0); grid.len()] };
@@ -169,15 +169,15 @@ impl Feasible {
     }
 }
 
-/// Some ways per cell: of equally sure ones a choice that gives each the same chance, so that they differ.
+/// Some ways per cell: of equally certain ones a uniform sample, so that they differ.
 struct Ways {
     kept: Vec<Vec<u32>>,
-    /// Per cell the rank met last, how many ways of that rank, and how many surer ones are kept.
+    /// Per cell the rank of the last way, how many ways had that rank, and how many of lower ranks are kept.
     met: Vec<(u8, usize, usize)>,
 }
 
 impl Ways {
-    /// Takes a way that reaches a cell; ranks only rise.
+    /// Adds a way that reaches a cell; ranks must not decrease.
     fn add(&mut self, cell: usize, way: usize, rank: u8) {
         let (last, met, surer) = &mut self.met[cell];
         let kept = &mut self.kept[cell];
@@ -198,7 +198,7 @@ impl Ways {
     }
 }
 
-/// An operation as far as the grid's dimensions tell it from others.
+/// The properties of an operation on which the grid's dimensions depend.
 #[derive(Debug, Clone, PartialEq)]
 struct KindOfOperation {
     window: Window,
@@ -206,18 +206,18 @@ struct KindOfOperation {
     class: Class,
 }
 
-/// What a normalised parameter can be.
+/// The possible values of a normalised parameter.
 #[derive(Debug, Clone, PartialEq)]
 enum Values {
-    /// Anything in `0..=1`.
+    /// All in `0..=1`.
     All,
     /// These only, ascending.
     These(Vec<f64>),
 }
 
 impl Values {
-    /// What the numbers of a parameter can be: one for a number, three for a point, none for a text, a file, or what
-    /// has no width.
+    /// The possible values of each number of a parameter: one for a number, three for a point, none for a text, a file,
+    /// or a range without width.
     fn of(domain: &Domain, parameter_space: &ParameterSpace) -> Vec<Values> {
         match (domain, parameter_space) {
             (&Domain::Number { low, high, .. }, &ParameterSpace::Number(range, shape)) => {
@@ -243,7 +243,7 @@ impl Values {
             Shape::Range => 0.0,
         };
         let steps = range.high - range.low;
-        // So many values are as good as all.
+        // So many values are treated as all.
         if steps > MOST_SUMS as f64 {
             return Some(Values::All);
         }
@@ -252,21 +252,22 @@ impl Values {
     }
 }
 
-/// Cells of some of the grid's axes, as what they add to a cell's number.
+/// Cells of some of the grid's axes, each as its contribution to the number of a cell.
 struct Reached {
     cells: Vec<usize>,
     exact: bool,
 }
 
-/// The grid's axes by what decides their values.
+/// The grid's axes, by what their values depend on.
 struct Sectors {
-    /// Per dimension of the grid: its axis, and what one cell further on it adds to a cell's number.
+    /// Per dimension of the grid: its axis, and its stride, by which the number of a cell grows from one cell of the
+    /// axis to the next.
     axes: BTreeMap<Dimension, (GridAxis, usize)>,
     one_interval_each: bool,
     margin: f64,
 }
 
-/// One cell of one axis: what it adds to a cell's number, and the values in it.
+/// One cell of one axis: its contribution to the number of a cell, and its bounds.
 #[derive(Debug, Clone, Copy)]
 struct Slice {
     offset: usize,
@@ -289,8 +290,8 @@ impl Sectors {
         dimensions.iter().any(|dimension| self.axes.contains_key(dimension))
     }
 
-    /// The operations of a campaign that are active during the run; those that the grid cannot tell apart are one. Of
-    /// each kind beside it the operations that are of it.
+    /// The kinds of operations of a campaign that are active during the run, and the operations of each kind. Operations
+    /// are of one kind if the grid does not distinguish them.
     fn kinds(&self, plan: &CampaignPlan, test_space: &TestSpace) -> (Vec<KindOfOperation>, Vec<Vec<OperationId>>) {
         let timed = self.has(&[Dimension::T1, Dimension::T2, Dimension::T3]);
         let graded = self.has(&[Dimension::P1, Dimension::P2]);
@@ -320,7 +321,7 @@ impl Sectors {
         (kinds, operations)
     }
 
-    /// The cells of an axis; one without bounds where the grid lacks the dimension.
+    /// The cells of an axis; a single one without bounds if the grid lacks the dimension.
     fn slices(&self, dimension: Dimension) -> Vec<Slice> {
         let Some((axis, stride)) = self.axes.get(&dimension) else {
             return vec![Slice { offset: 0, low: f64::NEG_INFINITY, high: f64::INFINITY }];
@@ -333,8 +334,8 @@ impl Sectors {
             .collect()
     }
 
-    /// The cells of an axis that hold a single value: two where it lies on the edge between them, since rounding may
-    /// put it into either.
+    /// The cells of an axis that contain a value: two if it lies on the edge between them, since rounding may put it into
+    /// either.
     fn at(&self, dimension: Dimension, value: f64) -> Vec<usize> {
         let Some((axis, stride)) = self.axes.get(&dimension) else { return vec![0] };
         let near = 1e-9 * (axis.high - axis.low);
@@ -343,16 +344,16 @@ impl Sectors {
         offsets
     }
 
-    /// The cells of an axis that values between two ends fall into; those of the single value where the ends are equal.
+    /// The cells of an axis that contain values between these bounds; if the bounds are equal, those that contain the value.
     fn between(&self, dimension: Dimension, low: f64, high: f64) -> Vec<usize> {
         if high - low <= 1e-9 {
             return self.at(dimension, f64::midpoint(low, high));
         }
         let slices = self.slices(dimension).into_iter();
-        slices.filter(|it| it.high.min(high) - it.low.max(low) > self.margin).map(|it| it.offset).collect()
+        slices.filter(|cell| cell.high.min(high) - cell.low.max(low) > self.margin).map(|cell| cell.offset).collect()
     }
 
-    /// The cell of a mixture's counts, as what it adds to a cell's number.
+    /// The cell of a mixture's counts, as its contribution to the number of a cell.
     fn numbers(&self, kinds: &[KindOfOperation], mixture: &[usize]) -> usize {
         let count = |class: Option<Class>| {
             let of_class = kinds.iter().zip(mixture).filter(|(kind, _)| class.is_none_or(|class| kind.class == class));
@@ -371,14 +372,15 @@ impl Sectors {
         offsets.sum()
     }
 
-    /// The cells of T1, T2 and T3 that intervals in these windows can reach, which are at most so long together.
+    /// The cells of T1, T2 and T3 that intervals in these windows can reach if the sum of their lengths is at most
+    /// `longest`.
     fn timing(&self, windows: &[(Window, usize)], longest: f64) -> Reached {
         let count: usize = windows.iter().map(|(_, count)| count).sum();
         let n = count as f64;
         let mean = |value: fn(&Window) -> f64| windows.iter().map(|(it, n)| value(it) * *n as f64).sum::<f64>() / n;
-        let centre = mean(|it| f64::midpoint(it.start, it.end));
-        let (width, shortest) = (mean(|it| it.end - it.start), mean(|it| it.shortest));
-        // Where intervals come and go as conditions say, means of any part of the windows can be had.
+        let centre = mean(|window| f64::midpoint(window.start, window.end));
+        let (width, shortest) = (mean(|window| window.end - window.start), mean(|window| window.shortest));
+        // With conditions, intervals can be anywhere in the windows, so the means can be those of any part of them.
         let reached_by_any = (
             windows.iter().map(|(it, _)| it.start).fold(f64::INFINITY, f64::min),
             windows.iter().map(|(it, _)| it.end).fold(f64::NEG_INFINITY, f64::max),
@@ -398,9 +400,9 @@ impl Sectors {
                 let (start, end) = reached_by_any;
                 (f64::midpoint(start, end), end - start)
             };
-            // The shortest intervals of the cell leave most room for their midpoints.
+            // The shortest intervals in the cell leave most room for their midpoints.
             let length = t2.low.max(shortest);
-            // Windows that were moved apart touch, so that all of what they have is reached too.
+            // Disjoint copies can touch, so the whole length can be reached too.
             let too_long = self.one_interval_each && length > longest / n + MARGIN;
             if too_long || t2.high.min(width) - length <= self.margin {
                 continue;
@@ -424,7 +426,7 @@ impl Sectors {
                     spread::midpoints(&members, n * room, low, high)
                 };
                 reached.exact &= spread.exact;
-                // Copies that were moved apart touch: then the very ends are reached too.
+                // Disjoint copies can touch; then the extreme values are reached too.
                 let touching = self.one_interval_each && longest < n * width - MARGIN;
                 let beyond = if touching { 2.0 * self.margin } else { 0.0 };
                 let t3 = self.between(Dimension::T3, spread.least - beyond, spread.greatest + beyond);
@@ -471,7 +473,7 @@ impl Sectors {
         };
         let (least, greatest) = all.iter().map(ends).fold((0.0, 0.0), |(a, b), (low, high)| (a + low, b + high));
         let (least, greatest) = (least / n, greatest / n);
-        // One parameter that takes all values fills the gaps between what the others sum up to.
+        // One parameter with all values fills the gaps between the sums of the others.
         let whole = all.iter().any(|values| matches!(values, Values::These(_)));
         let filled = all.iter().any(|values| matches!(values, Values::All));
         let spread_matters = self.has(&[Dimension::P2]) && all.len() > 1;
@@ -488,9 +490,9 @@ impl Sectors {
     }
 }
 
-/// All sums, each with the sum of squares, of one value from each list; `None` if there are too many.
+/// All sums of one value from each list, each with its sum of squares; `None` if there are too many.
 fn sums(lists: &[&[f64]]) -> Option<Vec<(f64, f64)>> {
-    // Kept by what is equal but for rounding.
+    // Sums that differ only by rounding have the same key.
     let key = |(sum, squares): (f64, f64)| [sum, squares].map(|x| libm::rint(x * 1e9).to_bits());
     let mut sums = BTreeMap::from([(key((0.0, 0.0)), (0.0, 0.0))]);
     for list in lists {
@@ -503,7 +505,8 @@ fn sums(lists: &[&[f64]]) -> Option<Vec<(f64, f64)>> {
     Some(sums.into_values().collect())
 }
 
-/// Every way to choose between `fewest` and `most` of so many kinds, as a count per kind; `None` if there are too many.
+/// Every way to choose `fewest` to `most` operations of this number of kinds, as a count per kind; `None` if there are too
+/// many.
 fn mixtures(kinds: usize, fewest: usize, most: usize) -> Option<Vec<Vec<usize>>> {
     let mut open: Vec<(Vec<usize>, usize)> = vec![(Vec::new(), 0)];
     for kind in 0..kinds {
@@ -525,7 +528,7 @@ fn mixtures(kinds: usize, fewest: usize, most: usize) -> Option<Vec<Vec<usize>>>
     Some(open.into_iter().map(|(counts, _)| counts).collect())
 }
 
-/// The distinct ones of these, and for each which of them it is.
+/// The distinct items, and for each item its position among them.
 fn distinct<T: PartialEq>(items: impl Iterator<Item = T>) -> (Vec<T>, Vec<usize>) {
     let mut kept: Vec<T> = Vec::new();
     let places = items.map(|item| {
@@ -538,7 +541,7 @@ fn distinct<T: PartialEq>(items: impl Iterator<Item = T>) -> (Vec<T>, Vec<usize>
     (kept, places)
 }
 
-/// How many of a mixture's operations are of each distinct sort.
+/// How many of a mixture's operations are of each sort.
 fn counted(mixture: &[usize], sort_of: &[usize], sorts: usize) -> Vec<usize> {
     let mut counts = vec![0; sorts];
     for (count, &sort) in mixture.iter().zip(sort_of) {
@@ -547,7 +550,7 @@ fn counted(mixture: &[usize], sort_of: &[usize], sorts: usize) -> Vec<usize> {
     counts
 }
 
-/// The sorts that occur, with how often.
+/// The sorts that occur, each with its count.
 fn paired<T: Clone>(sorts: &[T], counts: &[usize]) -> Vec<(T, usize)> {
     sorts.iter().cloned().zip(counts.iter().copied()).filter(|(_, count)| *count > 0).collect()
 }

@@ -17,7 +17,7 @@ pub struct Grid {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GridError {
     /// An axis that is not written as it should be.
-    #[error("`{0}` is no axis of a grid; write it as `DIMENSION:LOW:HIGH:CELLS`, for example `T1:0:1:6`")]
+    #[error("`{0}` is not an axis of a grid; write it as `DIMENSION:LOW:HIGH:CELLS`, for example `T1:0:1:6`")]
     Malformed(String),
     /// A dimension that does not exist.
     #[error("there is no dimension `{0}`; there are T1, T2, T3, P1, P2, O0, O1, O2 and O3")]
@@ -160,7 +160,7 @@ mod tests {
         let refused = |text: &str| Grid::parse(text).unwrap_err().to_string();
         assert_eq!(
             refused("T1:0:1"),
-            "`T1:0:1` is no axis of a grid; write it as `DIMENSION:LOW:HIGH:CELLS`, for example `T1:0:1:6`"
+            "`T1:0:1` is not an axis of a grid; write it as `DIMENSION:LOW:HIGH:CELLS`, for example `T1:0:1:6`"
         );
         assert!(refused("T4:0:1:6").starts_with("there is no dimension `T4`"));
         assert!(refused("T1:1:0:6").contains("from 1 to 0"));

@@ -86,10 +86,10 @@ impl Vertices<'_> {
     fn place(&mut self, at: usize, placed: Placed, free: [Option<Member>; 2]) {
         let Some(&(member, count)) = self.groups.get(at) else { return self.finish(placed, free) };
         let Member { centre, reach } = member;
-        let open = free.iter().filter(|it| it.is_none()).count();
+        let open = free.iter().filter(|slot| slot.is_none()).count();
         for left_open in 0..=open.min(count) {
             let mut free = free;
-            for slot in free.iter_mut().filter(|it| it.is_none()).take(left_open) {
+            for slot in free.iter_mut().filter(|slot| slot.is_none()).take(left_open) {
                 *slot = Some(member);
             }
             let fixed = count - left_open;
@@ -185,7 +185,7 @@ mod tests {
         let mut stream = Stream::derive(seed, "climb", &[]);
         let mut best: f64 = 0.0;
         for _ in 0..12 {
-            let mut x: Vec<f64> = members.iter().map(|it| stream.uniform(-it.reach, it.reach)).collect();
+            let mut x: Vec<f64> = members.iter().map(|member| stream.uniform(-member.reach, member.reach)).collect();
             let used: f64 = x.iter().map(|x| x.abs()).sum();
             for x in &mut x {
                 *x *= (budget / used).min(1.0);

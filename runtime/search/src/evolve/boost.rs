@@ -44,7 +44,7 @@ impl BoostingVariation {
         let every = u64::from(self.boosting.every_generations.max(1));
         // BoostingVariation generations are the multiples of `every` from `every` on.
         let [index, time] =
-            [place, (generation / every).saturating_sub(1)].map(|it| u32::try_from(it).unwrap_or(u32::MAX));
+            [place, (generation / every).saturating_sub(1)].map(|number| u32::try_from(number).unwrap_or(u32::MAX));
         generation.is_multiple_of(every) && self.boosting.children.includes(index, time)
     }
 

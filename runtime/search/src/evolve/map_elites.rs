@@ -80,13 +80,13 @@ impl MapElites {
         let Some(cell) = result.point.as_ref().and_then(|point| self.grid.cell_of(point)) else { return };
         let Fitness::Measured(_) = result.fitness else { return };
         let elites = self.elites.entry(cell).or_default();
-        if elites.iter().any(|it| dominates(&it.fitness, &result.fitness) || it.fitness == result.fitness) {
+        if elites.iter().any(|elite| dominates(&elite.fitness, &result.fitness) || elite.fitness == result.fitness) {
             return;
         }
-        elites.retain(|it| !dominates(&result.fitness, &it.fitness));
+        elites.retain(|elite| !dominates(&result.fitness, &elite.fitness));
         elites.push(result.clone());
         if elites.len() > ELITES {
-            let fitness: Vec<&Fitness> = elites.iter().map(|it| &it.fitness).collect();
+            let fitness: Vec<&Fitness> = elites.iter().map(|elite| &elite.fitness).collect();
             let kept = survivors(&fitness, ELITES);
             *elites = kept.into_iter().map(|(at, _)| elites[at].clone()).collect();
         }
@@ -160,7 +160,7 @@ mod tests {
                    for elite in elites {
                        prop_assert!(!here().any(|other| dominates(&other.fitness, &elite.fitness)));
                    }
-                   let best = here().filter(|it| !here().any(|other| dominates(&other.fitness, &it.fitness)));
+                   let best = here().filter(|elite| !here().any(|other| dominates(&other.fitness, &elite.fitness)));
                    let mut distinct: Vec<&Fitness> = Vec::new();
                    for it in best.filter(|_| true) {
                        if !distinct.contains(&&it.fitness) {
@@ -181,7 +181,8 @@ mod tests {
             plan.campaign.coverage =
                 Some(sesame_plan::CoverageGoal { axes: grid.axes().to_vec(), hits: 1, stop_at: None });
             let run = landscape.campaign(strategy(&plan, seed).unwrap().as_mut());
-            let mut cells: Vec<usize> = run.tests.iter().filter_map(|it| grid.cell_of(it.point.as_ref()?)).collect();
+            let mut cells: Vec<usize> =
+                run.tests.iter().filter_map(|test| grid.cell_of(test.point.as_ref()?)).collect();
             cells.sort_unstable();
             cells.dedup();
             cells.len()

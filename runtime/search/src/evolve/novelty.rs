@@ -210,7 +210,7 @@ mod tests {
             for seed in 1..=8 {
                 let run = landscape.campaign(strategy(&plan, seed).unwrap().as_mut());
                 let mut cells: Vec<usize> =
-                    run.tests.iter().filter_map(|it| grid.cell_of(it.point.as_ref()?)).collect();
+                    run.tests.iter().filter_map(|test| grid.cell_of(test.point.as_ref()?)).collect();
                 cells.sort_unstable();
                 cells.dedup();
                 covered += cells.len();

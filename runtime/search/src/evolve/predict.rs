@@ -60,8 +60,11 @@ impl VariableTrajectories {
     /// Where a test would lie with these values; `None` if no operation would be active.
     pub(crate) fn predicted(&self, plan: &CampaignPlan, test: &Test) -> Option<Point> {
         let operations = test.operations.iter();
-        let disturbances: Vec<_> =
-            operations.map(|it| disturbance(plan, it.operation, &it.parameters, self.intervals(plan, it))).collect();
+        let disturbances: Vec<_> = operations
+            .map(|operation| {
+                disturbance(plan, operation.operation, &operation.parameters, self.intervals(plan, operation))
+            })
+            .collect();
         Point::from_disturbances(&disturbances, Convention::Ours)
     }
 
@@ -71,7 +74,7 @@ impl VariableTrajectories {
         let end = within.end.min(plan.campaign.end_after);
         let mut activity = Activity::new(&operation.activation, Span { start: within.start, end });
         let value_in = |values: &[Option<f64>], metric| {
-            self.variables.iter().position(|it| *it == metric).and_then(|at| values[at])
+            self.variables.iter().position(|variable| *variable == metric).and_then(|at| values[at])
         };
         let mut before: Option<&Vec<Option<f64>>> = None;
         for (moment, values) in (0u32..).zip(&self.values) {

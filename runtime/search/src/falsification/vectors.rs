@@ -115,14 +115,14 @@ mod tests {
                 matches!(&parameter.domain, Domain::Texts { texts: of } | Domain::Files { files: of } if items(of))
             });
             let Some(vectors) = Vectors::from_space(&test_space, 1) else {
-                let fixed = test_space.operations().iter().all(|it| it.parameters.iter().all(ParameterSpace::is_fixed));
+                let fixed = test_space.operations().iter().all(|operation| operation.parameters.iter().all(ParameterSpace::is_fixed));
                 prop_assert!(chosen || fixed, "numbers are to be chosen, and nothing else");
                 return Ok(());
             };
             prop_assert!(!chosen);
             let test = vectors.test(&shares[..vectors.variables()], number);
             prop_assert_eq!(broken_rule(&plan, &test), None);
-            let held: Vec<_> = test.operations.iter().map(|it| it.operation).collect();
+            let held: Vec<_> = test.operations.iter().map(|operation| operation.operation).collect();
             prop_assert_eq!(held, plan.campaign.operations);
         }
     }

@@ -66,7 +66,7 @@ impl ShrinkSpace {
                     let step = if range.integer { libm::round(step).max(1.0) } else { step };
                     let end =
                         neutral_value(&operation.kind, &parameter.name).map(|end| end.clamp(range.low, range.high));
-                    // A value that is no stronger than another is left as it is.
+                    // A value that is not stronger than another is left as it is.
                     let known = end.is_some() || shape == Shape::Range;
                     (known && !range.is_fixed()).then_some(NeutralValue { end, step })
                 };
@@ -143,13 +143,13 @@ impl ShrinkSpace {
             Activation::Time { .. } | Activation::Offline => Vec::new(),
             Activation::ConditionFor { start, length, times } => {
                 let demanding = may_start(start);
-                let starts = simplified(start).into_iter().filter(|it| !demanding || may_start(it));
+                let starts = simplified(start).into_iter().filter(|condition| !demanding || may_start(condition));
                 starts.map(|start| Activation::ConditionFor { start, length: *length, times: *times }).collect()
             }
             Activation::Condition { start, end, times } => {
                 let (demanding_start, demanding_end) = (may_start(start), may_end(end));
-                let starts = simplified(start).into_iter().filter(|it| !demanding_start || may_start(it));
-                let ends = simplified(end).into_iter().filter(|it| !demanding_end || may_end(it));
+                let starts = simplified(start).into_iter().filter(|condition| !demanding_start || may_start(condition));
+                let ends = simplified(end).into_iter().filter(|condition| !demanding_end || may_end(condition));
                 let with_start = starts.map(|start| Activation::Condition { start, end: end.clone(), times: *times });
                 let with_end = ends.map(|end| Activation::Condition { start: start.clone(), end, times: *times });
                 with_start.chain(with_end).collect()
@@ -190,7 +190,7 @@ fn simplified(condition: &Condition) -> Vec<Condition> {
 /// | burst loss `leave` | 1: a burst that ends at once |
 /// | rate limit | the highest rate |
 /// | duplicate | one copy |
-/// | custom | 0, as far as anybody can know |
+/// | custom | 0, since its effect is unknown |
 /// | random absolute, stuck at | none: of a sub-range only a narrower one is milder |
 fn neutral_value(kind: &OperationKind, parameter: &str) -> Option<f64> {
     match kind {

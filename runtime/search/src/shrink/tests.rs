@@ -62,7 +62,7 @@ fn scattered(test: &Test, seed: u64) -> f64 {
 fn grown(before: &Test, after: &Test) -> Option<String> {
     let mut left = before.operations.iter();
     for used in &after.operations {
-        let was = left.find(|it| it.operation_seed == used.operation_seed && it.operation == used.operation)?;
+        let was = left.find(|old| old.operation_seed == used.operation_seed && old.operation == used.operation)?;
         let inside = match (&was.activation, &used.activation) {
             (Activation::Time { start: a, end: b }, Activation::Time { start, end }) => {
                 a <= start && start < end && end <= b
@@ -88,7 +88,7 @@ fn grown(before: &Test, after: &Test) -> Option<String> {
     None
 }
 
-/// Every test that is one step smaller, in whatever order.
+/// Every test that is one step smaller, in any order.
 fn one_step_smaller(space: &ShrinkSpace, test: &Test) -> Vec<Test> {
     let mut found = Vec::new();
     if test.operations.len() > space.fewest {
@@ -117,7 +117,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn whatever_fails_the_smallest_test_fails_is_permitted_and_loses_nothing_by_one_step(
+    fn the_smallest_test_fails_is_permitted_and_cannot_be_shrunk_by_one_step(
         plan in any_plan(), seed: u64, share in 0.05..0.95f64,
     ) {
         let test_space = TestSpace::from_plan(&plan).unwrap();
@@ -137,7 +137,7 @@ proptest! {
         let found = smallest(&shrink).unwrap();
         prop_assert!(fails(found, 7) && shrink.is_minimal());
         for smaller in one_step_smaller(&shrink.space, found) {
-            prop_assert!(!fails(&smaller, 7), "{:?} can be made smaller: {:?}", found, smaller);
+            prop_assert!(!fails(&smaller, 7), "{:?} can be shrunk: {:?}", found, smaller);
         }
         // A search gives every test as many activations as there may be; fewer are permitted too.
         let with_all_times = |mut test: Test| {
@@ -350,7 +350,7 @@ fn a_condition_loses_what_does_not_matter_and_activations_get_fewer_and_shorter(
     original.operations[0].activation = Activation::ConditionFor { start, length: 12.0, times: 3 };
     let shrink = shrunk(Shrink::new(&plan, shrinking(original, 1, 500)), |test, _| {
         let Activation::ConditionFor { start, length, times } = &test.operations[0].activation else { panic!() };
-        sesame_base::condition::mentions(start, &|it| it == sesame_base::condition::testing::variable(4))
+        sesame_base::condition::mentions(start, &|metric| metric == sesame_base::condition::testing::variable(4))
             && *length > 4.0
             && *times > 1
     });

@@ -25,7 +25,8 @@ pub(crate) fn is_allowed(condition: &Condition, space: &ConditionSpace, constrai
 
 /// Whether every comparison of two variables is of variables of one unit.
 fn of_one_unit(condition: &Condition, space: &ConditionSpace) -> bool {
-    let unit = |metric| space.variables.iter().find(|variable| variable.metric == metric).map(|it| &it.unit);
+    let unit =
+        |metric| space.variables.iter().find(|variable| variable.metric == metric).map(|variable| &variable.unit);
     match condition {
         Condition::Compare { left: Operand::Variable(left), right: Operand::Variable(right), .. } => {
             unit(*left) == unit(*right)
@@ -366,7 +367,7 @@ pub(crate) mod tests {
 
     proptest! {
         #[test]
-        fn whatever_is_grown_and_varied_is_of_the_grammar_and_keeps_its_constraints(
+        fn grown_and_varied_conditions_are_of_the_grammar_and_keep_their_constraints(
             space in any_space(), constraints in any_constraints(), seed: u64,
         ) {
             let mut stream = Stream::derive(seed, "test", &[]);

@@ -54,7 +54,7 @@ pub(crate) fn fresh_kinds<'a>(test_space: &'a TestSpace, number: &mut impl FnMut
     }
     let mut places: Vec<&OperationSpace> = Vec::with_capacity(length);
     while places.len() < length {
-        let held = |kind: &OperationSpace| places.iter().filter(|it| it.operation == kind.operation).count();
+        let held = |kind: &OperationSpace| places.iter().filter(|place| place.operation == kind.operation).count();
         let mut pool: Vec<_> = kinds.iter().copied().filter(|kind| held(kind) < test_space.most_copies(kind)).collect();
         let new: Vec<_> = pool.iter().copied().filter(|kind| held(kind) == 0).collect();
         let copies = new.is_empty();

@@ -150,13 +150,14 @@ impl TestSpace {
 
     /// Whether a test of these operations may hold one more copy of an operation.
     pub fn has_room(&self, operations: &[TestOperation], kind: &OperationSpace) -> bool {
-        operations.iter().filter(|it| it.operation == kind.operation).count() < self.most_copies(kind)
+        operations.iter().filter(|operation| operation.operation == kind.operation).count() < self.most_copies(kind)
     }
 
     /// Whether the copies of each operation in a test of this campaign are permitted.
     pub fn permits_copies(&self, test: &Test) -> bool {
         let mut draws = BTreeSet::new();
-        let drawn_alone = test.operations.iter().all(|it| draws.insert((it.operation, it.operation_seed)));
+        let drawn_alone =
+            test.operations.iter().all(|operation| draws.insert((operation.operation, operation.operation_seed)));
         drawn_alone
             && self.operations.iter().all(|kind| {
                 let copies = places_of(test, kind.operation);

@@ -70,14 +70,14 @@ fn intensities(parameter: &Parameter, choice: &Choice) -> Vec<Intensity> {
 /// operations are active, since conditions switch them. Operations that act before the start or after the end have no
 /// interval.
 pub fn planned(plan: &CampaignPlan, test: &Test) -> Option<Vec<Disturbance>> {
-    let operations = test.operations.iter().map(|it| match &it.activation {
+    let operations = test.operations.iter().map(|operation| match &operation.activation {
         &Activation::Time { start, end } => {
-            let within = plan.operation(it.operation).within;
+            let within = plan.operation(operation.operation).within;
             let (start, end) = (start.max(within.start), end.min(within.end).min(plan.campaign.end_after));
             let intervals = if start < end { vec![Span { start, end }] } else { Vec::new() };
-            Some(disturbance(plan, it.operation, &it.parameters, intervals))
+            Some(disturbance(plan, operation.operation, &operation.parameters, intervals))
         }
-        Activation::Offline => Some(disturbance(plan, it.operation, &it.parameters, Vec::new())),
+        Activation::Offline => Some(disturbance(plan, operation.operation, &operation.parameters, Vec::new())),
         Activation::Condition { .. } | Activation::ConditionFor { .. } => None,
     });
     operations.collect()
@@ -122,7 +122,8 @@ mod tests {
             let operations = vec![effect(first, 1.0, 2.0), effect(second, 5.0, 9.0)];
             let run = Observation { end: 10.0, operations, messages: 100, ..Observation::without_run(outcome) };
             observed_point(&plan, &test, &run).map(|point| {
-                [Dimension::O0, Dimension::T1].map(|it| libm::round(1000.0 * point.get(it).unwrap_or(f64::NAN)))
+                [Dimension::O0, Dimension::T1]
+                    .map(|dimension| libm::round(1000.0 * point.get(dimension).unwrap_or(f64::NAN)))
             })
         };
         assert_eq!(of(Outcome::Completed, 7, 7), Some([2000.0, 425.0]));

@@ -13,7 +13,8 @@ use crate::sspr::{Class, Window, class_of};
 /// [`Feasible`](crate::coverage::Feasible) tells. Where conditions switch operations, any times inside their windows
 /// count as possible.
 pub fn extent(plan: &CampaignPlan, test_space: &TestSpace, dimension: Dimension) -> Option<(f64, f64)> {
-    let timed: Vec<Timing> = test_space.operations().iter().filter_map(|it| Timing::of(plan, it)).collect();
+    let timed: Vec<Timing> =
+        test_space.operations().iter().filter_map(|operation| Timing::of(plan, operation)).collect();
     if timed.is_empty() {
         return None;
     }
@@ -25,19 +26,21 @@ pub fn extent(plan: &CampaignPlan, test_space: &TestSpace, dimension: Dimension)
     let least = |of: fn(&Timing) -> f64| timed.iter().map(of).fold(f64::INFINITY, f64::min);
     let greatest = |of: fn(&Timing) -> f64| timed.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
     let midpoints = (
-        least(|it| it.window.start + it.window.shortest / 2.0),
-        greatest(|it| it.window.end - it.window.shortest / 2.0),
+        least(|timing| timing.window.start + timing.window.shortest / 2.0),
+        greatest(|timing| timing.window.end - timing.window.shortest / 2.0),
     );
     let several = most > 1 || by_condition;
     match dimension {
         Dimension::T1 => Some(midpoints),
-        Dimension::T2 => Some((least(|it| it.window.shortest), greatest(|it| it.window.end - it.window.start))),
+        Dimension::T2 => {
+            Some((least(|timing| timing.window.shortest), greatest(|timing| timing.window.end - timing.window.start)))
+        }
         Dimension::T3 => Some((0.0, if several { (midpoints.1 - midpoints.0) / 2.0 } else { 0.0 })),
         Dimension::P1 => shares(plan, test_space).into_iter().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))),
         Dimension::P2 => {
             let all = shares(plan, test_space);
             let (low, high) = all.iter().copied().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
-            let several = most > 1 || timed.iter().any(|it| it.numbers > 1);
+            let several = most > 1 || timed.iter().any(|timing| timing.numbers > 1);
             Some((0.0, if several { (high - low) / 2.0 } else { 0.0 }))
         }
         Dimension::O0 => Some((fewest as f64, most as f64)),
@@ -64,8 +67,9 @@ impl Timing {
 
 /// Between what each number of the operations lies that are active during the run, as a share of what is permitted.
 fn shares(plan: &CampaignPlan, test_space: &TestSpace) -> Vec<(f64, f64)> {
-    let active = test_space.operations().iter().filter(|it| !plan.operation(it.operation).kind.is_offline());
-    active.flat_map(|it| it.parameters.iter().flat_map(shares_of)).collect()
+    let active =
+        test_space.operations().iter().filter(|operation| !plan.operation(operation.operation).kind.is_offline());
+    active.flat_map(|operation| operation.parameters.iter().flat_map(shares_of)).collect()
 }
 
 fn shares_of(parameter: &ParameterSpace) -> Vec<(f64, f64)> {
@@ -78,7 +82,7 @@ fn shares_of(parameter: &ParameterSpace) -> Vec<(f64, f64)> {
 
 /// How many operations of a class a test can have.
 fn counted(timed: &[Timing], class: Class, fewest: usize, most: usize) -> (f64, f64) {
-    let of_class = timed.iter().filter(|it| it.class == class).count();
+    let of_class = timed.iter().filter(|timing| timing.class == class).count();
     let least = if of_class == timed.len() { fewest } else { 0 };
     let greatest = if of_class > 0 { most } else { 0 };
     (least as f64, greatest as f64)

@@ -39,16 +39,19 @@ fn performed(text: &str, campaign: &str) -> Vec<Performed> {
     let named = |node: &Node<'_, '_>, tag: &str| node.tag_name().name() == tag;
     let id = ("http://www.omg.org/XMI", "id");
     let bounds = |operation: &Node<'_, '_>| {
-        let activation = operation.children().find(|it| named(it, "activation")).expect("an operation has a window");
-        let values = operation.children().find(|it| named(it, "valueSet")).expect("an operation has a range");
+        let activation =
+            operation.children().find(|element| named(element, "activation")).expect("an operation has a window");
+        let values = operation.children().find(|element| named(element, "valueSet")).expect("an operation has a range");
         let window = Span { start: number(&activation, "startTime"), end: number(&activation, "endTime") };
         (window, (number(&values, "lowerBound"), number(&values, "upperBound")))
     };
-    let found = document.descendants().find(|it| named(it, "campaigns") && it.attribute("name") == Some(campaign));
-    let tests = found.expect("the campaign is there").children().filter(|it| named(it, "performedTests"));
+    let found = document
+        .descendants()
+        .find(|element| named(element, "campaigns") && element.attribute("name") == Some(campaign));
+    let tests = found.expect("the campaign is there").children().filter(|element| named(element, "performedTests"));
     let disturbance = |operation: Node<'_, '_>| {
         let template = operation.attribute("fromTemplate").expect("an operation comes from a template");
-        let template = document.descendants().find(|it| it.attribute(id) == Some(template));
+        let template = document.descendants().find(|element| element.attribute(id) == Some(template));
         let (window, permitted) = bounds(&template.expect("the template is there"));
         let (interval, chosen) = bounds(&operation);
         let parameters = vec![Intensity { permitted, chosen, shape: Shape::Range }];
@@ -57,7 +60,7 @@ fn performed(text: &str, campaign: &str) -> Vec<Performed> {
     tests
         .map(|test| Performed {
             name: test.attribute("name").expect("a test has a name").to_owned(),
-            disturbances: test.children().filter(|it| named(it, "operations")).map(disturbance).collect(),
+            disturbances: test.children().filter(|element| named(element, "operations")).map(disturbance).collect(),
         })
         .collect()
 }

@@ -107,7 +107,7 @@ fn strategies_by_condition_draw_permitted_tests_only() {
 /// Also with more operations than places, where `random` repeated none, and `sobol` and `latin_hypercube` did in a
 /// quarter of their tests.
 #[test]
-fn fresh_tests_hold_copies_as_often_whatever_draws_them() {
+fn fresh_tests_contain_copies_equally_often_with_each_strategy() {
     let evaluations = 2_000;
     for copies in [Copies::Apart, Copies::MayOverlap] {
         let shares = [

@@ -63,9 +63,9 @@ proptest! {
         prop_assert_eq!(stream.given, whole);
     }
 
-    /// Of whatever else comes, no more is taken than a greeting may be long, and what is taken for one is one.
+    /// Of other bytes, no more are read than the longest greeting has, and only a greeting is accepted.
     #[test]
-    fn whatever_comes_no_more_is_taken_than_a_greeting_may_be_long(
+    fn no_more_is_read_than_the_longest_greeting(
         length in prop_oneof![any::<u32>(), 0u32..1100],
         body in proptest::collection::vec(any::<u8>(), 0..2000),
         parts in proptest::collection::vec(1usize..400, 0..60),

@@ -1,4 +1,4 @@
-//! Campaigns without processes: an executor in this thread, which ends tests in whatever order it is told to.
+//! Campaigns without processes: an executor in this thread, which ends tests in the order that it is told.
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;

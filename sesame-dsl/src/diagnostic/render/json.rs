@@ -5,23 +5,8 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use crate::diagnostic::{Diagnostic, Severity, hidden};
+use crate::place::Place;
 use crate::source::SourceMap;
-use crate::span::Span;
-
-/// A place in a file: bytes from 0, lines and columns (in characters) from 1; the end is exclusive.
-#[derive(Serialize)]
-struct Place<'a> {
-    file: &'a str,
-    start: Position,
-    end: Position,
-}
-
-#[derive(Serialize)]
-struct Position {
-    byte: u32,
-    line: u32,
-    column: u32,
-}
 
 #[derive(Serialize)]
 struct Label<'a> {
@@ -54,14 +39,7 @@ struct Edit<'a> {
 
 /// One JSON object per line and diagnostic.
 pub fn json(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
-    let place = |span: Span| {
-        let file = sources.file(span.file);
-        let position = |byte| {
-            let at = file.position(byte);
-            Position { byte, line: at.line, column: at.column }
-        };
-        Place { file: file.name(), start: position(span.lo), end: position(span.hi) }
-    };
+    let place = |span| Place::new(sources, span);
     let mut out = String::new();
     for diagnostic in diagnostics {
         let line = Line {

@@ -10,7 +10,8 @@ pub(super) fn for_terminals(diagnostic: &Diagnostic) -> Diagnostic {
     let texts = [&mut shown.title, &mut shown.label].into_iter();
     let texts = texts.chain(shown.secondary.iter_mut().map(|(_, label)| label)).chain(&mut shown.notes);
     let suggested = shown.suggestions.iter_mut();
-    let suggested = suggested.flat_map(|it| it.edits.iter_mut().map(|(_, text)| text).chain([&mut it.message]));
+    let suggested = suggested
+        .flat_map(|suggestion| suggestion.edits.iter_mut().map(|(_, text)| text).chain([&mut suggestion.message]));
     for text in texts.chain(suggested) {
         if let Cow::Owned(cleaned) = visible(text) {
             *text = cleaned;

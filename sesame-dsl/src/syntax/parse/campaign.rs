@@ -38,7 +38,8 @@ impl Reader<'_> {
                 Rule::observes => campaign.observes.push((span, reader.names(&member))),
                 Rule::operations => {
                     let count = expect_child(&member, Rule::count);
-                    let counts: Vec<Count> = children(&count, Rule::number).map(|it| reader.count(&it)).collect();
+                    let counts: Vec<Count> =
+                        children(&count, Rule::number).map(|number| reader.count(&number)).collect();
                     let min = *counts.first().expect("a count has a number");
                     let max = *counts.last().expect("a count has a number");
                     let copies = [(Rule::may_overlap, Copies::MayOverlap), (Rule::at_most_once, Copies::Once)];

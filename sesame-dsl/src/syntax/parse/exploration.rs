@@ -39,7 +39,8 @@ impl Reader<'_> {
         let mut boost = empty(span, kind);
         boost.has_errors = self.members(&expect_child(pair, Rule::boost_settings), |reader, setting| {
             let span = reader.keyword_span(&setting);
-            let mut counts = children(&setting, Rule::number).map(|it| reader.count(&it)).collect::<Vec<Count>>();
+            let mut counts =
+                children(&setting, Rule::number).map(|number| reader.count(&number)).collect::<Vec<Count>>();
             let last = counts.pop().expect("a setting of `boost` has a number");
             match setting.as_rule() {
                 Rule::boost_generations => boost.generations.push((span, last)),

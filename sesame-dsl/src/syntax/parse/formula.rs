@@ -147,7 +147,7 @@ impl Reader<'_> {
         let operand = pair
             .clone()
             .into_inner()
-            .find(|it| !matches!(it.as_rule(), Rule::minus | Rule::paren_open | Rule::COMMENT))
+            .find(|pair| !matches!(pair.as_rule(), Rule::minus | Rule::paren_open | Rule::COMMENT))
             .expect("a factor has an operand");
         let kind = match operand.as_rule() {
             Rule::quantity => ExpressionKind::Number(self.quantity(&operand)),
@@ -164,7 +164,8 @@ impl Reader<'_> {
             Rule::call => {
                 let function = expect_child(&operand, Rule::function);
                 let name = Name { text: function.as_str().to_owned(), span: self.span(&function) };
-                let arguments = children(&operand, Rule::expression).map(|it| self.expression(&it)).collect();
+                let arguments =
+                    children(&operand, Rule::expression).map(|argument| self.expression(&argument)).collect();
                 ExpressionKind::Call(name, arguments)
             }
             Rule::path => ExpressionKind::Field(self.path(&operand)),

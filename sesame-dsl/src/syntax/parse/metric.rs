@@ -17,7 +17,9 @@ impl Reader<'_> {
         let directions = directions.collect();
         let mut values = |rule| {
             let clauses = children(pair, rule);
-            clauses.map(|it| (self.keyword_span(&it), self.signed(&expect_child(&it, Rule::signed)))).collect()
+            clauses
+                .map(|clause| (self.keyword_span(&clause), self.signed(&expect_child(&clause, Rule::signed))))
+                .collect()
         };
         let defaults = values(Rule::default_value);
         let initials = values(Rule::initial_value);

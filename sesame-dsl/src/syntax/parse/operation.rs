@@ -41,7 +41,9 @@ impl Reader<'_> {
         let kind = self.operation_kind(pair);
         let mut signed = |rule| {
             let clauses = children(pair, rule);
-            clauses.map(|it| (self.keyword_span(&it), self.signed(&expect_child(&it, Rule::signed)))).collect()
+            clauses
+                .map(|clause| (self.keyword_span(&clause), self.signed(&expect_child(&clause, Rule::signed))))
+                .collect()
         };
         let priority = signed(Rule::priority);
         let inclusion = signed(Rule::inclusion);

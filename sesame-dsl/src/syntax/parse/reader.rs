@@ -54,7 +54,7 @@ pub(super) fn comparison(pair: &Pair<'_>) -> Option<Comparison> {
 fn end_of(pair: &Pair<'_>) -> usize {
     let last = pair.clone().into_inner().rfind(|inner| inner.as_rule() != Rule::COMMENT);
     match last {
-        // The closing quote is no pair.
+        // The closing quote is not a pair.
         Some(_) if pair.as_rule() == Rule::text => pair.as_span().end(),
         Some(last) => end_of(&last),
         None => pair.as_span().end(),

@@ -33,7 +33,7 @@ subprocess.run(["sh", "-c", "setsid sleep 1000 &"])
 
 
 def listen():
-    """The next order; nothing once the input is closed, whatever was awaited."""
+    """The next order; None once the input is closed."""
     return json.loads(sys.stdin.readline() or "null")
 
 
@@ -50,7 +50,7 @@ while order := listen():
     push = sum(message["value"] for message in heard["deliver"])
     if FAULT == "hang" and push > 0:
         time.sleep(1000)
-    if FAULT == "killed undisturbed" or (FAULT == "killed" and push > 0):
+    if FAULT == "killed without disturbance" or (FAULT == "killed" and push > 0):
         os.kill(os.getpid(), signal.SIGKILL)
     say({"done": {"messages": [{"topic": "gusty/harm", "value": push * gust}]}})
 

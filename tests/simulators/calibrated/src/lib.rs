@@ -16,7 +16,7 @@ impl Simulator for Calibrated {
     fn start(_: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../calibration.txt");
         let text = std::fs::read_to_string(file).map_err(|error| SimulatorError(error.to_string()))?;
-        let gain = text.trim().parse().map_err(|_| SimulatorError(format!("`{text}` is no gain")))?;
+        let gain = text.trim().parse().map_err(|_| SimulatorError(format!("`{text}` is not a gain")))?;
         let path = bus.open("path");
         bus.subscribe(path);
         let gains = bus.open("gain");

@@ -13,7 +13,7 @@ const UP: (f64, f64) = (0.27, 0.29);
 const DOWN: (f64, f64) = (-0.29, -0.27);
 
 fn main() {
-    undisturbed();
+    without_disturbance();
     println!("\n## Long jitter\n");
     println!("| joint | offset, rad | window, s | collisions | top speed, m/s | approach, mm | cycle, s |");
     println!("|---|---|---|---|---|---|---|");
@@ -48,9 +48,9 @@ fn main() {
     }
 }
 
-fn undisturbed() {
+fn without_disturbance() {
     let bench = run::<Cell>(0, &[]);
-    println!("## Undisturbed\n\n{:?}\n", outcome(&bench));
+    println!("## Without disturbance\n\n{:?}\n", outcome(&bench));
     println!("| zone | smallest level, mm | at, s | below 300 mm during, s |\n|---|---|---|---|");
     let pairs = ["ZR270073", "ZR270072", "ZR270073R270072"];
     for name in ZONES.iter().map(|zone| zone.name).chain(pairs) {

@@ -1,6 +1,7 @@
-//! What is said of a simulator that cannot be started, or closes its output.
+//! What is said of a simulator that cannot be started, or has a fault.
 
 use crate::lifecycle::{PostMortem, Program, Running, StartError};
+use crate::transport::process::session::Fault;
 use crate::transport::{Incidents, TransportError};
 
 impl From<StartError> for TransportError {
@@ -9,20 +10,29 @@ impl From<StartError> for TransportError {
     }
 }
 
-/// The error about a simulator that closed its output although something was awaited.
-pub(super) fn disconnected(
+/// The error for a fault of a simulator whose process was `running` and is never used again.
+pub(super) fn explain(
     program: &Program,
     running: Option<Running>,
-    awaited: String,
+    fault: Fault,
     incidents: &mut Incidents,
 ) -> TransportError {
-    let Some(running) = running else { unreachable!("only a connected simulator can disconnect") };
-    let PostMortem { how, last_lines, killed } = running.post_mortem();
-    incidents.killed |= killed;
-    TransportError::Disconnected { command: program.shown(), how, awaited, last_lines }
+    match fault {
+        Fault::Disconnected(awaited) => {
+            let Some(running) = running else { unreachable!("only a connected simulator can disconnect") };
+            let PostMortem { how, last_lines, killed } = running.post_mortem();
+            incidents.killed |= killed;
+            TransportError::Disconnected { command: program.shown(), how, awaited, last_lines }
+        }
+        Fault::Wrong(error) => error,
+    }
 }
 
-/// The note about a simulator that was restarted, because of a fault that may belong to the previous test.
-pub(super) fn restarted(reason: &TransportError) -> String {
-    format!("the simulator was restarted before this test, because of a fault after the previous one: {reason}")
+/// Notes that a simulator is restarted because of a fault that may belong to the previous test. That its old process
+/// was killed does not concern this test.
+pub(super) fn note_restart(program: &Program, running: Option<Running>, fault: Fault, incidents: &mut Incidents) {
+    let reason = explain(program, running, fault, &mut Incidents::default());
+    incidents.notes.push(format!(
+        "the simulator was restarted before this test, because of a fault after the previous one: {reason}"
+    ));
 }

@@ -20,7 +20,7 @@ use sesame_plan::CampaignPlan;
 use crate::lifecycle::{Input, Program, Running};
 use crate::relay::Exchange;
 use crate::simulator::Progress;
-use crate::transport::process::fault::{disconnected, restarted};
+use crate::transport::process::fault::{explain, note_restart};
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Read, SimulatorMessage, read_line, request};
 use crate::transport::process::session::{Fault, Topics};
 use crate::transport::{Capabilities, Incidents, Transport, TransportError};
@@ -74,17 +74,19 @@ impl FreeRunning {
         }
     }
 
-    /// The error for a fault. The connection is closed: a simulator is never used after a fault.
-    fn explain(&mut self, fault: Fault) -> TransportError {
-        let running = self.connection.take().map(|connection| {
+    /// Closes the connection, and returns the process.
+    fn disconnect(&mut self) -> Option<Running> {
+        self.connection.take().map(|connection| {
             // The simulator may be waiting for the end of its input.
             drop(connection.input);
             connection.running
-        });
-        match fault {
-            Fault::Disconnected(awaited) => disconnected(&self.program, running, awaited, &mut self.incidents),
-            Fault::Wrong(error) => error,
-        }
+        })
+    }
+
+    /// The error for a fault. The connection is closed: a simulator is never used after a fault.
+    fn explain(&mut self, fault: Fault) -> TransportError {
+        let running = self.disconnect();
+        explain(&self.program, running, fault, &mut self.incidents)
     }
 
     /// Begins a run with the existing process, or with a new one.
@@ -244,10 +246,8 @@ impl Transport for FreeRunning {
         if self.connection.is_some() {
             // A fault of a process that was used before may belong to the previous run.
             let Err(fault) = self.begin(seed, relay) else { return Ok(()) };
-            let killed = self.incidents.killed;
-            let reason = self.explain(fault);
-            self.incidents.killed = killed;
-            self.incidents.notes.push(restarted(&reason));
+            let running = self.disconnect();
+            note_restart(&self.program, running, fault, &mut self.incidents);
         }
         self.begin(seed, relay).map_err(|fault| self.explain(fault))
     }

@@ -16,7 +16,7 @@ use sesame_plan::CampaignPlan;
 use crate::lifecycle::{Input, Program, Running};
 use crate::relay::Exchange;
 use crate::simulator::Progress;
-use crate::transport::process::fault::{disconnected, restarted};
+use crate::transport::process::fault::{explain, note_restart};
 use crate::transport::process::session::{Fault, Session};
 use crate::transport::{Capabilities, Incidents, Transport, TransportError};
 
@@ -55,17 +55,19 @@ impl LockStepped {
         }
     }
 
-    /// The error for a fault. The connection is closed: a simulator is never used after a fault.
-    fn explain(&mut self, fault: Fault) -> TransportError {
-        let running = self.connection.take().map(|Connection { session, running, .. }| {
+    /// Closes the connection, and returns the process.
+    fn disconnect(&mut self) -> Option<Running> {
+        self.connection.take().map(|Connection { session, running, .. }| {
             // The simulator may be waiting for the end of its input.
             drop(session);
             running
-        });
-        match fault {
-            Fault::Disconnected(awaited) => disconnected(&self.program, running, awaited, &mut self.incidents),
-            Fault::Wrong(error) => error,
-        }
+        })
+    }
+
+    /// The error for a fault. The connection is closed: a simulator is never used after a fault.
+    fn explain(&mut self, fault: Fault) -> TransportError {
+        let running = self.disconnect();
+        explain(&self.program, running, fault, &mut self.incidents)
     }
 
     /// Begins a run with the existing process, or with a new one.
@@ -127,11 +129,8 @@ impl Transport for LockStepped {
                     Err(fault) => fault,
                 },
             };
-            let killed = self.incidents.killed;
-            let why = self.explain(fault);
-            // That the old process was killed does not concern this run.
-            self.incidents.killed = killed;
-            self.incidents.notes.push(restarted(&why));
+            let running = self.disconnect();
+            note_restart(&self.program, running, fault, &mut self.incidents);
         }
         self.begin(seed, relay).map_err(|fault| self.explain(fault))
     }

@@ -148,7 +148,7 @@ pub(super) fn read_line(reader: &mut impl BufRead, limit: usize, line: &mut Vec<
         let available = match reader.fill_buf() {
             Ok(available) => available,
             Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-            // The other end is closed, whatever error the system reports.
+            // The other end is closed; errors differ between systems.
             Err(_) => return Read::End,
         };
         if available.is_empty() {

@@ -98,7 +98,7 @@ fn crash(step: &str) -> Option<String> {
     let mut python = python_of(&format!("{FRAME}{step}"))?;
     match run(&mut python.transport, 1).outcome {
         Outcome::Crash { message } => Some(message),
-        other => panic!("{other:?} is no crash"),
+        other => panic!("{other:?} is not a crash"),
     }
 }
 
@@ -295,7 +295,7 @@ fn a_program_that_is_not_there_is_named() {
         let mut transport = stepped(&plan_of(program, &["a b", "c"]), folder.to_owned());
         match run(&mut transport, 1).outcome {
             Outcome::Crash { message } => message.replace(&*folder.to_string_lossy(), "FOLDER"),
-            other => panic!("{other:?} is no crash"),
+            other => panic!("{other:?} is not a crash"),
         }
     };
     std::fs::write(folder.path().join("data"), "").unwrap();
@@ -319,7 +319,7 @@ fn closing_ends_what_the_simulator_started_too() {
     let id = rustix::process::Pid::from_raw(id).unwrap();
     assert!(rustix::process::test_kill_process(id).is_ok(), "it lives as long as the simulator");
     python.transport.close();
-    // Killed it is; whoever inherited it may take a moment to notice.
+    // It is killed; the process that inherited it may need a moment to notice.
     let gone = || {
         let status = std::fs::read_to_string(format!("/proc/{}/stat", id.as_raw_pid())).unwrap_or_default();
         rustix::process::test_kill_process(id).is_err() || status.contains(") Z ")

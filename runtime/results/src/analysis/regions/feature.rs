@@ -40,11 +40,11 @@ pub(super) fn features(plan: &CampaignPlan) -> Vec<Feature> {
 /// The numbers of a test, a NaN for one that it does not have.
 pub(super) fn numbers(plan: &CampaignPlan, features: &[Feature], test: &ScannedTest) -> Vec<f64> {
     let point = test.point(plan, Convention::Ours);
-    let of = |id: OperationId| test.operations.iter().filter(move |it| it.operation == id);
+    let of = |id: OperationId| test.operations.iter().filter(move |operation| operation.operation == id);
     let spans = |id: OperationId| {
-        of(id).flat_map(|it| match it.planned {
+        of(id).flat_map(|operation| match operation.planned {
             Some(planned) => vec![planned],
-            None => it.intervals.clone(),
+            None => operation.intervals.clone(),
         })
     };
     let number = |feature: &Feature| match *feature {
@@ -52,10 +52,13 @@ pub(super) fn numbers(plan: &CampaignPlan, features: &[Feature], test: &ScannedT
         Feature::Count(id) => Some(of(id).count() as f64),
         Feature::Start(id) => mean(spans(id).map(|span| span.start)),
         Feature::Length(id) => mean(spans(id).map(Span::length)),
-        Feature::Share(id) => mean(of(id).flat_map(|it| {
-            let disturbance = disturbance(plan, id, &it.choices, Vec::new());
+        Feature::Share(id) => mean(of(id).flat_map(|operation| {
+            let disturbance = disturbance(plan, id, &operation.choices, Vec::new());
             let class = disturbance.class;
-            disturbance.parameters.into_iter().filter_map(move |it| it.normalised(class, Convention::Ours))
+            disturbance
+                .parameters
+                .into_iter()
+                .filter_map(move |parameter| parameter.normalised(class, Convention::Ours))
         })),
     };
     features.iter().map(|feature| number(feature).unwrap_or(f64::NAN)).collect()

@@ -235,7 +235,8 @@ fn the_counts_of_each_rule_are_those_of_the_tests_that_it_describes() {
                     "crash" => Some(matches!(row.outcome, Outcome::Crash { .. })),
                     "timeout" => Some(matches!(row.outcome, Outcome::Timeout { .. })),
                     name => {
-                        let requirement = repository.plan().requirements.iter().find(|it| it.name == name).unwrap();
+                        let requirement =
+                            repository.plan().requirements.iter().find(|requirement| requirement.name == name).unwrap();
                         match row.verdict(requirement) {
                             Verdict::Violated => Some(true),
                             Verdict::Satisfied => Some(false),

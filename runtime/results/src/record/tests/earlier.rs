@@ -150,7 +150,7 @@ fn a_schema_has_its_own_words_and_no_others() {
     for (fixture, sql, words) in changes {
         let folder = of_earlier(fixture);
         change(folder.path(), &format!("PRAGMA ignore_check_constraints = 1; {sql}"));
-        let said = Repository::open(folder.path()).and_then(|it| it.tests()).unwrap_err().to_string();
+        let said = Repository::open(folder.path()).and_then(|repository| repository.tests()).unwrap_err().to_string();
         assert!(said.contains(words), "{said}");
     }
 }

@@ -224,7 +224,7 @@ fn a_killed_run_whose_log_was_written_last_is_the_latest_and_the_one_to_go_on_wi
 fn reading_an_older_run_does_not_make_it_the_latest() {
     let results = folder();
     let [older, newer] = ["7", "8"].map(|name| results.path().join(name));
-    // Interrupted in good order: a database that wants a log, and none beside it.
+    // Interrupted in an orderly way: a database in write-ahead mode without a log beside it.
     commit_all(&older, &[]).interrupt().unwrap();
     age(&older, 500);
     commit_all(&newer, &[]).interrupt().unwrap();

@@ -269,7 +269,8 @@ mod tests {
     fn recorded(most: usize) -> (tempfile::TempDir, Repository) {
         let plan = sample::plan();
         let found = sample::records(&plan, 60);
-        let fails_r1 = |record: &TestRecord| record.observation.metrics.first().and_then(|it| it.value) > Some(0.0);
+        let fails_r1 =
+            |record: &TestRecord| record.observation.metrics.first().and_then(|metric| metric.value) > Some(0.0);
         let found = found.iter().find(|record| record.number > 20 && fails_r1(record)).unwrap();
         assert!(found.test.operations.len() > 1);
         let failing = Failing::Violation { requirements: vec![RequirementId(0)] };

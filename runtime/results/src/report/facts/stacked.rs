@@ -42,9 +42,10 @@ impl Stacked {
         let sums: Vec<String> = self
             .sums
             .iter()
-            .map(|it| {
-                let [sum, declared] = [it.up_to, it.declared].map(|value| number::quantity(value, it.unit.as_deref()));
-                format!("{} up to {sum}, declared up to {declared}", it.parameter)
+            .map(|summed| {
+                let [sum, declared] =
+                    [summed.up_to, summed.declared].map(|value| number::quantity(value, summed.unit.as_deref()));
+                format!("{} up to {sum}, declared up to {declared}", summed.parameter)
             })
             .collect();
         let colon = if sums.is_empty() { "" } else { ": " };
@@ -54,7 +55,8 @@ impl Stacked {
 
 /// The operations whose copies acted at the same time in a recorded test.
 pub(crate) fn stacked_in(plan: &CampaignPlan, record: &TestRecord) -> Vec<Stacked> {
-    let observed: Vec<&[Span]> = record.observation.operations.iter().map(|it| it.intervals.as_slice()).collect();
+    let observed: Vec<&[Span]> =
+        record.observation.operations.iter().map(|operation| operation.intervals.as_slice()).collect();
     stacked(plan, &record.test, &observed)
 }
 
@@ -159,7 +161,8 @@ mod tests {
             parameters: vec![Choice::Range { low, high }],
             operation_seed: 0,
         });
-        let spans = drawn.iter().map(|it| it.2.iter().map(|&(start, end)| Span { start, end }).collect());
+        let spans =
+            drawn.iter().map(|disturbance| disturbance.2.iter().map(|&(start, end)| Span { start, end }).collect());
         (Test { operations: operations.collect() }, spans.collect())
     }
 
@@ -177,10 +180,10 @@ mod tests {
                 for moment in 0..12 {
                     let now = f64::from(moment) + 0.5;
                     let active: Vec<&Drawn> =
-                        drawn.iter().filter(|it| it.0 == id && it.2.iter().any(|&(a, b)| a <= now && now < b)).collect();
+                        drawn.iter().filter(|disturbance| disturbance.0 == id && disturbance.2.iter().any(|&(a, b)| a <= now && now < b)).collect();
                     if active.len() > 1 {
                         most = most.max(active.len());
-                        let [low, high] = [active.iter().map(|it| it.1.0).sum::<f64>(), active.iter().map(|it| it.1.1).sum()];
+                        let [low, high] = [active.iter().map(|disturbance| disturbance.1.0).sum::<f64>(), active.iter().map(|disturbance| disturbance.1.1).sum()];
                         up_to = up_to.max(low.abs()).max(high.abs());
                     }
                 }

@@ -277,7 +277,7 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
         once: rows
             .iter()
             .filter(|row| counts_as_test(row) && judge.runs(row.number).is_empty())
-            .filter(|row| plan.requirements.iter().any(|it| row.verdict(it) == Verdict::Violated))
+            .filter(|row| plan.requirements.iter().any(|requirement| row.verdict(requirement) == Verdict::Violated))
             .count(),
         spreads: spreads(plan, rows),
         coverage: coverage(repository)?,
@@ -333,7 +333,7 @@ fn front(
     let key = objectives.iter().position(|objective| bounded(&objective)).unwrap_or(0);
     let danger = |row: &TestRow| -> f64 {
         let value = values(row).get(key).copied().flatten().unwrap_or(f64::NAN);
-        let minimise = objectives.get(key).is_some_and(|it| it.direction == Some(Direction::Minimise));
+        let minimise = objectives.get(key).is_some_and(|objective| objective.direction == Some(Direction::Minimise));
         if minimise { -value } else { value }
     };
     let members: BTreeSet<u32> = members.iter().copied().collect();

@@ -65,8 +65,9 @@ fn over_evaluations(markup: &mut Markup, coverage: &CoverageSummary, published: 
         markup.close();
     }
     let begin = std::iter::once((0.0, 0.0));
-    let own: Vec<(f64, f64)> =
-        begin.chain(coverage.curve.iter().map(|it| (f64::from(it.evaluations), 100.0 * it.coverage))).collect();
+    let own: Vec<(f64, f64)> = begin
+        .chain(coverage.curve.iter().map(|point| (f64::from(point.evaluations), 100.0 * point.coverage)))
+        .collect();
     let tracking = TRACKING.map(|(evaluations, cells)| (evaluations, percent_of(cells)));
     let lines: [(&str, &[(f64, f64)]); 2] = [("line published", &tracking), ("line", &own)];
     chart::steps(markup, &across, &up, if published { &lines } else { &lines[1..] });

@@ -51,7 +51,7 @@ pub(crate) fn generations(
             _ => analysis.generations.push(it),
         }
     }
-    analysis.generations.retain(|it| it.evaluations.is_some());
+    analysis.generations.retain(|generation| generation.evaluations.is_some());
     if analysis.generations.len() < 2 {
         return Ok(());
     }
@@ -73,7 +73,7 @@ fn caption(analysis: &IndicatorAnalysis) -> String {
             analysis.reference.iter().map(|(metric, value)| format!("{metric} {}", number::number(*value))).collect();
         let _ = write!(text, "Hypervolumes are measured from {}; more is better. ", number::join_words(&point));
     }
-    if analysis.generations.iter().any(|it| it.standard_error.is_some()) {
+    if analysis.generations.iter().any(|generation| generation.standard_error.is_some()) {
         let share = |it: &Indicator| it.hypervolume.zip(it.standard_error).map(|(volume, error)| error / volume);
         let worst = analysis.generations.iter().filter_map(share).fold(0.0, f64::max);
         let _ = write!(
@@ -98,9 +98,14 @@ type Line<'a> = (&'static str, &'static str, &'a dyn Fn(&Indicator) -> Option<f6
 type DrawnLine = (&'static str, &'static str, Vec<(f64, f64)>);
 
 fn charts(markup: &mut Markup, analysis: &IndicatorAnalysis) {
-    chart(markup, analysis, HYPERVOLUME, &[("line", HYPERVOLUME, &|it| it.hypervolume)]);
-    chart(markup, analysis, "IGD⁺ to the final front", &[("line", "IGD⁺", &|it| it.igd_plus)]);
-    chart(markup, analysis, "tests on the front", &[("line", "on the front", &|it| Some(f64::from(it.front)))]);
+    chart(markup, analysis, HYPERVOLUME, &[("line", HYPERVOLUME, &|generation| generation.hypervolume)]);
+    chart(markup, analysis, "IGD⁺ to the final front", &[("line", "IGD⁺", &|generation| generation.igd_plus)]);
+    chart(
+        markup,
+        analysis,
+        "tests on the front",
+        &[("line", "on the front", &|generation| Some(f64::from(generation.front)))],
+    );
     let share = |count: Option<u32>, it: &Indicator| {
         let all = it.evaluations.filter(|&all| all > 0)?;
         Some(100.0 * f64::from(count?) / f64::from(all))
@@ -125,8 +130,11 @@ fn chart(markup: &mut Markup, analysis: &IndicatorAnalysis, title: &str, lines: 
     let place = |it: &Indicator| f64::from(it.evaluations.unwrap_or_default());
     let mut drawn: Vec<DrawnLine> = Vec::new();
     for &(class, name, value) in lines {
-        let points: Vec<(f64, f64)> =
-            analysis.generations.iter().filter_map(|it| Some((place(it), value(it)?))).collect();
+        let points: Vec<(f64, f64)> = analysis
+            .generations
+            .iter()
+            .filter_map(|generation| Some((place(generation), value(generation)?)))
+            .collect();
         if points.iter().any(|point| point.1 != 0.0) {
             drawn.push((class, name, evenly(&points, POINTS)));
         }
@@ -211,7 +219,7 @@ fn fronts(
     }
     let members: Vec<(&TestRow, Stay)> =
         stays.iter().filter_map(|(number, stay)| Some((row_of(rows, *number)?, *stay))).collect();
-    let told: Vec<String> = shown.iter().map(|it| format!("[{},{}]", it.generation, it.members.len())).collect();
+    let told: Vec<String> = shown.iter().map(|set| format!("[{},{}]", set.generation, set.members.len())).collect();
     let told = format!("[{}]", told.join(","));
     markup.open("div", &[("class", "fronts"), ("data-fronts", &told)]);
     let pairs: Vec<(usize, usize)> =

@@ -34,7 +34,7 @@ pub(super) fn header(
         (Task::Shrink(shrinking), _) => format!("{} at most", budget(&format!("{} shrunk", shrinking.name))),
         (Task::Campaign, Search::Repeat { .. }) | (Task::Repeat { .. }, _) => {
             let repeated = facts.task.repeated(plan);
-            repeated.map_or_else(String::new, |it| format!("{} repeated {} times", it.name, it.times))
+            repeated.map_or_else(String::new, |repeated| format!("{} repeated {} times", repeated.name, repeated.times))
         }
     };
     let search = match plan.campaign.coverage.as_ref().and_then(|goal| goal.stop_at) {

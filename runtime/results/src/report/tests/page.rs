@@ -132,12 +132,13 @@ fn the_map_of_cells_has_all_that_its_script_shows() {
     let summary = summary(&repository).unwrap().coverage.unwrap();
     let hits: u64 = data["hit"].as_array().unwrap().iter().map(|row| row[1].as_u64().unwrap()).sum();
     assert_eq!(data["hit"].as_array().unwrap().len(), summary.covered);
-    let reach: Vec<u64> = data["reach"].as_array().unwrap().iter().map(|it| it.as_u64().unwrap()).collect();
+    let reach: Vec<u64> = data["reach"].as_array().unwrap().iter().map(|value| value.as_u64().unwrap()).collect();
     assert_eq!(reach.iter().sum::<u64>(), 108);
     assert_eq!(reach.iter().skip(1).step_by(2).sum::<u64>(), summary.feasible as u64);
     // The worst values are those that a look at every test finds.
     let grid = sesame_search::coverage::Grid::new(plan.campaign.coverage.as_ref().unwrap().axes.clone()).unwrap();
-    let collisions = data["metrics"].as_array().unwrap().iter().position(|it| it["name"] == "collision_occurrence");
+    let collisions =
+        data["metrics"].as_array().unwrap().iter().position(|metric| metric["name"] == "collision_occurrence");
     let column = 2 + 2 * collisions.unwrap();
     let mut counted = 0;
     repository

@@ -24,7 +24,7 @@ fn confirmed() -> (tempfile::TempDir, Repository) {
             let mut values = rows[test as usize].values.clone();
             let mut outcome = Outcome::Completed;
             match (at, position) {
-                (1, 2) => values.iter_mut().for_each(|it| *it = MetricValue::default()),
+                (1, 2) => values.iter_mut().for_each(|value| *value = MetricValue::default()),
                 (2, _) | (4, 2) => {
                     values[0] = MetricValue::whole(Some(0.0), false);
                     values[2] = MetricValue::whole(Some(1.0), true);
@@ -76,7 +76,7 @@ fn the_views_of_findings_agree_with_the_report() {
     let is_failure = |finding: &str| ["crash", "timeout"].contains(&finding);
     let mut told = Vec::new();
     for test in &summary.confirmed {
-        for it in test.findings.iter().filter(|it| !is_failure(&it.finding)) {
+        for it in test.findings.iter().filter(|finding| !is_failure(&finding.finding)) {
             told.push((
                 test.number,
                 it.finding.clone(),

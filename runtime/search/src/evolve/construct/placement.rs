@@ -1,26 +1,25 @@
 //! Construction of tests: the reduction of tests to points, inverted.
 //!
-//! Given a test and a cell, [`CellPlacer::place_in_cell`] changes the test as little as may be so that its point lies
-//! in the cell. The reduction throws away almost everything, so almost everything can stay: how many operations there
-//! are unless the cell counts them, the order of their windows, and of a sub-range its middle, as only its width is
-//! counted.
+//! Given a test and a cell, [`CellPlacer::place_in_cell`] changes the test as little as possible so that its point lies
+//! in the cell. The reduction discards almost everything, so almost everything can stay: the number of operations,
+//! unless the cell counts them; the order of their windows; and the middle of a sub-range, since only its width counts.
 //!
-//! 1. *Numbers of operations* (O0 to O3): operations are added, removed or replaced until all are as the cell wants
-//!    them.
-//! 2. *Timing* (T1 to T3): midpoints first, since they decide how long windows can be. All are moved by one amount
-//!    until T1 is in the cell, and towards the middles of their windows until there is room for lengths as the cell
-//!    wants them (T2); then apart or together until T3 is. Lengths follow, moved by one amount until their mean is in
-//!    the cell, each between the shortest and what its midpoint leaves. What is permitted of midpoints is convex, and
-//!    where they are farthest apart is a vertex of it, as in the computation of feasible cells; so every spread up to
-//!    that is found.
+//! 1. *Numbers of operations* (O0 to O3): operations are added, removed or replaced until all numbers are in the cell.
+//! 2. *Timing* (T1 to T3): midpoints come first, since they limit how long windows can be. All are shifted by the same
+//!    amount until T1 is in the cell, and moved towards the middles of their permitted windows until there is room for
+//!    the lengths that the cell requires (T2); then they are moved apart or together until T3 is in the cell. Then the
+//!    lengths are changed by the same amount until their mean is in the cell, each within the shortest length and the
+//!    longest that its midpoint permits. The permitted midpoints form a convex set, and they are farthest apart at one
+//!    of its vertices, as in the computation of feasible cells; so every spread up to that one is found.
 //! 3. *Intensity* (P1, P2): likewise with the normalised parameters.
 //!
-//! Where copies of one operation must not be active at the same time, its window is divided among them first, in the
-//! order in which they are: each has a part to itself, and whatever is done inside of those is permitted.
+//! Where copies of one operation must not be active at the same time, its window is first divided among them, in their
+//! order: each has a part to itself, and may be placed anywhere in it.
 //!
-//! Attempts begin at the test itself; then at what the computation of feasible cells says of the cell, the numbers of
-//! operations of each kind that reach it; the last ones at fresh tests. What comes out is reduced again and kept only
-//! if it lies in the cell, so whole numbers and rounding can cost an attempt but never put a test into another cell.
+//! The first attempts begin with the test itself, the next ones with the numbers of operations of each kind that
+//! reach the cell according to the computation of feasible cells, and the last ones with fresh tests. The result is
+//! reduced again and kept only if it lies in the cell, so integers and rounding can make an attempt fail but never
+//! put a test into another cell.
 
 mod spread;
 
@@ -36,12 +35,12 @@ use crate::space::test_space::TestSpace;
 use crate::space::test_space::{ActivationSpace, OperationSpace};
 use crate::sspr::{Class, Convention, Point, class_of, planned};
 
-/// Attempts from the test itself, with other random choices each.
+/// Attempts from the test itself, each with different random choices.
 const FROM_THE_TEST: u32 = 4;
-/// Attempts from each way to make up a test that is known to reach the cell.
+/// Attempts from each way to compose a test that is known to reach the cell.
 const FROM_A_WAY: u32 = 2;
-/// How far above the shortest that a cell wants the mean of the lengths can be at least, as a share of what it wants:
-/// midpoints leave as much room. In first attempts, and in later ones, which seek what is hard to reach.
+/// How much room midpoints leave for lengths above the least mean length that the cell requires, as a share of the range
+/// that the cell permits: in first attempts, and in later ones, which look for tests that are hard to reach.
 const SHARES_FOR_LENGTHS: [f64; 2] = [0.02, 1e-4];
 /// Attempts from fresh tests after those.
 const FROM_FRESH: u32 = 4;
@@ -55,12 +54,12 @@ pub(crate) struct CellPlacer {
     copies: Copies,
 }
 
-/// What a cell demands: per dimension of the grid the values from the first up to, not including, the second.
+/// What a cell requires: per dimension of the grid, the lower bound (inclusive) and the upper bound (exclusive).
 struct Demands(Vec<(Dimension, (f64, f64))>);
 
 impl Demands {
     fn of(&self, dimension: Dimension) -> Option<(f64, f64)> {
-        self.0.iter().find(|(it, _)| *it == dimension).map(|(_, ends)| *ends)
+        self.0.iter().find(|(demanded, _)| *demanded == dimension).map(|(_, ends)| *ends)
     }
 
     fn any_of(&self, dimensions: &[Dimension]) -> bool {
@@ -68,7 +67,7 @@ impl Demands {
     }
 }
 
-/// Where a permitted window lies, and an operation's in it, in shares of `within`.
+/// The permitted window of an operation and its chosen window inside it, both as shares of `within`.
 struct Window {
     at: usize,
     low: f64,
@@ -78,7 +77,7 @@ struct Window {
     end: f64,
 }
 
-/// A number that an operation's parameters count with.
+/// A number of an operation's parameters that counts in P1 and P2.
 struct Number {
     operation: usize,
     parameter: usize,
@@ -91,7 +90,7 @@ impl CellPlacer {
         CellPlacer { test_space, grid, feasible, copies }
     }
 
-    /// A permitted test in a cell, like the given one; `None` where none was found.
+    /// A permitted test in a cell, similar to the given one; `None` if none was found.
     pub(crate) fn place_in_cell(
         &self,
         test: &Test,
@@ -123,8 +122,8 @@ impl CellPlacer {
         })
     }
 
-    /// The test with windows and parameters moved into the cell, if that was found.
-    #[expect(clippy::too_many_arguments, reason = "all that an attempt goes by")]
+    /// The test with windows and parameters moved into the cell; `None` if this attempt failed.
+    #[expect(clippy::too_many_arguments, reason = "everything that an attempt depends on")]
     fn finished(
         &self,
         mut built: Test,
@@ -149,9 +148,9 @@ impl CellPlacer {
         (self.grid.cell_of(&point) == Some(cell)).then_some(built)
     }
 
-    /// A test of so many operations of each kind: those that this test has, and fresh ones. Copies of one only where a
-    /// kind has no other operations. What acts beside the run makes up what a test must hold at least; `None` where it
-    /// cannot.
+    /// A test with this number of operations of each kind: those that the given test has, and fresh ones. It has copies
+    /// of an operation only where the kind has no other operations. If the test then has too few operations, offline
+    /// ones are added; `None` where that is impossible.
     fn made_of(&self, test: &Test, way: &[(&[OperationId], usize)], stream: &mut Stream) -> Option<Test> {
         let mut operations = Vec::new();
         for &(kind, count) in way {
@@ -164,12 +163,12 @@ impl CellPlacer {
                 }
             }
             while taken.len() < count {
-                // Each operation once more before any is there twice more.
-                let times = |id: OperationId| taken.iter().filter(|&&it| it == id).count();
+                // Every operation gets its next copy before any gets a second one.
+                let times = |id: OperationId| taken.iter().filter(|&&other| other == id).count();
                 let fewest = kind.iter().map(|&id| times(id)).min().unwrap_or_default();
                 let open: Vec<OperationId> = kind.iter().copied().filter(|&id| times(id) == fewest).collect();
                 let id = open[stream.below(open.len())];
-                let operation_space = self.test_space.find(id).expect("what reaches a cell is permitted");
+                let operation_space = self.test_space.find(id).expect("operations that reach a cell are permitted");
                 operations.push(fresh_operation(operation_space, stream));
                 taken.push(id);
             }
@@ -185,14 +184,16 @@ impl CellPlacer {
         Some(Test { operations: order.into_iter().map(|at| built.operations[at].clone()).collect() })
     }
 
-    /// The test with as many operations as the cell wants.
+    /// The test with the numbers of operations that the cell requires.
     fn numbered(&self, mut test: Test, demands: &Demands, plan: &CampaignPlan, stream: &mut Stream) -> Option<Test> {
         self.number(&mut test, demands, plan, stream).then_some(test)
     }
 
-    /// Of these operations one, fresh: if copies are not welcome one that the test does not hold, where there is one.
+    /// A fresh instance of one of these operations: if copies cannot overlap, of one that the test does not contain, where
+    /// there is one.
     fn another(&self, of: &[&OperationSpace], test: &Test, stream: &mut Stream) -> Option<TestOperation> {
-        let held = |kind: &OperationSpace| test.operations.iter().any(|it| it.operation == kind.operation);
+        let held =
+            |kind: &OperationSpace| test.operations.iter().any(|operation| operation.operation == kind.operation);
         let new: Vec<&OperationSpace> = of.iter().copied().filter(|kind| !held(kind)).collect();
         let open = match self.copies {
             Copies::MayOverlap => of,
@@ -202,7 +203,8 @@ impl CellPlacer {
         (!open.is_empty()).then(|| fresh_operation(open[stream.below(open.len())], stream))
     }
 
-    /// A fresh test, half of it of any operations alike: a cell may ask for some that fresh tests rarely hold.
+    /// A fresh test in which about half of the operations are replaced by uniformly drawn ones: a cell may require
+    /// operations that fresh tests rarely contain.
     fn fresh(&self, stream: &mut Stream) -> Test {
         let kinds: Vec<&OperationSpace> = self.test_space.operations().iter().collect();
         let mut test = fresh_test(&self.test_space, stream);
@@ -220,8 +222,8 @@ impl CellPlacer {
         self.test_space.find(operation.operation).expect("a test of a campaign holds operations of that campaign")
     }
 
-    /// Adds, removes and replaces operations until their numbers are those of the cell. A walk of random steps, each
-    /// towards what lacks or is too much.
+    /// Adds, removes and replaces operations until their numbers are in the cell: a random walk, of which each step
+    /// corrects a number that is too small or too large.
     fn number(&self, test: &mut Test, demands: &Demands, plan: &CampaignPlan, stream: &mut Stream) -> bool {
         let class = |kind: &OperationSpace| class_of(&plan.operation(kind.operation).kind);
         let active = |kind: &OperationSpace| kind.activation != ActivationSpace::Offline;
@@ -231,12 +233,13 @@ impl CellPlacer {
                     Dimension::O1 => class(kind) == Class::Value,
                     Dimension::O2 => class(kind) == Class::Loss,
                     Dimension::O3 => class(kind) == Class::Delay,
-                    // Whatever can be counted.
+                    // Every operation with a parameter that counts.
                     Dimension::P1 | Dimension::P2 => graded(plan, kind),
                     Dimension::O0 | Dimension::T1 | Dimension::T2 | Dimension::T3 => true,
                 }
         };
-        // Every test in a cell is active, graded where parameters count, and a spread takes two.
+        // A test with a point has an active operation; P1 and P2 need one with a parameter that counts, and a positive
+        // spread needs two.
         let least = |dimension: Dimension| match (dimension, demands.of(dimension)) {
             (Dimension::T3 | Dimension::P2, Some((low, _))) if low > 0.0 => Some(2.0),
             (Dimension::T1 | Dimension::T2 | Dimension::T3 | Dimension::P1 | Dimension::P2, Some(_)) => Some(1.0),
@@ -244,7 +247,8 @@ impl CellPlacer {
         };
         for _ in 0..4 * self.test_space.most() + 8 {
             let wrong = demands.0.iter().find_map(|&(dimension, (low, high))| {
-                let these = test.operations.iter().filter(|it| is(self.kind_of(it), dimension)).count() as f64;
+                let these =
+                    test.operations.iter().filter(|operation| is(self.kind_of(operation), dimension)).count() as f64;
                 let (low, high) = match dimension {
                     Dimension::O0 | Dimension::O1 | Dimension::O2 | Dimension::O3 => (low, high),
                     _ => (least(dimension)?, f64::INFINITY),
@@ -253,7 +257,8 @@ impl CellPlacer {
             });
             let Some((dimension, too_few)) = wrong else { return true };
             let operations = &test.operations;
-            // Those that may leave: of what is too much, or anything else than what lacks.
+            // Those that may be removed: of the kind of which there are too many, or not of the kind of which there are too
+            // few.
             let leaving: Vec<usize> =
                 (0..operations.len()).filter(|&at| is(self.kind_of(&operations[at]), dimension) != too_few).collect();
             let coming: Vec<&OperationSpace> =
@@ -300,9 +305,10 @@ impl CellPlacer {
         windows.collect()
     }
 
-    /// Divides the windows of copies among them, in the order in which they lie. First where they are apart already;
-    /// then so that all but one have as much as the cell wants on the side on which it is; then evenly; then as it
-    /// falls. False where they are too many for that.
+    /// Divides the window of an operation among its copies, in the order of their starts. The first attempt divides
+    /// between copies that are already disjoint; the second gives all but one the length that the cell requires, towards
+    /// the cell's side of the window; the third divides evenly, and later ones at random. False where there are too
+    /// many copies.
     fn divide(
         &self,
         windows: &mut [Window],
@@ -328,7 +334,7 @@ impl CellPlacer {
             }
             copies.sort_by(|&a, &b| windows[a].start.total_cmp(&windows[b].start));
             let Window { low, high, shortest, .. } = windows[copies[0]];
-            // Somewhat more than the shortest each, so that rounding takes nothing away from it.
+            // Each gets slightly more than the shortest length, so that rounding does not make it shorter.
             let least = 1.001 * shortest;
             let spare = (high - low) - copies.len() as f64 * least;
             if spare < 0.0 {
@@ -371,11 +377,11 @@ impl CellPlacer {
         true
     }
 
-    /// Moves the windows.
+    /// Moves the windows of operations until T1 to T3 are in the cell; false if that is impossible.
     fn time(&self, test: &mut Test, demands: &Demands, plan: &CampaignPlan, attempt: u32, stream: &mut Stream) -> bool {
         let mut windows = self.windows(test, plan);
         let timed = demands.any_of(&[Dimension::T1, Dimension::T2, Dimension::T3]);
-        // Where no time is asked for, windows stay, but for those of copies that were put together here.
+        // If the grid has no dimension of time, windows stay, except those of copies that were added here.
         if !timed && (self.copies != Copies::Apart || !crowds(test)) {
             return true;
         }
@@ -385,10 +391,10 @@ impl CellPlacer {
         let n = windows.len() as f64;
         let anything = (f64::NEG_INFINITY, f64::INFINITY);
         let [t1, t2] = [Dimension::T1, Dimension::T2].map(|dimension| demands.of(dimension).unwrap_or(anything));
-        // The longer the intervals, the less room for their midpoints: lengths are as wanted if the midpoints are
-        // together no farther from the middles than this.
-        let shortest = windows.iter().map(|it| it.shortest).sum::<f64>() / n;
-        let width = windows.iter().map(|it| it.high - it.low).sum::<f64>() / n;
+        // The longer the intervals, the less room there is for their midpoints: the required lengths fit if the
+        // midpoints' distances from the middles of their windows add up to at most this budget.
+        let shortest = windows.iter().map(|window| window.shortest).sum::<f64>() / n;
+        let width = windows.iter().map(|window| window.high - window.low).sum::<f64>() / n;
         let longest = t2.1.min(width);
         let share = SHARES_FOR_LENGTHS[usize::from(attempt > 0)];
         let length = if t2.0 > shortest { t2.0 + share * (longest - t2.0) } else { shortest };
@@ -397,10 +403,10 @@ impl CellPlacer {
         }
         let midpoints: Vec<Member> = windows
             .iter()
-            .map(|it| Member {
-                now: f64::midpoint(it.start, it.end),
-                low: it.low + it.shortest / 2.0,
-                high: it.high - it.shortest / 2.0,
+            .map(|window| Member {
+                now: f64::midpoint(window.start, window.end),
+                low: window.low + window.shortest / 2.0,
+                high: window.high - window.shortest / 2.0,
                 step: None,
             })
             .collect();
@@ -410,9 +416,10 @@ impl CellPlacer {
         let lengths: Vec<Member> = windows
             .iter()
             .zip(&midpoints)
-            .map(|(it, midpoint)| {
-                let room = 2.0 * (midpoint - it.low).min(it.high - midpoint);
-                Member { now: it.end - it.start, low: it.shortest, high: room.max(it.shortest), step: None }
+            .map(|(window, midpoint)| {
+                let room = 2.0 * (midpoint - window.low).min(window.high - midpoint);
+                let Window { start, end, shortest, .. } = *window;
+                Member { now: end - start, low: shortest, high: room.max(shortest), step: None }
             })
             .collect();
         let wanted = Wanted { mean: t2, spread: None, budget: f64::INFINITY };
@@ -422,7 +429,7 @@ impl CellPlacer {
             let ActivationSpace::Time(range) = &self.kind_of(operation).activation else { continue };
             let within = plan.operation(operation.operation).within;
             let time = |share: f64| within.start + share * within.length();
-            // Inside its part of the window: what is the end of one copy's part is the same number in the next one's.
+            // Inside its part of the window: the end of one copy's part is exactly the start of the next one's.
             let part = (time(window.low).max(range.low), time(window.high).min(range.high));
             let inside = |share: f64| time(share).max(part.0).min(part.1);
             let (start, end) = (inside(midpoint - length / 2.0), inside(midpoint + length / 2.0));
@@ -434,7 +441,7 @@ impl CellPlacer {
         true
     }
 
-    /// The numbers that the parameters of a test count with.
+    /// The numbers of a test's parameters that count in P1 and P2.
     fn numbers(&self, test: &Test, plan: &CampaignPlan) -> Vec<Number> {
         let mut numbers = Vec::new();
         for (at, operation) in test.operations.iter().enumerate() {
@@ -452,12 +459,13 @@ impl CellPlacer {
         numbers
     }
 
+    /// Changes parameters until P1 and P2 are in the cell; false if that is impossible.
     fn grade(&self, test: &mut Test, demands: &Demands, plan: &CampaignPlan, stream: &mut Stream) -> bool {
         if !demands.any_of(&[Dimension::P1, Dimension::P2]) {
             return true;
         }
         let numbers = self.numbers(test, plan);
-        let members: Vec<Member> = numbers.iter().map(|it| it.member).collect();
+        let members: Vec<Member> = numbers.iter().map(|number| number.member).collect();
         let anything = (f64::NEG_INFINITY, f64::INFINITY);
         let wanted = Wanted {
             mean: demands.of(Dimension::P1).unwrap_or(anything),
@@ -476,13 +484,13 @@ impl CellPlacer {
     }
 }
 
-/// Whether a test holds an operation twice.
+/// Whether a test contains several copies of an operation.
 fn crowds(test: &Test) -> bool {
-    let ids = test.operations.iter().map(|it| it.operation);
+    let ids = test.operations.iter().map(|operation| operation.operation);
     ids.clone().enumerate().any(|(at, id)| ids.clone().take(at).any(|other| other == id))
 }
 
-/// Whether a kind of operation has a parameter that counts.
+/// Whether a kind of operation has a parameter that counts in P1 and P2.
 fn graded(plan: &CampaignPlan, kind: &OperationSpace) -> bool {
     let declared = plan.operation(kind.operation).parameters.iter();
     declared.zip(&kind.parameters).any(|(declared, parameter_space)| match (&declared.domain, parameter_space) {
@@ -492,7 +500,7 @@ fn graded(plan: &CampaignPlan, kind: &OperationSpace) -> bool {
     })
 }
 
-/// The numbers of one parameter, in shares of what the space permits, each with its axis.
+/// The numbers of one parameter, as shares of the permitted range, each with its axis.
 fn members(domain: &Domain, parameter_space: &ParameterSpace, choice: &Choice) -> Vec<(usize, Member)> {
     match (domain, parameter_space, choice) {
         (&Domain::Number { low, high, .. }, ParameterSpace::Number(range, _), choice) if low < high => {
@@ -523,7 +531,7 @@ fn members(domain: &Domain, parameter_space: &ParameterSpace, choice: &Choice) -
     }
 }
 
-/// Sets one number of a parameter to a share of what the space permits. A sub-range keeps its middle as far as it can.
+/// Sets one number of a parameter to a share of the permitted range. A sub-range keeps its middle as far as possible.
 fn set(choice: &mut Choice, domain: &Domain, parameter_space: &ParameterSpace, axis: usize, share: f64) {
     match (choice, domain, parameter_space) {
         (Choice::Value { value }, Domain::Number { low, high, .. }, ParameterSpace::Number(range, _)) => {

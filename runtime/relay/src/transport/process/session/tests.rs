@@ -26,7 +26,7 @@ impl Talk {
     fn error(self) -> String {
         match self.end {
             Err(Fault::Wrong(error)) => error.to_string(),
-            other => panic!("{other:?} is no error"),
+            other => panic!("{other:?} is not an error"),
         }
     }
 }
@@ -52,7 +52,7 @@ fn talk_about(operations: Vec<Operation>, test: &Test, steps: u32, said: &str) -
     Talk { orders, end, finished: relay.finish(now) }
 }
 
-/// A conversation undisturbed, after a good answer to `reset`.
+/// A conversation without disturbance, after a good answer to `reset`.
 fn talk(steps: u32, said: &[&str]) -> Talk {
     let said: String = [READY].iter().chain(said).flat_map(|line| [line, "\n"]).collect();
     talk_about(Vec::new(), &test_of(Vec::new()), steps, &said)

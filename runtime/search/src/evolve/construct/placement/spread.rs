@@ -1,22 +1,22 @@
-//! Moving numbers, each inside its own bounds, until their mean and their spread are as wanted.
+//! Moving numbers, each inside its own bounds, until their mean and their spread are in given ranges.
 //!
-//! What is permitted is a convex set: each number in its bounds, the mean in a range, and the distances of the numbers
-//! from the middles of their bounds together within a budget. So between two permitted places all are permitted, and
-//! the spread, which changes steadily on the way, takes every value between those at the ends. Spread as far as can be
-//! numbers are at vertices of the set, so one is climbed to; as near to each other as can be where all meet.
+//! The permitted vectors of numbers form a convex set: each number is in its bounds, the mean is in its range, and the
+//! sum of the numbers' distances from the middles of their bounds is within a budget. So all vectors between two
+//! permitted ones are permitted, and the spread, which is continuous, takes every value between those at the ends. The
+//! spread is greatest at a vertex of the set, so a local search climbs to one; it is least where all numbers meet.
 
 use sesame_rng::Stream;
 
 /// A number that can be moved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Member {
-    /// Where it is.
+    /// Its value before it is moved.
     pub(super) now: f64,
-    /// The least it can be.
+    /// Its lower bound.
     pub(super) low: f64,
-    /// The greatest it can be.
+    /// Its upper bound.
     pub(super) high: f64,
-    /// From `low` on only every such step is possible; `None` where everything is.
+    /// The distance between its possible values, from `low` on; `None` if all values are possible.
     pub(super) step: Option<f64>,
 }
 
@@ -30,25 +30,25 @@ impl Member {
     }
 }
 
-/// What is wanted of all together: values from the first up to, not including, the second.
+/// The ranges that the numbers are to be in: lower bounds are inclusive, upper bounds exclusive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Wanted {
     /// Of their mean.
     pub(super) mean: (f64, f64),
-    /// Of their population standard deviation, if anything.
+    /// Of their population standard deviation, if it matters.
     pub(super) spread: Option<(f64, f64)>,
-    /// How far from the middles of their bounds they may be, all distances together.
+    /// The greatest sum of their distances from the middles of their bounds.
     pub(super) budget: f64,
 }
 
 impl Wanted {
-    /// How far numbers are from it: 0 where they are as wanted.
+    /// How far the mean and the spread of these numbers are from their ranges: 0 if both are inside.
     fn missed_by(&self, numbers: &[f64]) -> f64 {
         let outside = |value: f64, (low, high): (f64, f64)| {
             if value < low {
                 low - value
             } else if value >= high {
-                // The upper end is not inside.
+                // The upper bound is outside.
                 value - high + 1e-12
             } else {
                 0.0
@@ -58,21 +58,21 @@ impl Wanted {
     }
 }
 
-/// Halvings of a bisection: what is left is far below any cell.
+/// Halvings of a bisection: the remaining interval is far smaller than any cell.
 const HALVINGS: u32 = 50;
-/// How far inside of what is wanted the aim lies at least and at most, as a share of its width.
+/// How far inside a range the target lies at least and at most, as a share of the width of the range.
 const DEEP: (f64, f64) = (0.02, 0.3);
-/// Steps of a climb to a vertex, and climbs from different places.
+/// Steps of a climb to a vertex, and number of climbs with different starting directions.
 const CLIMB: (usize, usize) = (6, 8);
-/// Moves of single numbers by a step, per number, to mend what rounding did.
+/// Moves of single numbers by a step, per number, to correct the effect of rounding.
 const MENDS: usize = 8;
 
-/// The members moved to where their mean and spread are as wanted, near to where they were; `None` where it was not
-/// found. The stream decides how far inside of what is wanted they end.
+/// The members moved, not far from their values, until their mean and spread are in their ranges; `None` if that was
+/// not found. The stream decides how far inside the ranges they end.
 pub(super) fn place(members: &[Member], wanted: &Wanted, stream: &mut Stream) -> Option<Vec<f64>> {
     let inside = stream.uniform(DEEP.0, DEEP.1);
     let placed = settle(members, wanted, inside, stream)?;
-    let whole = members.iter().any(|it| it.step.is_some());
+    let whole = members.iter().any(|member| member.step.is_some());
     Some(if whole { stepped(members, &placed, wanted, inside, stream) } else { placed })
 }
 
@@ -82,7 +82,7 @@ fn settle(members: &[Member], wanted: &Wanted, inside: f64, stream: &mut Stream)
         return None;
     }
     let set = FeasibleSet::of(members, wanted, inside)?;
-    let now: Vec<f64> = members.iter().map(|it| it.clamp(it.now)).collect();
+    let now: Vec<f64> = members.iter().map(|member| member.clamp(member.now)).collect();
     let moved = set.nearest(&now);
     let Some((least, most)) = wanted.spread else { return Some(moved) };
     let spread = deviation(&moved);
@@ -98,7 +98,7 @@ fn settle(members: &[Member], wanted: &Wanted, inside: f64, stream: &mut Stream)
     } else {
         low.max(0.0)
     };
-    // The spread is a convex function on the way, so it passes the aim once on the way up, and on the way down too.
+    // The spread is a convex function along this line, so it passes the target exactly once, upwards or downwards.
     let at = |share: f64| between(&moved, &other, share);
     let (mut near, mut far) = (0.0, 1.0);
     for _ in 0..HALVINGS {
@@ -112,13 +112,13 @@ fn settle(members: &[Member], wanted: &Wanted, inside: f64, stream: &mut Stream)
     Some(at(far))
 }
 
-/// Where numbers may be: a convex set that is not empty.
+/// The permitted vectors of numbers: a convex set that is not empty.
 struct FeasibleSet<'a> {
     members: &'a [Member],
-    /// What the mean may be, some way inside of what is wanted.
+    /// The range of the mean, reduced by a margin.
     mean: (f64, f64),
     budget: f64,
-    /// The place with the mean nearest to that of the middles, and the least distance from them.
+    /// The permitted vector nearest to the middles.
     middle: Vec<f64>,
 }
 
@@ -127,8 +127,9 @@ impl<'a> FeasibleSet<'a> {
         let n = members.len() as f64;
         let middles: Vec<f64> = members.iter().map(Member::middle).collect();
         let centre = mean(&middles);
-        // No mean is farther from the centre than the budget permits.
-        let room = (wanted.budget / n).min(members.iter().map(|it| (it.high - it.low) / 2.0).sum::<f64>() / n);
+        // The budget limits the distance of the mean from the centre.
+        let room =
+            (wanted.budget / n).min(members.iter().map(|member| (member.high - member.low) / 2.0).sum::<f64>() / n);
         let (low, high) = (wanted.mean.0.max(centre - room), wanted.mean.1.min(centre + room));
         if low > high {
             return None;
@@ -140,11 +141,11 @@ impl<'a> FeasibleSet<'a> {
     }
 
     fn spent(&self, numbers: &[f64]) -> f64 {
-        self.members.iter().zip(numbers).map(|(it, number)| (number - it.middle()).abs()).sum()
+        self.members.iter().zip(numbers).map(|(member, number)| (number - member.middle()).abs()).sum()
     }
 
-    /// A permitted place near these numbers: moved alike until their mean is permitted, then towards the middle as far
-    /// as the budget demands.
+    /// A permitted vector near these numbers: they are shifted by the same amount until their mean is permitted, then
+    /// moved towards the middle as far as the budget requires.
     fn nearest(&self, numbers: &[f64]) -> Vec<f64> {
         let moved = with_mean(self.members, numbers, mean(numbers).max(self.mean.0).min(self.mean.1));
         if self.spent(&moved) <= self.budget {
@@ -162,14 +163,15 @@ impl<'a> FeasibleSet<'a> {
         between(&self.middle, &moved, near)
     }
 
-    /// A permitted place whose spread is at least as great, climbed to from here and from random places; `None` where
-    /// none was found.
+    /// A permitted vector whose spread is at least `least`, found by climbing in the direction of these numbers and in
+    /// others; `None` if none was found.
     fn apart(&self, from: &[f64], least: f64, stream: &mut Stream) -> Option<Vec<f64>> {
         let mut order: Vec<usize> = (0..self.members.len()).collect();
         order.sort_by(|&a, &b| self.members[a].middle().total_cmp(&self.members[b].middle()));
         (0..CLIMB.1).find_map(|climb| {
             let centre = mean(from);
-            // Towards where it lies already, then one half of the windows to each side, then any to any.
+            // First in the direction of the numbers, then with half of the windows moving to each side, then in random
+            // directions.
             let mut ways: Vec<f64> = match climb {
                 0 => from.iter().map(|number| number - centre + 1e-6 * (stream.unit() - 0.5)).collect(),
                 1 => {
@@ -188,7 +190,7 @@ impl<'a> FeasibleSet<'a> {
                 if best.as_ref().is_some_and(|best| deviation(&vertex) <= deviation(best) + 1e-12) {
                     break;
                 }
-                // The spread is convex, so it is greater yet in the direction in which it grows here.
+                // The spread is convex, so it grows further in the direction in which it grows here.
                 let centre = mean(&vertex);
                 ways = vertex.iter().map(|number| number - centre).collect();
                 best = Some(vertex);
@@ -197,7 +199,8 @@ impl<'a> FeasibleSet<'a> {
         })
     }
 
-    /// The permitted place farthest in a direction: a linear programme, solved by the price of the mean.
+    /// The permitted vector farthest in a direction: a linear programme, solved by a Lagrange multiplier (`price`) on the
+    /// mean.
     fn farthest(&self, ways: &[f64]) -> Vec<f64> {
         let at = |price: f64| self.farthest_at(ways, price);
         let free = at(0.0);
@@ -207,7 +210,7 @@ impl<'a> FeasibleSet<'a> {
             return free;
         }
         let bound = if too_low { low } else { high };
-        // With a price as high as this all numbers go to the other side.
+        // At this price, all numbers move in the same direction.
         let most = 1.0 + 2.0 * ways.iter().fold(0.0, |most: f64, way| most.max(way.abs()));
         let (mut below, mut above) = if too_low { (0.0, -most) } else { (most, 0.0) };
         for _ in 0..HALVINGS {
@@ -218,14 +221,14 @@ impl<'a> FeasibleSet<'a> {
                 above = price;
             }
         }
-        // Where the price is just right there are two answers, and the mean is met between them.
+        // At the optimal price there are two solutions, and the bound on the mean is met between them.
         let (below, above) = (at(below), at(above));
         let (from, to) = (mean(&below), mean(&above));
         let share = if to > from { ((bound - from) / (to - from)).clamp(0.0, 1.0) } else { 0.0 };
         self.nearest(&between(&below, &above, share))
     }
 
-    /// The farthest place if the mean has a price: where moving brings most the budget is spent first.
+    /// The farthest vector if the mean has this price: the budget is spent first on the numbers that gain most by moving.
     fn farthest_at(&self, ways: &[f64], price: f64) -> Vec<f64> {
         let mut order: Vec<usize> = (0..ways.len()).collect();
         order.sort_by(|&a, &b| (ways[b] - price).abs().total_cmp(&(ways[a] - price).abs()));
@@ -239,31 +242,31 @@ impl<'a> FeasibleSet<'a> {
         placed
     }
 
-    /// A permitted place whose spread is less; `None` where none was found.
+    /// A permitted vector whose spread is less than `most`; `None` if none was found.
     fn together(&self, most: f64) -> Option<Vec<f64>> {
         let meeting = self.members.iter().map(Member::middle).chain([
             self.mean.0,
             self.mean.1,
             f64::midpoint(self.mean.0, self.mean.1),
         ]);
-        let places = meeting.filter(|it| it.is_finite()).map(|place| {
-            let met: Vec<f64> = self.members.iter().map(|it| it.clamp(place)).collect();
+        let places = meeting.filter(|place| place.is_finite()).map(|place| {
+            let met: Vec<f64> = self.members.iter().map(|member| member.clamp(place)).collect();
             self.nearest(&met)
         });
         places.min_by(|a, b| deviation(a).total_cmp(&deviation(b))).filter(|place| deviation(place) < most)
     }
 }
 
-/// The place so far on the way from one to another.
+/// The vector at this share of the way from one to another.
 fn between(from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
     from.iter().zip(to).map(|(from, to)| from * (1.0 - share) + to * share).collect()
 }
 
-/// All moved by one amount, each kept in its bounds, so that their mean is `aim`: the nearest such numbers.
+/// The numbers shifted by one amount, each kept in its bounds, so that their mean is `aim`: the nearest such vector.
 pub(super) fn with_mean(members: &[Member], now: &[f64], aim: f64) -> Vec<f64> {
-    let moved = |by: f64| -> Vec<f64> { members.iter().zip(now).map(|(it, now)| it.clamp(now + by)).collect() };
-    // Farther than this nothing moves.
-    let reach = members.iter().zip(now).map(|(it, now)| (it.high - now).abs().max((it.low - now).abs()));
+    let moved = |by: f64| -> Vec<f64> { members.iter().zip(now).map(|(member, now)| member.clamp(now + by)).collect() };
+    // A greater shift moves nothing further.
+    let reach = members.iter().zip(now).map(|(member, now)| (member.high - now).abs().max((member.low - now).abs()));
     let reach = reach.fold(0.0, f64::max);
     let (mut low, mut high) = (-reach, reach);
     for _ in 0..HALVINGS {
@@ -277,36 +280,38 @@ pub(super) fn with_mean(members: &[Member], now: &[f64], aim: f64) -> Vec<f64> {
     moved(f64::midpoint(low, high))
 }
 
-/// Puts numbers with steps onto them. Those without make up for it where they can; then single steps are taken, those
-/// that bring most, as long as one brings anything.
+/// Rounds numbers with steps to their possible values. Numbers without steps compensate for it where they can;
+/// otherwise numbers are moved by single steps, always by the best ones, as long as one improves the result.
 fn stepped(members: &[Member], placed: &[f64], wanted: &Wanted, inside: f64, stream: &mut Stream) -> Vec<f64> {
-    let on_step = |it: &Member, step: f64, number: f64| it.clamp(it.low + libm::rint((number - it.low) / step) * step);
+    let on_step = |member: &Member, step: f64, number: f64| {
+        member.clamp(member.low + libm::rint((number - member.low) / step) * step)
+    };
     let fixed: Vec<Member> = members
         .iter()
         .zip(placed)
-        .map(|(it, &number)| match it.step {
-            None => Member { now: number, ..*it },
+        .map(|(member, &number)| match member.step {
+            None => Member { now: number, ..*member },
             Some(step) => {
-                let number = on_step(it, step, number);
+                let number = on_step(member, step, number);
                 Member { now: number, low: number, high: number, step: None }
             }
         })
         .collect();
-    // The budget is of windows, which have no steps.
-    if let Some(mended) = settle(&fixed, wanted, inside, stream).filter(|it| wanted.missed_by(it) == 0.0) {
+    // Only windows have a budget, and they have no steps.
+    if let Some(mended) = settle(&fixed, wanted, inside, stream).filter(|mended| wanted.missed_by(mended) == 0.0) {
         return mended;
     }
-    let mut numbers: Vec<f64> = fixed.iter().map(|it| it.now).collect();
+    let mut numbers: Vec<f64> = fixed.iter().map(|member| member.now).collect();
     let moves: Vec<(usize, f64)> = members
         .iter()
         .enumerate()
-        .filter_map(|(at, it)| Some((at, it.step?)))
+        .filter_map(|(at, member)| Some((at, member.step?)))
         .flat_map(|(at, step)| [(at, step), (at, -step)])
         .collect();
     let fits = |at: usize, number: f64| {
-        let it = &members[at];
-        let slack = it.step.unwrap_or_default() / 2.0;
-        (it.low - slack..=it.high + slack).contains(&number)
+        let member = &members[at];
+        let slack = member.step.unwrap_or_default() / 2.0;
+        (member.low - slack..=member.high + slack).contains(&number)
     };
     for _ in 0..MENDS * members.len() {
         let now = wanted.missed_by(&numbers);
@@ -332,7 +337,7 @@ fn stepped(members: &[Member], placed: &[f64], wanted: &Wanted, inside: f64, str
         }
         match best {
             Some((missed, tried)) if missed < now => numbers = tried,
-            // No step brings anything: from elsewhere one may.
+            // No step is an improvement here; after a random one, another may be.
             _ => {
                 let (at, by) = moves[stream.below(moves.len())];
                 if fits(at, numbers[at] + by) {
@@ -372,19 +377,19 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_placed_has_the_mean_it_should_and_no_random_try_is_nearer(
+        fn shifted_numbers_have_the_given_mean_and_random_ones_are_not_nearer(
             members in members(), share in 0.05..0.95f64, seed: u64,
         ) {
             let n = members.len() as f64;
-            let (low, high) = members.iter().fold((0.0, 0.0), |(a, b), it| (a + it.low / n, b + it.high / n));
+            let (low, high) = members.iter().fold((0.0, 0.0), |(a, b), member| (a + member.low / n, b + member.high / n));
             let aim = low + share * (high - low);
-            let now: Vec<f64> = members.iter().map(|it| it.now).collect();
+            let now: Vec<f64> = members.iter().map(|member| member.now).collect();
             let placed = with_mean(&members, &now, aim);
             prop_assert!((mean(&placed) - aim).abs() < 1e-9);
             let distance = |to: &[f64]| now.iter().zip(to).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
             let mut stream = Stream::derive(seed, "test", &[]);
             for _ in 0..50 {
-                let tried: Vec<f64> = members.iter().map(|it| stream.uniform(it.low, it.high)).collect();
+                let tried: Vec<f64> = members.iter().map(|member| stream.uniform(member.low, member.high)).collect();
                 let tried = with_mean(&members, &tried, aim);
                 prop_assert!(distance(&placed) <= distance(&tried) + 1e-9, "{placed:?} and {tried:?}");
             }
@@ -408,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_steps_are_taken_until_the_mean_is_as_wanted() {
+    fn numbers_with_steps_are_moved_by_steps_until_the_mean_is_in_its_range() {
         let member = |now| Member { now, low: 0.0, high: 1.0, step: Some(0.25) };
         let wanted = Wanted { mean: (0.6, 0.7), spread: None, budget: f64::INFINITY };
         let mut stream = Stream::derive(1, "test", &[]);
@@ -418,7 +423,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_not_found() {
+    fn impossible_means_and_spreads_are_not_found() {
         let member = Member { now: 0.2, low: 0.0, high: 0.5, step: None };
         let mut stream = Stream::derive(1, "test", &[]);
         let mut place =

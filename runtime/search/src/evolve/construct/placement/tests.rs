@@ -39,15 +39,15 @@ fn not_reached(plan: &CampaignPlan, grid: &Grid, seed: u64) -> (Vec<Vec<u32>>, u
 
 /// Whether copies of one operation are active at the same time.
 fn overlaps(test: &Test) -> bool {
-    let windows = test.operations.iter().filter_map(|it| match it.activation {
-        Activation::Time { start, end } => Some((it.operation, start, end)),
+    let windows = test.operations.iter().filter_map(|operation| match operation.activation {
+        Activation::Time { start, end } => Some((operation.operation, start, end)),
         _ => None,
     });
     let windows: Vec<(OperationId, f64, f64)> = windows.collect();
     windows.iter().enumerate().any(|(at, a)| windows[..at].iter().any(|b| a.0 == b.0 && a.1 < b.2 && b.1 < a.2))
 }
 
-/// Twelve operations of all classes, in windows of their own, some with whole numbers and some without a number.
+/// Twelve operations of all classes, each with its own window, some with integers and some without a number.
 fn twelve_operations() -> CampaignPlan {
     let mut plan = SYNTHETIC_ROBOTS[2].plan(Search::new(Strategy::Random, 1));
     plan.operations = (0..12usize)
@@ -70,7 +70,7 @@ fn twelve_operations() -> CampaignPlan {
             }
             if at == 6
                 && let Some(Domain::Number { low, high, integer, .. }) =
-                    operation.parameters.first_mut().map(|it| &mut it.domain)
+                    operation.parameters.first_mut().map(|parameter| &mut parameter.domain)
             {
                 (*low, *high, *integer) = (0.0, 20.0, true);
             }
@@ -83,7 +83,8 @@ fn twelve_operations() -> CampaignPlan {
     plan
 }
 
-/// Cells that random tests fall into, most of them far from the middle: each is a witness that its cell can be reached.
+/// Cells that contain random tests, most of them far from the middle: each test is a witness that its cell can be
+/// reached.
 fn witnessed(plan: &CampaignPlan, grid: &Grid, tests: u64) -> std::collections::BTreeSet<usize> {
     let test_space = TestSpace::from_plan(plan).unwrap();
     let mut cells = std::collections::BTreeSet::new();
@@ -119,8 +120,8 @@ fn witnessed(plan: &CampaignPlan, grid: &Grid, tests: u64) -> std::collections::
     cells
 }
 
-/// Of the cells that witnesses fall into, every so manieth: those for which no test could be built from five fresh
-/// ones, and how many were tried.
+/// Of every `every`-th cell with a witness: those for which no test could be constructed from five fresh ones, and how
+/// many cells were tried.
 fn not_built(plan: &CampaignPlan, grid: &Grid, tests: u64, every: usize) -> (Vec<Vec<u32>>, usize, usize) {
     let test_space = TestSpace::from_plan(plan).unwrap();
     let feasible = Feasible::from_plan(plan, grid);
@@ -152,7 +153,7 @@ const FIVE_DIMENSIONS: [&str; 3] = [
 ];
 
 #[test]
-fn of_cells_of_five_dimensions_that_a_test_reaches_nearly_all_are_built() {
+fn tests_are_constructed_in_nearly_all_reachable_cells_of_five_dimensions() {
     for grid in FIVE_DIMENSIONS {
         let (failed, tried, _) = not_built(&twelve_operations(), &Grid::parse(grid).unwrap(), 6_000, 8);
         assert!(tried > 100 && failed.len() * 100 <= tried, "{} of {tried} of {grid}: {failed:?}", failed.len());
@@ -161,7 +162,7 @@ fn of_cells_of_five_dimensions_that_a_test_reaches_nearly_all_are_built() {
 
 #[test]
 #[ignore = "long: a million tests as witnesses for three grids of 10,000 cells, and a test built for each cell they reach"]
-fn of_all_cells_of_five_dimensions_that_a_million_tests_reach_99_of_100_are_built() {
+fn tests_are_constructed_in_99_percent_of_the_cells_of_five_dimensions_that_a_million_tests_reach() {
     for grid in FIVE_DIMENSIONS {
         let (failed, tried, feasible) = not_built(&twelve_operations(), &Grid::parse(grid).unwrap(), 1_000_000, 1);
         println!("{grid}: {} of {tried} witnessed cells not built, {feasible} feasible: {failed:?}", failed.len());
@@ -170,7 +171,7 @@ fn of_all_cells_of_five_dimensions_that_a_million_tests_reach_99_of_100_are_buil
 }
 
 #[test]
-fn copies_of_one_operation_are_built_apart_or_not_at_all() {
+fn copies_of_one_operation_are_constructed_disjoint_or_not_at_all() {
     let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     plan.campaign.operations.truncate(1);
     plan.campaign.count = Count { min: 1, max: 4 };
@@ -192,7 +193,7 @@ fn copies_of_one_operation_are_built_apart_or_not_at_all() {
 }
 
 #[test]
-fn every_feasible_cell_of_the_papers_grid_is_reached_from_any_test() {
+fn a_test_is_constructed_in_every_feasible_cell_of_the_papers_grid() {
     let plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     for seed in 0..5 {
         assert_eq!(not_reached(&plan, &table_3(), seed), (Vec::new(), 96));
@@ -200,7 +201,7 @@ fn every_feasible_cell_of_the_papers_grid_is_reached_from_any_test() {
 }
 
 #[test]
-fn numbers_of_operations_spreads_and_whole_numbers_are_reached_together() {
+fn cells_over_counts_spreads_and_integers_are_reached() {
     let mut plan = SYNTHETIC_ROBOTS[2].plan(Search::new(Strategy::Random, 1));
     plan.campaign.count = Count { min: 1, max: 4 };
     plan.operations[0].kind = OperationKind::PacketLoss;
@@ -224,9 +225,9 @@ fn numbers_of_operations_spreads_and_whole_numbers_are_reached_together() {
 }
 
 #[test]
-fn a_test_that_lies_in_the_cell_stays_nearly_as_it_is_and_of_others_middles_and_numbers_stay() {
+fn a_test_in_the_cell_changes_little_and_other_tests_keep_middles_and_numbers() {
     let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
-    // Copies that keep apart leave less room, and some may have to go.
+    // Disjoint copies leave less room, so some may have to be removed.
     plan.campaign.copies = Copies::MayOverlap;
     let (grid, test_space) = (table_3(), TestSpace::from_plan(&plan).unwrap());
     let feasible = Feasible::from_plan(&plan, &grid);
@@ -236,7 +237,7 @@ fn a_test_that_lies_in_the_cell_stays_nearly_as_it_is_and_of_others_middles_and_
         let test = fresh_test(&test_space, &mut stream);
         let cell = (0..grid.len()).filter(|&cell| feasible.reaches(cell)).nth(stream.below(feasible.count())).unwrap();
         let built = placer.place_in_cell(&test, cell, &plan, &mut stream).unwrap();
-        let kinds = |test: &Test| test.operations.iter().map(|it| it.operation).collect::<Vec<_>>();
+        let kinds = |test: &Test| test.operations.iter().map(|operation| operation.operation).collect::<Vec<_>>();
         assert_eq!(kinds(&built), kinds(&test), "the cell does not count operations");
         for (before, after) in test.operations.iter().zip(&built.operations) {
             let [Choice::Range { low: a, high: b }, Choice::Range { low: c, high: d }] =
@@ -244,7 +245,7 @@ fn a_test_that_lies_in_the_cell_stays_nearly_as_it_is_and_of_others_middles_and_
             else {
                 panic!("offsets are sub-ranges")
             };
-            // Narrower ones keep their middle; wider ones may not have the room.
+            // Narrower sub-ranges keep their middle; wider ones may lack the room.
             if d - c <= b - a {
                 assert!((f64::midpoint(*a, *b) - f64::midpoint(*c, *d)).abs() < 1e-9);
             }
@@ -256,10 +257,10 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
     #[test]
-    fn what_is_constructed_is_permitted_and_lies_in_its_cell(plan in any_timed_plan(), seed: u64) {
+    fn constructed_tests_are_permitted_and_lie_in_their_cell(plan in any_timed_plan(), seed: u64) {
         let grid = Grid::parse("T1:0:1:3,T2:0:1:3,P1:0:1:2,O0:0.5:4.5:2").unwrap();
-        // How many cells are reached is for the robots above: windows of a hundredth of a second beside some of a
-        // minute, and whole numbers, leave some a single way to be reached, which attempts need not find.
+        // The number of reached cells is tested with the robots above: with very different windows and with integers,
+        // some cells can be reached in one way only, which attempts need not find.
         not_reached(&plan, &grid, seed);
     }
 }

@@ -1,0 +1,104 @@
+//! A campaign: what its tests hold, how they are found, and when it stops.
+
+use serde::{Deserialize, Serialize};
+
+use crate::condition::ConditionSpace;
+use crate::{Confirmation, CoverageGoal, Exploration, MetricId, OperationId, Search, StopRule};
+
+/// A campaign.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Campaign {
+    /// Its name in the space.
+    pub name: String,
+    /// Its doc comment.
+    pub doc: String,
+    /// What the search optimises; each has a direction. Empty for a campaign that only repeats.
+    pub objectives: Vec<MetricId>,
+    /// The operations a test may hold.
+    pub operations: Vec<OperationId>,
+    /// How many operations a test holds.
+    pub count: Count,
+    /// What holds of several copies of one operation in a test.
+    #[serde(default, skip_serializing_if = "Copies::is_default")]
+    pub copies: Copies,
+    /// How tests switch their operations on and off.
+    pub activation: ActivationMode,
+    /// How tests are found.
+    pub search: Search,
+    /// How coverage of the space is counted; `None` for a campaign that does not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coverage: Option<CoverageGoal>,
+    /// What an evolution does to cover more cells; `None` for one that only counts them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exploration: Option<Exploration>,
+    /// How tests that enter the front are confirmed; `None` for a campaign that believes each first run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub confirm: Option<Confirmation>,
+    /// Over how many nearest tests the search averages what it is told of each; `None` for a search that is told what
+    /// came out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub neighbours: Option<u32>,
+    /// What stops the search besides its number of tests and its coverage.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stop: Vec<StopRule>,
+    /// The one seed that decides everything; `run --seed` overrides it.
+    pub seed: u64,
+    /// Simulation time at which a test ends, in seconds.
+    pub end_after: f64,
+    /// Of which tests the messages and the activity of operations are recorded; `None` for none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub record: Option<Recorded>,
+}
+
+/// Of which tests the messages and the activity of operations are recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Recorded {
+    /// Of those that violate a requirement, crash or time out, and of the reference runs to compare them with.
+    Failing,
+    /// Of all.
+    All,
+}
+
+/// Bounds of a count, both included.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Count {
+    /// At least.
+    pub min: u32,
+    /// At most.
+    pub max: u32,
+}
+
+/// What holds of several copies of one operation in a test.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Copies {
+    /// They are never active at the same time, so that together they stay within what the operation declares. By time
+    /// their windows are disjoint; by condition a copy waits while another one is active.
+    #[default]
+    Apart,
+    /// They may be active at the same time.
+    MayOverlap,
+    /// There is at most one.
+    Once,
+}
+
+impl Copies {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
+    fn is_default(&self) -> bool {
+        *self == Copies::default()
+    }
+}
+
+/// How tests switch their operations on and off.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum ActivationMode {
+    /// In windows of simulation time.
+    Time,
+    /// By conditions grown from this space.
+    Condition {
+        /// What they are made of.
+        space: ConditionSpace,
+    },
+}

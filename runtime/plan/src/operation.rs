@@ -1,0 +1,152 @@
+//! Fuzzing operations with the ranges that they permit.
+
+use serde::{Deserialize, Serialize};
+
+use crate::condition::Constraint;
+use crate::{OperationKind, TopicId};
+
+/// A fuzzing operation with its permitted ranges. A test holds instances of it, see [`crate::TestOperation`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Operation {
+    /// Its name in the space.
+    pub name: String,
+    /// Its doc comment.
+    pub doc: String,
+    /// The topic whose messages it disturbs; `None` exactly for a custom operation before the start or after the end.
+    pub topic: Option<TopicId>,
+    /// The values in each message that it changes, in written order; none exactly where it acts on whole messages.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub places: Vec<Place>,
+    /// What it does to them.
+    pub kind: OperationKind,
+    /// The parameters a test chooses, in the order that [`OperationKind`] documents.
+    pub parameters: Vec<Parameter>,
+    /// The time outside of which it is never active (`within`); seconds, `start < end`. Of an offline operation, which
+    /// is never active, the whole run.
+    pub within: Span,
+    /// Operations of a higher priority come first on a message; equal ones in declaration order. Default 0.
+    pub priority: i32,
+    /// Probability that a fresh test includes it. Default 1.
+    pub inclusion: f64,
+    /// Whether its active time counts in `fuzzing_time()`. Default true, and then not written.
+    #[serde(default = "timed", skip_serializing_if = "is_timed")]
+    pub timed: bool,
+    /// What its start conditions contain where a search grows them.
+    pub constraints: Vec<Constraint>,
+}
+
+fn timed() -> bool {
+    true
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
+fn is_timed(timed: &bool) -> bool {
+    *timed
+}
+
+/// A stretch of simulation time in seconds, `start <= end`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Span {
+    /// Where it starts, inclusive.
+    pub start: f64,
+    /// Where it ends, exclusive.
+    pub end: f64,
+}
+
+impl Span {
+    /// Its length in seconds.
+    pub fn length(self) -> f64 {
+        self.end - self.start
+    }
+}
+
+/// Where in a message a value is: from the message inwards; empty for the message itself.
+pub type Place = Vec<Step>;
+
+/// One step into a message.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Step {
+    /// The field of this name.
+    Field(String),
+    /// The element of a list at this position, from 0; none in a list that is shorter.
+    Element(u32),
+    /// Each element of a list.
+    Each,
+}
+
+/// A place behind a topic's name, as the `.sesame` file has it: `.level`, `[3]`, `.ranges[*]`.
+pub fn place_in_words(place: &[Step]) -> String {
+    let step = |step: &Step| match step {
+        Step::Field(name) => format!(".{name}"),
+        Step::Element(at) => format!("[{at}]"),
+        Step::Each => "[*]".to_owned(),
+    };
+    place.iter().map(step).collect()
+}
+
+/// A parameter of an operation: what is permitted in the space, and what a test makes of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Parameter {
+    /// Its name in a test, for example `offset`, `loss`, `delay`.
+    pub name: String,
+    /// Its unit; `None` for probabilities, plain numbers, texts and files.
+    pub unit: Option<String>,
+    /// What is permitted.
+    pub domain: Domain,
+}
+
+/// What a test may choose for a parameter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Domain {
+    /// Numbers of a range.
+    Number {
+        /// Lower end of what is permitted.
+        low: f64,
+        /// Upper end of what is permitted.
+        high: f64,
+        /// What a test chooses.
+        shape: Shape,
+        /// Whether only whole numbers are permitted.
+        integer: bool,
+    },
+    /// A point of a box, both corners included; `low <= high` on each axis.
+    Point {
+        /// Lower corner: x, y, z.
+        low: [f64; 3],
+        /// Upper corner.
+        high: [f64; 3],
+    },
+    /// One of these texts: at least one, none twice.
+    Texts {
+        /// The texts, in declaration order.
+        texts: Vec<String>,
+    },
+    /// One of these files: at least one, none twice. Paths are relative to the folder of the `.sesame` file, with `/`.
+    Files {
+        /// The paths, in declaration order.
+        files: Vec<String>,
+    },
+}
+
+impl Domain {
+    /// The texts or paths to choose from; `None` for numbers and points.
+    pub fn items(&self) -> Option<&[String]> {
+        match self {
+            Domain::Texts { texts } => Some(texts),
+            Domain::Files { files } => Some(files),
+            Domain::Number { .. } | Domain::Point { .. } => None,
+        }
+    }
+}
+
+/// What a test chooses of a permitted range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// One value of it.
+    Value,
+    /// A sub-range of it.
+    Range,
+}

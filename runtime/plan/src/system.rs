@@ -1,0 +1,133 @@
+//! The system under test: its simulator, its messages and their types, its topics and nodes.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{MessageId, TopicId};
+
+/// The simulator, and how the runner reaches it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Simulator {
+    /// Its name in the space.
+    pub name: String,
+    /// The transport and its settings.
+    pub transport: Transport,
+}
+
+/// How a runner exchanges messages with a simulator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Transport {
+    /// A Rust type linked into the runner, stepped in lock-step with the relay.
+    InProcess {
+        /// Path of the type, for example `kuka_cell_sim::Cell`.
+        path: String,
+        /// Simulation time of one step, in nanoseconds; positive.
+        step_ns: u64,
+    },
+    /// A program that the runner starts and with which it exchanges lines of JSON.
+    Process {
+        /// The program: a name to be found on `PATH`, or a path relative to the folder of the `.sesame` file, in which
+        /// the program runs. Where that folder is, generated code knows; a plan is the same wherever it lies.
+        program: String,
+        /// Its arguments, one by one; no shell reads them.
+        arguments: Vec<String>,
+        /// Simulation time of one step, in nanoseconds; positive. `None` for a simulator that runs freely: nobody steps
+        /// it, so equal tests need not give equal results.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        step_ns: Option<u64>,
+    },
+}
+
+/// A named message type.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MessageType {
+    /// Its name in the space.
+    pub name: String,
+    /// Its doc comment.
+    pub doc: String,
+    /// Its fields, in declaration order.
+    pub fields: Vec<Field>,
+}
+
+/// One field of a message type.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Field {
+    /// Its name, as on the wire.
+    pub name: String,
+    /// Its doc comment.
+    pub doc: String,
+    /// Its type.
+    #[serde(rename = "type")]
+    pub ty: Type,
+}
+
+/// The type of a field or topic.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Type {
+    /// True or false.
+    Bool,
+    /// A whole number, in a unit if one is declared.
+    Int {
+        /// The unit on the wire.
+        unit: Option<String>,
+    },
+    /// A real number, in a unit if one is declared.
+    Real {
+        /// The unit on the wire.
+        unit: Option<String>,
+    },
+    /// Text.
+    Text,
+    /// A point in space: x, y, z, in a unit if one is declared.
+    Point {
+        /// The unit on the wire.
+        unit: Option<String>,
+    },
+    /// Any number of values of one type.
+    List {
+        /// The type of each element.
+        of: Box<Type>,
+    },
+    /// A message type.
+    Message {
+        /// Which.
+        id: MessageId,
+    },
+}
+
+/// A topic, or a group of topics of one type.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Topic {
+    /// Its name in the space.
+    pub name: String,
+    /// Its doc comment.
+    pub doc: String,
+    /// Names on the wire, matched exactly: one, or the written-out members of a group.
+    pub paths: Vec<String>,
+    /// What it carries.
+    #[serde(rename = "type")]
+    pub ty: Type,
+}
+
+/// A node: a program that publishes and subscribes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Node {
+    /// Its name in the space.
+    pub name: String,
+    /// Its doc comment.
+    pub doc: String,
+    /// Topics it publishes.
+    pub publishes: Vec<TopicId>,
+    /// Topics it subscribes to.
+    pub subscribes: Vec<TopicId>,
+}
+
+/// A value inside the messages of a topic.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FieldRef {
+    /// The topic.
+    pub topic: TopicId,
+    /// Field names from the message inwards; empty for a topic that carries the value itself.
+    pub path: Vec<String>,
+}

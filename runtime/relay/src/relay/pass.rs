@@ -1,0 +1,131 @@
+//! The way of a message through its pipeline: each operation in turn acts on it, and what it adds follows it.
+
+use sesame_base::time::SimTime;
+
+use crate::fuzz::{Action, Disturbance, KeyedRng, MessageContext};
+use crate::relay::release::{Held, Why};
+use crate::relay::{COPIES_LIMIT, Delivery, HELD_LIMIT, Listener as _, OperationEvent, Phase, Relay};
+
+impl Relay<'_> {
+    /// Takes a message through the rest of its pipeline.
+    pub(super) fn pass(&mut self, now: SimTime, mut message: Held, deliveries: &mut Vec<Delivery>) {
+        while let Some(&(at, member)) = self.pipelines[message.wire.index()].get(message.next_stage) {
+            message.next_stage += 1;
+            let heard = self.heard[message.wire.index()];
+            let stage = &mut self.operations[at];
+            let queued_until = if stage.holds_order { self.queue.last_release(at, message.wire) } else { None };
+            let active = stage.activity.is_active();
+            if active {
+                stage.counters.seen += 1;
+            } else if stage.observes_inactive {
+                stage.disturbance.observe(now, member, &message.value);
+            }
+            if active && matches!(stage.disturbance, Disturbance::Custom(_)) {
+                return self.pass_custom(now, at, member, message, deliveries);
+            }
+            let action = if active {
+                let draws = KeyedRng::new(stage.operation_seed, member, message.index);
+                let context = MessageContext { now, active: now - stage.since, member, draws };
+                stage.disturbance.apply(context, &mut message.value)
+            } else {
+                Action::Unchanged
+            };
+            if let Action::Duplicated(copies) = action {
+                return self.pass_copies(now, at, message, copies, deliveries);
+            }
+            let release = match action {
+                Action::Delayed(delay) => now + delay,
+                _ => now,
+            }
+            .max(queued_until.unwrap_or(now));
+            if action == Action::Dropped {
+                stage.count(heard, now, 1, |counters| &mut counters.dropped);
+                self.tell(now, at, OperationEvent::Dropped(message.message_ref()));
+                return;
+            }
+            if action == Action::Changed {
+                stage.count(heard, now, 1, |counters| &mut counters.changed);
+                self.tell(now, at, OperationEvent::Changed(message.message_ref()));
+            }
+            if release > now {
+                let stage = &mut self.operations[at];
+                let why = match (heard, active) {
+                    (false, _) => Why::Unheard,
+                    (true, true) => Why::Delayed,
+                    (true, false) => Why::Queued,
+                };
+                stage.count(
+                    heard,
+                    now,
+                    1,
+                    |counters| if active { &mut counters.delayed } else { &mut counters.queued },
+                );
+                self.tell(now, at, OperationEvent::Delayed(message.message_ref(), release));
+                self.queue.push(release, at, why, message);
+                if self.queue.len() > HELD_LIMIT {
+                    self.overflowed = true;
+                    if let Some(oldest) = self.release() {
+                        self.pass(now, oldest, deliveries);
+                    }
+                }
+                return;
+            }
+        }
+        if self.phase != Phase::Over {
+            self.metrics.delivered(now, message.wire, message.published, &message.value);
+            for tap in &mut self.taps {
+                tap.delivered(now, message.wire, message.published, &message.value);
+            }
+        }
+        deliveries.push(Delivery { wire: message.wire, value: message.value });
+    }
+
+    /// Takes a message through a custom operation and on, followed by the messages that the operation injects.
+    fn pass_custom(&mut self, now: SimTime, at: usize, member: u64, mut message: Held, deliveries: &mut Vec<Delivery>) {
+        let heard = self.heard[message.wire.index()];
+        let stage = &mut self.operations[at];
+        let Disturbance::Custom(custom) = &mut stage.disturbance else {
+            unreachable!("only custom operations come here")
+        };
+        let draws = KeyedRng::new(stage.operation_seed, member, message.index);
+        let call = custom.on_message(now, self.wires.path(message.wire), draws, &mut message.value);
+        stage.count(heard, now, call.injected.len() as u64, |counters| &mut counters.injected);
+        stage.count(heard, now, u64::from(call.changed && !call.dropped), |counters| &mut counters.changed);
+        stage.count(heard, now, u64::from(call.dropped), |counters| &mut counters.dropped);
+        if call.dropped {
+            self.tell(now, at, OperationEvent::Dropped(message.message_ref()));
+        } else if call.changed {
+            self.tell(now, at, OperationEvent::Changed(message.message_ref()));
+        }
+        for _ in &call.injected {
+            self.tell(now, at, OperationEvent::Injected(message.message_ref()));
+        }
+        let injected = (0u64..).zip(call.injected);
+        let injected: Vec<Held> = injected.map(|(number, value)| message.beside(at, number, value)).collect();
+        if !call.dropped {
+            self.pass(now, message, deliveries);
+        }
+        for message in injected {
+            self.pass(now, message, deliveries);
+        }
+    }
+
+    /// Takes a message on, followed by its copies: as many as the operation makes, up to the limit of one event.
+    fn pass_copies(&mut self, now: SimTime, at: usize, message: Held, copies: u32, deliveries: &mut Vec<Delivery>) {
+        let room = COPIES_LIMIT - self.copies;
+        self.flooded |= copies > room;
+        let copies = copies.min(room);
+        self.copies += copies;
+        let heard = self.heard[message.wire.index()];
+        self.operations[at].count(heard, now, u64::from(copies), |counters| &mut counters.injected);
+        let made: Vec<Held> =
+            (0..u64::from(copies)).map(|number| message.beside(at, number, message.value.clone())).collect();
+        for copy in &made {
+            self.tell(now, at, OperationEvent::Injected(copy.message_ref()));
+        }
+        self.pass(now, message, deliveries);
+        for copy in made {
+            self.pass(now, copy, deliveries);
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! Operations with their parameters, from the model to the plan.
+
+use sesame_dsl::model::{self, Space};
+use sesame_plan as plan;
+
+use super::id::topic_id;
+use super::system::unit;
+use crate::plan::OperationPlan;
+
+pub(super) fn operation(
+    operation: &model::Operation,
+    end_after: f64,
+    constraints: Vec<plan::condition::Constraint>,
+) -> plan::Operation {
+    plan::Operation {
+        name: operation.declaration.name.clone(),
+        doc: operation.declaration.doc.clone(),
+        topic: operation.topic().map(topic_id),
+        places: operation.target.iter().flat_map(|target| &target.places).cloned().collect(),
+        kind: operation.kind.clone(),
+        parameters: operation.parameters.iter().map(parameter).collect(),
+        within: within(operation, end_after),
+        priority: operation.priority,
+        inclusion: operation.inclusion,
+        timed: operation.timed,
+        constraints,
+    }
+}
+
+fn parameter(parameter: &model::Parameter) -> plan::Parameter {
+    plan::Parameter {
+        name: parameter.name.clone(),
+        unit: unit(parameter.unit.as_ref()),
+        domain: match &parameter.domain {
+            model::Domain::Number { range, shape, integer } => {
+                plan::Domain::Number { low: range.low, high: range.high, shape: *shape, integer: *integer }
+            }
+            model::Domain::Point { low, high } => plan::Domain::Point { low: *low, high: *high },
+            model::Domain::Texts(texts) => plan::Domain::Texts { texts: texts.clone() },
+            model::Domain::Files(files) => plan::Domain::Files { files: files.clone() },
+        },
+    }
+}
+
+/// The window of an operation; one without `within` may be active during the whole test.
+pub(super) fn within(operation: &model::Operation, end_after: f64) -> plan::Span {
+    match operation.within {
+        Some(window) => plan::Span { start: window.low, end: window.high },
+        None => plan::Span { start: 0.0, end: end_after },
+    }
+}
+
+pub(super) fn custom_operations(space: &Space) -> Vec<OperationPlan> {
+    let operations = space.operations.values().filter_map(|operation| match &operation.kind {
+        model::OperationKind::Custom { moment: when } => Some(OperationPlan {
+            operation: operation.declaration.name.clone(),
+            doc: operation.declaration.doc.clone(),
+            source: space.file_of(&operation.declaration).to_owned(),
+            line: operation.declaration.line,
+            topic: operation.topic().map(topic_id),
+            moment: *when,
+            parameters: operation
+                .parameters
+                .iter()
+                .map(|declared| (parameter(declared), declared.doc.clone()))
+                .collect(),
+        }),
+        _ => None,
+    });
+    operations.collect()
+}
