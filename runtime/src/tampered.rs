@@ -17,9 +17,10 @@ use serde_json::Value as Json;
 
 use sesame_base::observation::{Observation, OperationEffect, Outcome};
 use sesame_plan::condition::{ConditionEnd, ConditionSpace};
+use sesame_plan::testing::{field, message};
 use sesame_plan::{
     Activation, ActivationMode, BoostedChildren, Bound, CampaignPlan, Confirmation, CoverageGoal, Dimension, Domain,
-    Expectation, Exploration, Failing, Field, GridAxis, KnownTestId, MessageId, MessageType, MetricId, MetricSource,
+    Expectation, Exploration, Failing, GridAxis, KnownTestId, MessageId, MessageType, MetricId, MetricSource,
     OperationId, RequirementId, Search, Shrinking, Statistic, StopRule, Strategy, Task, TopicId, Type,
 };
 use sesame_results::analysis::{
@@ -676,8 +677,7 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
 
 fn containing_itself() -> MessageType {
     let ty = Type::List { of: Box::new(Type::Message { id: MessageId(0) }) };
-    let field = Field { name: "again".to_owned(), doc: String::new(), ty };
-    MessageType { name: "Loop".to_owned(), doc: String::new(), fields: vec![field] }
+    message("Loop", vec![field("again", ty)])
 }
 
 fn space_of(plan: &mut CampaignPlan) -> &mut ConditionSpace {

@@ -1,10 +1,11 @@
 //! Random cases: a space, a test and a robot, made of a number and of nothing else.
 
 use sesame_plan::stl::{self, Interval, Robustness};
+use sesame_plan::testing;
 use sesame_plan::{
     Activation, Aggregate, Bound, CampaignPlan, Choice, Comparison, Condition, Copies, Distribution, Domain, Drain,
     Expression, FieldRef, Formula, Input, Members, Metric, MetricId, MetricSource, NotFinite, Operation, OperationId,
-    OperationKind, Parameter, Requirement, Shape, Side, Span, Step, Test, TestOperation, Topic, TopicId, ValueMode,
+    OperationKind, Requirement, Shape, Side, Span, Step, Test, TestOperation, Topic, TopicId, ValueMode,
     condition as switch,
 };
 use sesame_rng::Stream;
@@ -282,7 +283,7 @@ impl Maker {
                 lines.push(line);
             }
             self.carries.push(carries);
-            self.topics.push(Topic { name: format!("t{at}"), doc: String::new(), paths, ty: adapter::ty(carries) });
+            self.topics.push(Topic { paths, ..testing::topic(&format!("t{at}"), &[], adapter::ty(carries)) });
         }
         lines
     }
@@ -528,7 +529,7 @@ impl Maker {
                     _ => Bound::Within { low: value, high: value + self.quarters(0, 4) },
                 };
                 let name = format!("R{}", requirements.len() + 1);
-                requirements.push(Requirement { name, text: String::new(), metric: MetricId(at), bound });
+                requirements.push(testing::requirement(&name, at, bound));
             }
         }
         requirements
@@ -606,10 +607,8 @@ impl Maker {
                 Kind::Blackhole,
             ]),
         };
-        let number = |name: &str, low: f64, high: f64, shape, integer| Parameter {
-            name: name.to_owned(),
-            unit: None,
-            domain: Domain::Number { low, high, shape, integer },
+        let number = |name: &str, low: f64, high: f64, shape, integer| {
+            testing::parameter(name, Domain::Number { low, high, shape, integer })
         };
         let value = |name: &str, low, high| number(name, low, high, Shape::Value, false);
         let parameters = match &kind {
@@ -653,18 +652,13 @@ impl Maker {
             let start = self.ticks(0, 6);
             Span { start, end: start + self.ticks(2, 30) }
         };
+        let topic = u32::try_from(topic).unwrap();
         Operation {
-            name: format!("o{at}"),
-            doc: String::new(),
-            topic: Some(TopicId(u32::try_from(topic).unwrap())),
             places,
-            kind,
-            parameters,
             within,
             priority: self.between(0, 1),
-            inclusion: 1.0,
             timed: self.chance(0.8),
-            constraints: Vec::new(),
+            ..testing::operation_with(&format!("o{at}"), topic, kind, parameters)
         }
     }
 
