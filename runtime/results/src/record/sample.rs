@@ -356,13 +356,8 @@ pub fn front(plan: &CampaignPlan, records: &[TestRecord]) -> Vec<u32> {
         {
             return None;
         }
-        plan.campaign
-            .objectives
-            .iter()
-            .map(|&id| {
-                let sign = if plan.metric(id).direction == Some(Direction::Maximise) { -1.0 } else { 1.0 };
-                record.observation.metrics.get(id.index())?.value.map(|value| sign * value)
-            })
+        plan.objectives()
+            .map(|it| record.observation.metrics.get(it.metric.index())?.value.map(|value| it.oriented(value)))
             .collect()
     };
     let points: Vec<(u32, Vec<f64>)> =
