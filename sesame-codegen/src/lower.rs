@@ -19,7 +19,7 @@ use sesame_dsl::units::Unit;
 use sesame_plan as plan;
 
 use self::id::{raw, topic_id};
-use crate::plan::{HookPlan, OperationPlan, RunnerPlan};
+use crate::plan::{Called, HookPlan, Offline, OperationPlan, RunnerPlan};
 
 /// The plan of a campaign's runner. `source` is the `.sesame` file's name without its folder, `generator` the name and
 /// version of what generates.
@@ -266,13 +266,17 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
 
 fn custom_operations(space: &Space) -> Vec<OperationPlan> {
     let operations = space.operations.values().filter_map(|operation| match &operation.kind {
-        model::OperationKind::Custom { moment: when } => Some(OperationPlan {
+        model::OperationKind::Custom { moment } => Some(OperationPlan {
             operation: operation.declaration.name.clone(),
             doc: operation.declaration.doc.clone(),
             source: space.file_of(&operation.declaration).to_owned(),
             line: operation.declaration.line,
-            topic: operation.topic().map(topic_id),
-            moment: *when,
+            called: match (moment, operation.topic()) {
+                (plan::Moment::BeforeStart, _) => Called::Offline(Offline::BeforeStart),
+                (plan::Moment::AfterEnd, _) => Called::Offline(Offline::AfterEnd),
+                (plan::Moment::OnMessage, Some(topic)) => Called::OnMessage(topic_id(topic)),
+                (plan::Moment::OnMessage, None) => unreachable!("an operation that is called on messages has a topic"),
+            },
             parameters: operation.parameters.iter().map(|it| (parameter(it), it.doc.clone())).collect(),
         }),
         _ => None,
