@@ -27,7 +27,7 @@ pub use self::problem::Problem;
 pub use self::text::Templates;
 use crate::files::{File, Hook, Owner, Tree};
 use crate::names;
-use crate::plan::RunnerPlan;
+use crate::plan::{OperationPlan, RunnerPlan};
 
 /// The version of the interface between generated code and the runtime that this generator writes for.
 const ABI: u32 = 2;
@@ -350,7 +350,7 @@ fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> Str
     let plan = &runner.plan;
     let docs = rust::module_docs([format!("Campaign `{}`, for the runtime.", plan.campaign.name)]);
     // A runner that can go elsewhere leads out of itself only for files that operations beside the run work on.
-    let beside = runner.operations.iter().any(|operation| operation.topic.is_none());
+    let beside = runner.operations.iter().any(OperationPlan::is_offline);
     let folder =
         if environment.hooks == HooksFolder::Shared || beside { environment.space_folder.as_str() } else { "." };
     let operations = if runner.operations.is_empty() {

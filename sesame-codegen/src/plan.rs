@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use sesame_plan::{CampaignPlan, Direction, MetricSource, Moment, Parameter, TopicId};
+use sesame_plan::{CampaignPlan, Direction, MetricSource, Parameter, TopicId};
 
 /// The plan of one runner crate.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,12 +57,35 @@ pub struct OperationPlan {
     pub source: String,
     /// Line of its declaration, from 1.
     pub line: u32,
-    /// The topic whose messages it takes: `Some` exactly if it is called on messages.
-    pub topic: Option<TopicId>,
     /// When it is called.
-    pub moment: Moment,
+    pub called: Called,
     /// Its parameters, in declaration order, with their doc comments.
     pub parameters: Vec<(Parameter, String)>,
+}
+
+/// When a custom operation is called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Called {
+    /// With each message of this topic while the operation is active.
+    OnMessage(TopicId),
+    /// Once for a run, on files instead of messages.
+    Offline(Offline),
+}
+
+/// When an operation that does not act on messages is called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Offline {
+    /// Before the simulator starts afresh for the test.
+    BeforeStart,
+    /// After a run that came to its end.
+    AfterEnd,
+}
+
+impl OperationPlan {
+    /// Whether it acts before the start or after the end of a run.
+    pub fn is_offline(&self) -> bool {
+        matches!(self.called, Called::Offline(_))
+    }
 }
 
 impl RunnerPlan {

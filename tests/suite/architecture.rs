@@ -67,6 +67,24 @@ fn crates_link_each_other_as_the_architecture_says() {
     assert!(objections.is_empty(), "{objections:#?}");
 }
 
+/// Features named `testing` are for the tests of other crates: in `[dependencies]` they would be part of runners.
+#[test]
+fn no_crate_links_what_is_for_tests() {
+    let member = |folder: &str| fs::read_to_string(workspace().join(folder).join("Cargo.toml")).unwrap();
+    let root: toml::Table = toml::from_str(&member("")).unwrap();
+    let for_tests = |dependency: &toml::Value| {
+        let features = dependency.get("features").and_then(toml::Value::as_array);
+        features.is_some_and(|features| features.iter().any(|feature| feature.as_str() == Some("testing")))
+    };
+    let mut linked = Vec::new();
+    for folder in root["workspace"]["members"].as_array().unwrap().iter().filter_map(toml::Value::as_str) {
+        let manifest: toml::Table = toml::from_str(&member(folder)).unwrap();
+        let dependencies = manifest.get("dependencies").and_then(toml::Value::as_table).into_iter().flatten();
+        linked.extend(dependencies.filter(|(_, it)| for_tests(it)).map(|(name, _)| format!("{folder}: {name}")));
+    }
+    assert!(linked.is_empty(), "{linked:?}");
+}
+
 #[test]
 fn an_arrow_that_runs_up_a_missing_crate_and_another_link_are_objected_to() {
     let links = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<BTreeSet<_>>();

@@ -107,7 +107,8 @@ pub fn ends(bound: Bound) -> (Option<f64>, bool, Option<f64>, bool) {
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_plan::{Requirement, RequirementId, Trend};
+    use sesame_plan::testing::{plan, requirement};
+    use sesame_plan::{RequirementId, Trend};
 
     use super::*;
 
@@ -170,14 +171,9 @@ mod tests {
 
     #[test]
     fn a_run_fails_alike_if_it_violates_all_of_it_and_was_disturbed() {
-        let mut plan = sesame_plan::testing::plan(Vec::new());
+        let mut plan = plan(Vec::new());
         plan.requirements = [(0, 0.0), (1, 70.0)]
-            .map(|(metric, value)| Requirement {
-                name: format!("R{metric}"),
-                text: String::new(),
-                metric: MetricId(metric),
-                bound: Bound::AtMost { value },
-            })
+            .map(|(metric, value)| requirement(&format!("R{metric}"), metric, Bound::AtMost { value }))
             .to_vec();
         let violation =
             |ids: &[u32]| Failing::Violation { requirements: ids.iter().copied().map(RequirementId).collect() };

@@ -1,22 +1,82 @@
-//! Small plans for tests of the runtime.
+//! Plans for tests, and functions that make their parts.
+//!
+//! A function takes what every test gives of a part; all other fields have a default. A test that needs another value
+//! of a field says so with struct update syntax: `Metric { unit, ..metric("speed", source) }`. So a new field of the
+//! plan is filled in here, and in no test.
 
 use crate::{
-    Activation, ActivationMode, Campaign, CampaignPlan, Choice, Count, Distribution, Domain, Drain, Field, FieldRef,
-    MessageId, MessageType, Metric, MetricSource, Operation, OperationId, OperationKind, Parameter, SCHEMA, Search,
-    Shape, Simulator, Span, Step, Strategy, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode,
+    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Copies, Count, Distribution, Domain, Drain,
+    Field, FieldRef, KnownTest, MessageId, MessageType, Metric, MetricId, MetricSource, Operation, OperationId,
+    OperationKind, Parameter, Requirement, SCHEMA, Search, Shape, Simulator, Span, Step, Strategy, Test, TestOperation,
+    Topic, TopicId, Transport, Type, ValueMode,
 };
 
-/// Topic `command` of reals, topic `zones` with two members of `Zone { level: real, count: int }`.
-pub fn plan(operations: Vec<Operation>) -> CampaignPlan {
-    let ids = (0u32..).take(operations.len()).map(OperationId).collect();
-    let topic = |name: &str, paths: &[&str], ty| Topic {
+/// The smallest valid plan: a simulator, and [a campaign](campaign) that may not use anything.
+pub fn minimal() -> CampaignPlan {
+    CampaignPlan {
+        schema: SCHEMA,
+        generator: "test".to_owned(),
+        source: "test.sesame".to_owned(),
+        space: "test".to_owned(),
+        doc: String::new(),
+        simulator: in_process("sim", "sim::Sim", 100_000_000),
+        messages: Vec::new(),
+        topics: Vec::new(),
+        nodes: Vec::new(),
+        metrics: Vec::new(),
+        requirements: Vec::new(),
+        operations: Vec::new(),
+        tests: Vec::new(),
+        campaign: campaign("campaign", 0),
+    }
+}
+
+/// A campaign of one random test of ten seconds, by time, with seed 1. It may use the first operations of the plan, so
+/// many of them, and has no objective.
+pub fn campaign(name: &str, operations: usize) -> Campaign {
+    Campaign {
         name: name.to_owned(),
         doc: String::new(),
-        paths: paths.iter().map(|&path| path.to_owned()).collect(),
-        ty,
-    };
-    let field = |name: &str, ty| Field { name: name.to_owned(), doc: String::new(), ty };
-    let metric = |name: &str, source| Metric {
+        objectives: Vec::new(),
+        operations: (0..).take(operations).map(OperationId).collect(),
+        count: Count { min: 1, max: 5 },
+        copies: Copies::default(),
+        activation: ActivationMode::Time,
+        search: Search::new(Strategy::Random, 1),
+        coverage: None,
+        exploration: None,
+        confirm: None,
+        neighbours: None,
+        stop: Vec::new(),
+        seed: 1,
+        end_after: 10.0,
+        record: None,
+    }
+}
+
+/// A simulator that is a Rust type, with steps of so many nanoseconds.
+pub fn in_process(name: &str, path: &str, step_ns: u64) -> Simulator {
+    Simulator { name: name.to_owned(), transport: Transport::InProcess { path: path.to_owned(), step_ns } }
+}
+
+/// A message type.
+pub fn message(name: &str, fields: Vec<Field>) -> MessageType {
+    MessageType { name: name.to_owned(), doc: String::new(), fields }
+}
+
+/// A field of a message type.
+pub fn field(name: &str, ty: Type) -> Field {
+    Field { name: name.to_owned(), doc: String::new(), ty }
+}
+
+/// A topic, or a group of topics.
+pub fn topic(name: &str, paths: &[&str], ty: Type) -> Topic {
+    Topic { name: name.to_owned(), doc: String::new(), paths: paths.iter().map(|&path| path.to_owned()).collect(), ty }
+}
+
+/// A metric without a unit, a direction or a trend.
+pub fn metric(name: &str, source: MetricSource) -> Metric {
+    Metric {
         name: name.to_owned(),
         doc: String::new(),
         unit: None,
@@ -27,93 +87,24 @@ pub fn plan(operations: Vec<Operation>) -> CampaignPlan {
         trend: None,
         accepts_not_finite: false,
         line: 1,
-    };
-    CampaignPlan {
-        schema: SCHEMA,
-        generator: "test".to_owned(),
-        source: "test.sesame".to_owned(),
-        space: "test".to_owned(),
-        doc: String::new(),
-        simulator: Simulator {
-            name: "sim".to_owned(),
-            transport: Transport::InProcess { path: "sim::Sim".to_owned(), step_ns: 100_000_000 },
-        },
-        messages: vec![MessageType {
-            name: "Zone".to_owned(),
-            doc: String::new(),
-            fields: vec![field("level", Type::Real { unit: None }), field("count", Type::Int { unit: None })],
-        }],
-        topics: vec![
-            topic("command", &["arm/command"], Type::Real { unit: None }),
-            topic("zones", &["zones/Z1", "zones/Z2"], Type::Message { id: MessageId(0) }),
-        ],
-        nodes: Vec::new(),
-        metrics: vec![
-            metric("fuzzing_time", MetricSource::FuzzingTime),
-            metric("last_command", MetricSource::Last { input: FieldRef { topic: TopicId(0), path: Vec::new() } }),
-        ],
-        requirements: Vec::new(),
-        operations,
-        tests: Vec::new(),
-        campaign: Campaign {
-            name: "campaign".to_owned(),
-            doc: String::new(),
-            objectives: Vec::new(),
-            operations: ids,
-            count: Count { min: 1, max: 5 },
-            copies: crate::Copies::default(),
-            activation: ActivationMode::Time,
-            search: Search::new(Strategy::Random, 1),
-            coverage: None,
-            exploration: None,
-            confirm: None,
-            neighbours: None,
-            stop: Vec::new(),
-            seed: 1,
-            end_after: 10.0,
-            record: None,
-        },
     }
 }
 
-/// An operation on a topic, permitted in the first ten seconds.
-pub fn operation(topic: u32, kind: OperationKind) -> Operation {
-    let parameter = |name: &str, low, high, shape, integer| Parameter {
-        name: name.to_owned(),
-        unit: None,
-        domain: Domain::Number { low, high, shape, integer },
-    };
-    let parameters = match &kind {
-        OperationKind::RandomValue { integer, mode } => {
-            vec![parameter(random_word(*mode), -9.0, 9.0, Shape::Range, *integer)]
-        }
-        OperationKind::PacketLoss => vec![parameter("loss", 0.0, 1.0, Shape::Value, false)],
-        OperationKind::Latency { distribution: Distribution::Fixed, .. } => {
-            vec![parameter("delay", 0.0, 5.0, Shape::Value, false)]
-        }
-        OperationKind::Latency { .. } => vec![parameter("delay", 0.0, 5.0, Shape::Range, false)],
-        OperationKind::Bias => vec![parameter("bias", -9.0, 9.0, Shape::Value, false)],
-        OperationKind::ClockSkew => vec![parameter("skew", -9.0, 9.0, Shape::Value, false)],
-        OperationKind::StuckAt { truth: None } => vec![parameter("value", -9.0, 9.0, Shape::Value, false)],
-        OperationKind::Drift => vec![parameter("rate", -9.0, 9.0, Shape::Value, false)],
-        OperationKind::Noise => vec![parameter("sigma", 0.0, 9.0, Shape::Value, false)],
-        OperationKind::Scale => vec![parameter("factor", -9.0, 9.0, Shape::Value, false)],
-        OperationKind::Stale => vec![parameter("age", 0.0, 5.0, Shape::Value, false)],
-        OperationKind::BurstLoss => {
-            ["enter", "leave", "loss"].map(|name| parameter(name, 0.0, 1.0, Shape::Value, false)).to_vec()
-        }
-        OperationKind::RateLimit => vec![parameter("rate", 0.1, 100.0, Shape::Value, false)],
-        OperationKind::Reorder { .. } => vec![parameter("window", 0.0, 5.0, Shape::Value, false)],
-        OperationKind::Duplicate => vec![parameter("copies", 1.0, 100.0, Shape::Value, true)],
-        OperationKind::RandomText { .. }
-        | OperationKind::StuckAt { truth: Some(_) }
-        | OperationKind::NotFinite { .. }
-        | OperationKind::Freeze
-        | OperationKind::Blackhole
-        | OperationKind::Custom { .. } => Vec::new(),
-    };
+/// A requirement on a metric.
+pub fn requirement(name: &str, metric: u32, bound: Bound) -> Requirement {
+    Requirement { name: name.to_owned(), text: String::new(), metric: MetricId(metric), bound }
+}
+
+/// A known test that expects nothing.
+pub fn known_test(name: &str, test: Test) -> KnownTest {
+    KnownTest { name: name.to_owned(), doc: String::new(), test, expectations: Vec::new() }
+}
+
+/// An operation that is permitted in the first ten seconds, on whole messages of a topic; on no topic if it acts beside
+/// the run.
+pub fn operation_with(name: &str, topic: u32, kind: OperationKind, parameters: Vec<Parameter>) -> Operation {
     Operation {
-        name: kind.words().replace(' ', "_"),
+        name: name.to_owned(),
         doc: String::new(),
         topic: (!kind.is_offline()).then_some(TopicId(topic)),
         places: Vec::new(),
@@ -125,6 +116,76 @@ pub fn operation(topic: u32, kind: OperationKind) -> Operation {
         timed: true,
         constraints: Vec::new(),
     }
+}
+
+/// A parameter without a unit.
+pub fn parameter(name: &str, domain: Domain) -> Parameter {
+    Parameter { name: name.to_owned(), unit: None, domain }
+}
+
+/// A parameter of which a test chooses one real number.
+pub fn value(name: &str, low: f64, high: f64) -> Parameter {
+    parameter(name, Domain::Number { low, high, shape: Shape::Value, integer: false })
+}
+
+/// A parameter of which a test chooses a sub-range of real numbers.
+pub fn range(name: &str, low: f64, high: f64) -> Parameter {
+    parameter(name, Domain::Number { low, high, shape: Shape::Range, integer: false })
+}
+
+/// A plan of topic `command` of reals and topic `zones` with two members of `Zone { level: real, count: int }`, and of
+/// two metrics: the fuzzing time and the last command. Its campaign may use all of the operations.
+pub fn plan(operations: Vec<Operation>) -> CampaignPlan {
+    let (real, int) = (Type::Real { unit: None }, Type::Int { unit: None });
+    let command = FieldRef { topic: TopicId(0), path: Vec::new() };
+    CampaignPlan {
+        messages: vec![message("Zone", vec![field("level", real.clone()), field("count", int)])],
+        topics: vec![
+            topic("command", &["arm/command"], real),
+            topic("zones", &["zones/Z1", "zones/Z2"], Type::Message { id: MessageId(0) }),
+        ],
+        metrics: vec![
+            metric("fuzzing_time", MetricSource::FuzzingTime),
+            metric("last_command", MetricSource::Last { input: command }),
+        ],
+        campaign: campaign("campaign", operations.len()),
+        operations,
+        ..minimal()
+    }
+}
+
+/// An operation of this kind with the parameters that the kind needs, named after it; otherwise as
+/// [`operation_with`].
+pub fn operation(topic: u32, kind: OperationKind) -> Operation {
+    let whole =
+        |name: &str, low, high| parameter(name, Domain::Number { low, high, shape: Shape::Value, integer: true });
+    let parameters = match &kind {
+        OperationKind::RandomValue { integer, mode } => {
+            let domain = Domain::Number { low: -9.0, high: 9.0, shape: Shape::Range, integer: *integer };
+            vec![parameter(random_word(*mode), domain)]
+        }
+        OperationKind::PacketLoss => vec![value("loss", 0.0, 1.0)],
+        OperationKind::Latency { distribution: Distribution::Fixed, .. } => vec![value("delay", 0.0, 5.0)],
+        OperationKind::Latency { .. } => vec![range("delay", 0.0, 5.0)],
+        OperationKind::Bias => vec![value("bias", -9.0, 9.0)],
+        OperationKind::ClockSkew => vec![value("skew", -9.0, 9.0)],
+        OperationKind::StuckAt { truth: None } => vec![value("value", -9.0, 9.0)],
+        OperationKind::Drift => vec![value("rate", -9.0, 9.0)],
+        OperationKind::Noise => vec![value("sigma", 0.0, 9.0)],
+        OperationKind::Scale => vec![value("factor", -9.0, 9.0)],
+        OperationKind::Stale => vec![value("age", 0.0, 5.0)],
+        OperationKind::BurstLoss => ["enter", "leave", "loss"].map(|name| value(name, 0.0, 1.0)).to_vec(),
+        OperationKind::RateLimit => vec![value("rate", 0.1, 100.0)],
+        OperationKind::Reorder { .. } => vec![value("window", 0.0, 5.0)],
+        OperationKind::Duplicate => vec![whole("copies", 1.0, 100.0)],
+        OperationKind::RandomText { .. }
+        | OperationKind::StuckAt { truth: Some(_) }
+        | OperationKind::NotFinite { .. }
+        | OperationKind::Freeze
+        | OperationKind::Blackhole
+        | OperationKind::Custom { .. } => Vec::new(),
+    };
+    operation_with(&kind.words().replace(' ', "_"), topic, kind, parameters)
 }
 
 /// The same operation on a field.
@@ -160,4 +221,15 @@ pub fn use_of(operation: u32, start: f64, end: f64, parameters: Vec<Choice>, ope
 /// A test of these operations.
 pub fn test_of(operations: Vec<TestOperation>) -> Test {
     Test { operations }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_plans_for_tests_are_valid() {
+        minimal().validate().unwrap();
+        plan(vec![operation(0, OperationKind::Bias), operation(1, OperationKind::Blackhole)]).validate().unwrap();
+    }
 }

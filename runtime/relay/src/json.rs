@@ -213,7 +213,7 @@ pub(crate) fn quoted(text: &str, out: &mut Vec<u8>) {
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_plan::{Field, MessageType};
+    use sesame_plan::testing::{field, message};
 
     use super::*;
 
@@ -225,16 +225,9 @@ mod tests {
     /// }`.
     fn plan() -> CampaignPlan {
         let mut plan = sesame_plan::testing::plan(Vec::new());
-        let field = |name: &str, ty| Field { name: name.into(), doc: String::new(), ty };
-        plan.messages.push(MessageType {
-            name: "Outer".into(),
-            doc: String::new(),
-            fields: vec![
-                field("inner", Type::Message { id: MessageId(0) }),
-                field("at", POINT),
-                field("tags", Type::List { of: Box::new(Type::Text) }),
-            ],
-        });
+        let tags = Type::List { of: Box::new(Type::Text) };
+        let inner = Type::Message { id: MessageId(0) };
+        plan.messages.push(message("Outer", vec![field("inner", inner), field("at", POINT), field("tags", tags)]));
         plan
     }
 

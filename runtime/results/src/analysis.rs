@@ -18,7 +18,6 @@ use sesame_optimise::dominance::lexicographic;
 use sesame_optimise::front::{Front, FrontMember};
 use sesame_plan::{CampaignPlan, Dimension, GridAxis, MetricId};
 use sesame_search::coverage::{Coverage, CurvePoint, Feasible, Grid, curve};
-use sesame_search::in_unit;
 use sesame_search::sspr::Convention;
 
 use crate::analysis::confirmed::confirmed_tests;
@@ -157,7 +156,7 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Table, Re
     for (number, fitness) in &judged {
         let Some(oriented) = fitness.objectives() else { continue };
         let Ok(at) = members.binary_search_by(|member| lexicographic(&member.objectives, oriented)) else { continue };
-        let values = objectives.iter().zip(oriented).map(|(&id, &value)| Datum::real(Some(in_unit(plan, id, value))));
+        let values = plan.objectives().zip(oriented).map(|(it, &value)| Datum::real(Some(it.in_unit(value))));
         let same = if members[at].number == *number { Datum::Missing } else { Datum::test(members[at].number) };
         let of = confirmed.iter().find(|test| test.number == *number);
         let surest = of.and_then(|test| test.surest());

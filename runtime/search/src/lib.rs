@@ -35,6 +35,6 @@ pub use error::SearchError;
 pub use evolve::variation::{Rates, TestVariation};
 pub use margin::{confirmed_margins, margins};
 pub use neighbours::Neighbours;
-pub use objective::{fitness, fitness_of, in_unit};
+pub use objective::{fitness, fitness_of};
 pub use stop::StopRules;
 pub use strategy::{Candidate, Evaluated, Strategy};

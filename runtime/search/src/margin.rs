@@ -58,19 +58,14 @@ mod tests {
     use proptest::prelude::*;
 
     use sesame_base::observation::{MetricObservation, Outcome, Reach};
-    use sesame_plan::{MetricId, Search, Strategy};
+    use sesame_plan::{Search, Strategy};
 
     use super::*;
     use crate::testing::synthetic_robots::SYNTHETIC_ROBOTS;
 
     fn margin(outcome: Outcome, shown: MetricObservation) -> Margin {
         let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
-        plan.requirements = vec![Requirement {
-            name: "in_time".to_owned(),
-            text: String::new(),
-            metric: MetricId(0),
-            bound: Bound::AtMost { value: 70.0 },
-        }];
+        plan.requirements = vec![sesame_plan::testing::requirement("in_time", 0, Bound::AtMost { value: 70.0 })];
         let observation = Observation { end: 70.0, metrics: vec![shown], ..Observation::without_run(outcome) };
         margins(&plan, &observation).remove(0)
     }

@@ -2,7 +2,7 @@
 
 use sesame_base::observation::{Observation, Outcome};
 use sesame_optimise::dominance::{Fitness, Unfit};
-use sesame_plan::{CampaignPlan, Direction, MetricId};
+use sesame_plan::{CampaignPlan, MetricId};
 
 /// The fitness of a run: its objective values in the campaign's order, negated where more is sought; or why it has
 /// none.
@@ -19,20 +19,11 @@ pub fn fitness_of(plan: &CampaignPlan, outcome: &Outcome, value: impl Fn(MetricI
         Outcome::Crash { .. } => return Fitness::Unfit(Unfit::Crash),
         Outcome::Timeout { .. } => return Fitness::Unfit(Unfit::Timeout),
     }
-    let oriented = plan.campaign.objectives.iter().map(|&id| {
-        let value = value(id).filter(|value| !value.is_nan())?;
-        // Subtracted from zero and added to it, so that no negative zero comes out.
-        match plan.metric(id).direction.expect("the generator gives every objective a direction") {
-            Direction::Minimise => Some(0.0 + value),
-            Direction::Maximise => Some(0.0 - value),
-        }
+    let oriented = plan.objectives().map(|objective| {
+        let value = value(objective.metric).filter(|value| !value.is_nan())?;
+        Some(objective.oriented(value))
     });
     oriented.collect::<Option<Vec<f64>>>().map_or(Fitness::Unfit(Unfit::Unmeasured), Fitness::Measured)
-}
-
-/// An oriented value of an objective as the metric has it, in its unit. It undoes what [`fitness`] does.
-pub fn in_unit(plan: &CampaignPlan, objective: MetricId, oriented: f64) -> f64 {
-    if plan.metric(objective).direction == Some(Direction::Maximise) { 0.0 - oriented } else { 0.0 + oriented }
 }
 
 #[cfg(test)]

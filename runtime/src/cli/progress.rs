@@ -64,11 +64,11 @@ impl<'a> Display<'a> {
 
     /// The worst value of each objective so far.
     fn remember(&mut self, record: &TestRecord) {
-        for (worst, &id) in self.worst.iter_mut().zip(&self.plan.campaign.objectives) {
-            let value = record.observation.metrics.get(id.index()).and_then(|metric| metric.value);
-            *worst = match (*worst, value, self.plan.metric(id).direction) {
-                (Some(old), Some(new), Some(Direction::Maximise)) => Some(old.max(new)),
-                (Some(old), Some(new), _) => Some(old.min(new)),
+        for (worst, objective) in self.worst.iter_mut().zip(self.plan.objectives()) {
+            let value = record.observation.metrics.get(objective.metric.index()).and_then(|metric| metric.value);
+            *worst = match (*worst, value, objective.direction) {
+                (Some(old), Some(new), Direction::Maximise) => Some(old.max(new)),
+                (Some(old), Some(new), Direction::Minimise) => Some(old.min(new)),
                 (old, new, _) => old.or(new),
             };
         }
@@ -85,14 +85,14 @@ impl<'a> Display<'a> {
         if let Some(coverage) = progress.coverage {
             parts.push(format!("coverage {:.0} %", 100.0 * coverage.share()));
         }
-        for (worst, &id) in self.worst.iter().zip(&self.plan.campaign.objectives) {
-            let metric = self.plan.metric(id);
+        for (worst, objective) in self.worst.iter().zip(self.plan.objectives()) {
+            let metric = self.plan.metric(objective.metric);
             // The least fuzzing time is not worth a line.
             if matches!(metric.source, MetricSource::FuzzingTime) {
                 continue;
             }
             let Some(worst) = worst else { continue };
-            let word = if metric.direction == Some(Direction::Maximise) { "most" } else { "least" };
+            let word = if objective.direction == Direction::Maximise { "most" } else { "least" };
             parts.push(
                 format!("{word} {} {worst:.4}", metric.name).trim_end_matches('0').trim_end_matches('.').to_owned(),
             );

@@ -7,10 +7,10 @@ use rusqlite::Connection;
 
 use sesame_base::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome};
 use sesame_plan::stl::{self, Robustness};
+use sesame_plan::testing;
 use sesame_plan::{
-    ActivationMode, Aggregate, Campaign, CampaignPlan, Copies, Count, Drain, Expression, Field, Input, MessageId,
-    MessageType, Metric, MetricSource, Operation, OperationKind, Requirement, SCHEMA, Search, Side, Simulator,
-    Strategy, Test, Topic, Transport, Trend, Type,
+    Aggregate, Campaign, CampaignPlan, Copies, Drain, Expression, Input, MessageId, Metric, MetricSource, Operation,
+    OperationKind, Requirement, Side, Test, Topic, Trend, Type,
 };
 use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
 use sesame_relay::metric::MetricTable;
@@ -28,27 +28,17 @@ pub(crate) const STEP: i64 = 100_000_000;
 
 /// A metric; of a hook with its trend declared.
 pub(crate) fn metric(name: &str, default: Option<f64>, initial: Option<f64>, source: MetricSource) -> Metric {
-    Metric {
-        name: name.to_owned(),
-        doc: String::new(),
-        unit: None,
-        direction: None,
-        default,
-        initial,
-        trend: match &source {
-            MetricSource::Hook { .. } => trend(HookKind::named(name)),
-            MetricSource::FuzzingTime => Some(Trend::Rising),
-            MetricSource::Formula { formula } => match formula.aggregate {
-                Aggregate::Max { .. } | Aggregate::Count { .. } | Aggregate::Duration { .. } => Some(Trend::Rising),
-                Aggregate::Min { .. } => Some(Trend::Falling),
-                Aggregate::Last { .. } | Aggregate::Mean { .. } => None,
-            },
-            MetricSource::Last { .. } | MetricSource::Robustness { .. } => None,
+    let trend = match &source {
+        MetricSource::Hook { .. } => trend(HookKind::named(name)),
+        MetricSource::FuzzingTime => Some(Trend::Rising),
+        MetricSource::Formula { formula } => match formula.aggregate {
+            Aggregate::Max { .. } | Aggregate::Count { .. } | Aggregate::Duration { .. } => Some(Trend::Rising),
+            Aggregate::Min { .. } => Some(Trend::Falling),
+            Aggregate::Last { .. } | Aggregate::Mean { .. } => None,
         },
-        source,
-        accepts_not_finite: false,
-        line: 1,
-    }
+        MetricSource::Last { .. } | MetricSource::Robustness { .. } => None,
+    };
+    Metric { default, initial, trend, ..testing::metric(name, source) }
 }
 
 fn trend(kind: HookKind) -> Option<Trend> {
@@ -99,51 +89,23 @@ pub(crate) fn plan(
     copies: Copies,
     end_after: f64,
 ) -> CampaignPlan {
-    let field = |name: &str, ty| Field { name: name.to_owned(), doc: String::new(), ty };
+    let fields = vec![
+        testing::field("level", Type::Real { unit: None }),
+        testing::field("count", Type::Int { unit: None }),
+        testing::field("inside", Type::Bool),
+        testing::field("name", Type::Text),
+    ];
     CampaignPlan {
-        schema: SCHEMA,
-        generator: "test".to_owned(),
         source: "made_up.sesame".to_owned(),
         space: "made_up".to_owned(),
-        doc: String::new(),
-        simulator: Simulator {
-            name: "robot".to_owned(),
-            transport: Transport::InProcess { path: "robot::Robot".to_owned(), step_ns: STEP.unsigned_abs() },
-        },
-        messages: vec![MessageType {
-            name: "Zone".to_owned(),
-            doc: String::new(),
-            fields: vec![
-                field("level", Type::Real { unit: None }),
-                field("count", Type::Int { unit: None }),
-                field("inside", Type::Bool),
-                field("name", Type::Text),
-            ],
-        }],
+        simulator: testing::in_process("robot", "robot::Robot", STEP.unsigned_abs()),
+        messages: vec![testing::message("Zone", fields)],
         topics,
-        nodes: Vec::new(),
         metrics,
         requirements,
         operations: operations.to_vec(),
-        tests: Vec::new(),
-        campaign: Campaign {
-            name: "made_up".to_owned(),
-            doc: String::new(),
-            objectives: Vec::new(),
-            operations: (0u32..).take(operations.len()).map(sesame_plan::OperationId).collect(),
-            count: Count { min: 1, max: 5 },
-            copies,
-            activation: ActivationMode::Time,
-            search: Search::new(Strategy::Random, 1),
-            coverage: None,
-            exploration: None,
-            confirm: None,
-            neighbours: None,
-            stop: Vec::new(),
-            seed: 1,
-            end_after,
-            record: None,
-        },
+        campaign: Campaign { copies, end_after, ..testing::campaign("made_up", operations.len()) },
+        ..testing::minimal()
     }
 }
 

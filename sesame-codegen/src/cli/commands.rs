@@ -17,7 +17,7 @@ use crate::files::{Owner, Tree};
 use crate::frontend::{Checked, Language};
 use crate::input;
 use crate::output::{self, Change, Mode, Orphan, Report};
-use crate::plan::RunnerPlan;
+use crate::plan::{OperationPlan, RunnerPlan};
 use crate::{emit, names, project};
 
 /// `sesamec new`
@@ -294,7 +294,7 @@ fn write(
              `{folder}`, relative to its own folder"
         ));
     }
-    if alone && space.operations.iter().any(|operation| operation.topic.is_none()) {
+    if alone && space.operations.iter().any(OperationPlan::is_offline) {
         let folder = &environment.space_folder;
         shell.warning(format!(
             "custom operations before the start and after the end work on files, which are not copied: a runner that \

@@ -18,16 +18,25 @@ pub(super) struct Handler<'a> {
 
 /// The handlers of a hook, in the order of its inputs.
 pub(super) fn handlers<'a>(plan: &'a CampaignPlan, inputs: &[TopicId]) -> Vec<Handler<'a>> {
+    let mut scope = free_methods();
+    inputs.iter().map(|&input| handler_among(plan, input, &mut scope)).collect()
+}
+
+/// The handler of a hook that takes messages of one topic.
+pub(super) fn handler(plan: &CampaignPlan, input: TopicId) -> Handler<'_> {
+    handler_among(plan, input, &mut free_methods())
+}
+
+/// The names that a handler may have.
+fn free_methods() -> Scope {
     // A hook is also told when a run starts and ends.
-    let mut scope = Scope::reserving(&["on_start", "on_end"]);
-    inputs
-        .iter()
-        .map(|&input| {
-            let topic = plan.topic(input);
-            let method = scope.take(format!("on_{}", topic.name.to_snake_case()), "_message");
-            Handler { topic, method, parameter: parameter(plan, topic) }
-        })
-        .collect()
+    Scope::reserving(&["on_start", "on_end"])
+}
+
+fn handler_among<'a>(plan: &'a CampaignPlan, input: TopicId, scope: &mut Scope) -> Handler<'a> {
+    let topic = plan.topic(input);
+    let method = scope.take(format!("on_{}", topic.name.to_snake_case()), "_message");
+    Handler { topic, method, parameter: parameter(plan, topic) }
 }
 
 /// What a handler calls its message: the last word of its type (`SafetyZone` → `zone`), or the topic's name for a

@@ -4,34 +4,49 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 use serde::Serialize;
-use sesame_plan::{Domain, Moment, Parameter, Topic, Type};
+use sesame_plan::{Domain, Parameter, Topic, Type};
 
-use super::handlers::{self, handlers, paths};
+use super::handlers::{self, Handler, handler, paths};
 use super::messages::{self, Messages, Place};
 use super::problem::Problem;
 use super::registry::{self, Registered};
 use super::rust::{self, one_line};
 use super::text::Templates;
 use crate::names::{self, Scope};
-use crate::plan::{OperationPlan, RunnerPlan};
+use crate::plan::{Called, Offline, OperationPlan, RunnerPlan};
 
 /// Where an operation is declared, for example ``operation `bend_path` (kuka_cell.sesame:41)``.
 fn declared(operation: &OperationPlan) -> String {
     format!("operation `{}` ({}:{})", operation.operation, operation.source, operation.line)
 }
 
-/// The function of a hook, with the topic and the name of its message if it takes one.
+/// The function of a hook.
 struct Call<'a> {
     method: String,
-    message: Option<(&'a Topic, String)>,
+    takes: Takes<'a>,
+}
+
+/// What the function of a hook is called with.
+enum Takes<'a> {
+    /// A message of this topic, and the name of the parameter.
+    Message(&'a Topic, String),
+    /// The run.
+    Run(Offline),
 }
 
 fn call<'a>(runner: &'a RunnerPlan, operation: &OperationPlan) -> Call<'a> {
-    let handler = handlers(&runner.plan, operation.topic.as_slice()).into_iter().next();
-    match (handler, operation.moment) {
-        (Some(handler), _) => Call { method: handler.method, message: Some((handler.topic, handler.parameter)) },
-        (None, Moment::AfterEnd) => Call { method: "after_end".to_owned(), message: None },
-        (None, _) => Call { method: "before_start".to_owned(), message: None },
+    match operation.called {
+        Called::OnMessage(topic) => {
+            let Handler { topic, method, parameter } = handler(&runner.plan, topic);
+            Call { method, takes: Takes::Message(topic, parameter) }
+        }
+        Called::Offline(moment) => {
+            let method = match moment {
+                Offline::BeforeStart => "before_start",
+                Offline::AfterEnd => "after_end",
+            };
+            Call { method: method.to_owned(), takes: Takes::Run(moment) }
+        }
     }
 }
 
@@ -70,10 +85,10 @@ fn permitted(parameter: &Parameter) -> String {
 
 /// What a hook is given, as [`handlers::inputs`] says it.
 pub(super) fn inputs(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPlan) -> Vec<String> {
-    let mut lines = handlers::inputs(&runner.plan, types, operation.topic.as_slice());
-    if lines.is_empty() {
-        lines.push(call(runner, operation).method);
-    }
+    let mut lines = match operation.called {
+        Called::OnMessage(topic) => handlers::inputs(&runner.plan, types, &[topic]),
+        Called::Offline(_) => vec![call(runner, operation).method],
+    };
     for (parameter, _, name) in fields(operation) {
         let unit = parameter.unit.as_ref().map(|unit| format!(" in {unit}")).unwrap_or_default();
         lines.push(format!("parameters.{name}: {}{unit}", parameter_type(parameter, "")));
@@ -120,31 +135,34 @@ fn hook_trait(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPl
             (names::ident(&name), messages::tokens(&parameter_type(parameter, "::sesame_runtime::value::")));
         quote! { #docs pub #name: #ty }
     });
-    let Call { method, message: taken } = call(runner, operation);
+    let Call { method, takes } = call(runner, operation);
     let method = names::ident(&method);
-    let method = if let Some((topic, parameter)) = taken {
-        let mut doc = vec![format!("A message on `{}` (\"{}\"), to be changed.", topic.name, paths(topic))];
-        doc.extend(messages::unit(&topic.ty).map(|unit| format!("In {unit}.")));
-        let docs = rust::docs(doc);
-        let parameter = names::ident(&parameter);
-        let ty = messages::tokens(&types.owned(&topic.ty, Place::WHOLE));
-        quote! {
-            #docs
-            fn #method(
-                &mut self,
-                #parameter: &mut #ty,
-                parameters: &#parameters,
-                ctx: &mut ::sesame_runtime::fuzz::OperationContext<'_, #ty>,
-            );
+    let method = match takes {
+        Takes::Message(topic, parameter) => {
+            let mut doc = vec![format!("A message on `{}` (\"{}\"), to be changed.", topic.name, paths(topic))];
+            doc.extend(messages::unit(&topic.ty).map(|unit| format!("In {unit}.")));
+            let docs = rust::docs(doc);
+            let parameter = names::ident(&parameter);
+            let ty = messages::tokens(&types.owned(&topic.ty, Place::WHOLE));
+            quote! {
+                #docs
+                fn #method(
+                    &mut self,
+                    #parameter: &mut #ty,
+                    parameters: &#parameters,
+                    ctx: &mut ::sesame_runtime::fuzz::OperationContext<'_, #ty>,
+                );
+            }
         }
-    } else {
-        let docs = rust::docs([match operation.moment {
-            Moment::AfterEnd => "After the last message of a run that came to its end.",
-            _ => "Before the simulator starts afresh for the run.",
-        }]);
-        quote! {
-            #docs
-            fn #method(&mut self, parameters: &#parameters, ctx: &mut ::sesame_runtime::fuzz::RunContext<'_>);
+        Takes::Run(moment) => {
+            let docs = rust::docs([match moment {
+                Offline::BeforeStart => "Before the simulator starts afresh for the run.",
+                Offline::AfterEnd => "After the last message of a run that came to its end.",
+            }]);
+            quote! {
+                #docs
+                fn #method(&mut self, parameters: &#parameters, ctx: &mut ::sesame_runtime::fuzz::RunContext<'_>);
+            }
         }
     };
     quote! {
@@ -199,25 +217,28 @@ fn adapter(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPlan)
         quote! { #name: ::sesame_runtime::fuzz::chosen(choices, #position) }
     });
     let unused = operation.parameters.is_empty().then(|| quote! { let _ = choices; });
-    let Call { method, message } = call(runner, operation);
+    let Call { method, takes } = call(runner, operation);
     let method = names::ident(&method);
-    let called = if let Some((topic, _)) = message {
-        let ty = messages::tokens(&types.owned(&topic.ty, Place::WHOLE));
-        quote! {
-            fn on_message(
-                &mut self,
-                message: &mut ::sesame_runtime::value::Value,
-                call: &mut ::sesame_runtime::fuzz::MessageCall<'_>,
-            ) {
-                call.typed::<#ty>(message, |message, ctx| {
-                    #hook_trait::#method(&mut self.hook, message, &self.parameters, ctx);
-                });
+    let called = match takes {
+        Takes::Message(topic, _) => {
+            let ty = messages::tokens(&types.owned(&topic.ty, Place::WHOLE));
+            quote! {
+                fn on_message(
+                    &mut self,
+                    message: &mut ::sesame_runtime::value::Value,
+                    call: &mut ::sesame_runtime::fuzz::MessageCall<'_>,
+                ) {
+                    call.typed::<#ty>(message, |message, ctx| {
+                        #hook_trait::#method(&mut self.hook, message, &self.parameters, ctx);
+                    });
+                }
             }
         }
-    } else {
-        quote! {
-            fn before_or_after_run(&mut self, ctx: &mut ::sesame_runtime::fuzz::RunContext<'_>) {
-                #hook_trait::#method(&mut self.hook, &self.parameters, ctx);
+        Takes::Run(_) => {
+            quote! {
+                fn before_or_after_run(&mut self, ctx: &mut ::sesame_runtime::fuzz::RunContext<'_>) {
+                    #hook_trait::#method(&mut self.hook, &self.parameters, ctx);
+                }
             }
         }
     };
@@ -278,51 +299,50 @@ pub(super) fn stub(
 ) -> Result<String, Problem> {
     let (hook_type, hook_trait) = (names::hook_type(&operation.operation), names::hook_trait(&operation.operation));
     let parameters_type = names::parameters_type(&operation.operation);
-    let Call { method, message } = call(runner, operation);
+    let Call { method, takes } = call(runner, operation);
     let mut own = [names::written(&hook_trait), parameters_type.clone()];
     own.sort();
     let mut imports = vec![format!("crate::generated::operations::{{{}}}", own.join(", "))];
-    let message = message.map(|(topic, name)| {
-        let of = messages::named_message(&topic.ty).map(|id| types.struct_name(id).to_owned());
-        // A message called like the hook or its parameters is reached through its module.
-        let clash = of.as_ref().is_some_and(|of| [&hook_type, &hook_trait, &parameters_type].contains(&of));
-        imports.extend(of.map(|of| {
-            if clash {
-                "crate::generated::messages".to_owned()
-            } else {
-                format!("crate::generated::messages::{}", names::written(&of))
+    let (message, when, context, example) = match takes {
+        Takes::Message(topic, name) => {
+            let of = messages::named_message(&topic.ty).map(|id| types.struct_name(id).to_owned());
+            // A message called like the hook or its parameters is reached through its module.
+            let clash = of.as_ref().is_some_and(|of| [&hook_type, &hook_trait, &parameters_type].contains(&of));
+            imports.extend(of.map(|of| {
+                if clash {
+                    "crate::generated::messages".to_owned()
+                } else {
+                    format!("crate::generated::messages::{}", names::written(&of))
+                }
+            }));
+            imports.push("sesame_runtime::fuzz::OperationContext".to_owned());
+            if messages::holds_text(&topic.ty) {
+                imports.push("sesame_runtime::value::Text".to_owned());
             }
-        }));
-        imports.push("sesame_runtime::fuzz::OperationContext".to_owned());
-        if messages::holds_text(&topic.ty) {
-            imports.push("sesame_runtime::value::Text".to_owned());
-        }
-        let ty = types.owned(&topic.ty, if clash { Place::BY_MODULE } else { Place::IMPORTED });
-        (topic, StubMessage { name: names::written(&name), ty })
-    });
-    if message.is_none() {
-        imports.push("sesame_runtime::fuzz::RunContext".to_owned());
-    }
-    imports.sort();
-    let (when, context, example) = match (&message, operation.moment) {
-        (Some((topic, message)), _) => {
+            let ty = types.owned(&topic.ty, if clash { Place::BY_MODULE } else { Place::IMPORTED });
+            let message = StubMessage { name: names::written(&name), ty };
             let unit = messages::unit(&topic.ty).map(|unit| format!("; in {unit}")).unwrap_or_default();
             let when = format!("A message on `{}` (\"{}\"), to be changed{unit}.", topic.name, paths(topic));
             let example = match &topic.ty {
                 Type::Real { .. } => format!("*{} += ctx.draw_between(-0.1, 0.1);", message.name),
                 _ => format!("if ctx.draw() < 0.1 {{ ctx.inject({}.clone()); }}", message.name),
             };
-            (when, format!("OperationContext<'_, {}>", message.ty), example)
+            let context = format!("OperationContext<'_, {}>", message.ty);
+            (Some(message), when, context, example)
         }
-        (None, moment) => {
+        Takes::Run(moment) => {
+            imports.push("sesame_runtime::fuzz::RunContext".to_owned());
             let when = match moment {
-                Moment::AfterEnd => "After the last message of a run that came to its end.",
-                _ => "Before the simulator starts afresh for the run. Changed files are put back after it.",
+                Offline::BeforeStart => {
+                    "Before the simulator starts afresh for the run. Changed files are put back after it."
+                }
+                Offline::AfterEnd => "After the last message of a run that came to its end.",
             };
             let example = "ctx.edit_file(\"config.yaml\", |text| text.replace(\"gain: 1\", \"gain: 2\"));";
-            (when.to_owned(), "RunContext<'_>".to_owned(), example.to_owned())
+            (None, when.to_owned(), "RunContext<'_>".to_owned(), example.to_owned())
         }
     };
+    imports.sort();
     let stub = Stub {
         doc: operation.doc.lines().map(one_line).collect(),
         operation: operation.operation.clone(),
@@ -335,7 +355,7 @@ pub(super) fn stub(
         parameters_type,
         method: names::written(&method),
         when: one_line(&when),
-        message: message.map(|(_, message)| message),
+        message,
         context,
         example,
     };

@@ -5,7 +5,7 @@ use sesame_plan as plan;
 
 use super::id::topic_id;
 use super::system::unit;
-use crate::plan::OperationPlan;
+use crate::plan::{Called, Offline, OperationPlan};
 
 pub(super) fn operation(
     operation: &model::Operation,
@@ -52,13 +52,17 @@ pub(super) fn within(operation: &model::Operation, end_after: f64) -> plan::Span
 
 pub(super) fn custom_operations(space: &Space) -> Vec<OperationPlan> {
     let operations = space.operations.values().filter_map(|operation| match &operation.kind {
-        model::OperationKind::Custom { moment: when } => Some(OperationPlan {
+        model::OperationKind::Custom { moment } => Some(OperationPlan {
             operation: operation.declaration.name.clone(),
             doc: operation.declaration.doc.clone(),
             source: space.file_of(&operation.declaration).to_owned(),
             line: operation.declaration.line,
-            topic: operation.topic().map(topic_id),
-            moment: *when,
+            called: match (moment, operation.topic()) {
+                (plan::Moment::BeforeStart, _) => Called::Offline(Offline::BeforeStart),
+                (plan::Moment::AfterEnd, _) => Called::Offline(Offline::AfterEnd),
+                (plan::Moment::OnMessage, Some(topic)) => Called::OnMessage(topic_id(topic)),
+                (plan::Moment::OnMessage, None) => unreachable!("an operation that is called on messages has a topic"),
+            },
             parameters: operation
                 .parameters
                 .iter()

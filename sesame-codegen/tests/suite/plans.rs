@@ -2,13 +2,14 @@
 
 use sesame_codegen::emit::Environment;
 use sesame_codegen::plan::{HookPlan, RunnerPlan};
+use sesame_plan::testing;
 use sesame_plan::{
-    ActivationMode, Campaign, CampaignPlan, Count, Direction, Field, FieldRef, MessageId, MessageType, Metric,
-    MetricId, MetricSource, Node, Search, Simulator, Strategy, Topic, TopicId, Transport, Type,
+    Campaign, CampaignPlan, Direction, Field, FieldRef, MessageId, MessageType, Metric, MetricId, MetricSource, Node,
+    Search, Strategy, Topic, TopicId, Transport, Type,
 };
 
 fn field(name: &str, doc: &str, ty: Type) -> Field {
-    Field { name: name.into(), doc: doc.into(), ty }
+    Field { doc: doc.into(), ..testing::field(name, ty) }
 }
 
 fn real(unit: &str) -> Type {
@@ -16,7 +17,11 @@ fn real(unit: &str) -> Type {
 }
 
 fn topic(name: &str, doc: &str, paths: &[&str], ty: Type) -> Topic {
-    Topic { name: name.into(), doc: doc.into(), paths: paths.iter().map(|&path| path.into()).collect(), ty }
+    Topic { doc: doc.into(), ..testing::topic(name, paths, ty) }
+}
+
+fn message(name: &str, doc: &str, fields: Vec<Field>) -> MessageType {
+    MessageType { doc: doc.into(), ..testing::message(name, fields) }
 }
 
 pub(crate) fn hook(metric: &str, line: u32, inputs: &[u32]) -> HookPlan {
@@ -34,17 +39,14 @@ pub(crate) fn hook(metric: &str, line: u32, inputs: &[u32]) -> HookPlan {
 /// Measures the hook in the campaign of the plan.
 pub(crate) fn measured(runner: &mut RunnerPlan, metric: &str) {
     let hook = runner.hooks.iter().find(|hook| hook.metric == metric).expect("the space has the hook");
+    let source = MetricSource::Hook { topics: hook.inputs.clone() };
     runner.plan.metrics.push(Metric {
-        name: hook.metric.clone(),
         doc: hook.doc.clone(),
         unit: hook.unit.clone(),
         direction: hook.direction,
         default: Some(0.0),
-        initial: None,
-        trend: None,
-        accepts_not_finite: false,
-        source: MetricSource::Hook { topics: hook.inputs.clone() },
         line: hook.line,
+        ..testing::metric(&hook.metric, source)
     });
 }
 
@@ -52,23 +54,19 @@ pub(crate) fn measured(runner: &mut RunnerPlan, metric: &str) {
 pub(crate) fn small(campaign: &str) -> RunnerPlan {
     let mut runner = RunnerPlan {
         plan: CampaignPlan {
-            schema: sesame_plan::SCHEMA,
             generator: "sesamec 0.1.0".into(),
             source: "kuka_cell.sesame".into(),
             space: "kuka_cell".into(),
             doc: "The gearbox cell.".into(),
-            simulator: Simulator {
-                name: "cell".into(),
-                transport: Transport::InProcess { path: "kuka_cell_sim::Cell".into(), step_ns: 20_000_000 },
-            },
-            messages: vec![MessageType {
-                name: "SafetyZone".into(),
-                doc: "A zone that people may be in.".into(),
-                fields: vec![
+            simulator: testing::in_process("cell", "kuka_cell_sim::Cell", 20_000_000),
+            messages: vec![message(
+                "SafetyZone",
+                "A zone that people may be in.",
+                vec![
                     field("zone", "Its name.", Type::Text),
                     field("level", "Distance of the gripper sphere's surface, negative inside.", real("mm")),
                 ],
-            }],
+            )],
             topics: vec![
                 topic("link0", "", &["joints/R3200/Link0/position"], real("rad")),
                 topic("zones", "", &["safetyzones/Z1", "safetyzones/Z2"], Type::Message { id: MessageId(0) }),
@@ -81,38 +79,20 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 subscribes: vec![TopicId(1)],
             }],
             metrics: vec![Metric {
-                name: "fuzzing_time".into(),
-                doc: String::new(),
                 unit: Some("s".into()),
                 direction: Some(Direction::Minimise),
-                default: None,
-                initial: None,
-                trend: None,
-                accepts_not_finite: false,
-                source: MetricSource::FuzzingTime,
                 line: 30,
+                ..testing::metric("fuzzing_time", MetricSource::FuzzingTime)
             }],
-            requirements: Vec::new(),
-            operations: Vec::new(),
-            tests: Vec::new(),
             campaign: Campaign {
-                name: campaign.into(),
                 doc: "Finds tests.".into(),
                 objectives: vec![MetricId(0)],
-                operations: Vec::new(),
-                count: Count { min: 1, max: 5 },
-                copies: sesame_plan::Copies::default(),
-                activation: ActivationMode::Time,
                 search: Search::new(Strategy::Random, 10),
-                coverage: None,
-                exploration: None,
-                confirm: None,
-                neighbours: None,
-                stop: Vec::new(),
                 seed: 42,
                 end_after: 70.0,
-                record: None,
+                ..testing::campaign(campaign, 0)
             },
+            ..testing::minimal()
         },
         operations: vec![],
         hooks: vec![
@@ -146,10 +126,10 @@ pub(crate) fn with_program(campaign: &str) -> RunnerPlan {
 pub(crate) fn awkward() -> RunnerPlan {
     let mut runner = small("type");
     let plan = &mut runner.plan;
-    plan.messages.push(MessageType {
-        name: "Text".into(),
-        doc: "Called like a type of the runtime.\n*/ fn evil() {} // {{ evil }} \u{2028}\" r#\"".into(),
-        fields: vec![
+    plan.messages.push(message(
+        "Text",
+        "Called like a type of the runtime.\n*/ fn evil() {} // {{ evil }} \u{2028}\" r#\"",
+        vec![
             field("type", "A keyword.", Type::Bool),
             field("self", "A keyword that cannot be escaped.", Type::Int { unit: None }),
             field("frameId", "Not in snake case.", Type::Text),
@@ -160,13 +140,9 @@ pub(crate) fn awkward() -> RunnerPlan {
             field("matrix", "", Type::List { of: Box::new(Type::List { of: Box::new(Type::Int { unit: None }) }) }),
             field("gen", "Reserved since edition 2024.", Type::Message { id: MessageId(0) }),
         ],
-    });
-    plan.messages.push(MessageType { name: "empty".into(), doc: String::new(), fields: Vec::new() });
-    plan.messages.push(MessageType {
-        name: "Metric".into(),
-        doc: "A hook of the same name takes it.".into(),
-        fields: vec![field("ok", "", Type::Bool)],
-    });
+    ));
+    plan.messages.push(message("empty", "", Vec::new()));
+    plan.messages.push(message("Metric", "A hook of the same name takes it.", vec![field("ok", "", Type::Bool)]));
     let unit = |unit: &str| Some(unit.to_owned());
     let first = u32::try_from(plan.topics.len()).expect("few topics");
     let list = |of: Type| Type::List { of: Box::new(of) };
@@ -195,17 +171,11 @@ pub(crate) fn awkward() -> RunnerPlan {
     for name in ["everything", "self", "match", "metric", "messages", "context", "std", "sesame_runtime", "box"] {
         measured(&mut runner, name);
     }
+    let level = FieldRef { topic: TopicId(1), path: vec!["level".into()] };
     runner.plan.metrics.push(Metric {
-        name: "last_level".into(),
-        doc: String::new(),
         unit: unit("mm"),
-        direction: None,
-        default: None,
-        initial: None,
-        trend: None,
-        accepts_not_finite: false,
-        source: MetricSource::Last { input: FieldRef { topic: TopicId(1), path: vec!["level".into()] } },
         line: 71,
+        ..testing::metric("last_level", MetricSource::Last { input: level })
     });
     runner
 }

@@ -6,11 +6,10 @@
 
 use sesame_base::time::SimTime;
 use sesame_plan::condition::{Comparison, Condition, Operand};
-use sesame_plan::testing::plan;
+use sesame_plan::testing::{self, plan};
 use sesame_plan::{
     Activation, CampaignPlan, Choice, Distribution, Domain, Drain, FieldRef, MetricId, MetricSource, NotFinite,
-    Operation, OperationId, OperationKind, Parameter, Place, Shape, Span, Step, Test, TestOperation, Topic, TopicId,
-    Type, ValueMode,
+    Operation, OperationId, OperationKind, Place, Span, Step, Test, TestOperation, TopicId, Type, ValueMode,
 };
 
 use crate::fuzz::KeyedRng;
@@ -228,41 +227,20 @@ impl Switch {
 
 /// A plan of one topic that carries the payload, and one whose messages switch conditions.
 fn plan_of(payload: Payload, case: &Case) -> CampaignPlan {
-    let parameter = |(name, choice): &(&str, Choice)| Parameter {
-        name: (*name).to_owned(),
-        unit: None,
-        domain: match choice {
-            Choice::Value { .. } => Domain::Number { low: -9.0, high: 9.0, shape: Shape::Value, integer: false },
-            Choice::Range { .. } => Domain::Number { low: -9.0, high: 9.0, shape: Shape::Range, integer: false },
-            Choice::Point { .. } => Domain::Point { low: [-9.0; 3], high: [9.0; 3] },
-            Choice::Text { text } => Domain::Texts { texts: vec![text.clone()] },
-        },
+    let parameter = |(name, choice): &(&str, Choice)| match choice {
+        Choice::Value { .. } => testing::value(name, -9.0, 9.0),
+        Choice::Range { .. } => testing::range(name, -9.0, 9.0),
+        Choice::Point { .. } => testing::parameter(name, Domain::Point { low: [-9.0; 3], high: [9.0; 3] }),
+        Choice::Text { text } => testing::parameter(name, Domain::Texts { texts: vec![text.clone()] }),
     };
-    let operation = Operation {
-        name: "operation".to_owned(),
-        doc: String::new(),
-        topic: Some(TopicId(2)),
-        places: if case.on_values { payload.places() } else { Vec::new() },
-        kind: case.kind.clone(),
-        parameters: case.choices.iter().map(parameter).collect(),
-        within: Span { start: 0.0, end: 10.0 },
-        priority: 0,
-        inclusion: 1.0,
-        timed: true,
-        constraints: Vec::new(),
-    };
-    let mut plan = plan(vec![operation]);
-    let topic = |name: &str| Topic {
-        name: name.to_owned(),
-        doc: String::new(),
-        paths: vec![name.to_owned()],
-        ty: Type::Real { unit: None },
-    };
+    let parameters = case.choices.iter().map(parameter).collect();
+    let places = if case.on_values { payload.places() } else { Vec::new() };
+    let mut plan =
+        plan(vec![Operation { places, ..testing::operation_with("operation", 2, case.kind.clone(), parameters) }]);
+    let topic = |name: &str| testing::topic(name, &[name], Type::Real { unit: None });
     plan.topics.extend([topic("payload"), topic("switch")]);
-    let mut metric = plan.metrics[1].clone();
-    metric.name = "switch_value".to_owned();
-    metric.source = MetricSource::Last { input: FieldRef { topic: TopicId(3), path: Vec::new() } };
-    plan.metrics.push(metric);
+    let switch = FieldRef { topic: TopicId(3), path: Vec::new() };
+    plan.metrics.push(testing::metric("switch_value", MetricSource::Last { input: switch }));
     plan
 }
 

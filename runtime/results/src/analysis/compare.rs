@@ -8,7 +8,6 @@ use sesame_optimise::front::Front;
 use sesame_optimise::igd::IgdPlus;
 use sesame_plan::{CampaignPlan, Direction};
 use sesame_search::coverage::{Coverage, Grid, GridError};
-use sesame_search::in_unit;
 use sesame_search::indicators::volume;
 use sesame_search::sspr::Convention;
 
@@ -138,7 +137,7 @@ pub fn compare(runs: &[Run], reference: Option<&[f64]>, grid: Option<Grid>) -> R
         runs.iter().map(|run| measure(run, cells.as_ref())).collect::<Result<Vec<Measured>, RecordError>>()?;
 
     let reference: Vec<f64> = match reference {
-        Some(given) => plan.campaign.objectives.iter().zip(given).map(|(&id, &x)| in_unit(plan, id, x)).collect(),
+        Some(given) => plan.objectives().zip(given).map(|(it, &x)| it.oriented(x)).collect(),
         None => (0..needed)
             .map(|at| measured.iter().filter_map(|run| run.worst.get(at).copied()).fold(f64::NEG_INFINITY, f64::max))
             .collect(),
@@ -167,19 +166,18 @@ pub fn compare(runs: &[Run], reference: Option<&[f64]>, grid: Option<Grid>) -> R
         let had = joint.members().iter().filter(|member| own(&member.objectives)).count();
         run.joint_share = (!joint.members().is_empty()).then(|| had as f64 / joint.members().len() as f64);
     }
-    let named = plan.campaign.objectives.iter().zip(&reference).filter(|_| finite);
-    let reference = named.map(|(&id, &value)| (plan.metric(id).name.clone(), in_unit(plan, id, value))).collect();
+    let named = plan.objectives().zip(&reference).filter(|_| finite);
+    let reference = named.map(|(it, &value)| (plan.metric(it.metric).name.clone(), it.in_unit(value))).collect();
     Ok(Comparison { runs: measured, reference, covers: cells.is_some() })
 }
 
 /// The objectives in words: what must be equal.
 fn objectives(plan: &CampaignPlan) -> Vec<String> {
-    let words = plan.campaign.objectives.iter().map(|&id| {
-        let metric = plan.metric(id);
-        let direction = match metric.direction {
-            Some(Direction::Maximise) => "maximised",
-            Some(Direction::Minimise) => "minimised",
-            None => "undirected",
+    let words = plan.objectives().map(|objective| {
+        let metric = plan.metric(objective.metric);
+        let direction = match objective.direction {
+            Direction::Maximise => "maximised",
+            Direction::Minimise => "minimised",
         };
         match &metric.unit {
             Some(unit) => format!("{} [{unit}] {direction}", metric.name),

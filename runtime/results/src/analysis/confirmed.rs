@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
-use sesame_plan::{CampaignPlan, Direction};
+use sesame_plan::CampaignPlan;
 
 use crate::analysis::statistics::wilson;
 use crate::present::number::{fixed, plural};
@@ -169,10 +169,7 @@ fn confirmed(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow, front: bool)
 /// The objective values by which a campaign's front takes a test that was run again, as its metrics have them.
 pub(crate) fn confirmed_values(plan: &CampaignPlan, runs: &[Repetition]) -> Option<Vec<f64>> {
     let fitness = confirmed_fitness(plan, runs)?;
-    let values =
-        fitness.objectives()?.iter().zip(&plan.campaign.objectives).map(|(value, &id)| {
-            if plan.metric(id).direction == Some(Direction::Maximise) { 0.0 - value } else { *value }
-        });
+    let values = plan.objectives().zip(fitness.objectives()?).map(|(objective, &value)| objective.in_unit(value));
     Some(values.collect())
 }
 

@@ -6,7 +6,6 @@ use sesame_optimise::hypervolume::Volume;
 use sesame_optimise::igd::IgdPlus;
 use sesame_plan::CampaignPlan;
 use sesame_search::coverage::{Coverage, Feasible, Grid};
-use sesame_search::in_unit;
 use sesame_search::indicators::{reference_point, volume};
 use sesame_search::sspr::Convention;
 
@@ -72,7 +71,6 @@ struct Judged {
 /// tests.
 pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<IndicatorAnalysis, RecordError> {
     let plan = repository.plan();
-    let objectives = &plan.campaign.objectives;
     let grid = match &plan.campaign.coverage {
         Some(goal) => Some(Grid::new(goal.axes.clone()).map_err(|error| {
             RecordError::damaged(repository.path(), format!("the cells of its coverage are not a grid: {error}"))
@@ -96,9 +94,9 @@ pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<
     let coverage = grid.as_ref().map(|grid| Coverage::new(grid.clone(), needed));
     let whole = Front::from_tests(tests.iter().map(|test| (test.number, &test.fitness)));
     let distance = IgdPlus::to(whole.members().iter().map(|member| member.objectives.as_slice()))
-        .filter(|_| !objectives.is_empty());
+        .filter(|_| !plan.campaign.objectives.is_empty());
     let oriented = |point: &[f64]| -> Vec<f64> {
-        objectives.iter().zip(point).map(|(&id, &value)| in_unit(plan, id, value)).collect()
+        plan.objectives().zip(point).map(|(objective, &value)| objective.oriented(value)).collect()
     };
     let given = reference.map(oriented);
     let stored = repository.reference_point()?.as_deref().map(oriented);
@@ -147,8 +145,8 @@ pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<
 }
 
 fn named(plan: &CampaignPlan, reference: &[f64]) -> Vec<(String, f64)> {
-    let objectives = plan.campaign.objectives.iter().zip(reference);
-    objectives.map(|(&id, &value)| (plan.metric(id).name.clone(), in_unit(plan, id, value))).collect()
+    let objectives = plan.objectives().zip(reference);
+    objectives.map(|(it, &value)| (plan.metric(it.metric).name.clone(), it.in_unit(value))).collect()
 }
 
 /// Fills in what was not recorded while the campaign ran: distances, coverage, and hypervolumes from another point.

@@ -7,7 +7,6 @@ use rusqlite::{Connection, ErrorCode, params};
 
 use sesame_base::test_number::TestNumber;
 use sesame_plan::{CampaignPlan, Task};
-use sesame_search as search;
 use sesame_search::indicators::GenerationIndicators;
 
 use crate::record::columns::index;
@@ -264,13 +263,13 @@ impl Recorder {
                     standard_error.is_some(),
                     standard_error
                 ])?;
-            let objectives = plan.campaign.objectives.iter().zip(reference.unwrap_or_default()).enumerate();
-            for (position, (&metric, &value)) in objectives {
+            let objectives = plan.objectives().zip(reference.unwrap_or_default()).enumerate();
+            for (position, (objective, &value)) in objectives {
                 transaction
                     .prepare_cached(
                         "INSERT OR REPLACE INTO reference_point (objective, metric, value) VALUES (?1, ?2, ?3)",
                     )?
-                    .execute(params![index(position), metric.0, search::in_unit(plan, metric, value)])?;
+                    .execute(params![index(position), objective.metric.0, objective.in_unit(value)])?;
             }
             transaction.commit()
         });

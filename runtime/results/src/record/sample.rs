@@ -5,11 +5,11 @@ use std::path::Path;
 
 use sesame_base::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, Reach, WallTime};
 use sesame_plan::condition::{Comparison, Condition, ConditionEnd, ConditionSpace, Integers, Operand, Variable};
+use sesame_plan::testing;
 use sesame_plan::{
-    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Count, Direction, Domain, KnownTest,
-    KnownTestId, Metric, MetricId, MetricSource, Moment, Operation, OperationId, OperationKind, Parameter, Requirement,
-    SCHEMA, Search, Shape, Simulator, Span, Strategy, Test, TestOperation, Topic, TopicId, Transport, Trend, Type,
-    ValueMode,
+    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Direction, Domain, KnownTestId, Metric,
+    MetricId, MetricSource, Moment, Operation, OperationId, OperationKind, Parameter, Requirement, Search, Shape, Span,
+    Strategy, Test, TestOperation, TopicId, Trend, Type, ValueMode,
 };
 use sesame_rng::Stream;
 use sesame_search as search;
@@ -18,34 +18,13 @@ use sesame_search::indicators::Indicators;
 use crate::record::{Event, EventKind, Origin, Recorder, Repository, ResultSet, Status, TestRecord};
 
 fn metric(name: &str, unit: Option<&str>, direction: Direction, default: Option<f64>, source: MetricSource) -> Metric {
-    Metric {
-        name: name.to_owned(),
-        doc: String::new(),
-        unit: unit.map(str::to_owned),
-        direction: Some(direction),
-        default,
-        initial: None,
-        trend: trends(name),
-        accepts_not_finite: false,
-        source,
-        line: 1,
-    }
+    let (unit, direction) = (unit.map(str::to_owned), Some(direction));
+    Metric { unit, direction, default, trend: trends(name), ..testing::metric(name, source) }
 }
 
 fn operation(name: &str, topic: u32, kind: OperationKind, parameters: Vec<Parameter>) -> Operation {
-    Operation {
-        name: name.to_owned(),
-        doc: String::new(),
-        topic: Some(TopicId(topic)),
-        kind,
-        parameters,
-        within: Span { start: 0.0, end: 65.0 },
-        priority: 0,
-        inclusion: 1.0,
-        places: Vec::new(),
-        timed: true,
-        constraints: Vec::new(),
-    }
+    let within = Span { start: 0.0, end: 65.0 };
+    Operation { within, ..testing::operation_with(name, topic, kind, parameters) }
 }
 
 /// The metrics of this plan that change in one direction only; a cycle time is set once.
@@ -68,46 +47,28 @@ fn break_off(plan: &CampaignPlan, observation: &mut Observation, outcome: Outcom
 /// A campaign on a robot cell: two objectives, four requirements, four operations, one regression test.
 pub fn plan() -> CampaignPlan {
     let hook = || MetricSource::Hook { topics: vec![TopicId(2)] };
-    let offset = Parameter {
-        name: "offset".to_owned(),
-        unit: Some("rad".to_owned()),
-        domain: Domain::Number { low: -0.3, high: 0.3, shape: Shape::Range, integer: false },
-    };
-    let loss = Parameter {
-        name: "loss".to_owned(),
-        unit: None,
-        domain: Domain::Number { low: 0.0, high: 1.0, shape: Shape::Value, integer: false },
-    };
+    let unit = || Some("rad".to_owned());
+    let offset = Parameter { unit: unit(), ..testing::range("offset", -0.3, 0.3) };
+    let loss = testing::value("loss", 0.0, 1.0);
     let jitter = || OperationKind::RandomValue { mode: ValueMode::Offset, integer: false };
-    let topic = |name: &str, path: &str| Topic {
-        name: name.to_owned(),
-        doc: String::new(),
-        paths: vec![path.to_owned()],
-        ty: Type::Real { unit: Some("rad".to_owned()) },
-    };
+    let topic = |name: &str, path: &str| testing::topic(name, &[path], Type::Real { unit: unit() });
     let requirement = |name: &str, text: &str, metric: u32, bound: Bound| Requirement {
-        name: name.to_owned(),
         text: text.to_owned(),
-        metric: MetricId(metric),
-        bound,
+        ..testing::requirement(name, metric, bound)
     };
+    let known =
+        Test { operations: vec![testing::use_of(1, 8.0, 57.0, vec![Choice::Range { low: 0.27, high: 0.29 }], 7)] };
     CampaignPlan {
-        schema: SCHEMA,
         generator: "sesamec 0.1.0".to_owned(),
         source: "kuka_cell.sesame".to_owned(),
         space: "kuka_cell".to_owned(),
         doc: "The KUKA gearbox cell: three robots on sliding conveyors, workers around them.".to_owned(),
-        simulator: Simulator {
-            name: "cell".to_owned(),
-            transport: Transport::InProcess { path: "kuka_cell_sim::Cell".to_owned(), step_ns: 20_000_000 },
-        },
-        messages: vec![],
+        simulator: testing::in_process("cell", "kuka_cell_sim::Cell", 20_000_000),
         topics: vec![
             topic("link0", "joints/R3200ProductMove/Link0/R/position"),
             topic("link1", "joints/R3200ProductMove/Link1/R/position"),
             topic("zones", "safetyzones/Z1"),
         ],
-        nodes: vec![],
         metrics: vec![
             metric("collision_occurrence", None, Direction::Maximise, Some(0.0), hook()),
             metric("fuzzing_time", Some("s"), Direction::Minimise, None, MetricSource::FuzzingTime),
@@ -127,37 +88,16 @@ pub fn plan() -> CampaignPlan {
             operation("lose_link0", 0, OperationKind::PacketLoss, vec![loss]),
             operation("cut_link1", 1, OperationKind::Blackhole, vec![]),
         ],
-        tests: vec![KnownTest {
-            name: "known_jitter".to_owned(),
-            doc: String::new(),
-            test: Test {
-                operations: vec![TestOperation {
-                    operation: OperationId(1),
-                    activation: Activation::Time { start: 8.0, end: 57.0 },
-                    parameters: vec![Choice::Range { low: 0.27, high: 0.29 }],
-                    operation_seed: 7,
-                }],
-            },
-            expectations: vec![],
-        }],
+        tests: vec![testing::known_test("known_jitter", known)],
         campaign: Campaign {
-            name: "coverage_experiment".to_owned(),
             doc: "How short a disturbance drives a gripper into a safety zone?".to_owned(),
             objectives: vec![MetricId(1), MetricId(0)],
-            operations: vec![OperationId(0), OperationId(1), OperationId(2), OperationId(3)],
-            count: Count { min: 1, max: 5 },
-            copies: sesame_plan::Copies::default(),
-            activation: ActivationMode::Time,
             search: Search::new(Strategy::Nsga2 { population: 10 }, 210),
-            coverage: None,
-            exploration: None,
-            confirm: None,
-            neighbours: None,
-            stop: Vec::new(),
             seed: 42,
             end_after: 70.0,
-            record: None,
+            ..testing::campaign("coverage_experiment", 4)
         },
+        ..testing::minimal()
     }
 }
 
@@ -175,9 +115,9 @@ fn window(operation: &TestOperation) -> (f64, f64) {
 pub fn offline_plan(end: ConditionEnd) -> CampaignPlan {
     let mut plan = plan();
     let texts = ["cold", "warm", "hot"].map(str::to_owned).to_vec();
-    let way = Parameter { name: "way".to_owned(), unit: None, domain: Domain::Texts { texts } };
+    let way = testing::parameter("way", Domain::Texts { texts });
     let kind = OperationKind::Custom { moment: Moment::BeforeStart };
-    plan.operations.push(Operation { topic: None, ..operation("spoil", 0, kind, vec![way]) });
+    plan.operations.push(operation("spoil", 0, kind, vec![way]));
     plan.campaign.operations.push(OperationId(4));
     let variable = |metric: u32, high: f64| Variable {
         metric: MetricId(metric),
@@ -416,13 +356,8 @@ pub fn front(plan: &CampaignPlan, records: &[TestRecord]) -> Vec<u32> {
         {
             return None;
         }
-        plan.campaign
-            .objectives
-            .iter()
-            .map(|&id| {
-                let sign = if plan.metric(id).direction == Some(Direction::Maximise) { -1.0 } else { 1.0 };
-                record.observation.metrics.get(id.index())?.value.map(|value| sign * value)
-            })
+        plan.objectives()
+            .map(|it| record.observation.metrics.get(it.metric.index())?.value.map(|value| it.oriented(value)))
             .collect()
     };
     let points: Vec<(u32, Vec<f64>)> =

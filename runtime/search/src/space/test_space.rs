@@ -276,9 +276,7 @@ pub(crate) mod tests {
 
     use sesame_base::condition::constant::has_constant_part;
     use sesame_plan::condition::{ConditionEnd, Integers};
-    use sesame_plan::{
-        Activation, Choice, Domain, Drain, Operation, OperationKind, Parameter, Search, Shape, Span, Test,
-    };
+    use sesame_plan::{Activation, Choice, Domain, Drain, Operation, OperationKind, Search, Shape, Span, Test};
 
     use super::*;
     use crate::space::condition::contains;
@@ -307,25 +305,17 @@ pub(crate) mod tests {
         let texts = (1usize..4).prop_map(move |n| Domain::Texts { texts: items(n) });
         let files = (1usize..3).prop_map(move |n| Domain::Files { files: items(n) });
         let domain = prop_oneof![4 => parameter, 1 => point, 1 => texts, 1 => files];
-        let parameter = domain.prop_map(|domain| Parameter { name: "p".to_owned(), unit: None, domain });
+        let parameter = domain.prop_map(|domain| sesame_plan::testing::parameter("p", domain));
         let operation = (ends(), proptest::collection::vec(parameter, 0..4), 0.0..=1.0f64, 0u32..5).prop_map(
-            |((start, end), parameters, inclusion, kind)| Operation {
-                name: "o".to_owned(),
-                doc: String::new(),
-                topic: (kind > 0).then_some(sesame_plan::TopicId(0)),
+            |((start, end), parameters, inclusion, kind)| {
                 // What is varied follows from the parameters, and from the kind only whether there is a window.
-                kind: if kind == 0 {
+                let kind = if kind == 0 {
                     OperationKind::Custom { moment: sesame_plan::Moment::BeforeStart }
                 } else {
                     OperationKind::Latency { distribution: sesame_plan::Distribution::Fixed, drain: Drain::Finish }
-                },
-                parameters,
-                within: Span { start, end: end + 0.01 },
-                priority: 0,
-                inclusion,
-                places: Vec::new(),
-                timed: true,
-                constraints: Vec::new(),
+                };
+                let within = Span { start, end: end + 0.01 };
+                Operation { within, inclusion, ..sesame_plan::testing::operation_with("o", 0, kind, parameters) }
             },
         );
         let copies = prop_oneof![Just(Copies::Apart), Just(Copies::MayOverlap), Just(Copies::Once)];

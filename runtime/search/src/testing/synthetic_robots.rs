@@ -13,10 +13,10 @@ use sesame_optimise::dominance::{Fitness, Unfit};
 use sesame_optimise::front::Front;
 use sesame_optimise::hypervolume::hypervolume;
 use sesame_plan::condition::{ConditionEnd, ConditionSpace, Integers, Variable};
+use sesame_plan::testing;
 use sesame_plan::{
-    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Copies, Count, Direction, Domain, Metric,
-    MetricId, MetricSource, Operation, OperationId, OperationKind, Parameter, Requirement, SCHEMA, Search, Shape,
-    Simulator, Span, Test, TestOperation, TopicId, Transport, ValueMode,
+    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Copies, Direction, Metric, MetricId,
+    MetricSource, Operation, OperationKind, Parameter, Requirement, Search, Span, Test, TestOperation, ValueMode,
 };
 
 use crate::sspr::{self, Convention, Point};
@@ -85,78 +85,38 @@ impl SyntheticRobot {
     /// A campaign on this robot: `random offset [-0.3, 0.3] within [0s, 65s]` on each signal, 1 to 5 per test,
     /// which may overlap.
     pub fn plan(&self, search: Search) -> CampaignPlan {
+        let offset = || Parameter { unit: Some("rad".to_owned()), ..testing::range("offset", -0.3, 0.3) };
+        let jitter = || OperationKind::RandomValue { mode: ValueMode::Offset, integer: false };
         let operation = |k: usize| Operation {
-            name: format!("jitter{k}"),
-            doc: String::new(),
-            topic: Some(TopicId(0)),
-            kind: OperationKind::RandomValue { mode: ValueMode::Offset, integer: false },
-            parameters: vec![Parameter {
-                name: "offset".to_owned(),
-                unit: Some("rad".to_owned()),
-                domain: Domain::Number { low: -0.3, high: 0.3, shape: Shape::Range, integer: false },
-            }],
             within: Span { start: 0.0, end: 65.0 },
-            priority: 0,
-            inclusion: 1.0,
-            places: Vec::new(),
-            timed: true,
-            constraints: Vec::new(),
+            ..testing::operation_with(&format!("jitter{k}"), 0, jitter(), vec![offset()])
         };
         let metric = |name: &str, direction| Metric {
-            name: name.to_owned(),
-            doc: String::new(),
-            unit: None,
             direction: Some(direction),
-            default: None,
-            initial: None,
-            source: MetricSource::FuzzingTime,
-            trend: None,
-            accepts_not_finite: false,
-            line: 1,
+            ..testing::metric(name, MetricSource::FuzzingTime)
         };
         CampaignPlan {
-            schema: SCHEMA,
-            generator: "test".to_owned(),
             source: "landscape.sesame".to_owned(),
             space: "landscape".to_owned(),
-            doc: String::new(),
-            simulator: Simulator {
-                name: "robot".to_owned(),
-                transport: Transport::InProcess { path: "robot::Robot".to_owned(), step_ns: 20_000_000 },
-            },
-            messages: Vec::new(),
-            topics: Vec::new(),
-            nodes: Vec::new(),
+            simulator: testing::in_process("robot", "robot::Robot", 20_000_000),
             metrics: vec![metric("fuzzing_time", Direction::Minimise), metric("hits", Direction::Maximise)],
-            requirements: Vec::new(),
             operations: (0..self.signals).map(operation).collect(),
-            tests: Vec::new(),
             campaign: Campaign {
-                name: self.name.to_owned(),
-                doc: String::new(),
                 objectives: vec![MetricId(0), MetricId(1)],
-                operations: (0u32..).take(self.signals).map(OperationId).collect(),
-                count: Count { min: 1, max: 5 },
                 // As in the paper.
                 copies: Copies::MayOverlap,
-                activation: ActivationMode::Time,
                 search,
-                coverage: None,
-                exploration: None,
-                confirm: None,
-                neighbours: None,
-                stop: Vec::new(),
                 seed: 0,
                 end_after: 70.0,
-                record: None,
+                ..testing::campaign(self.name, self.signals)
             },
+            ..testing::minimal()
         }
     }
 
     /// A requirement on the hits of a test.
     pub fn fewer_hits_than(value: f64) -> Requirement {
-        let bound = Bound::Below { value };
-        Requirement { name: "R1".to_owned(), text: String::new(), metric: MetricId(1), bound }
+        testing::requirement("R1", 1, Bound::Below { value })
     }
 
     /// The same campaign with operations switched by conditions over where the robot is in its cycle: how far each of
@@ -412,12 +372,7 @@ mod tests {
     /// All generations of a search in which nothing can be measured.
     fn generations(search: Search) -> Vec<Vec<Candidate>> {
         let mut plan = SYNTHETIC_ROBOTS[0].plan(search);
-        plan.tests = vec![sesame_plan::KnownTest {
-            name: "known".to_owned(),
-            doc: String::new(),
-            test: Test::default(),
-            expectations: Vec::new(),
-        }];
+        plan.tests = vec![testing::known_test("known", Test::default())];
         let mut strategy = strategy(&plan, 1).unwrap();
         let mut generations: Vec<Vec<Candidate>> = Vec::new();
         loop {

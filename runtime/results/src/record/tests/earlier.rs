@@ -38,8 +38,7 @@ fn recorded_again(repository: &Repository) -> (TempDir, Repository) {
         recorder.put_coverage(&coverage).unwrap();
     }
     let reference = repository.reference_point().unwrap().map(|point| {
-        let oriented = facts.plan.campaign.objectives.iter().zip(point);
-        oriented.map(|(&id, value)| sesame_search::in_unit(&facts.plan, id, value)).collect::<Vec<_>>()
+        facts.plan.objectives().zip(point).map(|(objective, value)| objective.oriented(value)).collect::<Vec<_>>()
     });
     for indicators in repository.indicators().unwrap() {
         recorder.put_indicators(&indicators, reference.as_deref()).unwrap();

@@ -92,7 +92,7 @@ pub struct Objective {
     /// Its unit; `None` for a plain number.
     pub unit: Option<String>,
     /// Which way it goes.
-    pub direction: Option<Direction>,
+    pub direction: Direction,
     #[serde(skip)]
     pub(crate) id: MetricId,
 }
@@ -241,12 +241,10 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
     let facts = repository.campaign();
     let plan = &facts.plan;
     let objectives: Vec<Objective> = plan
-        .campaign
-        .objectives
-        .iter()
-        .map(|&id| {
+        .objectives()
+        .map(|sesame_plan::Objective { metric: id, direction }| {
             let metric = plan.metric(id);
-            Objective { metric: metric.name.clone(), unit: metric.unit.clone(), direction: metric.direction, id }
+            Objective { metric: metric.name.clone(), unit: metric.unit.clone(), direction, id }
         })
         .collect();
     let warnings = repository.events()?.into_iter().filter(|event| event.kind == EventKind::Warning).map(|event| {
@@ -333,7 +331,7 @@ fn front(
     let key = objectives.iter().position(|objective| bounded(&objective)).unwrap_or(0);
     let danger = |row: &TestRow| -> f64 {
         let value = values(row).get(key).copied().flatten().unwrap_or(f64::NAN);
-        let minimise = objectives.get(key).is_some_and(|objective| objective.direction == Some(Direction::Minimise));
+        let minimise = objectives.get(key).is_some_and(|objective| objective.direction == Direction::Minimise);
         if minimise { -value } else { value }
     };
     let members: BTreeSet<u32> = members.iter().copied().collect();

@@ -235,7 +235,7 @@ fn fronts(
         markup.open("div", &[("class", "chart small")]);
         markup.element("p", &[("class", "axis-title")], &title_y);
         let label = format!("fronts of {} generations: {title_y} against {title_x}", shown.len());
-        let best = if objectives[x].direction == Some(Direction::Maximise) { "right" } else { "left" };
+        let best = if objectives[x].direction == Direction::Maximise { "right" } else { "left" };
         markup.open("svg", &[("class", "scatter"), ("role", "img"), ("aria-label", &label), ("data-best", best)]);
         chart::ticks(markup, &across, &up);
         if pairs.len() == 1 {

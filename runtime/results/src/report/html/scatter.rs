@@ -114,7 +114,7 @@ pub(crate) fn dimension(objective: &Objective) -> Dimension {
         Some(unit) => format!("{} [{unit}]", objective.metric),
         None => objective.metric.clone(),
     };
-    Dimension { title, direction: objective.direction }
+    Dimension { title, direction: Some(objective.direction) }
 }
 
 impl Dimension {
