@@ -119,6 +119,68 @@ impl OperationKind {
         matches!(self, OperationKind::PacketLoss | OperationKind::BurstLoss)
     }
 
+    /// What it does to messages, as far as the dimensions O1 to O3 of the reduced space distinguish it.
+    pub fn class(&self) -> Class {
+        match self {
+            OperationKind::RandomValue { .. }
+            | OperationKind::RandomText { .. }
+            | OperationKind::StuckAt { .. }
+            | OperationKind::Bias
+            | OperationKind::Drift
+            | OperationKind::Noise
+            | OperationKind::Scale
+            | OperationKind::NotFinite { .. }
+            | OperationKind::Freeze
+            | OperationKind::ClockSkew
+            | OperationKind::Duplicate => Class::Value,
+            OperationKind::PacketLoss
+            | OperationKind::BurstLoss
+            | OperationKind::RateLimit
+            | OperationKind::Blackhole => Class::Loss,
+            OperationKind::Latency { .. } | OperationKind::Reorder { .. } | OperationKind::Stale => Class::Delay,
+            // What the user's code does is not known.
+            OperationKind::Custom { .. } => Class::Other,
+        }
+    }
+
+    /// The number at which a parameter disturbs nothing, or least: the permitted number nearest to it is the mildest.
+    ///
+    /// | kind | mildest |
+    /// |---|---|
+    /// | random offset, bias, drift, noise, clock skew | 0 |
+    /// | scale | factor 1 |
+    /// | stale, latency, reorder | no delay |
+    /// | packet loss; burst loss `enter` and `loss` | 0 |
+    /// | burst loss `leave` | 1: a burst that ends at once |
+    /// | rate limit | the highest rate |
+    /// | duplicate | one copy |
+    /// | custom | 0, since what the user's code does is not known |
+    /// | random absolute, stuck at | none: of a sub-range only a narrower one is milder |
+    pub fn neutral_value(&self, parameter: &str) -> Option<f64> {
+        match self {
+            OperationKind::RandomValue { mode: ValueMode::Absolute, .. }
+            | OperationKind::StuckAt { .. }
+            | OperationKind::RandomText { .. }
+            | OperationKind::NotFinite { .. }
+            | OperationKind::Freeze
+            | OperationKind::Blackhole => None,
+            OperationKind::Scale | OperationKind::Duplicate => Some(1.0),
+            OperationKind::BurstLoss if parameter == "leave" => Some(1.0),
+            OperationKind::RateLimit => Some(f64::INFINITY),
+            OperationKind::RandomValue { mode: ValueMode::Offset, .. }
+            | OperationKind::Bias
+            | OperationKind::Drift
+            | OperationKind::Noise
+            | OperationKind::Stale
+            | OperationKind::ClockSkew
+            | OperationKind::PacketLoss
+            | OperationKind::BurstLoss
+            | OperationKind::Latency { .. }
+            | OperationKind::Reorder { .. }
+            | OperationKind::Custom { .. } => Some(0.0),
+        }
+    }
+
     /// The kind in words, as the `.sesame` file has it.
     pub fn words(&self) -> &'static str {
         match self {
@@ -150,6 +212,19 @@ impl OperationKind {
             OperationKind::Custom { moment: Moment::AfterEnd } => "custom after end",
         }
     }
+}
+
+/// What an operation does to messages, as far as the dimensions O1 to O3 of the reduced space distinguish it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
+    /// It changes values; counted in O1.
+    Value,
+    /// It loses messages; counted in O2.
+    Loss,
+    /// It delays messages; counted in O3.
+    Delay,
+    /// None of these; counted in O0 only.
+    Other,
 }
 
 /// Whether a random value replaces or shifts the original.

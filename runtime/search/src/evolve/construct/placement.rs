@@ -34,7 +34,7 @@ use crate::space::initial::{fresh_operation, fresh_test};
 use crate::space::parameter_space::ParameterSpace;
 use crate::space::test_space::TestSpace;
 use crate::space::test_space::{ActivationSpace, OperationSpace};
-use crate::sspr::{Class, Convention, Point, class_of, planned};
+use crate::sspr::{Class, Convention, Point, planned};
 
 /// Attempts from the test itself, with other random choices each.
 const FROM_THE_TEST: u32 = 4;
@@ -223,7 +223,7 @@ impl CellPlacer {
     /// Adds, removes and replaces operations until their numbers are those of the cell. A walk of random steps, each
     /// towards what lacks or is too much.
     fn number(&self, test: &mut Test, demands: &Demands, plan: &CampaignPlan, stream: &mut Stream) -> bool {
-        let class = |kind: &OperationSpace| class_of(&plan.operation(kind.operation).kind);
+        let class = |kind: &OperationSpace| plan.operation(kind.operation).kind.class();
         let active = |kind: &OperationSpace| kind.activation != ActivationSpace::Offline;
         let is = |kind: &OperationSpace, dimension: Dimension| {
             active(kind)
