@@ -36,6 +36,9 @@ pub enum OperationKind {
     /// Adds a fresh normal draw per message and number, of mean zero. One parameter `sigma`, not negative: its standard
     /// deviation, on each axis of a point.
     Noise,
+    /// Adds a Brownian motion per number that starts at 0 when the operation becomes active. One parameter `sigma`, not
+    /// negative: its standard deviation after one second of being active, on each axis of a point.
+    RandomWalk,
     /// Multiplies. One parameter `factor`: a number.
     Scale,
     /// Replaces reals, and all coordinates of points, by a value that is not a finite number. No parameters.
@@ -128,6 +131,7 @@ impl OperationKind {
             | OperationKind::Bias
             | OperationKind::Drift
             | OperationKind::Noise
+            | OperationKind::RandomWalk
             | OperationKind::Scale
             | OperationKind::NotFinite { .. }
             | OperationKind::Freeze
@@ -147,7 +151,7 @@ impl OperationKind {
     ///
     /// | kind | mildest |
     /// |---|---|
-    /// | random offset, bias, drift, noise, clock skew | 0 |
+    /// | random offset, bias, drift, noise, random walk, clock skew | 0 |
     /// | scale | factor 1 |
     /// | stale, latency, reorder | no delay |
     /// | packet loss; burst loss `enter` and `loss` | 0 |
@@ -171,6 +175,7 @@ impl OperationKind {
             | OperationKind::Bias
             | OperationKind::Drift
             | OperationKind::Noise
+            | OperationKind::RandomWalk
             | OperationKind::Stale
             | OperationKind::ClockSkew
             | OperationKind::PacketLoss
@@ -193,6 +198,7 @@ impl OperationKind {
             OperationKind::Bias => "bias",
             OperationKind::Drift => "drift",
             OperationKind::Noise => "noise",
+            OperationKind::RandomWalk => "random walk",
             OperationKind::Scale => "scale",
             OperationKind::NotFinite { number: NotFinite::Nan } => "nan",
             OperationKind::NotFinite { number: NotFinite::Infinity } => "infinity",

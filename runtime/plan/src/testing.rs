@@ -96,7 +96,7 @@ pub fn operation(topic: u32, kind: OperationKind) -> Operation {
         OperationKind::ClockSkew => vec![parameter("skew", -9.0, 9.0, Shape::Value, false)],
         OperationKind::StuckAt { truth: None } => vec![parameter("value", -9.0, 9.0, Shape::Value, false)],
         OperationKind::Drift => vec![parameter("rate", -9.0, 9.0, Shape::Value, false)],
-        OperationKind::Noise => vec![parameter("sigma", 0.0, 9.0, Shape::Value, false)],
+        OperationKind::Noise | OperationKind::RandomWalk => vec![parameter("sigma", 0.0, 9.0, Shape::Value, false)],
         OperationKind::Scale => vec![parameter("factor", -9.0, 9.0, Shape::Value, false)],
         OperationKind::Stale => vec![parameter("age", 0.0, 5.0, Shape::Value, false)],
         OperationKind::BurstLoss => {

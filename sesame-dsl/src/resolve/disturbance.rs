@@ -106,6 +106,10 @@ impl<'a> Resolver<'a> {
                 let (target, sigma) = self.sigma(target, "noise", range)?;
                 Some((target, OperationKind::Noise, vec![sigma]))
             }
+            (Rule::random_walk, Some(ast::Amounts::Range(range))) => {
+                let (target, sigma) = self.sigma(target, "a random walk", range)?;
+                Some((target, OperationKind::RandomWalk, vec![sigma]))
+            }
             (Rule::scale, Some(ast::Amounts::Range(range))) => {
                 let found = self.amounts_of(target, "a scale");
                 let factor = self.range(range, None, "`factor`")?;

@@ -199,6 +199,9 @@ const FOREIGN_WORDS: &[(&str, &str)] = &[
     ("dropout", "packet loss"),
     ("packet_loss", "packet loss"),
     ("gain", "scale"),
+    ("brownian", "random walk"),
+    ("wander", "random walk"),
+    ("random_walk", "random walk"),
     ("hold", "freeze"),
     ("skew", "clock skew"),
 ];
