@@ -402,6 +402,7 @@ mod tests {
     const OPERATIONS: &str = "
         operation swing on link = random offset [-18deg, 18deg] within [0s, 1min] start contains near, integer [2, 3]
         operation level on zones.level = random absolute [0m, 1m] inclusion 7%
+        operation roam on zones.level = random walk [0m, 5mm]
         operation lose on link = packet loss [0%, 7%] priority -1
         operation lag on link = latency [0ms, 300ms] uniform drain drop
         operation late on link = latency [0.1s, 0.7s]
@@ -427,7 +428,7 @@ mod tests {
           activate by condition over near, collisions { integers [1, 1000]  depth 1 }
           search random { evaluations 8  seed 7 }  end after 70s }";
     const BY_TIME: &str = "
-        campaign timed { objectives time  operations cut, swing 1 per test  observes pace
+        campaign timed { objectives time  operations cut, swing, roam 1 per test  observes pace
           search random { evaluations 8 }  record mcap failing  end after 70s
           coverage { T1 [0, 1] cells 6  O0 [0.5, 1.5] cells 1  hits 2  stop at 7%  failsafe 30 } }";
     const BOOSTED: &str = "

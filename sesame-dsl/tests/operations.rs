@@ -51,7 +51,7 @@ impl For {
 
 /// A kind in the words of the language. `AMOUNTS` stands for what is permitted of a number or a point, `RANGE` for a
 /// range in the unit of the target, and `RATE` for amounts per second.
-const KINDS: [(&str, For); 24] = [
+const KINDS: [(&str, For); 25] = [
     ("random offset AMOUNTS", For::Amounts),
     ("random absolute AMOUNTS", For::Amounts),
     ("random one of \"a\", \"b\"", For::Texts),
@@ -62,6 +62,7 @@ const KINDS: [(&str, For); 24] = [
     ("bias AMOUNTS", For::Amounts),
     ("drift RATE", For::Amounts),
     ("noise RANGE", For::Amounts),
+    ("random walk RANGE", For::Amounts),
     ("scale [0.5, 2]", For::Amounts),
     ("nan", For::Reals),
     ("infinity", For::Reals),
@@ -128,5 +129,5 @@ fn a_kind_is_accepted_on_what_it_is_for_and_refused_on_all_else() {
             }
         }
     }
-    assert_eq!((accepted, refused), (100, 188));
+    assert_eq!((accepted, refused), (107, 193));
 }

@@ -49,6 +49,7 @@ const SPACE: &str = r#"
     operation skew on zone.at = clock skew [-1ms, 1ms]
     operation stretch on zone.level, zone.spans[2], zone.spans[*] = scale [10%, 3]
     operation tremble on zone.level = noise [0mm, 3m]
+    operation roam on zone.spans[*] = random walk [0mm, 3m]
     operation freeze_all on zone = freeze
     operation age on zone.spans = stale [0ms, 700ms]
     operation bursts on zone = burst loss { enter [0%, 12.3%]  leave [1.7%, 100%]  loss [50%, 99.9%] }
@@ -65,8 +66,8 @@ const SPACE: &str = r#"
     campaign look {
       objectives time, collisions, distance, share, fastest
       operations swing, rush, recount, shift, level, fill, lose, lose_some, lag, wobble, cut, bend, spoil, tidy,
-                 carry, place, sink, charge, rename, guess, deny, skew, stretch, tremble, freeze_all, age, bursts, thin, mix,
-                 twice, uneven   1..31 per test
+                 carry, place, sink, charge, rename, guess, deny, skew, stretch, tremble, roam, freeze_all, age, bursts, thin, mix,
+                 twice, uneven   1..32 per test
       activate by time
       search random { evaluations 100 }
       end after 70s

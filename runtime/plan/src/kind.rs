@@ -36,6 +36,9 @@ pub enum OperationKind {
     /// Adds a fresh normal draw per message and number, of mean zero. One parameter `sigma`, not negative: its standard
     /// deviation, on each axis of a point.
     Noise,
+    /// Adds a Brownian motion per number that starts at 0 when the operation becomes active. One parameter `sigma`, not
+    /// negative: its standard deviation after one second of being active, on each axis of a point.
+    RandomWalk,
     /// Multiplies. One parameter `factor`: a number.
     Scale,
     /// Replaces reals, and all coordinates of points, by a value that is not a finite number. No parameters.
@@ -119,6 +122,70 @@ impl OperationKind {
         matches!(self, OperationKind::PacketLoss | OperationKind::BurstLoss)
     }
 
+    /// What it does to messages, as far as the dimensions O1 to O3 of the reduced space distinguish it.
+    pub fn class(&self) -> Class {
+        match self {
+            OperationKind::RandomValue { .. }
+            | OperationKind::RandomText { .. }
+            | OperationKind::StuckAt { .. }
+            | OperationKind::Bias
+            | OperationKind::Drift
+            | OperationKind::Noise
+            | OperationKind::RandomWalk
+            | OperationKind::Scale
+            | OperationKind::NotFinite { .. }
+            | OperationKind::Freeze
+            | OperationKind::ClockSkew
+            | OperationKind::Duplicate => Class::Value,
+            OperationKind::PacketLoss
+            | OperationKind::BurstLoss
+            | OperationKind::RateLimit
+            | OperationKind::Blackhole => Class::Loss,
+            OperationKind::Latency { .. } | OperationKind::Reorder { .. } | OperationKind::Stale => Class::Delay,
+            // What the user's code does is not known.
+            OperationKind::Custom { .. } => Class::Other,
+        }
+    }
+
+    /// The number at which a parameter disturbs nothing, or least: the permitted number nearest to it is the mildest.
+    ///
+    /// | kind | mildest |
+    /// |---|---|
+    /// | random offset, bias, drift, noise, random walk, clock skew | 0 |
+    /// | scale | factor 1 |
+    /// | stale, latency, reorder | no delay |
+    /// | packet loss; burst loss `enter` and `loss` | 0 |
+    /// | burst loss `leave` | 1: a burst that ends at once |
+    /// | rate limit | the highest rate |
+    /// | duplicate | one copy |
+    /// | custom | 0, since what the user's code does is not known |
+    /// | random absolute, stuck at | none: of a sub-range only a narrower one is milder |
+    pub fn neutral_value(&self, parameter: &str) -> Option<f64> {
+        match self {
+            OperationKind::RandomValue { mode: ValueMode::Absolute, .. }
+            | OperationKind::StuckAt { .. }
+            | OperationKind::RandomText { .. }
+            | OperationKind::NotFinite { .. }
+            | OperationKind::Freeze
+            | OperationKind::Blackhole => None,
+            OperationKind::Scale | OperationKind::Duplicate => Some(1.0),
+            OperationKind::BurstLoss if parameter == "leave" => Some(1.0),
+            OperationKind::RateLimit => Some(f64::INFINITY),
+            OperationKind::RandomValue { mode: ValueMode::Offset, .. }
+            | OperationKind::Bias
+            | OperationKind::Drift
+            | OperationKind::Noise
+            | OperationKind::RandomWalk
+            | OperationKind::Stale
+            | OperationKind::ClockSkew
+            | OperationKind::PacketLoss
+            | OperationKind::BurstLoss
+            | OperationKind::Latency { .. }
+            | OperationKind::Reorder { .. }
+            | OperationKind::Custom { .. } => Some(0.0),
+        }
+    }
+
     /// The kind in words, as the `.sesame` file has it.
     pub fn words(&self) -> &'static str {
         match self {
@@ -131,6 +198,7 @@ impl OperationKind {
             OperationKind::Bias => "bias",
             OperationKind::Drift => "drift",
             OperationKind::Noise => "noise",
+            OperationKind::RandomWalk => "random walk",
             OperationKind::Scale => "scale",
             OperationKind::NotFinite { number: NotFinite::Nan } => "nan",
             OperationKind::NotFinite { number: NotFinite::Infinity } => "infinity",
@@ -150,6 +218,19 @@ impl OperationKind {
             OperationKind::Custom { moment: Moment::AfterEnd } => "custom after end",
         }
     }
+}
+
+/// What an operation does to messages, as far as the dimensions O1 to O3 of the reduced space distinguish it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
+    /// It changes values; counted in O1.
+    Value,
+    /// It loses messages; counted in O2.
+    Loss,
+    /// It delays messages; counted in O3.
+    Delay,
+    /// None of these; counted in O0 only.
+    Other,
 }
 
 /// Whether a random value replaces or shifts the original.

@@ -171,7 +171,7 @@ pub fn operation(topic: u32, kind: OperationKind) -> Operation {
         OperationKind::ClockSkew => vec![value("skew", -9.0, 9.0)],
         OperationKind::StuckAt { truth: None } => vec![value("value", -9.0, 9.0)],
         OperationKind::Drift => vec![value("rate", -9.0, 9.0)],
-        OperationKind::Noise => vec![value("sigma", 0.0, 9.0)],
+        OperationKind::Noise | OperationKind::RandomWalk => vec![value("sigma", 0.0, 9.0)],
         OperationKind::Scale => vec![value("factor", -9.0, 9.0)],
         OperationKind::Stale => vec![value("age", 0.0, 5.0)],
         OperationKind::BurstLoss => ["enter", "leave", "loss"].map(|name| value(name, 0.0, 1.0)).to_vec(),

@@ -2,7 +2,7 @@
 //!
 //! Random numbers are keyed by the operation seed and by the message's index on its wire, so they do not depend on what
 //! happened before: repeating a test repeats its disturbance, and a shorter window disturbs its messages in the same
-//! way.
+//! way. Operations that add up, such as a random walk, add up numbers of this kind.
 
 mod bias;
 mod burst_loss;
@@ -17,6 +17,7 @@ mod packet_loss;
 mod places;
 mod probe;
 mod random_value;
+mod random_walk;
 mod rate_limit;
 mod reorder;
 mod scale;
@@ -45,6 +46,7 @@ pub use packet_loss::PacketLoss;
 pub use places::Places;
 pub use probe::unimplemented_operations;
 pub use random_value::{RandomText, RandomValue};
+pub use random_walk::RandomWalk;
 pub use rate_limit::RateLimit;
 pub use reorder::Reorder;
 pub use scale::Scale;
@@ -66,6 +68,8 @@ pub enum Disturbance {
     Drift(Drift),
     /// Adds normally distributed noise.
     Noise(Noise),
+    /// Adds a Brownian motion.
+    RandomWalk(RandomWalk),
     /// Multiplies by a constant.
     Scale(Scale),
     /// Replaces numbers by NaN or infinity.
@@ -228,6 +232,7 @@ impl Disturbance {
             OperationKind::ClockSkew => Disturbance::Bias(Bias { places, bias: amount("skew")? }),
             OperationKind::Drift => Disturbance::Drift(Drift { places, rate: amount("rate")? }),
             OperationKind::Noise => Disturbance::Noise(Noise { places, sigma: number("sigma")? }),
+            OperationKind::RandomWalk => Disturbance::RandomWalk(RandomWalk::new(places, number("sigma")?)),
             OperationKind::Scale => Disturbance::Scale(Scale { places, factor: number("factor")? }),
             OperationKind::NotFinite { number } => Disturbance::NotFinite(MakeNotFinite { places, number: *number }),
             OperationKind::Freeze => Disturbance::Freeze(Freeze::new(places)),
@@ -262,6 +267,7 @@ impl Disturbance {
     /// The operation becomes active: its state is reset, except for what it observed while it was inactive.
     pub fn begin(&mut self) {
         match self {
+            Disturbance::RandomWalk(operation) => operation.begin(),
             Disturbance::BurstLoss(operation) => operation.bursting = PerWire::default(),
             Disturbance::RateLimit(operation) => operation.passed = PerWire::default(),
             _ => {}
@@ -306,6 +312,7 @@ impl Disturbance {
             Disturbance::Bias(operation) => operation.apply(message),
             Disturbance::Drift(operation) => operation.apply(at.active, message),
             Disturbance::Noise(operation) => operation.apply(at.draws, message),
+            Disturbance::RandomWalk(operation) => operation.apply(at, message),
             Disturbance::Scale(operation) => operation.apply(message),
             Disturbance::NotFinite(operation) => operation.apply(message),
             Disturbance::Freeze(operation) => operation.apply(at.member, message),

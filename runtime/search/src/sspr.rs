@@ -18,22 +18,10 @@ mod window;
 
 use sesame_plan::{Dimension, Shape, Span};
 
-pub use adapt::{class_of, disturbance, observed, observed_point, planned};
+pub use adapt::{disturbance, observed, observed_point, planned};
 pub use extent::extent;
+pub use sesame_plan::Class;
 pub(crate) use window::Window;
-
-/// What an operation does to messages, as far as the dimensions O1 to O3 tell it apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Class {
-    /// It changes values; counted in O1.
-    Value,
-    /// It loses messages; counted in O2.
-    Loss,
-    /// It delays messages; counted in O3.
-    Delay,
-    /// None of these; counted in O0 only.
-    Other,
-}
 
 /// One operation of a test, as far as the reduction sees it.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,5 +1,7 @@
 //! What operations disturb, and what tests may choose: each kind with its units and bounds.
 
+use sesame_grammar::Rule;
+
 use super::Resolver;
 use super::system::type_in_words;
 use crate::diagnostic::{Code, Diagnostic};
@@ -27,6 +29,7 @@ impl<'a> Resolver<'a> {
     /// An operation of any kind but a custom one.
     pub(super) fn disturbance(&mut self, target: &'a ast::Target, kind: &'a ast::OperationKind) -> Option<Resolved> {
         match kind {
+            ast::OperationKind::Plain { rule, amounts } => self.plain(target, *rule, amounts.as_ref()),
             ast::OperationKind::Random { absolute, amounts } => self.random_value(target, *absolute, amounts),
             ast::OperationKind::RandomText(texts) => {
                 let found = self.values(target, "a random text", "a `text`", |ty| matches!(ty, Type::Text));
@@ -34,38 +37,6 @@ impl<'a> Resolver<'a> {
                 Some((found?.0, OperationKind::RandomText { texts }, Vec::new()))
             }
             ast::OperationKind::StuckAt(at) => self.stuck_at(target, at),
-            ast::OperationKind::Bias(amounts) => {
-                let (target, held) = self.amounts_of(target, "a bias")?;
-                let parameter = self.one_amount("bias", amounts, &held, &target)?;
-                Some((target.found, OperationKind::Bias, vec![parameter]))
-            }
-            ast::OperationKind::Drift(amounts) => {
-                let (target, held) = self.amounts_of(target, "a drift")?;
-                let per_second = |unit: Option<Unit>| {
-                    let text = unit.map_or("Hz".to_owned(), |unit| format!("{}/s", unit.text()));
-                    Some(Unit::parse(&text).expect("a unit of a field goes through being divided by a second"))
-                };
-                let rate = match held {
-                    Held::Number { unit, .. } => Held::Number { unit: per_second(unit), integer: false },
-                    Held::Point { unit } => Held::Point { unit: per_second(unit) },
-                };
-                let parameter = self.one_amount("rate", amounts, &rate, &target)?;
-                Some((target.found, OperationKind::Drift, vec![parameter]))
-            }
-            ast::OperationKind::Noise(range) => {
-                let (target, held) = self.amounts_of(target, "noise")?;
-                let (Held::Number { unit, .. } | Held::Point { unit }) = held;
-                let sigma = self.range(range, unit.as_ref(), "`sigma`")?;
-                let all = Range { low: 0.0, high: f64::INFINITY };
-                let parameter = number("sigma", unit, sigma);
-                let fits = self.inside(sigma, range.span, all, "a standard deviation", "0 or more", None);
-                fits.then_some((target.found, OperationKind::Noise, vec![parameter]))
-            }
-            ast::OperationKind::Scale(range) => {
-                let found = self.amounts_of(target, "a scale");
-                let factor = self.range(range, None, "`factor`")?;
-                Some((found?.0.found, OperationKind::Scale, vec![number("factor", None, factor)]))
-            }
             ast::OperationKind::NotFinite(written) => {
                 let wants = "a real number or a point";
                 let real = |ty: &Type| matches!(ty, Type::Real(_) | Type::Point(_));
@@ -77,68 +48,8 @@ impl<'a> Resolver<'a> {
                 };
                 Some((target, OperationKind::NotFinite { number }, Vec::new()))
             }
-            ast::OperationKind::Freeze => {
-                let (target, _) = self.values(target, "a freeze", "anything", |_| true)?;
-                Some((whole_or_parts(target), OperationKind::Freeze, Vec::new()))
-            }
-            ast::OperationKind::Stale(range) => {
-                let found = self.values(target, "a stale value", "anything", |_| true);
-                let age = self.times(range, "the age")?;
-                let parameter = number("age", Some(Unit::seconds()), age);
-                Some((whole_or_parts(found?.0), OperationKind::Stale, vec![parameter]))
-            }
-            ast::OperationKind::ClockSkew(range) => self.clock_skew(target, range),
-            _ => self.on_messages(target, kind),
-        }
-    }
-
-    /// An operation on whole messages.
-    fn on_messages(&mut self, target: &'a ast::Target, kind: &'a ast::OperationKind) -> Option<Resolved> {
-        let seconds = || Some(Unit::seconds());
-        let (target, kind, parameters) = match kind {
-            ast::OperationKind::PacketLoss(range) => {
-                let target = self.whole_messages(target, "packet loss drops");
-                let loss = self.probabilities(range, "the loss")?;
-                (target?, OperationKind::PacketLoss, vec![number("loss", None, loss)])
-            }
             ast::OperationKind::BurstLoss { span, enter, leave, loss } => {
-                let target = self.whole_messages(target, "burst loss drops");
-                let mut parameters = Vec::new();
-                let mut complete = true;
-                for (name, clauses, what) in [
-                    ("enter", enter, "the probability that a burst begins"),
-                    ("leave", leave, "the probability that a burst ends"),
-                    ("loss", loss, "the loss in a burst"),
-                ] {
-                    match self.single(clauses, name) {
-                        Some(range) => match self.probabilities(range, what) {
-                            Some(range) => parameters.push(number(name, None, range)),
-                            None => complete = false,
-                        },
-                        None if name == "loss" => {}
-                        None => {
-                            let title = format!("burst loss is missing `{name}`, {what}");
-                            let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, *span, title)
-                                .label(format!("add it in the braces, for example `{name} [0%, 20%]`"));
-                            self.report(diagnostic);
-                            complete = false;
-                        }
-                    }
-                }
-                if !complete {
-                    return None;
-                }
-                (target?, OperationKind::BurstLoss, parameters)
-            }
-            ast::OperationKind::RateLimit(range) => {
-                let target = self.whole_messages(target, "a rate limit drops");
-                let unit = Unit::parse("Hz").expect("`Hz` is in the table");
-                let rate = self.range(range, Some(&unit), "the rate")?;
-                let all = Range { low: f64::MIN_POSITIVE, high: f64::INFINITY };
-                if !self.inside(rate, range.span, all, "a rate limit", "more than 0Hz", None) {
-                    return None;
-                }
-                (target?, OperationKind::RateLimit, vec![number("rate", Some(unit), rate)])
+                self.burst_loss(target, *span, [enter, leave, loss])
             }
             ast::OperationKind::Latency { range, distribution, drain } => {
                 let target = self.whole_messages(target, "latency delays");
@@ -156,16 +67,81 @@ impl<'a> Resolver<'a> {
                 };
                 let drain = self.drain(drain);
                 let domain = Domain::Number { range: self.times(range, "the delay")?, shape, integer: false };
-                let parameter = Parameter { name: "delay".to_owned(), doc: String::new(), unit: seconds(), domain };
-                (target?, OperationKind::Latency { distribution, drain }, vec![parameter])
+                let unit = Some(Unit::seconds());
+                let parameter = Parameter { name: "delay".to_owned(), doc: String::new(), unit, domain };
+                Some((target?, OperationKind::Latency { distribution, drain }, vec![parameter]))
             }
             ast::OperationKind::Reorder { range, drain } => {
                 let target = self.whole_messages(target, "reordering delays");
                 let drain = self.drain(drain);
-                let window = number("window", seconds(), self.times(range, "the window")?);
-                (target?, OperationKind::Reorder { drain }, vec![window])
+                let window = number("window", Some(Unit::seconds()), self.times(range, "the window")?);
+                Some((target?, OperationKind::Reorder { drain }, vec![window]))
             }
-            ast::OperationKind::Duplicate(range) => {
+            ast::OperationKind::Custom(_) => unreachable!("custom operations are resolved apart"),
+        }
+    }
+
+    /// A kind of which the rule of the grammar says everything but the amount after its words.
+    fn plain(&mut self, target: &'a ast::Target, rule: Rule, amounts: Option<&'a ast::Amounts>) -> Option<Resolved> {
+        match (rule, amounts) {
+            (Rule::bias, Some(amounts)) => {
+                let (target, held) = self.amounts_of(target, "a bias")?;
+                let parameter = self.one_amount("bias", amounts, &held, &target)?;
+                Some((target.found, OperationKind::Bias, vec![parameter]))
+            }
+            (Rule::drift, Some(amounts)) => {
+                let (target, held) = self.amounts_of(target, "a drift")?;
+                let per_second = |unit: Option<Unit>| {
+                    let text = unit.map_or("Hz".to_owned(), |unit| format!("{}/s", unit.text()));
+                    Some(Unit::parse(&text).expect("a unit of a field goes through being divided by a second"))
+                };
+                let rate = match held {
+                    Held::Number { unit, .. } => Held::Number { unit: per_second(unit), integer: false },
+                    Held::Point { unit } => Held::Point { unit: per_second(unit) },
+                };
+                let parameter = self.one_amount("rate", amounts, &rate, &target)?;
+                Some((target.found, OperationKind::Drift, vec![parameter]))
+            }
+            (Rule::noise, Some(ast::Amounts::Range(range))) => {
+                let (target, sigma) = self.sigma(target, "noise", range)?;
+                Some((target, OperationKind::Noise, vec![sigma]))
+            }
+            (Rule::random_walk, Some(ast::Amounts::Range(range))) => {
+                let (target, sigma) = self.sigma(target, "a random walk", range)?;
+                Some((target, OperationKind::RandomWalk, vec![sigma]))
+            }
+            (Rule::scale, Some(ast::Amounts::Range(range))) => {
+                let found = self.amounts_of(target, "a scale");
+                let factor = self.range(range, None, "`factor`")?;
+                Some((found?.0.found, OperationKind::Scale, vec![number("factor", None, factor)]))
+            }
+            (Rule::freeze, None) => {
+                let (target, _) = self.values(target, "a freeze", "anything", |_| true)?;
+                Some((whole_or_parts(target), OperationKind::Freeze, Vec::new()))
+            }
+            (Rule::stale_value, Some(ast::Amounts::Range(range))) => {
+                let found = self.values(target, "a stale value", "anything", |_| true);
+                let age = self.times(range, "the age")?;
+                let parameter = number("age", Some(Unit::seconds()), age);
+                Some((whole_or_parts(found?.0), OperationKind::Stale, vec![parameter]))
+            }
+            (Rule::clock_skew, Some(ast::Amounts::Range(range))) => self.clock_skew(target, range),
+            (Rule::packet_loss, Some(ast::Amounts::Range(range))) => {
+                let target = self.whole_messages(target, "packet loss drops");
+                let loss = self.probabilities(range, "the loss")?;
+                Some((target?, OperationKind::PacketLoss, vec![number("loss", None, loss)]))
+            }
+            (Rule::rate_limit, Some(ast::Amounts::Range(range))) => {
+                let target = self.whole_messages(target, "a rate limit drops");
+                let unit = Unit::parse("Hz").expect("`Hz` is in the table");
+                let rate = self.range(range, Some(&unit), "the rate")?;
+                let all = Range { low: f64::MIN_POSITIVE, high: f64::INFINITY };
+                if !self.inside(rate, range.span, all, "a rate limit", "more than 0Hz", None) {
+                    return None;
+                }
+                Some((target?, OperationKind::RateLimit, vec![number("rate", Some(unit), rate)]))
+            }
+            (Rule::duplicate, Some(ast::Amounts::Range(range))) => {
                 let target = self.whole_messages(target, "duplication copies");
                 let copies = self.range(range, None, "`copies`")?;
                 let all = Range { low: 1.0, high: MOST_COPIES };
@@ -176,14 +152,56 @@ impl<'a> Resolver<'a> {
                 }
                 let domain = Domain::Number { range: copies, shape: Shape::Value, integer: true };
                 let parameter = Parameter { name: "copies".to_owned(), doc: String::new(), unit: None, domain };
-                (target?, OperationKind::Duplicate, vec![parameter])
+                Some((target?, OperationKind::Duplicate, vec![parameter]))
             }
-            ast::OperationKind::Blackhole => {
-                (self.whole_messages(target, "a blackhole drops")?, OperationKind::Blackhole, Vec::new())
+            (Rule::blackhole, None) => {
+                Some((self.whole_messages(target, "a blackhole drops")?, OperationKind::Blackhole, Vec::new()))
             }
-            _ => unreachable!("operations on values and custom ones are resolved apart"),
-        };
-        Some((target, kind, parameters))
+            (rule, _) => unreachable!("the grammar has no operation that is {rule:?} with this amount"),
+        }
+    }
+
+    /// The values of an operation that adds normally distributed numbers, and their standard deviation, which is in the
+    /// unit of the values.
+    fn sigma(&mut self, target: &'a ast::Target, user: &str, range: &'a ast::Range) -> Option<(Target, Parameter)> {
+        let (target, held) = self.amounts_of(target, user)?;
+        let (Held::Number { unit, .. } | Held::Point { unit }) = held;
+        let sigma = self.range(range, unit.as_ref(), "`sigma`")?;
+        let all = Range { low: 0.0, high: f64::INFINITY };
+        let fits = self.inside(sigma, range.span, all, "a standard deviation", "0 or more", None);
+        fits.then(|| (target.found, number("sigma", unit, sigma)))
+    }
+
+    fn burst_loss(
+        &mut self,
+        target: &'a ast::Target,
+        span: Span,
+        [enter, leave, loss]: [&'a [(Span, ast::Range)]; 3],
+    ) -> Option<Resolved> {
+        let target = self.whole_messages(target, "burst loss drops");
+        let mut parameters = Vec::new();
+        let mut complete = true;
+        for (name, clauses, what) in [
+            ("enter", enter, "the probability that a burst begins"),
+            ("leave", leave, "the probability that a burst ends"),
+            ("loss", loss, "the loss in a burst"),
+        ] {
+            match self.single(clauses, name) {
+                Some(range) => match self.probabilities(range, what) {
+                    Some(range) => parameters.push(number(name, None, range)),
+                    None => complete = false,
+                },
+                None if name == "loss" => {}
+                None => {
+                    let title = format!("burst loss is missing `{name}`, {what}");
+                    let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, span, title)
+                        .label(format!("add it in the braces, for example `{name} [0%, 20%]`"));
+                    self.report(diagnostic);
+                    complete = false;
+                }
+            }
+        }
+        complete.then_some((target?, OperationKind::BurstLoss, parameters))
     }
 
     fn drain(&mut self, drain: &'a [(Span, ast::Drain)]) -> Drain {

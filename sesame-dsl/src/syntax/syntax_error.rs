@@ -114,10 +114,12 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, block: &Block, pre
         let mut candidates: Vec<&'static str> = failure.expected.iter().filter_map(|&rule| keyword_of(rule)).collect();
         candidates.extend(block.words().filter(|_| at_start));
         let candidates = candidates.into_iter().chain(fitting.iter().filter_map(|phrase| first_word(phrase)));
+        let candidates: Vec<&str> = candidates.collect();
         // A word of the language is not a misspelling of another.
         let known = Rule::all_rules().iter().any(|&rule| keyword_of(rule) == Some(found.text));
-        if let Some(similar) = crate::similar::most_similar(found.text, candidates).filter(|_| !known) {
-            diagnostic = diagnostic.did_you_mean(span, similar);
+        let similar = || crate::similar::most_similar(found.text, candidates.iter().copied()).filter(|_| !known);
+        if let Some(meant) = word_for(found.text, &candidates).or_else(similar) {
+            diagnostic = diagnostic.did_you_mean(span, meant);
         }
         let number_before = before.is_some_and(char::is_whitespace)
             && text[..found.lo].trim_end().ends_with(|c: char| c.is_ascii_digit());
@@ -187,6 +189,28 @@ fn first_word(phrase: &str) -> Option<&str> {
     let quoted = phrase.strip_prefix('`')?;
     let end = quoted.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))?;
     (end > 0).then(|| &quoted[..end])
+}
+
+/// Words that other tools and fields use, each with the words of the language for the same.
+const FOREIGN_WORDS: &[(&str, &str)] = &[
+    ("gaussian", "noise"),
+    ("gaussian", "normal"),
+    ("delay", "latency"),
+    ("dropout", "packet loss"),
+    ("packet_loss", "packet loss"),
+    ("gain", "scale"),
+    ("brownian", "random walk"),
+    ("wander", "random walk"),
+    ("random_walk", "random walk"),
+    ("hold", "freeze"),
+    ("skew", "clock skew"),
+];
+
+/// What the language calls a foreign word, if one of the candidates begins it.
+fn word_for(foreign: &str, candidates: &[&str]) -> Option<&'static str> {
+    let lower = foreign.to_lowercase();
+    let fits = |words: &str| words.split(' ').next().is_some_and(|first| candidates.contains(&first));
+    FOREIGN_WORDS.iter().find(|(word, words)| *word == lower && fits(words)).map(|(_, words)| *words)
 }
 
 /// The word a keyword rule stands for.

@@ -63,6 +63,10 @@ impl Space {
                 }
                 None => (of_message, "blackhole".to_owned(), Kind::Nothing),
             },
+            16 => {
+                let range = (range.0.abs().min(range.1.abs()), range.0.abs().max(range.1.abs()));
+                (target, format!("random walk {}", written(range, unit)), one("sigma", range, unit))
+            }
             _ => (of_message, "packet loss [0%, 100%]".to_owned(), one("loss", (0.0, 100.0), "%")),
         }
     }

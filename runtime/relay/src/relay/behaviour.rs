@@ -193,6 +193,7 @@ fn each_member_of_a_group_is_disturbed_as_if_it_were_alone() {
         (of_kind(OperationKind::Freeze), vec![]),
         (of_kind(OperationKind::Stale), choices(&[0.7])),
         (of_kind(OperationKind::Noise), choices(&[1.0])),
+        (of_kind(OperationKind::RandomWalk), choices(&[1.0])),
         (operation(1, OperationKind::BurstLoss), choices(&[0.3, 0.3, 1.0])),
         (operation(1, OperationKind::RateLimit), choices(&[3.0])),
     ];
@@ -232,6 +233,9 @@ fn each_activation_begins_afresh() {
     assert_eq!((frozen[25], frozen[35], frozen[65], frozen[75]), (19.0, 35.0, 59.0, 75.0));
     let (drifted, _) = twice(OperationKind::Drift, &[5.0]);
     assert_eq!((drifted[20], drifted[29], drifted[60], drifted[62]), (20.0, 33.5, 60.0, 63.0));
+    let (walked, _) = twice(OperationKind::RandomWalk, &[5.0]);
+    assert_eq!((walked[20], walked[60]), (20.0, 60.0), "a walk starts at 0");
+    assert!((21..29).chain(61..69).all(|n| walked[n] != n as f64), "{walked:?}");
     let (limited, _) = twice(OperationKind::RateLimit, &[1.0]);
     assert!(limited.contains(&20.0) && limited.contains(&60.0), "the first message of an activation passes");
     assert_eq!(limited.len(), 80 - 18);

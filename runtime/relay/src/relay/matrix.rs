@@ -164,6 +164,7 @@ fn cases(payload: Payload) -> Vec<Case> {
         on_values(OperationKind::Bias, vec![amount("bias", payload, -2.0)]);
         on_values(OperationKind::Drift, vec![amount("rate", payload, 1.5)]);
         on_values(OperationKind::Noise, vec![value("sigma", 2.0)]);
+        on_values(OperationKind::RandomWalk, vec![value("sigma", 2.0)]);
         on_values(OperationKind::Scale, vec![value("factor", -1.5)]);
     }
     if payload.is_real() || payload.is_point() {
@@ -334,6 +335,12 @@ fn new_number(case: &Case, payload: Payload, n: u32, first_draw: u64, axis: usiz
         OperationKind::Noise => {
             let noise = 2.0 * normal(n, first_draw + 2 * axis as u64);
             old + if payload.is_int() { noise.round() } else { noise }
+        }
+        OperationKind::RandomWalk => {
+            // A step per message since the one at 2 s, each with the variance of a tenth of a second.
+            let step = |m| 2.0 * libm::sqrt(0.1) * normal(m, first_draw + 2 * axis as u64);
+            let walked: f64 = (21..=n).map(step).sum();
+            old + if payload.is_int() { walked.round() } else { walked }
         }
         OperationKind::Scale => {
             let scaled = old * -1.5;
@@ -513,5 +520,5 @@ fn every_operation_does_what_it_means_on_every_payload_under_every_activation() 
             }
         }
     }
-    assert_eq!(combinations, 816, "the table is as long as it was");
+    assert_eq!(combinations, 837, "the table is as long as it was");
 }

@@ -10,7 +10,7 @@ use crate::coverage::spread::{self, Member};
 use crate::space::parameter_space::ParameterSpace;
 use crate::space::range::Range;
 use crate::space::test_space::{ActivationSpace, TestSpace};
-use crate::sspr::{Class, Window, class_of};
+use crate::sspr::{Class, Window};
 
 /// The most distinct ways to compose a test of operations; beyond it, every cell counts as feasible.
 const MOST_MIXTURES: usize = 20_000;
@@ -309,7 +309,7 @@ impl Sectors {
                     .filter(|_| graded)
                     .flat_map(|(parameter, parameter_space)| Values::of(&parameter.domain, parameter_space))
                     .collect(),
-                class: if classed { class_of(&operation.kind) } else { Class::Other },
+                class: if classed { operation.kind.class() } else { Class::Other },
             };
             if let Some(at) = kinds.iter().position(|other| *other == kind) {
                 operations[at].push(it.operation);

@@ -1,10 +1,7 @@
 //! What smaller means: the shortest windows, the neutral end of each parameter, and how far one step goes.
 
 use sesame_plan::condition::{Condition, ConditionEnd, ConditionSpace};
-use sesame_plan::{
-    Activation, ActivationMode, CampaignPlan, Choice, Domain, OperationId, OperationKind, Shape, Test, TestOperation,
-    ValueMode,
-};
+use sesame_plan::{Activation, ActivationMode, CampaignPlan, Choice, Domain, OperationId, Shape, Test, TestOperation};
 
 use crate::space::condition::is_allowed;
 use crate::space::parameter_space::ParameterSpace;
@@ -64,8 +61,7 @@ impl ShrinkSpace {
                 let neutral = |range: Range, shape| {
                     let step = (range.high - range.low) * resolution;
                     let step = if range.integer { libm::round(step).max(1.0) } else { step };
-                    let end =
-                        neutral_value(&operation.kind, &parameter.name).map(|end| end.clamp(range.low, range.high));
+                    let end = operation.kind.neutral_value(&parameter.name).map(|end| end.clamp(range.low, range.high));
                     // A value that is not stronger than another is left as it is.
                     let known = end.is_some() || shape == Shape::Range;
                     (known && !range.is_fixed()).then_some(NeutralValue { end, step })
@@ -74,7 +70,7 @@ impl ShrinkSpace {
                     ParameterSpace::Number(range, shape) => neutral(range, shape).map(Parameter::Number),
                     ParameterSpace::Point(axes) => {
                         let fixed = |range: Range| NeutralValue { end: Some(range.low), step: 0.0 };
-                        neutral_value(&operation.kind, &parameter.name)?;
+                        operation.kind.neutral_value(&parameter.name)?;
                         Some(Parameter::Point(axes.map(|axis| neutral(axis, Shape::Value).unwrap_or(fixed(axis)))))
                     }
                     ParameterSpace::Items(_) => None,
@@ -179,44 +175,6 @@ fn simplified(condition: &Condition) -> Vec<Condition> {
     found
 }
 
-/// The number at which a parameter disturbs nothing, or least: what is permitted and nearest to it is mildest.
-///
-/// | kind | mildest |
-/// |---|---|
-/// | random offset, bias, drift, noise, clock skew | 0 |
-/// | scale | factor 1 |
-/// | stale, latency, reorder | no delay |
-/// | packet loss; burst loss `enter` and `loss` | 0 |
-/// | burst loss `leave` | 1: a burst that ends at once |
-/// | rate limit | the highest rate |
-/// | duplicate | one copy |
-/// | custom | 0, since its effect is unknown |
-/// | random absolute, stuck at | none: of a sub-range only a narrower one is milder |
-fn neutral_value(kind: &OperationKind, parameter: &str) -> Option<f64> {
-    match kind {
-        OperationKind::RandomValue { mode: ValueMode::Absolute, .. }
-        | OperationKind::StuckAt { .. }
-        | OperationKind::RandomText { .. }
-        | OperationKind::NotFinite { .. }
-        | OperationKind::Freeze
-        | OperationKind::Blackhole => None,
-        OperationKind::Scale | OperationKind::Duplicate => Some(1.0),
-        OperationKind::BurstLoss if parameter == "leave" => Some(1.0),
-        OperationKind::RateLimit => Some(f64::INFINITY),
-        OperationKind::RandomValue { mode: ValueMode::Offset, .. }
-        | OperationKind::Bias
-        | OperationKind::Drift
-        | OperationKind::Noise
-        | OperationKind::Stale
-        | OperationKind::ClockSkew
-        | OperationKind::PacketLoss
-        | OperationKind::BurstLoss
-        | OperationKind::Latency { .. }
-        | OperationKind::Reorder { .. }
-        | OperationKind::Custom { .. } => Some(0.0),
-    }
-}
-
 /// How strong a test is: the sum over its operations, of which each counts from 0 to 1. An operation counts the mean,
 /// over its numbers, of how far each is from where it is mildest, as a share of how far it may be; of a sub-range the
 /// end counts that is farther away, and where no number is milder than another its width. One without such a number
@@ -229,7 +187,7 @@ fn strength_of(plan: &CampaignPlan, used: &TestOperation) -> f64 {
     let operation = plan.operation(used.operation);
     let mut shares = Vec::new();
     for (parameter, choice) in operation.parameters.iter().zip(&used.parameters) {
-        let end = neutral_value(&operation.kind, &parameter.name);
+        let end = operation.kind.neutral_value(&parameter.name);
         let mut add = |(low, high): (f64, f64), (from, to): (f64, f64), shape| {
             let share = match end.map(|end| end.clamp(low, high)) {
                 Some(end) => (from - end).abs().max((to - end).abs()) / (high - end).max(end - low),

@@ -1,32 +1,9 @@
 //! Disturbances of a plan's tests, as planned and as observed.
 
 use sesame_base::observation::{Observation, Outcome};
-use sesame_plan::{Activation, CampaignPlan, Choice, Domain, OperationId, OperationKind, Parameter, Shape, Span, Test};
+use sesame_plan::{Activation, CampaignPlan, Choice, Domain, OperationId, Parameter, Shape, Span, Test};
 
-use crate::sspr::{Class, Convention, Disturbance, Intensity, Point};
-
-/// The class of a kind of operation.
-pub fn class_of(kind: &OperationKind) -> Class {
-    match kind {
-        OperationKind::RandomValue { .. }
-        | OperationKind::RandomText { .. }
-        | OperationKind::StuckAt { .. }
-        | OperationKind::Bias
-        | OperationKind::Drift
-        | OperationKind::Noise
-        | OperationKind::Scale
-        | OperationKind::NotFinite { .. }
-        | OperationKind::Freeze
-        | OperationKind::ClockSkew
-        | OperationKind::Duplicate => Class::Value,
-        OperationKind::PacketLoss | OperationKind::BurstLoss | OperationKind::RateLimit | OperationKind::Blackhole => {
-            Class::Loss
-        }
-        OperationKind::Latency { .. } | OperationKind::Reorder { .. } | OperationKind::Stale => Class::Delay,
-        // What the user's code does nobody knows.
-        OperationKind::Custom { .. } => Class::Other,
-    }
-}
+use crate::sspr::{Convention, Disturbance, Intensity, Point};
 
 /// An operation of the plan with these choices for its parameters, active in these intervals.
 pub fn disturbance(
@@ -38,12 +15,7 @@ pub fn disturbance(
     let operation = plan.operation(operation);
     let parameters =
         operation.parameters.iter().zip(choices).flat_map(|(parameter, choice)| intensities(parameter, choice));
-    Disturbance {
-        class: class_of(&operation.kind),
-        window: operation.within,
-        intervals,
-        parameters: parameters.collect(),
-    }
+    Disturbance { class: operation.kind.class(), window: operation.within, intervals, parameters: parameters.collect() }
 }
 
 /// What was chosen for a parameter, in numbers: one for a number, three for a point, none for a text or a file.
@@ -110,7 +82,7 @@ mod tests {
 
     #[test]
     fn an_operation_without_effect_is_no_part_of_the_point_unless_nobody_counted() {
-        let plan = plan(vec![operation(0, OperationKind::Blackhole)]);
+        let plan = plan(vec![operation(0, sesame_plan::OperationKind::Blackhole)]);
         let test = test_of(vec![use_of(0, 1.0, 2.0, vec![], 1), use_of(0, 5.0, 9.0, vec![], 2)]);
         let effect = |dropped, start, end| OperationEffect {
             intervals: vec![Span { start, end }],

@@ -4,7 +4,7 @@ use sesame_plan::{ActivationMode, CampaignPlan, Dimension, Shape};
 
 use crate::space::parameter_space::ParameterSpace;
 use crate::space::test_space::{OperationSpace, TestSpace};
-use crate::sspr::{Class, Window, class_of};
+use crate::sspr::{Class, Window};
 
 /// The least and the greatest value of a dimension over all tests that a campaign permits; `None` where no test has
 /// one.
@@ -61,7 +61,7 @@ impl Timing {
     fn of(plan: &CampaignPlan, it: &OperationSpace) -> Option<Timing> {
         let window = Window::of(plan, it)?;
         let numbers = it.parameters.iter().map(|parameter| shares_of(parameter).len()).sum();
-        Some(Timing { window, class: class_of(&plan.operation(it.operation).kind), numbers })
+        Some(Timing { window, class: plan.operation(it.operation).kind.class(), numbers })
     }
 }
 

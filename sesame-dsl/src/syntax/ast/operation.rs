@@ -1,5 +1,7 @@
 //! Operations: what they disturb, and how.
 
+use sesame_grammar::Rule;
+
 use super::words::{Count, Head, Name, Point, Quantity, Range, Text, UnitName};
 use crate::span::Span;
 
@@ -61,21 +63,20 @@ pub(crate) enum Contained {
 
 #[derive(Debug)]
 pub(crate) enum OperationKind {
+    /// Words of the language with at most one amount after them: `blackhole`, `noise [0m, 1m]`, or
+    /// `bias [(0, 0, 0)m, (1, 1, 1)m]`. Which kind it is, and whether it has an amount, is as the rule of the grammar
+    /// says.
+    Plain {
+        rule: Rule,
+        amounts: Option<Amounts>,
+    },
     Random {
         absolute: bool,
         amounts: Amounts,
     },
     RandomText(Vec<Text>),
     StuckAt(Stuck),
-    Bias(Amounts),
-    Drift(Amounts),
-    Noise(Range),
-    Scale(Range),
     NotFinite(NotFinite),
-    Freeze,
-    Stale(Range),
-    ClockSkew(Range),
-    PacketLoss(Range),
     /// The words `burst loss`, and the clauses as written.
     BurstLoss {
         span: Span,
@@ -83,7 +84,6 @@ pub(crate) enum OperationKind {
         leave: Vec<(Span, Range)>,
         loss: Vec<(Span, Range)>,
     },
-    RateLimit(Range),
     Latency {
         range: Range,
         distribution: Vec<(Span, Distribution)>,
@@ -93,8 +93,6 @@ pub(crate) enum OperationKind {
         range: Range,
         drain: Vec<(Span, Drain)>,
     },
-    Duplicate(Range),
-    Blackhole,
     Custom(Custom),
 }
 
@@ -102,20 +100,12 @@ impl OperationKind {
     /// Where it is written what a parameter of a kind, other than a custom one, may be.
     pub(crate) fn written(&self, parameter: &str) -> Option<Span> {
         match self {
-            OperationKind::Random { amounts, .. } | OperationKind::Bias(amounts) | OperationKind::Drift(amounts) => {
+            OperationKind::Plain { amounts, .. } => amounts.as_ref().map(Amounts::span),
+            OperationKind::Random { amounts, .. } | OperationKind::StuckAt(Stuck::Amounts(amounts)) => {
                 Some(amounts.span())
             }
-            OperationKind::StuckAt(Stuck::Amounts(amounts)) => Some(amounts.span()),
             OperationKind::StuckAt(Stuck::Texts(texts)) => Some(texts.first()?.span.to(texts.last()?.span)),
-            OperationKind::Noise(range)
-            | OperationKind::Scale(range)
-            | OperationKind::Stale(range)
-            | OperationKind::ClockSkew(range)
-            | OperationKind::PacketLoss(range)
-            | OperationKind::RateLimit(range)
-            | OperationKind::Latency { range, .. }
-            | OperationKind::Reorder { range, .. }
-            | OperationKind::Duplicate(range) => Some(range.span),
+            OperationKind::Latency { range, .. } | OperationKind::Reorder { range, .. } => Some(range.span),
             OperationKind::BurstLoss { enter, leave, loss, .. } => {
                 let written = match parameter {
                     "enter" => enter,
@@ -127,8 +117,6 @@ impl OperationKind {
             OperationKind::StuckAt(Stuck::Truth(..))
             | OperationKind::RandomText(_)
             | OperationKind::NotFinite(_)
-            | OperationKind::Freeze
-            | OperationKind::Blackhole
             | OperationKind::Custom(_) => None,
         }
     }

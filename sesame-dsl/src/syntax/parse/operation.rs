@@ -9,27 +9,6 @@ use crate::syntax::ast::{
     OperationBody, OperationKind, Place, Range, Step, Stuck, Target, Text,
 };
 
-const KINDS: [Rule; 18] = [
-    Rule::random_value,
-    Rule::stuck_at,
-    Rule::bias,
-    Rule::drift,
-    Rule::noise,
-    Rule::scale,
-    Rule::not_finite,
-    Rule::freeze,
-    Rule::stale_value,
-    Rule::clock_skew,
-    Rule::packet_loss,
-    Rule::burst_loss,
-    Rule::rate_limit,
-    Rule::latency,
-    Rule::reorder,
-    Rule::duplicate,
-    Rule::blackhole,
-    Rule::custom,
-];
-
 impl Reader<'_> {
     pub(super) fn operation(&mut self, pair: &Pair<'_>) -> Operation {
         let head = self.head(pair);
@@ -84,7 +63,7 @@ impl Reader<'_> {
     }
 
     fn operation_kind(&mut self, pair: &Pair<'_>) -> OperationKind {
-        let kind = first_of(pair, &KINDS).expect("an operation has a kind");
+        let kind = after_equals(pair).expect("an operation has a kind");
         match kind.as_rule() {
             Rule::random_value => match child(&kind, Rule::value_mode) {
                 Some(mode) => OperationKind::Random {
@@ -100,10 +79,6 @@ impl Reader<'_> {
                     _ => Stuck::Amounts(self.amounts(&kind).expect("a value is stuck at something")),
                 })
             }
-            Rule::bias => OperationKind::Bias(self.amounts(&kind).expect("a bias has a range")),
-            Rule::drift => OperationKind::Drift(self.amounts(&kind).expect("a drift has a range")),
-            Rule::noise => OperationKind::Noise(self.only_range(&kind)),
-            Rule::scale => OperationKind::Scale(self.only_range(&kind)),
             Rule::not_finite => {
                 OperationKind::NotFinite(match (child(&kind, Rule::k_nan), child(&kind, Rule::minus)) {
                     (Some(_), _) => NotFinite::Nan,
@@ -111,17 +86,12 @@ impl Reader<'_> {
                     (None, Some(_)) => NotFinite::MinusInfinity,
                 })
             }
-            Rule::freeze => OperationKind::Freeze,
-            Rule::stale_value => OperationKind::Stale(self.only_range(&kind)),
-            Rule::clock_skew => OperationKind::ClockSkew(self.only_range(&kind)),
-            Rule::packet_loss => OperationKind::PacketLoss(self.only_range(&kind)),
             Rule::burst_loss => OperationKind::BurstLoss {
                 span: self.keyword_span(&kind).to(self.span(&expect_child(&kind, Rule::k_loss))),
                 enter: self.ranges(&kind, Rule::burst_enter),
                 leave: self.ranges(&kind, Rule::burst_leave),
                 loss: self.ranges(&kind, Rule::burst_drops),
             },
-            Rule::rate_limit => OperationKind::RateLimit(self.only_range(&kind)),
             Rule::latency => OperationKind::Latency {
                 range: self.only_range(&kind),
                 distribution: children(&kind, Rule::distribution)
@@ -138,9 +108,8 @@ impl Reader<'_> {
                 drain: self.drains(&kind),
             },
             Rule::reorder => OperationKind::Reorder { range: self.only_range(&kind), drain: self.drains(&kind) },
-            Rule::duplicate => OperationKind::Duplicate(self.only_range(&kind)),
-            Rule::blackhole => OperationKind::Blackhole,
-            _ => OperationKind::Custom(self.custom(&kind)),
+            Rule::custom => OperationKind::Custom(self.custom(&kind)),
+            rule => OperationKind::Plain { rule, amounts: self.amounts(&kind) },
         }
     }
 
@@ -239,4 +208,10 @@ impl Reader<'_> {
         }
         found
     }
+}
+
+/// What an operation is: the first construct after its `=`.
+fn after_equals<'i>(pair: &Pair<'i>) -> Option<Pair<'i>> {
+    let mut after = pair.clone().into_inner().skip_while(|inner| inner.as_rule() != Rule::equals).skip(1);
+    after.find(|inner| inner.as_rule() != Rule::COMMENT)
 }

@@ -33,7 +33,7 @@ use crate::space::initial::{fresh_operation, fresh_test};
 use crate::space::parameter_space::ParameterSpace;
 use crate::space::test_space::TestSpace;
 use crate::space::test_space::{ActivationSpace, OperationSpace};
-use crate::sspr::{Class, Convention, Point, class_of, planned};
+use crate::sspr::{Class, Convention, Point, planned};
 
 /// Attempts from the test itself, each with different random choices.
 const FROM_THE_TEST: u32 = 4;
@@ -225,7 +225,7 @@ impl CellPlacer {
     /// Adds, removes and replaces operations until their numbers are in the cell: a random walk, of which each step
     /// corrects a number that is too small or too large.
     fn number(&self, test: &mut Test, demands: &Demands, plan: &CampaignPlan, stream: &mut Stream) -> bool {
-        let class = |kind: &OperationSpace| class_of(&plan.operation(kind.operation).kind);
+        let class = |kind: &OperationSpace| plan.operation(kind.operation).kind.class();
         let active = |kind: &OperationSpace| kind.activation != ActivationSpace::Offline;
         let is = |kind: &OperationSpace, dimension: Dimension| {
             active(kind)
