@@ -77,8 +77,9 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
 fn require_what_it_needs(plan: &CampaignPlan, strategy: plan::Strategy) -> Result<(), SearchError> {
     let campaign = || plan.campaign.name.clone();
     let properties = strategy.kind().properties();
-    if strategy.population() == Some(0) {
-        return Err(SearchError::NoPopulation { campaign: campaign() });
+    if let Some((setting, value)) = strategy.not_permitted() {
+        let (setting, permitted) = (setting.noun(), setting.bounds());
+        return Err(SearchError::Setting { campaign: campaign(), setting, value, permitted });
     }
     if properties.by_time_only && plan.campaign.activation != ActivationMode::Time {
         return Err(SearchError::NotByTime { campaign: campaign() });
