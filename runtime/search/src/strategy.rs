@@ -14,7 +14,8 @@ use crate::sspr::Point;
 ///
 /// The caller alternates: it asks for a generation, evaluates all of it in any order, and tells the results in the
 /// order asked. The number of tests of all generations together is exactly
-/// [`Task::evaluations`](sesame_plan::Task::evaluations); when a test is shrunk, at most.
+/// [`Task::evaluations`](sesame_plan::Task::evaluations), or less if the strategy runs out of tests; then
+/// [`Strategy::ended`] says so.
 pub trait Strategy: Send {
     /// The next generation of tests; empty when the search is over.
     fn ask(&mut self) -> Vec<Candidate>;
