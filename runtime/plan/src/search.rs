@@ -4,7 +4,11 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
-use crate::KnownTestId;
+use crate::{Copies, KnownTestId};
+
+/// At most so many copies of one operation with disjoint windows are in one test: as short as they may be, they fill
+/// half of what is permitted. So there is always room to move.
+pub const MOST_APART: u32 = 500;
 
 /// What a campaign does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -116,6 +120,17 @@ impl Strategy {
             | Strategy::MapElites { population }
             | Strategy::Falsification { population } => Some(population),
             Strategy::Random | Strategy::LatinHypercube | Strategy::Sobol => None,
+        }
+    }
+
+    /// How many copies of one operation its tests by time may contain; `offline` tells whether the operation
+    /// [is offline](crate::OperationKind::is_offline).
+    pub fn most_copies(self, copies: Copies, offline: bool) -> u32 {
+        match copies {
+            Copies::Once => 1,
+            Copies::Apart if offline => 1,
+            Copies::Apart => MOST_APART,
+            Copies::MayOverlap => u32::MAX,
         }
     }
 

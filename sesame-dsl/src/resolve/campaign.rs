@@ -5,7 +5,7 @@ use super::{Kind, Resolver, list};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
     self, Activation, ActivationMode, Averaging, CampaignId, Copies, Id as _, MetricId, OperationId, OwnSetting,
-    Search, Setting, StrategyKind, StrategyProperties, TestId, TestTemplate,
+    Search, Setting, Strategy, StrategyKind, StrategyProperties, TestId, TestTemplate,
 };
 use crate::span::Span;
 use crate::syntax::ast::{self, Count};
@@ -290,7 +290,39 @@ impl<'a> Resolver<'a> {
             None => 0,
             Some(own) => self.own_setting(campaign, search, own, evaluations.zip(found))?,
         };
-        Some(Search::Strategy { template: template?, strategy: kind.with_own(value), evaluations: found? })
+        let (template, strategy) = (template?, kind.with_own(value));
+        self.room_for_operations(campaign, search, &template, strategy)?;
+        Some(Search::Strategy { template, strategy, evaluations: found? })
+    }
+
+    /// Reports tests by time that contain more copies than the strategy can place.
+    fn room_for_operations(
+        &mut self,
+        campaign: &'a ast::Campaign,
+        search: &'a ast::Search,
+        template: &TestTemplate,
+        strategy: Strategy,
+    ) -> Option<()> {
+        let written = campaign.operations.first()?;
+        let TestTemplate { operations, min, copies, activation, .. } = template;
+        if *activation != ActivationMode::Time {
+            return Some(());
+        }
+        let copies = |id: &OperationId| {
+            let offline = self.operations[id.index()].as_ref().is_some_and(|operation| operation.kind.is_offline());
+            strategy.most_copies(*copies, offline)
+        };
+        let most = operations.iter().map(copies).fold(0, u32::saturating_add);
+        if *min <= most {
+            return Some(());
+        }
+        let keyword = strategy.kind().properties().keyword;
+        let title = format!("a test of campaign `{}` cannot contain {min} operations", campaign.head.name.text);
+        let diagnostic = Diagnostic::new(Code::BAD_COUNT, written.min.span, title)
+            .label(format!("`search {keyword}` can place at most {most}"))
+            .secondary(search.span, "this search");
+        self.report(diagnostic);
+        None
     }
 
     /// Whether a search has a setting that its strategy does not have, which is reported.
