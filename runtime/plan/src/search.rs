@@ -91,6 +91,11 @@ pub enum Strategy {
     LatinHypercube,
     /// Sobol' sampling: tests are spread evenly over their choices, and so is every beginning of the sequence.
     Sobol,
+    /// Grid search: the full factorial of equally spaced levels.
+    Grid {
+        /// Levels of each number, and of the times at which windows begin and end; 2 to 64.
+        levels: u32,
+    },
     /// Focused falsification: the tests that most probably violate a requirement.
     Falsification {
         /// Tests at a time, after the first ones; at least 1.
@@ -108,6 +113,7 @@ impl Strategy {
             Strategy::Random => StrategyKind::Random,
             Strategy::LatinHypercube => StrategyKind::LatinHypercube,
             Strategy::Sobol => StrategyKind::Sobol,
+            Strategy::Grid { .. } => StrategyKind::Grid,
             Strategy::Falsification { .. } => StrategyKind::Falsification,
         }
     }
@@ -119,6 +125,7 @@ impl Strategy {
             | Strategy::Nsga3 { population }
             | Strategy::MapElites { population }
             | Strategy::Falsification { population } => Some(population),
+            Strategy::Grid { levels } => Some(levels),
             Strategy::Random | Strategy::LatinHypercube | Strategy::Sobol => None,
         }
     }
@@ -126,11 +133,14 @@ impl Strategy {
     /// How many copies of one operation its tests by time may contain; `offline` tells whether the operation
     /// [is offline](crate::OperationKind::is_offline).
     pub fn most_copies(self, copies: Copies, offline: bool) -> u32 {
-        match copies {
-            Copies::Once => 1,
-            Copies::Apart if offline => 1,
-            Copies::Apart => MOST_APART,
-            Copies::MayOverlap => u32::MAX,
+        match (self, copies) {
+            (_, Copies::Once) => 1,
+            // In a grid copies differ in their windows, which begin and end at levels.
+            (_, Copies::Apart) | (Strategy::Grid { .. }, Copies::MayOverlap) if offline => 1,
+            (Strategy::Grid { levels }, Copies::Apart) => levels.saturating_sub(1),
+            (Strategy::Grid { levels }, Copies::MayOverlap) => levels.saturating_mul(levels.saturating_sub(1)) / 2,
+            (_, Copies::Apart) => MOST_APART,
+            (_, Copies::MayOverlap) => u32::MAX,
         }
     }
 
@@ -147,6 +157,7 @@ impl Strategy {
             Strategy::Nsga2 { population } | Strategy::Nsga3 { population } | Strategy::MapElites { population } => {
                 format!("{title}, population {population}")
             }
+            Strategy::Grid { levels } => format!("{title}, {levels} levels"),
             Strategy::Falsification { population } if population > 1 => {
                 format!("{title}, {population} tests at a time")
             }
@@ -176,6 +187,8 @@ pub enum StrategyKind {
     LatinHypercube,
     /// See [`Strategy::Sobol`].
     Sobol,
+    /// See [`Strategy::Grid`].
+    Grid,
     /// See [`Strategy::Falsification`].
     Falsification,
 }
@@ -185,16 +198,19 @@ pub enum StrategyKind {
 pub enum Setting {
     /// How many tests are varied, or asked for, together.
     Population,
+    /// How many values of each number are tried.
+    Levels,
 }
 
 impl Setting {
     /// All of them.
-    pub const ALL: [Setting; 1] = [Setting::Population];
+    pub const ALL: [Setting; 2] = [Setting::Population, Setting::Levels];
 
     /// Its word in the language.
     pub const fn keyword(self) -> &'static str {
         match self {
             Setting::Population => "population",
+            Setting::Levels => "levels",
         }
     }
 
@@ -207,6 +223,7 @@ impl Setting {
     pub const fn noun(self) -> &'static str {
         match self {
             Setting::Population => "population",
+            Setting::Levels => "number of levels",
         }
     }
 
@@ -214,6 +231,7 @@ impl Setting {
     pub const fn permitted(self) -> RangeInclusive<u32> {
         match self {
             Setting::Population => 1..=u32::MAX,
+            Setting::Levels => 2..=64,
         }
     }
 
@@ -244,6 +262,8 @@ impl OwnSetting {
     const BRED: OwnSetting = OwnSetting { setting: Setting::Population, default: None, example: 10, bred: true };
     /// The tests that are asked for at a time.
     const BATCH: OwnSetting = OwnSetting { setting: Setting::Population, default: Some(1), example: 4, bred: false };
+    /// The levels of each number.
+    const LEVELS: OwnSetting = OwnSetting { setting: Setting::Levels, default: None, example: 4, bred: false };
 }
 
 /// Why a strategy has no setting `neighbours`.
@@ -285,13 +305,14 @@ pub struct StrategyProperties {
 
 impl StrategyKind {
     /// All of them.
-    pub const ALL: [StrategyKind; 7] = [
+    pub const ALL: [StrategyKind; 8] = [
         StrategyKind::Nsga2,
         StrategyKind::Nsga3,
         StrategyKind::MapElites,
         StrategyKind::Random,
         StrategyKind::LatinHypercube,
         StrategyKind::Sobol,
+        StrategyKind::Grid,
         StrategyKind::Falsification,
     ];
 
@@ -309,6 +330,7 @@ impl StrategyKind {
             StrategyKind::Random => Strategy::Random,
             StrategyKind::LatinHypercube => Strategy::LatinHypercube,
             StrategyKind::Sobol => Strategy::Sobol,
+            StrategyKind::Grid => Strategy::Grid { levels: value },
             StrategyKind::Falsification => Strategy::Falsification { population: value },
         }
     }
@@ -343,6 +365,11 @@ impl StrategyKind {
             StrategyKind::Sobol => {
                 StrategyProperties { by_time_only: true, ..properties("sobol", "Sobol points", "a Sobol search") }
             }
+            StrategyKind::Grid => StrategyProperties {
+                own: Some(OwnSetting::LEVELS),
+                by_time_only: true,
+                ..properties("grid", "grid", "a grid search")
+            },
             StrategyKind::Falsification => StrategyProperties {
                 own: Some(OwnSetting::BATCH),
                 averaging: Averaging::ByItself,
