@@ -37,6 +37,11 @@ pub trait Strategy: Send {
         Vec::new()
     }
 
+    /// How many tests there are to choose from, if they are counted; [`u128::MAX`] if there are more.
+    fn tests(&self) -> Option<u128> {
+        None
+    }
+
     /// Why the search is over, if there is more to say than that all tests were evaluated.
     fn ended(&self) -> Option<String> {
         None

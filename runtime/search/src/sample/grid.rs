@@ -192,6 +192,10 @@ impl Sampling for FullFactorial {
         None
     }
 
+    fn tests(&self) -> Option<u128> {
+        Some(self.tests)
+    }
+
     fn ended(&self, evaluated: u32) -> Option<String> {
         Some(match self.tests {
             u128::MAX => format!("{evaluated} of the more than 10^38 tests of the grid were evaluated"),

@@ -12,6 +12,11 @@ pub(crate) trait Sampling: Send {
     /// The test of an index; asked for in order, from 0. It depends on the index alone. `None` after the last one.
     fn test(&mut self, index: u32) -> Option<Test>;
 
+    /// As [`Strategy::tests`].
+    fn tests(&self) -> Option<u128> {
+        None
+    }
+
     /// What there is to say of the tests that there are, after so many of them were evaluated.
     fn ended(&self, _evaluated: u32) -> Option<String> {
         None
@@ -51,6 +56,10 @@ impl<S: Sampling> Strategy for SampledSearch<S> {
         let asked = batch.len() as u32;
         self.asked += asked;
         batch
+    }
+
+    fn tests(&self) -> Option<u128> {
+        self.sampling.tests()
     }
 
     fn ended(&self) -> Option<String> {
