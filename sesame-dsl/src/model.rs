@@ -31,8 +31,8 @@ use std::collections::BTreeMap;
 pub use sesame_plan::stl::Interval;
 pub use sesame_plan::{
     Aggregate, Averaging, BoostedChildren, Bound, Choice, Comparison, Condition, Confirmation, Copies, Dimension,
-    Direction, Distribution, Drain, Exploration, Expression, Members, Moment, NotFinite, OperationKind, Population,
-    Recorded, Shape, Statistic, Step, StopRule, Strategy, StrategyKind, StrategyProperties, Trend, ValueMode,
+    Direction, Distribution, Drain, Exploration, Expression, Members, Moment, NotFinite, OperationKind, OwnSetting,
+    Recorded, Setting, Shape, Statistic, Step, StopRule, Strategy, StrategyKind, StrategyProperties, Trend, ValueMode,
 };
 
 use crate::span::FileId;

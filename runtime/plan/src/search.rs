@@ -1,8 +1,14 @@
 //! What a campaign does: it searches by a strategy, or it repeats one test.
 
+use std::ops::RangeInclusive;
+
 use serde::{Deserialize, Serialize};
 
-use crate::KnownTestId;
+use crate::{Copies, KnownTestId};
+
+/// At most so many copies of one operation with disjoint windows are in one test: as short as they may be, they fill
+/// half of what is permitted. So there is always room to move.
+pub const MOST_APART: u32 = 500;
 
 /// What a campaign does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -85,6 +91,11 @@ pub enum Strategy {
     LatinHypercube,
     /// Sobol' sampling: tests are spread evenly over their choices, and so is every beginning of the sequence.
     Sobol,
+    /// Grid search: the full factorial of equally spaced levels.
+    Grid {
+        /// Levels of each number, and of the times at which windows begin and end; 2 to 64.
+        levels: u32,
+    },
     /// Focused falsification: the tests that most probably violate a requirement.
     Falsification {
         /// Tests at a time, after the first ones; at least 1.
@@ -102,34 +113,62 @@ impl Strategy {
             Strategy::Random => StrategyKind::Random,
             Strategy::LatinHypercube => StrategyKind::LatinHypercube,
             Strategy::Sobol => StrategyKind::Sobol,
+            Strategy::Grid { .. } => StrategyKind::Grid,
             Strategy::Falsification { .. } => StrategyKind::Falsification,
         }
     }
 
-    /// The size of its population, if it has this setting.
-    pub fn population(self) -> Option<u32> {
+    /// The value of its [own setting](StrategyProperties::own), if it has one.
+    pub fn own(self) -> Option<u32> {
         match self {
             Strategy::Nsga2 { population }
             | Strategy::Nsga3 { population }
             | Strategy::MapElites { population }
             | Strategy::Falsification { population } => Some(population),
+            Strategy::Grid { levels } => Some(levels),
             Strategy::Random | Strategy::LatinHypercube | Strategy::Sobol => None,
         }
     }
 
+    /// How many copies of one operation its tests by time may contain; `offline` tells whether the operation
+    /// [is offline](crate::OperationKind::is_offline).
+    pub fn most_copies(self, copies: Copies, offline: bool) -> u32 {
+        match (self, copies) {
+            (_, Copies::Once) => 1,
+            // In a grid copies differ in their windows, which begin and end at levels.
+            (_, Copies::Apart) | (Strategy::Grid { .. }, Copies::MayOverlap) if offline => 1,
+            (Strategy::Grid { levels }, Copies::Apart) => levels.saturating_sub(1),
+            (Strategy::Grid { levels }, Copies::MayOverlap) => levels.saturating_mul(levels.saturating_sub(1)) / 2,
+            (_, Copies::Apart) => MOST_APART,
+            (_, Copies::MayOverlap) => u32::MAX,
+        }
+    }
+
+    /// Its own setting and the value, if the value is not permitted.
+    pub fn not_permitted(self) -> Option<(Setting, u32)> {
+        let setting = self.kind().properties().own?.setting;
+        self.own().filter(|value| !setting.permitted().contains(value)).map(|value| (setting, value))
+    }
+
     /// Its name and settings in reports: `NSGA-II, population 10`.
     pub fn title(self) -> String {
-        let properties = self.kind().properties();
-        match (properties.population, self.population()) {
-            (Population::Bred, Some(size)) => format!("{}, population {size}", properties.title),
-            (Population::Batch, Some(size)) if size > 1 => format!("{}, {size} tests at a time", properties.title),
-            _ => properties.title.to_owned(),
+        let title = self.kind().properties().title;
+        match self {
+            Strategy::Nsga2 { population } | Strategy::Nsga3 { population } | Strategy::MapElites { population } => {
+                format!("{title}, population {population}")
+            }
+            Strategy::Grid { levels } => format!("{title}, {levels} levels"),
+            Strategy::Falsification { population } if population > 1 => {
+                format!("{title}, {population} tests at a time")
+            }
+            _ => title.to_owned(),
         }
     }
 
     /// Its settings as a `search` block of the language has them, without those that every strategy has.
     pub fn settings(self) -> String {
-        self.population().map_or_else(String::new, |size| format!("population {size}  "))
+        let own = self.kind().properties().own.zip(self.own());
+        own.map_or_else(String::new, |(own, value)| format!("{} {value}  ", own.setting.keyword()))
     }
 }
 
@@ -148,19 +187,83 @@ pub enum StrategyKind {
     LatinHypercube,
     /// See [`Strategy::Sobol`].
     Sobol,
+    /// See [`Strategy::Grid`].
+    Grid,
     /// See [`Strategy::Falsification`].
     Falsification,
 }
 
-/// What a strategy's `population` means.
+/// A setting that only some strategies have. Its value is a whole number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Population {
-    /// It has no such setting.
-    None,
-    /// The tests of a generation, bred in pairs: even, and required.
-    Bred,
-    /// The tests that are asked for at a time: 1 by default.
-    Batch,
+pub enum Setting {
+    /// How many tests are varied, or asked for, together.
+    Population,
+    /// How many values of each number are tried.
+    Levels,
+}
+
+impl Setting {
+    /// All of them.
+    pub const ALL: [Setting; 2] = [Setting::Population, Setting::Levels];
+
+    /// Its word in the language.
+    pub const fn keyword(self) -> &'static str {
+        match self {
+            Setting::Population => "population",
+            Setting::Levels => "levels",
+        }
+    }
+
+    /// The setting with this word.
+    pub fn from_keyword(keyword: &str) -> Option<Setting> {
+        Setting::ALL.into_iter().find(|setting| setting.keyword() == keyword)
+    }
+
+    /// What it is in a sentence, after an article: `the population`.
+    pub const fn noun(self) -> &'static str {
+        match self {
+            Setting::Population => "population",
+            Setting::Levels => "number of levels",
+        }
+    }
+
+    /// The values with which a strategy works.
+    pub const fn permitted(self) -> RangeInclusive<u32> {
+        match self {
+            Setting::Population => 1..=u32::MAX,
+            Setting::Levels => 2..=64,
+        }
+    }
+
+    /// The values with which a strategy works, in words: `at least 1`.
+    pub fn bounds(self) -> String {
+        match self.permitted().into_inner() {
+            (least, u32::MAX) => format!("at least {least}"),
+            (least, most) => format!("{least} to {most}"),
+        }
+    }
+}
+
+/// A strategy's own setting, which not all strategies have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OwnSetting {
+    /// Which.
+    pub setting: Setting,
+    /// Its value in a campaign that does not have the setting; `None` if every campaign must have it.
+    pub default: Option<u32>,
+    /// A value that suits many campaigns, for examples.
+    pub example: u32,
+    /// Whether it is a number of tests that are bred in pairs: even, and at most the number of evaluations.
+    pub bred: bool,
+}
+
+impl OwnSetting {
+    /// The tests of a generation, bred in pairs.
+    const BRED: OwnSetting = OwnSetting { setting: Setting::Population, default: None, example: 10, bred: true };
+    /// The tests that are asked for at a time.
+    const BATCH: OwnSetting = OwnSetting { setting: Setting::Population, default: Some(1), example: 4, bred: false };
+    /// The levels of each number.
+    const LEVELS: OwnSetting = OwnSetting { setting: Setting::Levels, default: None, example: 4, bred: false };
 }
 
 /// Why a strategy has no setting `neighbours`.
@@ -182,10 +285,10 @@ pub struct StrategyProperties {
     pub keyword: &'static str,
     /// Its name in reports.
     pub title: &'static str,
-    /// What it is in a sentence, after an article: `a Sobol search`.
+    /// What it is in a sentence: `a Sobol search`.
     pub noun: &'static str,
-    /// Its setting `population`.
-    pub population: Population,
+    /// The setting that it has and others do not.
+    pub own: Option<OwnSetting>,
     /// Its setting `neighbours`.
     pub averaging: Averaging,
     /// Whether it chooses windows of time, so that campaigns by condition cannot use it.
@@ -202,13 +305,14 @@ pub struct StrategyProperties {
 
 impl StrategyKind {
     /// All of them.
-    pub const ALL: [StrategyKind; 7] = [
+    pub const ALL: [StrategyKind; 8] = [
         StrategyKind::Nsga2,
         StrategyKind::Nsga3,
         StrategyKind::MapElites,
         StrategyKind::Random,
         StrategyKind::LatinHypercube,
         StrategyKind::Sobol,
+        StrategyKind::Grid,
         StrategyKind::Falsification,
     ];
 
@@ -217,16 +321,17 @@ impl StrategyKind {
         StrategyKind::ALL.into_iter().find(|kind| kind.properties().keyword == keyword)
     }
 
-    /// The strategy with its settings; `population` is not used by one without this setting.
-    pub fn with_settings(self, population: u32) -> Strategy {
+    /// The strategy with the value of its [own setting](StrategyProperties::own), which is not used if it has none.
+    pub fn with_own(self, value: u32) -> Strategy {
         match self {
-            StrategyKind::Nsga2 => Strategy::Nsga2 { population },
-            StrategyKind::Nsga3 => Strategy::Nsga3 { population },
-            StrategyKind::MapElites => Strategy::MapElites { population },
+            StrategyKind::Nsga2 => Strategy::Nsga2 { population: value },
+            StrategyKind::Nsga3 => Strategy::Nsga3 { population: value },
+            StrategyKind::MapElites => Strategy::MapElites { population: value },
             StrategyKind::Random => Strategy::Random,
             StrategyKind::LatinHypercube => Strategy::LatinHypercube,
             StrategyKind::Sobol => Strategy::Sobol,
-            StrategyKind::Falsification => Strategy::Falsification { population },
+            StrategyKind::Grid => Strategy::Grid { levels: value },
+            StrategyKind::Falsification => Strategy::Falsification { population: value },
         }
     }
 
@@ -234,38 +339,43 @@ impl StrategyKind {
     pub const fn properties(self) -> StrategyProperties {
         match self {
             StrategyKind::Nsga2 => StrategyProperties {
-                population: Population::Bred,
+                own: Some(OwnSetting::BRED),
                 averaging: Averaging::Possible,
                 explores: true,
-                ..properties("nsga2", "NSGA-II", "NSGA-II search")
+                ..properties("nsga2", "NSGA-II", "an NSGA-II search")
             },
             StrategyKind::Nsga3 => StrategyProperties {
-                population: Population::Bred,
+                own: Some(OwnSetting::BRED),
                 averaging: Averaging::Possible,
-                ..properties("nsga3", "NSGA-III", "NSGA-III search")
+                ..properties("nsga3", "NSGA-III", "an NSGA-III search")
             },
             StrategyKind::MapElites => StrategyProperties {
-                population: Population::Bred,
+                own: Some(OwnSetting::BRED),
                 averaging: Averaging::Possible,
                 needs_coverage: true,
-                ..properties("map_elites", "MAP-Elites", "MAP-Elites search")
+                ..properties("map_elites", "MAP-Elites", "a MAP-Elites search")
             },
             StrategyKind::Random => {
-                StrategyProperties { independent: true, ..properties("random", "random", "random search") }
+                StrategyProperties { independent: true, ..properties("random", "random", "a random search") }
             }
             StrategyKind::LatinHypercube => StrategyProperties {
                 by_time_only: true,
-                ..properties("latin_hypercube", "Latin hypercube", "Latin hypercube")
+                ..properties("latin_hypercube", "Latin hypercube", "a Latin hypercube")
             },
             StrategyKind::Sobol => {
-                StrategyProperties { by_time_only: true, ..properties("sobol", "Sobol points", "Sobol search") }
+                StrategyProperties { by_time_only: true, ..properties("sobol", "Sobol points", "a Sobol search") }
             }
+            StrategyKind::Grid => StrategyProperties {
+                own: Some(OwnSetting::LEVELS),
+                by_time_only: true,
+                ..properties("grid", "grid", "a grid search")
+            },
             StrategyKind::Falsification => StrategyProperties {
-                population: Population::Batch,
+                own: Some(OwnSetting::BATCH),
                 averaging: Averaging::ByItself,
                 by_time_only: true,
                 needs_requirements: true,
-                ..properties("falsification", "falsification", "falsification")
+                ..properties("falsification", "falsification", "a falsification")
             },
         }
     }
@@ -277,7 +387,7 @@ const fn properties(keyword: &'static str, title: &'static str, noun: &'static s
         keyword,
         title,
         noun,
-        population: Population::None,
+        own: None,
         averaging: Averaging::LearnsNothing,
         by_time_only: false,
         needs_requirements: false,

@@ -16,6 +16,7 @@ use crate::evolve::predict::PredictingVariation;
 use crate::evolve::variation::{self, TestVariation};
 use crate::falsification::Falsification;
 use crate::fixed_tests::FixedTests;
+use crate::sample::grid::FullFactorial;
 use crate::sample::latin_hypercube::LatinHypercube;
 use crate::sample::random::Random;
 use crate::sample::sampled_search::SampledSearch;
@@ -64,6 +65,9 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
             Box::new(SampledSearch::new(LatinHypercube::new(space, evaluations, seed), evaluations))
         }
         plan::Strategy::Sobol => Box::new(SampledSearch::new(Sobol::new(space, seed), evaluations)),
+        plan::Strategy::Grid { levels } => {
+            Box::new(SampledSearch::new(FullFactorial::new(plan, &space, levels, seed)?, evaluations))
+        }
         plan::Strategy::Falsification { population } => {
             let requirements = plan.requirements.len();
             let settings = falsify::Settings { requirements, evaluations, batch: population, seed };
@@ -77,8 +81,9 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
 fn require_what_it_needs(plan: &CampaignPlan, strategy: plan::Strategy) -> Result<(), SearchError> {
     let campaign = || plan.campaign.name.clone();
     let properties = strategy.kind().properties();
-    if strategy.population() == Some(0) {
-        return Err(SearchError::NoPopulation { campaign: campaign() });
+    if let Some((setting, value)) = strategy.not_permitted() {
+        let (setting, permitted) = (setting.noun(), setting.bounds());
+        return Err(SearchError::Setting { campaign: campaign(), setting, value, permitted });
     }
     if properties.by_time_only && plan.campaign.activation != ActivationMode::Time {
         return Err(SearchError::NotByTime { campaign: campaign() });

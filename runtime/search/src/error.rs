@@ -91,10 +91,16 @@ pub enum SearchError {
         /// The campaign.
         campaign: String,
     },
-    /// A population without members.
-    #[error("campaign `{campaign}` has a population of 0; it must be at least 1")]
-    NoPopulation {
+    /// A setting with which its strategy cannot work.
+    #[error("campaign `{campaign}` has a {setting} of {value}; it must be {permitted}")]
+    Setting {
         /// The campaign.
         campaign: String,
+        /// The setting, as a noun.
+        setting: &'static str,
+        /// Its value.
+        value: u32,
+        /// The values that are permitted, in words.
+        permitted: String,
     },
 }

@@ -166,7 +166,7 @@ impl SearchDomain for TestDomain {
     type Point = EmbeddedTest;
 
     fn quasi_random(&mut self, index: u32) -> EmbeddedTest {
-        let test = self.spread.test(index);
+        let test = self.spread.test(index).expect("points never run out");
         self.embedded(test, Vec::new())
     }
 

@@ -2,6 +2,7 @@
 
 pub(crate) mod decode;
 
+pub(crate) mod grid;
 pub(crate) mod latin_hypercube;
 pub(crate) mod random;
 pub(crate) mod sampled_search;

@@ -14,7 +14,8 @@ use crate::sspr::Point;
 ///
 /// The caller alternates: it asks for a generation, evaluates all of it in any order, and tells the results in the
 /// order asked. The number of tests of all generations together is exactly
-/// [`Task::evaluations`](sesame_plan::Task::evaluations); when a test is shrunk, at most.
+/// [`Task::evaluations`](sesame_plan::Task::evaluations), or less if the strategy runs out of tests; then
+/// [`Strategy::ended`] says so.
 pub trait Strategy: Send {
     /// The next generation of tests; empty when the search is over.
     fn ask(&mut self) -> Vec<Candidate>;
@@ -34,6 +35,11 @@ pub trait Strategy: Send {
     /// What the search gave up, for the record of the campaign.
     fn given_up(&self) -> Vec<String> {
         Vec::new()
+    }
+
+    /// How many tests there are to choose from, if they are counted; [`u128::MAX`] if there are more.
+    fn tests(&self) -> Option<u128> {
+        None
     }
 
     /// Why the search is over, if there is more to say than that all tests were evaluated.

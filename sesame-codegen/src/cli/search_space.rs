@@ -9,6 +9,7 @@ use sesame_search::space::ParameterSpace;
 use sesame_search::space::TestSpace;
 use sesame_search::space::{ActivationSpace, OperationSpace};
 use sesame_search::sspr::extent;
+use sesame_search::strategy;
 
 /// A number that may be anything in a range counts as so many values.
 const STEPS: f64 = 100.0;
@@ -20,7 +21,11 @@ pub(super) fn described(plan: &CampaignPlan) -> String {
     let mut lines = Vec::new();
     if plan.campaign.search.strategy().is_some() {
         match TestSpace::from_plan(plan) {
-            Ok(test_space) => space(plan, &test_space, &mut lines),
+            Ok(test_space) => {
+                space(plan, &test_space, &mut lines);
+                let counted = strategy(plan, plan.campaign.seed).ok().and_then(|search| search.tests());
+                lines.extend(counted.map(|tests| (plan.campaign.search.keyword(), counted_tests(tests))));
+            }
             Err(error) => lines.push(("tests", error.to_string())),
         }
     }
@@ -84,6 +89,11 @@ fn space(plan: &CampaignPlan, permitted: &TestSpace, lines: &mut Vec<(&str, Stri
         let known = if feasible.is_exact() { "" } else { ", as far as known" };
         lines.push(("cells", format!("{} of {} can be reached{known}", feasible.count(), grid.len())));
     }
+}
+
+/// How many tests a search can choose from.
+fn counted_tests(tests: u128) -> String {
+    if tests == u128::MAX { "more than 10^38 tests".to_owned() } else { format!("{tests} tests") }
 }
 
 /// How many runs it may take to confirm what a search of so many tests finds.
@@ -226,7 +236,41 @@ fn duration(seconds: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use sesame_dsl::analyse;
+    use sesame_dsl::source::SourceMap;
+
     use super::*;
+    use crate::lower::lower;
+
+    const CELL: &str = r#"
+        space cell
+        system {
+          simulator sim = in_process "cell_sim::Cell" { crate "simulator"  step 20ms }
+          topic link0 = "joints/link0" : real[rad]
+        }
+        metric time minimise = fuzzing_time()
+        operation shake on link0 = random offset [-0.3rad, 0.3rad] within [0s, 65s]
+        campaign systematic { objectives time  operations shake 1 per test
+                              search grid { levels 4  evaluations 100 }  end after 70s }
+        campaign larger from systematic { operations shake 1..3 per test }
+        campaign huge from systematic { operations shake 60 per test  search grid { levels 64  evaluations 100 } }
+        campaign drawn from systematic { search sobol { evaluations 100 } }
+    "#;
+
+    #[test]
+    fn of_a_grid_it_is_said_how_many_tests_there_are() {
+        let mut sources = SourceMap::new();
+        let file = sources.add("cell.sesame", CELL);
+        let space = analyse(&sources, file).model.unwrap();
+        let grid = |campaign: &str| {
+            let plan = lower(&space, space.campaign(campaign).unwrap(), "cell.sesame", "sesamec 0.0.0").plan;
+            described(&plan).lines().find(|line| line.starts_with("// grid ")).map(str::to_owned)
+        };
+        assert_eq!(grid("systematic").unwrap(), "// grid            60 tests");
+        assert_eq!(grid("larger").unwrap(), "// grid            1560 tests");
+        assert_eq!(grid("huge").unwrap(), "// grid            more than 10^38 tests");
+        assert_eq!(grid("drawn"), None);
+    }
 
     #[test]
     fn ways_to_choose_are_multisets() {

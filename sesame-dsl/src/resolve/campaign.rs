@@ -1,11 +1,11 @@
 //! Campaigns.
 
 use super::exploration::exploring;
-use super::{Kind, Resolver};
+use super::{Kind, Resolver, list};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
-    self, Activation, ActivationMode, CampaignId, Copies, Id as _, MetricId, OperationId, Population, Search, TestId,
-    TestTemplate,
+    self, Activation, ActivationMode, Averaging, CampaignId, Copies, Id as _, MetricId, OperationId, OwnSetting,
+    Search, Setting, Strategy, StrategyKind, StrategyProperties, TestId, TestTemplate,
 };
 use crate::span::Span;
 use crate::syntax::ast::{self, Count};
@@ -278,60 +278,115 @@ impl<'a> Resolver<'a> {
         template: Option<TestTemplate>,
     ) -> Option<Search> {
         let kind = search.strategy?;
-        let population = self.single(&search.population, "population").copied();
         let evaluations = self.single(&search.evaluations, "evaluations").copied();
         if evaluations.is_none() && !search.has_errors {
             self.missing(&campaign.head.name, "its number of evaluations", "evaluations 200");
         }
         let found = evaluations.and_then(|count| self.count(count, 1, "the number of evaluations"));
-        let size = match kind.properties().population {
-            Population::None => {
-                if let Some((span, _)) = search.population.first() {
-                    let title = format!("a {} has no setting `population`", kind.properties().noun);
-                    let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, *span, title)
-                        .label("remove this")
-                        .note("its settings are `evaluations` and `seed`");
-                    self.report(diagnostic);
-                    return None;
-                }
-                0
-            }
-            Population::Batch => match population {
-                Some(count) => self.count(count, 1, "the population")?,
-                None => 1,
-            },
-            Population::Bred => {
-                let Some(count) = population else {
-                    if !search.has_errors {
-                        self.missing(&campaign.head.name, "its population size", "population 10");
-                    }
-                    return None;
-                };
-                let size = self.count(count, 2, "the population")?;
-                let even = size % 2 == 0;
-                if !even {
-                    let title = format!("the population must be even, not {size}");
-                    let diagnostic = Diagnostic::new(Code::BAD_COUNT, count.span, title)
-                        .label("expected an even number, because children are made in pairs");
-                    self.report(match size.checked_add(1) {
-                        Some(even) => diagnostic.suggest(format!("use {even}"), count.span, even.to_string()),
-                        None => diagnostic,
-                    });
-                }
-                let found = found?;
-                if found < size {
-                    let title = format!("{found} evaluations are too few for a population of {size}");
-                    let span = evaluations.map_or(count.span, |count| count.span);
-                    let diagnostic = Diagnostic::new(Code::BAD_COUNT, span, title)
-                        .label(format!("expected at least {size}"))
-                        .secondary(count.span, "the population");
-                    self.report(diagnostic);
-                    return None;
-                }
-                even.then_some(size)?
-            }
+        if self.foreign_setting(search, kind) {
+            return None;
+        }
+        let value = match kind.properties().own {
+            None => 0,
+            Some(own) => self.own_setting(campaign, search, own, evaluations.zip(found))?,
         };
-        Some(Search::Strategy { template: template?, strategy: kind.with_settings(size), evaluations: found? })
+        let (template, strategy) = (template?, kind.with_own(value));
+        self.room_for_operations(campaign, search, &template, strategy)?;
+        Some(Search::Strategy { template, strategy, evaluations: found? })
+    }
+
+    /// Reports tests by time that contain more copies than the strategy can place.
+    fn room_for_operations(
+        &mut self,
+        campaign: &'a ast::Campaign,
+        search: &'a ast::Search,
+        template: &TestTemplate,
+        strategy: Strategy,
+    ) -> Option<()> {
+        let written = campaign.operations.first()?;
+        let TestTemplate { operations, min, copies, activation, .. } = template;
+        if *activation != ActivationMode::Time {
+            return Some(());
+        }
+        let copies = |id: &OperationId| {
+            let offline = self.operations[id.index()].as_ref().is_some_and(|operation| operation.kind.is_offline());
+            strategy.most_copies(*copies, offline)
+        };
+        let most = operations.iter().map(copies).fold(0, u32::saturating_add);
+        if *min <= most {
+            return Some(());
+        }
+        let keyword = strategy.kind().properties().keyword;
+        let title = format!("a test of campaign `{}` cannot contain {min} operations", campaign.head.name.text);
+        let diagnostic = Diagnostic::new(Code::BAD_COUNT, written.min.span, title)
+            .label(format!("`search {keyword}` can place at most {most}"))
+            .secondary(search.span, "this search");
+        self.report(diagnostic);
+        None
+    }
+
+    /// Whether a search has a setting that its strategy does not have, which is reported.
+    fn foreign_setting(&mut self, search: &'a ast::Search, kind: StrategyKind) -> bool {
+        let StrategyProperties { own, averaging, noun, .. } = kind.properties();
+        let foreign = |it: &&(Span, (Setting, Count))| own.is_none_or(|own| own.setting != it.1.0);
+        let Some((span, (setting, _))) = search.own.iter().find(foreign) else { return false };
+        let neighbours = (averaging == Averaging::Possible).then_some("neighbours");
+        let known: Vec<&str> =
+            own.map(|own| own.setting.keyword()).into_iter().chain(["evaluations", "seed"]).chain(neighbours).collect();
+        let diagnostic =
+            Diagnostic::new(Code::UNKNOWN_NAME, *span, format!("{noun} has no setting `{}`", setting.keyword()))
+                .label("remove this")
+                .note(format!("its settings are {}", list(&known)));
+        self.report(diagnostic);
+        true
+    }
+
+    /// The value of a strategy's own setting. `evaluations` is what is written of them, and their number.
+    fn own_setting(
+        &mut self,
+        campaign: &'a ast::Campaign,
+        search: &'a ast::Search,
+        own: OwnSetting,
+        evaluations: Option<(Count, u32)>,
+    ) -> Option<u32> {
+        let (keyword, noun) = (own.setting.keyword(), own.setting.noun());
+        let Some(&(_, count)) = self.single(&search.own, keyword) else {
+            if own.default.is_none() && !search.has_errors {
+                let example = format!("{keyword} {}", own.example);
+                self.missing(&campaign.head.name, &format!("its {noun}"), &example);
+            }
+            return own.default;
+        };
+        let (least, most) = own.setting.permitted().into_inner();
+        let value = self.count(count, if own.bred { least.max(2) } else { least }, &format!("the {noun}"))?;
+        if value > most {
+            let title = format!("the {noun} must be at most {most}, not {value}");
+            self.report(Diagnostic::new(Code::BAD_COUNT, count.span, title).label(format!("expected {most} or less")));
+            return None;
+        }
+        if !own.bred {
+            return Some(value);
+        }
+        let even = value % 2 == 0;
+        if !even {
+            let title = format!("the {noun} must be even, not {value}");
+            let diagnostic = Diagnostic::new(Code::BAD_COUNT, count.span, title)
+                .label("expected an even number, because children are made in pairs");
+            self.report(match value.checked_add(1) {
+                Some(even) => diagnostic.suggest(format!("use {even}"), count.span, even.to_string()),
+                None => diagnostic,
+            });
+        }
+        let (evaluations, found) = evaluations?;
+        if found < value {
+            let title = format!("{found} evaluations are too few for a {noun} of {value}");
+            let diagnostic = Diagnostic::new(Code::BAD_COUNT, evaluations.span, title)
+                .label(format!("expected at least {value}"))
+                .secondary(count.span, format!("the {noun}"));
+            self.report(diagnostic);
+            return None;
+        }
+        even.then_some(value)
     }
 
     fn repeat(&mut self, repeat: &'a ast::Repeat, end_after: Option<f64>) -> Option<Search> {

@@ -44,7 +44,7 @@ impl<'a> Resolver<'a> {
             Averaging::LearnsNothing => "its tests do not depend on the results of earlier ones",
             Averaging::ByItself => "its model of the distance to a violation already accounts for noise",
         };
-        let title = format!("a {} has no setting `neighbours`", properties.noun);
+        let title = format!("{} has no setting `neighbours`", properties.noun);
         let diagnostic =
             Diagnostic::new(Code::UNKNOWN_NAME, search.neighbours[0].0, title).label("remove this").note(note);
         self.report(diagnostic);

@@ -4,6 +4,7 @@
 //! which word was probably meant. A new block is its rules in the grammar and a row here.
 
 use sesame_grammar::Rule;
+use sesame_plan::Setting;
 
 /// A construct with members, most of them in braces.
 #[derive(Debug)]
@@ -98,6 +99,19 @@ pub(super) fn members(rule: Rule) -> impl Iterator<Item = &'static Member> {
 pub(super) fn declares(word: &str) -> bool {
     BLOCKS.iter().flat_map(|block| block.members).any(|member| member.declares && member.word == Some(word))
 }
+
+/// The settings of a search: those of single strategies, then those of all.
+const SEARCH_SETTINGS: [Member; Setting::ALL.len() + 3] = {
+    let mut members = [const { Member::new(Rule::setting_neighbours, "neighbours") }; Setting::ALL.len() + 3];
+    let mut at = 0;
+    while at < Setting::ALL.len() {
+        members[at] = Member::new(Rule::strategy_setting, Setting::ALL[at].keyword());
+        at += 1;
+    }
+    members[at] = Member::new(Rule::setting_evaluations, "evaluations");
+    members[at + 1] = Member::new(Rule::setting_seed, "seed");
+    members
+};
 
 /// All blocks of the language.
 pub(super) const BLOCKS: &[Block] = &[
@@ -217,16 +231,7 @@ pub(super) const BLOCKS: &[Block] = &[
         "condition",
         &[Member::new(Rule::setting_depth, "depth"), Member::new(Rule::setting_integers, "integers")],
     ),
-    Block::settings(
-        Rule::search_settings,
-        "search",
-        &[
-            Member::new(Rule::setting_population, "population"),
-            Member::new(Rule::setting_evaluations, "evaluations"),
-            Member::new(Rule::setting_seed, "seed"),
-            Member::new(Rule::setting_neighbours, "neighbours"),
-        ],
-    ),
+    Block::settings(Rule::search_settings, "search", &SEARCH_SETTINGS),
     Block {
         rule: Rule::coverage,
         name: "coverage",
@@ -350,10 +355,11 @@ mod tests {
             let first = text.trim_start().strip_prefix("docs ~").unwrap_or(text).trim_start();
             match member.word {
                 Some(word) => {
-                    let keyword = format!("k_{word}");
-                    let rest = first.strip_prefix(keyword.as_str());
-                    let whole = rest.is_some_and(|rest| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_'));
-                    assert!(whole, "{rule} begins with `{word}` in the table, and with {first} in the grammar");
+                    // One word, or several in parentheses of which it is one.
+                    let group = first.strip_prefix('(').and_then(|rest| rest.split_once(')'));
+                    let words = group.map_or(first.split(['~', '}']).next().unwrap(), |(words, _)| words);
+                    let listed = words.split('|').any(|it| it.trim() == format!("k_{word}"));
+                    assert!(listed, "{rule} begins with `{word}` in the table, and with {first} in the grammar");
                 }
                 None => assert!(!first.starts_with("k_"), "{rule} begins with a word in the grammar: {first}"),
             }

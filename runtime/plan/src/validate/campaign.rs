@@ -60,10 +60,12 @@ impl CampaignPlan {
 
     fn sound_search(&self, search: &Search) -> Checked {
         match search {
-            Search::Strategy { strategy, evaluations: _ } => at(
-                "strategy",
-                strategy.population().map_or(Ok(()), |population| at("population", at_least_one(population))),
-            ),
+            Search::Strategy { strategy, evaluations: _ } => match strategy.not_permitted() {
+                None => Ok(()),
+                Some((setting, _)) => {
+                    at("strategy", at(setting.keyword(), require(false, || format!("must be {}", setting.bounds()))))
+                }
+            },
             Search::Repeat { test, times: _ } => at("test", self.has_test(*test)),
         }
     }

@@ -23,7 +23,7 @@ impl Random {
 }
 
 impl Sampling for Random {
-    fn test(&mut self, index: u32) -> Test {
-        fresh_test(&self.test_space, &mut Stream::derive(self.seed, "initial", &[u64::from(index)]))
+    fn test(&mut self, index: u32) -> Option<Test> {
+        Some(fresh_test(&self.test_space, &mut Stream::derive(self.seed, "initial", &[u64::from(index)])))
     }
 }

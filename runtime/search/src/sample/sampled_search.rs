@@ -9,23 +9,35 @@ const GENERATION: u32 = 50;
 
 /// Tests that are there before any is run.
 pub(crate) trait Sampling: Send {
-    /// The test of an index, from 0. It depends on the index alone.
-    fn test(&mut self, index: u32) -> Test;
+    /// The test of an index; asked for in order, from 0. It depends on the index alone. `None` after the last one.
+    fn test(&mut self, index: u32) -> Option<Test>;
+
+    /// As [`Strategy::tests`].
+    fn tests(&self) -> Option<u128> {
+        None
+    }
+
+    /// What there is to say of the tests that there are, after so many of them were evaluated.
+    fn ended(&self, _evaluated: u32) -> Option<String> {
+        None
+    }
 }
 
-/// A search that learns nothing: as many tests of a sampling as evaluations, in generations of 50.
+/// A search that learns nothing: as many tests of a sampling as evaluations, if it has so many, in generations of 50.
 #[derive(Debug, Clone)]
 pub(crate) struct SampledSearch<S> {
     sampling: S,
     evaluations: u32,
     asked: u32,
     awaited: usize,
+    /// Whether there are no further tests to ask for.
+    over: bool,
 }
 
 impl<S: Sampling> SampledSearch<S> {
     /// The first so many tests of a sampling.
     pub(crate) fn new(sampling: S, evaluations: u32) -> Self {
-        SampledSearch { sampling, evaluations, asked: 0, awaited: 0 }
+        SampledSearch { sampling, evaluations, asked: 0, awaited: 0, over: false }
     }
 }
 
@@ -34,13 +46,24 @@ impl<S: Sampling> Strategy for SampledSearch<S> {
         assert!(self.awaited == 0, "a generation is told before the next is asked");
         let generation = self.asked / GENERATION;
         let end = self.evaluations.min(self.asked + GENERATION);
-        let tests = (self.asked..end).map(|index| self.sampling.test(index));
+        let tests = (self.asked..end).map_while(|index| self.sampling.test(index));
         let batch: Vec<Candidate> = tests
             .map(|test| Candidate { test, parents: Vec::new(), generation, known: None, simulator_seed: None })
             .collect();
-        self.asked = end;
         self.awaited = batch.len();
+        self.over = batch.is_empty();
+        #[expect(clippy::cast_possible_truncation, reason = "at most as many as a generation has")]
+        let asked = batch.len() as u32;
+        self.asked += asked;
         batch
+    }
+
+    fn tests(&self) -> Option<u128> {
+        self.sampling.tests()
+    }
+
+    fn ended(&self) -> Option<String> {
+        self.over.then(|| self.sampling.ended(self.asked)).flatten()
     }
 
     fn tell(&mut self, results: &[Evaluated]) {

@@ -13,10 +13,6 @@
 
 use crate::space::range::Range;
 
-/// At most so many copies are in one test: as short as they may be, they fill half of what is permitted. So there is
-/// always room to move.
-pub(crate) const MOST_APART: usize = 500;
-
 /// Windows that are uniform over all disjoint ones, of independent [windows](Range::interval) that are uniform each.
 pub(crate) fn spread(permitted: Range, windows: &mut [(f64, f64)]) {
     let copies = windows.len() as f64;

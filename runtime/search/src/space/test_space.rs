@@ -13,11 +13,13 @@
 use std::collections::BTreeSet;
 
 use sesame_plan::condition::{Condition, ConditionSpace, Constraint};
-use sesame_plan::{Activation, ActivationMode, CampaignPlan, Copies, Count, OperationId, Test, TestOperation};
+use sesame_plan::{
+    Activation, ActivationMode, CampaignPlan, Copies, Count, MOST_APART, OperationId, Test, TestOperation,
+};
 use sesame_rng::Stream;
 
 use crate::SearchError;
-use crate::space::apart::{self, MOST_APART};
+use crate::space::apart;
 use crate::space::condition::grown;
 use crate::space::initial::fresh_operation;
 use crate::space::parameter_space::ParameterSpace;
@@ -143,7 +145,7 @@ impl TestSpace {
     pub fn most_copies(&self, kind: &OperationSpace) -> usize {
         match (self.copies, &kind.activation) {
             (Copies::Once, _) | (Copies::Apart, ActivationSpace::Offline) => 1,
-            (Copies::Apart, ActivationSpace::Time(_)) => MOST_APART,
+            (Copies::Apart, ActivationSpace::Time(_)) => MOST_APART as usize,
             (Copies::Apart, ActivationSpace::Condition { .. }) | (Copies::MayOverlap, _) => usize::MAX,
         }
     }

@@ -142,6 +142,7 @@ fn the_seed_decides_and_results_told_again_bring_a_search_back_to_where_it_was()
         (Search::new(Strategy::MapElites { population: 10 }, 210), None),
         (Search::new(Strategy::LatinHypercube, 210), None),
         (Search::new(Strategy::Sobol, 210), None),
+        (Search::new(Strategy::Grid { levels: 5 }, 210), None),
         (nsga2(), Some(Exploration::Novelty { neighbours: 10, over: sesame_plan::Dimension::ALL.to_vec() })),
     ];
     for (search, exploration) in strategies {

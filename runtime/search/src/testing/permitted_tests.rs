@@ -28,6 +28,7 @@ fn by_time(copies: Copies, evaluations: u32) -> Vec<CampaignPlan> {
         plan(Search::new(Strategy::Random, evaluations), None),
         plan(Search::new(Strategy::Sobol, evaluations), None),
         plan(Search::new(Strategy::LatinHypercube, evaluations), None),
+        plan(Search::new(Strategy::Grid { levels: 6 }, evaluations), None),
         plan(nsga2.clone(), None),
         plan(nsga2.clone(), Some(Exploration::Boost { every_generations: 1, children, tries: 5 })),
         plan(nsga2.clone(), Some(Exploration::Construct { share: 0.5, until: None })),

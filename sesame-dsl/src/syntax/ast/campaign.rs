@@ -1,6 +1,6 @@
 //! Campaigns: how tests are found and run.
 
-use sesame_plan::{Copies, StrategyKind};
+use sesame_plan::{Copies, Setting, StrategyKind};
 
 use super::exploration::{Confirm, Coverage, Exploration, Stop};
 use super::words::{Count, Head, Name, Quantity, Range};
@@ -81,7 +81,8 @@ pub(crate) struct Search {
     pub(crate) span: Span,
     /// `None` for a strategy that is not supported yet.
     pub(crate) strategy: Option<StrategyKind>,
-    pub(crate) population: Vec<(Span, Count)>,
+    /// Settings that only some strategies have.
+    pub(crate) own: Vec<(Span, (Setting, Count))>,
     pub(crate) evaluations: Vec<(Span, Count)>,
     pub(crate) seed: Vec<(Span, Count)>,
     pub(crate) neighbours: Vec<(Span, Count)>,

@@ -1,7 +1,7 @@
 //! Campaigns: their clauses, searches, and what conditions are grown from.
 
 use sesame_grammar::Rule;
-use sesame_plan::{Copies, StrategyKind};
+use sesame_plan::{Copies, Setting, StrategyKind};
 
 use super::reader::{Pair, Reader, child, children, expect_child};
 use crate::span::Span;
@@ -93,7 +93,7 @@ impl Reader<'_> {
         let mut search = Search {
             span,
             strategy: None,
-            population: vec![],
+            own: vec![],
             evaluations: vec![],
             seed: vec![],
             neighbours: vec![],
@@ -106,9 +106,13 @@ impl Reader<'_> {
         search.strategy = pair.clone().into_inner().find_map(|word| StrategyKind::from_keyword(word.as_str()));
         let settings = expect_child(pair, Rule::search_settings);
         search.has_errors = self.members(&settings, |reader, setting| {
-            let value = (reader.keyword_span(&setting), reader.count(&expect_child(&setting, Rule::number)));
+            let span = reader.keyword_span(&setting);
+            let value = (span, reader.count(&expect_child(&setting, Rule::number)));
             match setting.as_rule() {
-                Rule::setting_population => search.population.push(value),
+                Rule::strategy_setting => {
+                    let own = setting.into_inner().find_map(|word| Setting::from_keyword(word.as_str()));
+                    search.own.extend(own.map(|own| (span, (own, value.1))));
+                }
                 Rule::setting_evaluations => search.evaluations.push(value),
                 Rule::setting_neighbours => search.neighbours.push(value),
                 _ => search.seed.push(value),
