@@ -5,9 +5,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use rusqlite::{Connection, ErrorCode, Transaction, params};
 
-use sesame_base::condition;
 use sesame_base::observation::{Observation, Outcome};
 use sesame_base::test_number::TestNumber;
+use sesame_notation as notation;
 use sesame_plan::condition::{Condition, Operand};
 use sesame_plan::{Activation, CampaignPlan, Choice, Task};
 use sesame_search as search;
@@ -435,7 +435,7 @@ fn numbers_of(condition: &Condition, take: &mut impl FnMut(f64)) {
 type Switched = (Option<f64>, Option<f64>, Option<String>, Option<String>, Option<f64>, Option<u32>);
 
 fn switched(activation: &Activation, plan: &CampaignPlan) -> Switched {
-    let text = |condition| Some(condition::text::write(condition, &plan.metrics));
+    let text = |condition| Some(notation::condition::write(condition, &plan.metrics));
     match activation {
         Activation::Time { start, end } => (Some(*start), Some(*end), None, None, None, None),
         Activation::Condition { start, end, times } => (None, None, text(start), text(end), None, Some(*times)),
