@@ -91,9 +91,7 @@ fn disturbance(operation: &Operation) -> String {
         OperationKind::BurstLoss => {
             let clauses =
                 operation.parameters.iter().zip(&permitted).map(|(it, range)| format!("{} {range}  ", it.name));
-            let whole = operation.parameters.iter().all(|it| it.name != "loss");
-            let loss = if whole { "loss [100%, 100%]  " } else { "" };
-            format!("{words} {{ {}{loss}}}", clauses.collect::<String>())
+            format!("{words} {{ {}}}", clauses.collect::<String>())
         }
         OperationKind::Latency { distribution, drain } => {
             let distribution = match distribution {
