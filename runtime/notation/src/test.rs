@@ -29,9 +29,11 @@ pub fn test_member<'a>(
     activation: &str,
     seed: Option<u64>,
 ) -> String {
-    let choices: String = choices.into_iter().map(|(parameter, chosen)| format!(" {parameter} {chosen}")).collect();
-    let seed = seed.map(|seed| format!(" seed {seed}")).unwrap_or_default();
-    format!("{name}{choices} {activation}{seed}")
+    let mut words = vec![name.to_owned()];
+    words.extend(choices.into_iter().flat_map(|(parameter, chosen)| [parameter.to_owned(), chosen]));
+    words.push(activation.to_owned());
+    words.extend(seed.map(|seed| format!("seed {seed}")));
+    words.join(" ")
 }
 
 /// When an operation of a test of this plan is active.

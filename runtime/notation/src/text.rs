@@ -17,13 +17,14 @@ pub(crate) fn list(texts: &[String]) -> String {
 
 /// A documentation comment: a line for each line of the text, and none for an empty text.
 pub fn doc_comment(text: &str) -> String {
-    text.lines().map(|line| format!("{}\n", format!("/// {line}").trim_end())).collect()
+    let lines = text.lines().map(|line| format!("{}\n", format!("/// {line}").trim_end()));
+    lines.collect()
 }
 
 /// A declaration with a block: its documentation, its first line, and a line for each member.
 pub(crate) fn block(doc: &str, head: &str, members: impl IntoIterator<Item = String>) -> String {
-    let members: String = members.into_iter().map(|member| format!("  {member}\n")).collect();
-    format!("{}{head} {{\n{members}}}\n", doc_comment(doc))
+    let members = members.into_iter().map(|member| format!("  {member}\n"));
+    format!("{}{head} {{\n{}}}\n", doc_comment(doc), members.collect::<String>())
 }
 
 /// Whether something has the form of a name. That it is not a word of the language is for the language to say.

@@ -52,9 +52,9 @@ fn system(units: &[&str]) -> String {
 /// An operation of each kind, on every unit where the kind has numbers of a unit. The numbers are replaced.
 fn operations(units: &[&str]) -> String {
     let mut text = String::new();
-    for at in 0..units.len() {
-        let one = if units[at] == "%" { "[0%, 1%]".to_owned() } else { format!("[0{0}, 1{0}]", units[at]) };
-        let corners = format!("[(0, 0, 0){0}, (1, 1, 1){0}]", units[at]);
+    for (at, unit) in units.iter().enumerate() {
+        let one = format!("[0{unit}, 1{unit}]");
+        let corners = format!("[(0, 0, 0){unit}, (1, 1, 1){unit}]");
         let _ = writeln!(text, "operation offset{at} on t{at} = random offset {one}");
         let _ = writeln!(text, "operation moved{at} on p{at} = random absolute {corners}");
         let _ = writeln!(text, "operation stuck{at} on t{at} = stuck at {one}");
