@@ -24,7 +24,7 @@ use source::SourceMap;
 use span::FileId;
 
 pub use import::load_imports;
-pub use syntax::{MAX_BYTES, quoted};
+pub use syntax::MAX_BYTES;
 
 /// What an analysis found.
 #[derive(Debug, Clone, PartialEq)]

@@ -14,5 +14,4 @@ mod token;
 pub use limits::MAX_BYTES;
 pub(crate) use limits::parse_bounded;
 pub(crate) use parse::parse;
-pub use text::quoted;
 pub(crate) use token::{is_keyword, token_at};

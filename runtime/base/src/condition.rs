@@ -1,12 +1,11 @@
-//! Conditions over metrics, which switch operations ([SESAME 2023, §3.9.2]): whether they hold, whether they are
-//! constant, and their notation.
+//! Conditions over metrics, which switch operations ([SESAME 2023, §3.9.2]): whether they hold, and whether they are
+//! constant.
 //!
 //! The plan defines them ([`sesame_plan::condition`]); here are the functions over them.
 
 pub mod constant;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
-pub mod text;
 
 use sesame_plan::MetricId;
 use sesame_plan::condition::{Condition, Operand};

@@ -6,7 +6,6 @@
 
 pub mod activation;
 pub mod condition;
-pub mod decimal;
 pub mod observation;
 pub mod test_number;
 pub mod time;

@@ -15,7 +15,7 @@ mod text;
 
 pub use crate::analysis::confirmed::{ConfirmedTest, FindingAgain};
 pub use crate::present::table::TextOptions;
-pub use export::{ExportError, Exported, export, is_name};
+pub use export::{ExportError, Exported, export};
 pub use facts::coverage::CoverageSummary;
 pub use facts::recording::{FedMetric, RecordingReplay, Sameness};
 pub use facts::repetition::{Repetition, ViolationRate};

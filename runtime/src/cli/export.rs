@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use sesame_base::visible::visible_lines;
+use sesame_notation::is_name;
 use sesame_results::report;
 
 use crate::cli::failure::Failure;
@@ -27,7 +28,7 @@ pub(super) struct Options {
 }
 
 fn name(text: &str) -> Result<String, String> {
-    if report::is_name(text) {
+    if is_name(text) {
         Ok(text.to_owned())
     } else {
         Err("a name is made of letters, digits and `_`, and does not begin with a digit".to_owned())

@@ -1,8 +1,11 @@
 //! Campaigns of the original, and the tests that they repeat, in the words of the language.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::mem::discriminant;
+
+use sesame_notation::{self as notation, Clause, Unit, activation_named, quoted};
+use sesame_plan::condition as grown;
+use sesame_plan::{self as plan, Copies, CoverageGoal, Dimension, GridAxis, MetricId, Strategy};
 
 use crate::notes::Kind;
 use crate::original::{
@@ -10,8 +13,8 @@ use crate::original::{
     Operation, OperationKind, Original, Reference, Test,
 };
 use crate::parts::{Effect, matching};
-use crate::writer::{Writer, number, percent, quoted_text};
-use crate::xml::printable;
+use crate::writer::{Writer, called_before, meant};
+use crate::xml::{cleaned, printable};
 
 /// Levels of a condition that the language permits.
 const MOST_LEVELS: u32 = 40;
@@ -103,14 +106,15 @@ fn campaign_text(
         objectives = writer.mapped.metrics.iter().flatten().cloned().collect();
         writer.notes.say(Kind::Changed, format!("campaign `{shown}` measures nothing: it has all objectives now"));
     }
-    let mut lines: Vec<String> = Vec::new();
+    let mut clauses: Vec<Clause> = Vec::new();
     // What else its tests have values or conditions of is measured too, so that results have a place for it.
     let measured = campaign.tests.iter().flat_map(|test| test.values.iter().map(|&(metric, _)| metric));
     let compared = campaign.tests.iter().flat_map(|test| &test.operations).flat_map(compared_by);
     let mut observed = names(writer, &mut campaign.metrics.iter().copied().chain(measured).chain(compared));
     let end = end_of(original, campaign);
     if campaign.limit.is_none() {
-        let text = format!("campaign `{shown}` does not say when its tests end: after {}s now", number(end));
+        let after = Unit::SECONDS.number(end);
+        let text = format!("campaign `{shown}` does not say when its tests end: after {after} now");
         writer.notes.say(Kind::Changed, text);
     }
 
@@ -128,14 +132,14 @@ fn campaign_text(
         } else {
             let repeated = &original.campaigns[place.0].tests[place.1];
             let over = first_end(original, place);
-            let Some(lines) = held_by(writer, repeated, over).or_else(|| undisturbed(writer, repeated, end)) else {
+            let Some(members) = held_by(writer, repeated, over).or_else(|| undisturbed(writer, repeated, end)) else {
                 return leave_out(writer, "nothing of the test that it repeats can be said");
             };
-            let name = known_test(writer, repeated, &lines, tests);
+            let name = known_test(writer, repeated, members, tests);
             known.insert(place, name.clone());
             name
         };
-        lines.push(format!("repeat   {test} {} times", times.max(1)));
+        clauses.push(notation::repeat_clause(&test, times.max(1), None));
     } else {
         let mut held: Vec<usize> = campaign.included.iter().filter_map(|&it| original.operation(it)).collect();
         held.extend(writer.mapped.holders.used_by(original, &campaign.tests));
@@ -157,38 +161,28 @@ fn campaign_text(
             writer.mapped.holders.find(original, operation).map_or(0, |at| writer.mapped.parts[at].len())
         };
         let longest = campaign.tests.iter().map(|test| test.operations.iter().map(parts).sum::<usize>()).max();
-        let most = operations.len().max(longest.unwrap_or(0));
-        lines.push(format!("objectives {}", objectives.join(", ")));
+        let most = u32::try_from(operations.len().max(longest.unwrap_or(0))).unwrap_or(u32::MAX);
+        clauses.push(("objectives", objectives.join(", ")));
         observed.retain(|name| !objectives.contains(name));
         // The original platform lets copies of one operation act together.
-        lines.push(format!("operations {}   1..{most} per test may overlap", operations.join(", ")));
-        activation(writer, campaign, &shown, &mut observed, &mut lines);
-        search(writer, campaign, &shown, &mut lines);
+        clauses.push(notation::operations_clause(&operations, (1, most), Copies::MayOverlap));
+        clauses.push(("activate", format!("by {}", activation(writer, campaign, &shown, &mut observed))));
+        search(writer, campaign, &shown, &mut clauses);
     }
     if !observed.is_empty() {
-        lines.push(format!("observes {}", observed.join(", ")));
+        clauses.push(("observes", observed.join(", ")));
     }
-    lines.push(format!("end      after {}s", number(end)));
+    clauses.push(notation::end_clause(end));
     let name = writer.name("campaign", &campaign.name);
+    let doc = if name == campaign.name { String::new() } else { called_before(&campaign.name) };
     text.push('\n');
-    if name != campaign.name {
-        let _ = writeln!(text, "/// In the original: `{shown}`.");
-    }
-    let _ = writeln!(text, "campaign {name} {{\n  {}\n}}", lines.join("\n  "));
+    text.push_str(&notation::campaign_block(&doc, &name, clauses));
     Some(name)
 }
 
-fn activation(
-    writer: &mut Writer<'_>,
-    campaign: &Campaign,
-    shown: &str,
-    observed: &mut Vec<String>,
-    lines: &mut Vec<String>,
-) {
-    let Some(depth) = by_condition(campaign) else {
-        lines.push("activate by time".to_owned());
-        return;
-    };
+/// By what the tests of a campaign switch operations. Variables of conditions are observed anyway.
+fn activation(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, observed: &mut Vec<String>) -> String {
+    let Some(depth) = by_condition(campaign) else { return "time".to_owned() };
     if campaign.activation.is_none() {
         let text = format!("campaign `{shown}` does not say how operations are switched; its tests do it by condition");
         writer.notes.say(Kind::Changed, text);
@@ -201,15 +195,14 @@ fn activation(
     }
     if over.is_empty() {
         writer.notes.say(Kind::Changed, format!("campaign `{shown}` has no condition metrics: it activates by time"));
-        lines.push("activate by time".to_owned());
-        return;
+        return "time".to_owned();
     }
     observed.retain(|name| !over.contains(&name.as_str()));
     let settings = if depth == 0 { String::new() } else { format!(" {{ depth {} }}", depth.min(10)) };
-    lines.push(format!("activate by condition over {}{settings}", over.join(", ")));
+    format!("condition over {}{settings}", over.join(", "))
 }
 
-fn search(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, lines: &mut Vec<String>) {
+fn search(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, clauses: &mut Vec<Clause>) {
     let performed = u32::try_from(campaign.tests.len()).unwrap_or(u32::MAX);
     match &campaign.approach {
         Approach::Nsga { population, evaluations, coverage } => {
@@ -221,9 +214,9 @@ fn search(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, lines: &mut
                 );
                 writer.notes.say(Kind::Changed, text);
             }
-            lines.push(format!("search   nsga2 {{ population {settled}  evaluations {total} }}"));
+            clauses.push(notation::search_clause(Strategy::Nsga2 { population: settled }, total, None, None));
             if let Some(coverage) = coverage {
-                lines.extend(cells(writer, coverage, shown));
+                clauses.extend(cells(writer, coverage, shown).as_ref().map(notation::coverage_clause));
             }
         }
         approach => {
@@ -231,43 +224,42 @@ fn search(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, lines: &mut
             if *approach == Approach::Unsaid {
                 writer.notes.say(Kind::Changed, format!("campaign `{shown}` does not say how it searches: at random"));
             }
-            lines.push(format!("search   random {{ evaluations {total} }}"));
+            clauses.push(notation::search_clause(Strategy::Random, total, None, None));
         }
     }
 }
 
-fn cells(writer: &mut Writer<'_>, coverage: &Coverage, shown: &str) -> Option<String> {
-    let mut axes = String::new();
-    let mut taken: Vec<&str> = Vec::new();
+fn cells(writer: &mut Writer<'_>, coverage: &Coverage, shown: &str) -> Option<CoverageGoal> {
+    let mut axes: Vec<GridAxis> = Vec::new();
     for (dimension, low, high, count) in &coverage.dimensions {
-        let (name, low, high) = match dimension.as_str() {
-            "T1_TIME_MIDPOINT_MEAN" => ("T1", *low, *high),
-            "T2_TIME_LENGTH_MEAN" => ("T2", *low, *high),
-            "T3_TIME_MIDPOINT_VAR" => ("T3", *low, *high),
-            "P1_PARAMETER_MEAN" => ("P1", *low, *high),
+        let (dimension, low, high) = match dimension.as_str() {
+            "T1_TIME_MIDPOINT_MEAN" => (Dimension::T1, *low, *high),
+            "T2_TIME_LENGTH_MEAN" => (Dimension::T2, *low, *high),
+            "T3_TIME_MIDPOINT_VAR" => (Dimension::T3, *low, *high),
+            "P1_PARAMETER_MEAN" => (Dimension::P1, *low, *high),
             "P2_PARAMETER_VARIANCE" => {
                 let text =
                     format!("campaign `{shown}`: P2 is a standard deviation, no variance; its cells are converted");
                 writer.notes.say(Kind::Changed, text);
-                ("P2", low.max(0.0).sqrt(), high.max(0.0).sqrt())
+                (Dimension::P2, low.max(0.0).sqrt(), high.max(0.0).sqrt())
             }
-            "O0_TOTAL_COUNT" => ("O0", *low, *high),
-            "O1_FUZZRANGE_COUNT" => ("O1", *low, *high),
+            "O0_TOTAL_COUNT" => (Dimension::O0, *low, *high),
+            "O1_FUZZRANGE_COUNT" => (Dimension::O1, *low, *high),
             // The original has these two the other way round.
-            "O2_DELAY_COUNT" => ("O3", *low, *high),
-            "O3_DELETION_COUNT" => ("O2", *low, *high),
+            "O2_DELAY_COUNT" => (Dimension::O3, *low, *high),
+            "O3_DELETION_COUNT" => (Dimension::O2, *low, *high),
             other => {
                 let other = printable(other);
                 writer.notes.say(Kind::LeftOut, format!("campaign `{shown}`: there is no dimension `{other}`"));
                 continue;
             }
         };
-        if low >= high || *count == 0 || taken.contains(&name) {
+        if low >= high || *count == 0 || axes.iter().any(|axis| axis.dimension == dimension) {
+            let name = dimension.name();
             writer.notes.say(Kind::LeftOut, format!("campaign `{shown}`: the cells of {name} are no cells"));
             continue;
         }
-        taken.push(name);
-        let _ = write!(axes, "{name} [{}, {}] cells {count}   ", number(low), number(high));
+        axes.push(GridAxis { dimension, low, high, cells: *count });
     }
     if axes.is_empty() {
         let text = format!(
@@ -276,12 +268,8 @@ fn cells(writer: &mut Writer<'_>, coverage: &Coverage, shown: &str) -> Option<St
         writer.notes.say(Kind::LeftOut, text);
         return None;
     }
-    let stop = if coverage.target > 0.0 && coverage.target <= 1.0 {
-        format!("   stop at {}", percent(coverage.target))
-    } else {
-        String::new()
-    };
-    Some(format!("coverage {{ {axes}hits {}{stop} }}", coverage.hits.max(1)))
+    let stop_at = (coverage.target > 0.0 && coverage.target <= 1.0).then(|| meant(coverage.target));
+    Some(CoverageGoal { axes, hits: coverage.hits.max(1), stop_at })
 }
 
 /// The metrics that the conditions of an operation compare.
@@ -311,19 +299,17 @@ pub(crate) fn compared_by(operation: &Operation) -> Vec<Reference> {
     metrics
 }
 
-/// A test that is repeated, as a known test of these lines; its name.
-fn known_test(writer: &mut Writer<'_>, test: &Test, lines: &str, text: &mut String) -> String {
+/// A test that is repeated, as a regression test with these members; its name.
+fn known_test(writer: &mut Writer<'_>, test: &Test, members: Vec<String>, text: &mut String) -> String {
     let name = writer.name("test", &test.name);
+    let doc = if name == *test.name { String::new() } else { called_before(&test.name) };
     text.push('\n');
-    if name != *test.name {
-        let _ = writeln!(text, "/// In the original: `{}`.", printable(&test.name));
-    }
-    let _ = writeln!(text, "test {name} {{\n{lines}}}");
+    text.push_str(&notation::test_block(&doc, &name, members));
     name
 }
 
-/// A line for a known test that disturbs nothing: an operation that adds 0, or loses nothing.
-fn undisturbed(writer: &mut Writer<'_>, test: &Test, end: f64) -> Option<String> {
+/// The member of a regression test that disturbs nothing: an operation that adds 0, or loses nothing.
+fn undisturbed(writer: &mut Writer<'_>, test: &Test, end: f64) -> Option<Vec<String>> {
     if !test.operations.is_empty() {
         return None;
     }
@@ -334,45 +320,43 @@ fn undisturbed(writer: &mut Writer<'_>, test: &Test, end: f64) -> Option<String>
         (&Effect::Value { set, relative: true }, OperationKind::RandomValue { values, .. }) => match values[set].domain
         {
             Domain::Reals(low, high) if low.min(high) <= 0.0 && low.max(high) >= 0.0 => {
-                Some((holder, format!("{} offset [0, 0]", part.name)))
+                Some((holder, &part.name, "offset", Unit::None.range(0.0, 0.0)))
             }
             _ => None,
         },
         (Effect::Loss, OperationKind::PacketLoss { keep }) if keep.0.max(keep.1) >= 1.0 => {
-            Some((holder, format!("{} loss 0%", part.name)))
+            Some((holder, &part.name, "loss", Unit::Share.number(0.0)))
         }
         _ => None,
     });
-    let (holder, harmless) = harmless.next()?;
-    let (from, to) = match holder.activation {
+    let (holder, name, parameter, nothing) = harmless.next()?;
+    let (start, end) = match holder.activation {
         Activation::Time(from, to) if from.max(0.0) < to.min(end) => (from.max(0.0), to.min(end)),
         _ => (0.0, end),
     };
-    let shown = printable(&test.name);
+    let (shown, harmless) = (printable(&test.name), format!("{name} {parameter} {nothing}"));
+    let window = when(writer, &plan::Activation::Time { start, end });
+    let member = notation::test_member(name, [(parameter, nothing)], &window, None);
     writer.notes.say(Kind::Changed, format!("known test `{shown}` disturbs nothing: it holds `{harmless}`"));
-    Some(format!("  {harmless} from {}s to {}s\n", number(from), number(to)))
+    Some(vec![member])
 }
 
-/// The operations of a known test, a line for each; `None` if there is none that can be said. The test is over after so
-/// many seconds.
-fn held_by(writer: &mut Writer<'_>, test: &Test, over: f64) -> Option<String> {
+/// The operations of a regression test, as members of its block; `None` if none of them can be translated. The test is
+/// over after so many seconds.
+fn held_by(writer: &mut Writer<'_>, test: &Test, over: f64) -> Option<Vec<String>> {
     let shown = printable(&test.name);
-    let mut lines = String::new();
+    let mut members = Vec::new();
     for operation in &test.operations {
         let Some(at) = writer.mapped.holders.find(writer.original, operation) else { continue };
         let template = writer.mapped.holders.operations[at].clone();
         for part in writer.mapped.parts[at].clone() {
             let offline = matches!(part.effect, Effect::Custom { offline: true, .. });
             let window =
-                if offline { Ok("before start".to_owned()) } else { window(writer, operation, &template, over) };
+                if offline { Ok(plan::Activation::Offline) } else { window(writer, operation, &template, over) };
             match window.and_then(|window| Ok((window, choices(operation, &template, &part.effect)?))) {
                 Ok((window, choices)) => {
-                    let seed = if operation.seed == 0 || offline {
-                        String::new()
-                    } else {
-                        format!("   seed {}", operation.seed.cast_unsigned())
-                    };
-                    let _ = writeln!(lines, "  {}{choices} {window}{seed}", part.name);
+                    let seed = (operation.seed != 0 && !offline).then(|| operation.seed.cast_unsigned());
+                    members.push(notation::test_member(&part.name, choices, &when(writer, &window), seed));
                 }
                 Err(why) => {
                     writer.notes.say(Kind::LeftOut, format!("known test `{shown}`, operation `{}`: {why}", part.name));
@@ -380,7 +364,23 @@ fn held_by(writer: &mut Writer<'_>, test: &Test, over: f64) -> Option<String> {
             }
         }
     }
-    (!lines.is_empty()).then_some(lines)
+    (!members.is_empty()).then_some(members)
+}
+
+/// When an operation of a regression test is active, as text. The metrics of a condition are those of the original, by
+/// position.
+fn when(writer: &Writer<'_>, activation: &plan::Activation) -> String {
+    let before_start = plan::OperationKind::Custom { moment: plan::Moment::BeforeStart };
+    activation_named(activation, &before_start, &|metric| {
+        let at = metric.index();
+        let name = writer.mapped.metrics[at].as_deref();
+        let name = name.expect("a condition compares metrics that were translated");
+        (name, if is_timed(writer, at) { Unit::SECONDS } else { Unit::None })
+    })
+}
+
+fn is_timed(writer: &Writer<'_>, metric: usize) -> bool {
+    writer.original.metrics[metric].source == MetricSource::FuzzingTime
 }
 
 /// A delay as far as a template permits it, in seconds.
@@ -392,9 +392,13 @@ fn permitted_delay(template: &Operation, delay: f64) -> f64 {
     delay.max(0.0)
 }
 
-/// What a test chooses, in words, each after a blank. What its template does not permit is the nearest that it does, so
-/// that the space is right.
-fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Result<String, String> {
+/// What a test chooses, by parameter. What its template does not permit is the nearest that it does, so that the space
+/// is right.
+fn choices<'e>(
+    operation: &Operation,
+    template: &Operation,
+    effect: &'e Effect,
+) -> Result<Vec<(&'e str, String)>, String> {
     let sets = |operation: &Operation| match &operation.kind {
         OperationKind::RandomValue { values: sets, .. } | OperationKind::Custom { parameters: sets } => sets.clone(),
         _ => Vec::new(),
@@ -424,38 +428,38 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
             };
             let (low, high) = within(low, high, set);
             let word = if relative { "offset" } else { "value" };
-            format!(" {word} [{}, {}]", number(low), number(high))
+            vec![(word, Unit::None.range(low, high))]
         }
         (Effect::Loss, OperationKind::PacketLoss { keep }) => {
             let chosen = match template.kind {
                 OperationKind::PacketLoss { keep: of } => keep.0.min(keep.1).clamp(of.0.min(of.1), of.0.max(of.1)),
                 _ => keep.0.min(keep.1),
             };
-            format!(" loss {}", percent(1.0 - chosen.clamp(0.0, 1.0)))
+            vec![("loss", Unit::Share.number(meant(1.0 - chosen.clamp(0.0, 1.0))))]
         }
         (Effect::Delay { randomised: false }, OperationKind::Latency { delay, .. }) => {
-            format!(" delay {}s", number(permitted_delay(template, delay.0.min(delay.1))))
+            vec![("delay", Unit::SECONDS.number(permitted_delay(template, delay.0.min(delay.1))))]
         }
         (Effect::Delay { randomised: true }, OperationKind::Latency { delay, .. }) => {
             let (low, high) = (delay.0.min(delay.1), delay.0.max(delay.1));
             let (low, high) = (permitted_delay(template, low), permitted_delay(template, high));
-            format!(" delay [{}s, {}s]", number(low), number(high))
+            vec![("delay", Unit::SECONDS.range(low, high))]
         }
         (Effect::Custom { parameters, .. }, _) => {
-            let mut text = String::new();
+            let mut all = Vec::new();
             for (name, at) in parameters {
                 let chosen = domain(*at)?;
                 if permitted.get(*at).is_some_and(|set| discriminant(&set.domain) != discriminant(chosen)) {
                     return Err(format!("what it chooses for `{name}` is of another kind than its template permits"));
                 }
                 let chosen = match chosen {
-                    Domain::Reals(low, high) => number(within(low.min(*high), *high, *at).0),
+                    Domain::Reals(low, high) => Unit::None.number(within(low.min(*high), *high, *at).0),
                     Domain::Integers(low, high) => {
                         let low = *low.min(high);
-                        match permitted.get(*at).map(|set| &set.domain) {
-                            Some(&Domain::Integers(from, to)) => low.clamp(from.min(to), from.max(to)).to_string(),
-                            _ => low.to_string(),
-                        }
+                        Unit::None.number(match permitted.get(*at).map(|set| &set.domain) {
+                            Some(&Domain::Integers(from, to)) => low.clamp(from.min(to), from.max(to)) as f64,
+                            _ => low as f64,
+                        })
                     }
                     Domain::Points(low, _) => {
                         let mut point = *low;
@@ -464,7 +468,7 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
                                 point[axis] = point[axis].clamp(from[axis].min(to[axis]), from[axis].max(to[axis]));
                             }
                         }
-                        format!("({}, {}, {})", number(point[0]), number(point[1]), number(point[2]))
+                        Unit::None.point(point)
                     }
                     Domain::Texts(texts) => {
                         let offered = |text: &str| match permitted.get(*at).map(|set| &set.domain) {
@@ -472,24 +476,30 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
                             _ => true,
                         };
                         match texts.first().filter(|text| offered(text)) {
-                            Some(text) => quoted_text(text),
+                            Some(text) => quoted(&cleaned(text)),
                             None => return Err("it chooses no text that its template offers".to_owned()),
                         }
                     }
                     Domain::Other(_) => return Err("it chooses something that nothing is like".to_owned()),
                 };
-                let _ = write!(text, " {name} {chosen}");
+                all.push((name.as_str(), chosen));
             }
-            text
+            all
         }
-        (Effect::Blackhole, _) => String::new(),
+        (Effect::Blackhole, _) => Vec::new(),
         (Effect::Loss | Effect::Delay { .. }, _) => return Err("it does something else than its template".to_owned()),
     })
 }
 
-/// When an operation of a known test is active, in words.
-fn window(writer: &Writer<'_>, operation: &Operation, template: &Operation, over: f64) -> Result<String, String> {
-    let forever = "1000000s";
+/// When an operation of a regression test is active. The metrics of a condition are those of the original, by position.
+fn window(
+    writer: &Writer<'_>,
+    operation: &Operation,
+    template: &Operation,
+    over: f64,
+) -> Result<plan::Activation, String> {
+    let forever = 1e6;
+    let times = 1;
     let never = || Err("it is never active".to_owned());
     match &operation.activation {
         Activation::Time(start, end) => {
@@ -500,24 +510,26 @@ fn window(writer: &Writer<'_>, operation: &Operation, template: &Operation, over
                 (start, end) = (start.max(from), end.min(to));
             }
             if start >= over {
-                return Err(format!("its window begins when the test is over, after {}s", number(over)));
+                return Err(format!("its window begins when the test is over, after {}", Unit::SECONDS.number(over)));
             }
-            if start < end { Ok(format!("from {}s to {}s", number(start), number(end))) } else { never() }
+            if start < end { Ok(plan::Activation::Time { start, end }) } else { never() }
         }
         Activation::Condition(start, end) => {
             let start = match start.as_ref().map(|it| settled(writer, it)).transpose()? {
-                Some(Truth::Sometimes(words)) => words,
+                Some(Truth::Sometimes(start)) => start,
                 Some(Truth::Always) => return Err("it begins at once, which is no condition".to_owned()),
                 Some(Truth::Never) | None => return never(),
             };
             match end.as_ref().map(|it| settled(writer, it)).transpose()? {
-                Some(Truth::Sometimes(end)) => Ok(format!("when {start} until {end}")),
+                Some(Truth::Sometimes(end)) => Ok(plan::Activation::Condition { start, end, times }),
                 Some(Truth::Always) => Err("it ends at once, which is no condition".to_owned()),
-                Some(Truth::Never) | None => Ok(format!("when {start} for {forever}")),
+                Some(Truth::Never) | None => Ok(plan::Activation::ConditionFor { start, length: forever, times }),
             }
         }
         Activation::ConditionFor(start, length) => match start.as_ref().map(|it| settled(writer, it)).transpose()? {
-            Some(Truth::Sometimes(words)) if *length > 0.0 => Ok(format!("when {words} for {}s", number(*length))),
+            Some(Truth::Sometimes(start)) if *length > 0.0 => {
+                Ok(plan::Activation::ConditionFor { start, length: *length, times })
+            }
             Some(Truth::Always) => Err("it begins at once, which is no condition".to_owned()),
             _ => never(),
         },
@@ -529,7 +541,7 @@ fn window(writer: &Writer<'_>, operation: &Operation, template: &Operation, over
 enum Truth {
     Always,
     Never,
-    Sometimes(String),
+    Sometimes(grown::Condition),
 }
 
 fn settled(writer: &Writer<'_>, condition: &Condition) -> Result<Truth, String> {
@@ -547,43 +559,48 @@ fn settled_at(writer: &Writer<'_>, condition: &Condition, level: u32) -> Result<
         Condition::And(a, b) => match both(a, b)? {
             (Truth::Never, _) | (_, Truth::Never) => Truth::Never,
             (Truth::Always, other) | (other, Truth::Always) => other,
-            (Truth::Sometimes(a), Truth::Sometimes(b)) => Truth::Sometimes(format!("({a}) and ({b})")),
+            (Truth::Sometimes(a), Truth::Sometimes(b)) => {
+                Truth::Sometimes(grown::Condition::And(Box::new(a), Box::new(b)))
+            }
         },
         Condition::Or(a, b) => match both(a, b)? {
             (Truth::Always, _) | (_, Truth::Always) => Truth::Always,
             (Truth::Never, other) | (other, Truth::Never) => other,
-            (Truth::Sometimes(a), Truth::Sometimes(b)) => Truth::Sometimes(format!("({a}) or ({b})")),
+            (Truth::Sometimes(a), Truth::Sometimes(b)) => {
+                Truth::Sometimes(grown::Condition::Or(Box::new(a), Box::new(b)))
+            }
         },
         Condition::Compare(left, by, right) => {
             let named = |metric: Reference| {
-                let source = writer.original.metric(metric).map(|at| &writer.original.metrics[at].source);
-                writer.metric(metric).zip(source).ok_or_else(|| "its condition compares what is no metric".to_owned())
+                let at = writer.original.metric(metric).filter(|&at| writer.mapped.metrics[at].is_some());
+                at.ok_or_else(|| "its condition compares what is no metric".to_owned())
             };
-            let (variable, source) = named(*left)?;
-            let sign = match by {
-                Comparison::Less => "<",
-                Comparison::Greater => ">",
-                Comparison::Equal => "==",
+            let variable = named(*left)?;
+            let timed = is_timed(writer, variable);
+            let comparison = |right: grown::Operand| {
+                Truth::Sometimes(grown::Condition::Compare { left: operand(variable), by: (*by).into(), right })
             };
-            let timed = *source == MetricSource::FuzzingTime;
             match *right {
                 Operand::Integer(value) if timed && value < 0 => match by {
                     Comparison::Greater => Truth::Always,
                     Comparison::Less | Comparison::Equal => Truth::Never,
                 },
                 Operand::Integer(0) if timed && *by == Comparison::Less => Truth::Never,
-                Operand::Integer(value) => {
-                    Truth::Sometimes(format!("{variable} {sign} {value}{}", if timed { "s" } else { "" }))
-                }
+                Operand::Integer(value) => comparison(grown::Operand::Number(value as f64)),
                 Operand::Metric(other) => match named(other)? {
-                    (other, _) if other == variable && *by == Comparison::Equal => Truth::Always,
-                    (other, _) if other == variable => Truth::Never,
-                    (_, source) if (*source == MetricSource::FuzzingTime) != timed => {
+                    other if other == variable && *by == Comparison::Equal => Truth::Always,
+                    other if other == variable => Truth::Never,
+                    other if is_timed(writer, other) != timed => {
                         return Err("its condition compares seconds with a plain number".to_owned());
                     }
-                    (other, _) => Truth::Sometimes(format!("{variable} {sign} {other}")),
+                    other => comparison(operand(other)),
                 },
             }
         }
     })
+}
+
+/// A metric of the original, by position, as a variable of a condition.
+fn operand(metric: usize) -> grown::Operand {
+    grown::Operand::Variable(MetricId(u32::try_from(metric).expect("a file has fewer than 2^32 metrics")))
 }

@@ -279,6 +279,16 @@ pub enum Comparison {
     Equal,
 }
 
+impl From<Comparison> for sesame_plan::condition::Comparison {
+    fn from(by: Comparison) -> Self {
+        match by {
+            Comparison::Less => Self::Below,
+            Comparison::Greater => Self::Above,
+            Comparison::Equal => Self::Equal,
+        }
+    }
+}
+
 /// The right side of a comparison.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Operand {

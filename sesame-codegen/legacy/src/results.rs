@@ -8,9 +8,7 @@ use sesame_plan::{CampaignPlan, Choice, MetricId, OperationId, Span, TestOperati
 use sesame_results::record::{Origin, RecordError, Recorder, ResultSet, Status, TestRecord};
 
 use crate::notes::{Kind, Notes};
-use crate::original::{
-    Activation, Campaign, Comparison, Condition, Domain, Operand, Operation, OperationKind, Original, Test,
-};
+use crate::original::{Activation, Campaign, Condition, Domain, Operand, Operation, OperationKind, Original, Test};
 use crate::parts::{Effect, Part, matching};
 use crate::writer::Mapped;
 use crate::xml::{cleaned, printable};
@@ -198,11 +196,7 @@ impl Importer<'_> {
         Ok(match condition {
             Condition::Compare(left, by, right) => plan_condition::Condition::Compare {
                 left: plan_condition::Operand::Variable(metric(*left)?),
-                by: match by {
-                    Comparison::Less => plan_condition::Comparison::Below,
-                    Comparison::Greater => plan_condition::Comparison::Above,
-                    Comparison::Equal => plan_condition::Comparison::Equal,
-                },
+                by: (*by).into(),
                 right: match *right {
                     Operand::Metric(right) => plan_condition::Operand::Variable(metric(right)?),
                     Operand::Integer(value) => plan_condition::Operand::Number(value as f64),

@@ -3,6 +3,10 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use sesame_notation::{self as notation, Clauses, Unit, doc_comment, quoted};
+use sesame_plan::condition::Integers;
+use sesame_plan::{self as plan, Shape, Span};
+
 use crate::campaigns;
 use crate::dialect::Dialect;
 use crate::naming::Names;
@@ -13,8 +17,8 @@ use crate::original::{
 };
 use crate::parts::{Effect, Holders, Part, called, ordered};
 use crate::types::{Messages, Type};
-use crate::writer::{Mapped, Writer, number, percent, quoted_text};
-use crate::xml::printable;
+use crate::writer::{Mapped, Writer, called_before, meant};
+use crate::xml::{cleaned, printable};
 
 /// Maps a whole space. The error says what it lacks.
 pub(crate) fn map(original: &Original, file: &str, notes: &mut Notes) -> Result<Mapped, String> {
@@ -113,14 +117,16 @@ impl Writer<'_> {
         if !simulator.kind.is_empty() {
             let (kind, address) = (printable(&simulator.kind), printable(&simulator.address));
             let at = if address.is_empty() { String::new() } else { format!(" at {address}") };
-            let _ = writeln!(text, "  /// In the original: {kind}{at}. Name your simulator here.");
+            let doc = format!("In the original: {kind}{at}. Name your simulator here.");
+            let _ = write!(text, "  {}", doc_comment(&doc));
             self.notes.say(Kind::Changed, format!("simulator {kind}{at}: its line is a placeholder to be replaced"));
         }
         let step = simulator.step_ms.filter(|step| (0.001..=3_600_000.0).contains(step));
         // Times are whole nanoseconds.
         let step = (step.unwrap_or(20.0) * 1e6).round() / 1e6;
         let sut = self.names.take("system_under_test", "system_under_test");
-        let _ = writeln!(text, "  simulator {sut} = process \"simulator\" {{ step {}ms }}\n", number(step));
+        let step = Unit::Symbol("ms").number(step);
+        let _ = writeln!(text, "  simulator {sut} = process \"simulator\" {{ step {step} }}\n");
         for empty in self.messages.empty() {
             self.notes.say(Kind::Changed, format!("message `{empty}`: the file does not say what it holds"));
         }
@@ -132,8 +138,8 @@ impl Writer<'_> {
             .iter()
             .fold((0, 0), |(name, path), (topic, at, _)| (name.max(topic.len()), path.max(at.chars().count() + 2)));
         for (topic, path, ty) in topics {
-            let quoted = format!("\"{path}\"");
-            let _ = writeln!(text, "  topic {topic:longest$} = {quoted:widest$} : {}", self.messages.words(ty));
+            let path = quoted(path);
+            let _ = writeln!(text, "  topic {topic:longest$} = {path:widest$} : {}", self.messages.words(ty));
         }
         let mut first = true;
         for node in &self.original.system.nodes {
@@ -172,10 +178,9 @@ impl Writer<'_> {
             }
             let name = self.name("metric", &metric.name);
             let direction = if metric.highest { "maximise" } else { "minimise" };
-            if name == metric.name {
-                text.push('\n');
-            } else {
-                let _ = writeln!(text, "\n/// In the original: `{shown}`.");
+            text.push('\n');
+            if name != metric.name {
+                text.push_str(&doc_comment(&called_before(&metric.name)));
             }
             if metric.source == MetricSource::FuzzingTime {
                 let _ = writeln!(text, "metric {name} {direction} = fuzzing_time()");
@@ -196,8 +201,8 @@ impl Writer<'_> {
                 if metric.related.is_empty() {
                     let _ = writeln!(text, "// It heard everything: keep the topics that it needs.");
                 }
-                let default = metric.default.map_or(String::new(), |it| format!(" default {}", number(it)));
-                let initial = metric.initial.map_or(String::new(), |it| format!(" initial {}", number(it)));
+                let default = metric.default.map_or(String::new(), |it| format!(" default {}", Unit::None.number(it)));
+                let initial = metric.initial.map_or(String::new(), |it| format!(" initial {}", Unit::None.number(it)));
                 let _ =
                     writeln!(text, "metric {name} {direction}{default}{initial} {{ hook on {} }}", topics.join(", "));
                 self.notes
@@ -274,7 +279,7 @@ impl Writer<'_> {
                     };
                     let name = self.declared_name(&wanted, operation, text);
                     let place = std::iter::once(&topic).chain(&path).map(String::as_str).collect::<Vec<_>>().join(".");
-                    let range = format!("[{}, {}]", number(low), number(high));
+                    let range = Unit::None.range(low, high);
                     let _ = writeln!(text, "operation {name} on {place} = random {mode} {range}{clauses}");
                     parts.push(Part { name, effect: Effect::Value { set, relative: *relative } });
                 }
@@ -287,7 +292,7 @@ impl Writer<'_> {
             OperationKind::PacketLoss { keep } => {
                 let (low, high) = ordered(keep.0, keep.1, &called, self.notes);
                 let (low, high) = (low.clamp(0.0, 1.0), high.clamp(0.0, 1.0));
-                let loss = format!("[{}, {}]", percent(1.0 - high), percent(1.0 - low));
+                let loss = Unit::Share.range(meant(1.0 - high), meant(1.0 - low));
                 self.notes.say(
                     Kind::Flipped,
                     format!("{called}: it kept messages with [{low}, {high}], which is `packet loss {loss}`"),
@@ -300,7 +305,7 @@ impl Writer<'_> {
                 let (low, high) = ordered(delay.0.max(0.0), delay.1.max(0.0), &called, self.notes);
                 let uniform = if *randomised { " uniform" } else { "" };
                 let name = self.declared_name(&wanted, operation, text);
-                let range = format!("[{}s, {}s]", number(low), number(high));
+                let range = Unit::SECONDS.range(low, high);
                 let _ = writeln!(text, "operation {name} on {topic} = latency {range}{uniform}{clauses}");
                 parts.push(Part { name, effect: Effect::Delay { randomised: *randomised } });
             }
@@ -339,32 +344,29 @@ impl Writer<'_> {
             let domain = match &set.domain {
                 Domain::Reals(low, high) => {
                     let (low, high) = ordered(*low, *high, &of, self.notes);
-                    format!("real [{}, {}]", number(low), number(high))
+                    plan::Domain::Number { low, high, shape: Shape::Value, integer: false }
                 }
                 Domain::Integers(low, high) => {
                     let (low, high) = ordered(*low, *high, &of, self.notes);
-                    format!("int [{low}, {high}]")
+                    plan::Domain::Number { low: low as f64, high: high as f64, shape: Shape::Value, integer: true }
                 }
                 Domain::Points(one, other) => {
                     let axis = |axis: usize, notes: &mut Notes| ordered(one[axis], other[axis], &of, notes);
                     let axes = [axis(0, self.notes), axis(1, self.notes), axis(2, self.notes)];
-                    let corner = |pick: fn(&(f64, f64)) -> f64| {
-                        axes.iter().map(|it| number(pick(it))).collect::<Vec<_>>().join(", ")
-                    };
-                    format!("point [({}), ({})]", corner(|it| it.0), corner(|it| it.1))
+                    plan::Domain::Point { low: axes.map(|(low, _)| low), high: axes.map(|(_, high)| high) }
                 }
                 Domain::Texts(texts) => {
-                    let mut quoted: Vec<String> = Vec::new();
-                    for text in texts.iter().map(|text| quoted_text(text)) {
-                        if text != "\"\"" && !quoted.contains(&text) {
-                            quoted.push(text);
+                    let mut offered: Vec<String> = Vec::new();
+                    for text in texts.iter().map(|text| cleaned(text)) {
+                        if !text.is_empty() && !offered.contains(&text) {
+                            offered.push(text);
                         }
                     }
-                    if quoted.is_empty() {
+                    if offered.is_empty() {
                         self.notes.say(Kind::LeftOut, format!("{of}: there is nothing to choose from"));
                         continue;
                     }
-                    format!("one of {}", quoted.join(", "))
+                    plan::Domain::Texts { texts: offered }
                 }
                 Domain::Other(kind) => {
                     self.notes.say(Kind::LeftOut, format!("{of}: nothing is like a `{}`", printable(kind)));
@@ -372,7 +374,7 @@ impl Writer<'_> {
                 }
             };
             let name = inner.take(&set.name, "parameter");
-            let _ = writeln!(lines, "  {name}: {domain}");
+            let _ = writeln!(lines, "  {name}: {}", notation::custom_domain(&domain, Unit::None));
             parameters.push((name, at));
         }
         let name = self.declared_name(wanted, operation, text);
@@ -392,13 +394,13 @@ impl Writer<'_> {
     fn declared_name(&mut self, wanted: &str, operation: &Operation, text: &mut String) -> String {
         let name = self.name("operation", wanted);
         if !operation.name.is_empty() && name != *operation.name {
-            let _ = writeln!(text, "/// In the original: `{}`.", printable(&operation.name));
+            text.push_str(&doc_comment(&called_before(&operation.name)));
         }
         name
     }
 
     fn clauses(&mut self, at: usize, operation: &Operation, called: &str) -> String {
-        let mut clauses = String::new();
+        let mut clauses = Clauses::default();
         if let Activation::Time(start, end) = operation.activation {
             let (start, end) = ordered(start, end, &format!("the window of {called}"), self.notes);
             let start = start.max(0.0);
@@ -411,21 +413,20 @@ impl Writer<'_> {
                     format!("{called}: its window begins when tests are over, so it may be active at any time"),
                 );
             } else {
-                let _ = write!(clauses, "   within [{}s, {}s]", number(start), number(end));
+                clauses.within = Some(Span { start, end });
             }
         }
         if operation.priority != 0 {
-            let _ = write!(clauses, "   priority {}", operation.priority);
+            clauses.priority = Some(operation.priority);
         }
         if (0.0..1.0).contains(&operation.inclusion) {
-            let _ = write!(clauses, "   inclusion {}", percent(operation.inclusion));
+            clauses.inclusion = Some(meant(operation.inclusion));
         }
-        let mut constraints: Vec<String> = Vec::new();
         let mut left_out = 0;
         for constraint in &operation.constraints {
             match self.constraint(at, constraint) {
-                Some(text) if constraints.contains(&text) => {}
-                Some(text) => constraints.push(text),
+                Some(text) if clauses.start_contains.contains(&text) => {}
+                Some(text) => clauses.start_contains.push(text),
                 None => left_out += 1,
             }
         }
@@ -437,10 +438,7 @@ impl Writer<'_> {
                 ),
             );
         }
-        if !constraints.is_empty() {
-            let _ = write!(clauses, "   start contains {}", constraints.join(", "));
-        }
-        clauses
+        clauses.write()
     }
 
     /// A constraint that every campaign by condition with this operation can meet.
@@ -460,8 +458,8 @@ impl Writer<'_> {
             }
             Constraint::Integer(low, high) => {
                 // Conditions compare with whole numbers from 1 to 20.
-                let (low, high) = (low.min(high).max(1), high.max(low).min(20));
-                (low <= high).then(|| format!("integer [{low}, {high}]"))
+                let bounds = Integers { lowest: low.min(high).max(1), highest: high.max(low).min(20) };
+                (bounds.lowest <= bounds.highest).then(|| notation::integer_constraint(bounds))
             }
         }
     }

@@ -5,7 +5,7 @@ use crate::notes::{Kind, Notes};
 use crate::original::{Original, Reference};
 use crate::parts::{Holders, Part};
 use crate::types::{Messages, Type};
-use crate::xml::{cleaned, printable};
+use crate::xml::printable;
 
 /// What of the original became what.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -57,18 +57,12 @@ impl Writer<'_> {
     }
 }
 
-/// A number as the language writes it.
-pub(crate) fn number(value: f64) -> String {
-    // Zero has no sign.
-    format!("{}", value + 0.0)
+/// A fraction with the digits that were meant: what is left of 1 has noise in its last ones.
+pub(crate) fn meant(share: f64) -> f64 {
+    (share * 1e11).round() / 1e11
 }
 
-/// A share as the language writes it, with the digits that were meant.
-pub(crate) fn percent(share: f64) -> String {
-    format!("{}%", number((share * 1e11).round() / 1e9))
-}
-
-/// A text as the language writes it.
-pub(crate) fn quoted_text(text: &str) -> String {
-    sesame_dsl::quoted(&cleaned(text))
+/// What is written above a declaration that was called something else.
+pub(crate) fn called_before(original: &str) -> String {
+    format!("In the original: `{}`.", printable(original))
 }

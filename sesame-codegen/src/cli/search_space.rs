@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use sesame_notation::Unit;
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace};
 use sesame_plan::{CampaignPlan, Confirmation, Copies, Dimension, Shape};
 use sesame_search::coverage::{Feasible, Grid};
@@ -79,7 +80,7 @@ fn space(plan: &CampaignPlan, permitted: &TestSpace, lines: &mut Vec<(&str, Stri
 
     let extents = Dimension::ALL.iter().filter_map(|&dimension| {
         let (low, high) = extent(plan, permitted, dimension)?;
-        Some(format!("{} [{}, {}]", dimension.name(), rounded(low), rounded(high)))
+        Some(format!("{} {}", dimension.name(), Unit::None.range(rounded(low), rounded(high))))
     });
     let extents: Vec<String> = extents.collect();
     lines.push(("reduced (SSPR)", extents.join("  ")));

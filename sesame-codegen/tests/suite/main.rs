@@ -6,6 +6,7 @@ mod emission;
 mod emitted;
 mod hostile_checkout;
 mod mutated_imports;
+mod notation;
 mod options;
 mod originals;
 mod plans;

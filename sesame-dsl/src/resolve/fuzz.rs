@@ -1,12 +1,14 @@
 //! Operations and tests.
 
+use sesame_notation::quoted;
+
 use super::quantity::percent;
 use super::{Kind, Resolver, list};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{self, Activation, Choice, Domain, Id as _, OperationId, OperationKind, Parameter, Range, Shape};
 
 use crate::span::Span;
-use crate::syntax::{ast, quoted};
+use crate::syntax::ast;
 use crate::units::{Unit, convert};
 
 impl<'a> Resolver<'a> {

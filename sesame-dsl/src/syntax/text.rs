@@ -1,9 +1,4 @@
-//! Texts as the language writes them.
-
-/// A text as the language writes it, in quotes.
-pub fn quoted(text: &str) -> String {
-    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
-}
+//! Where a quoted text ends.
 
 /// One past the closing quote of the text that begins at an offset; `None` when it does not end on its line.
 pub(super) fn text_end(text: &str, open: usize) -> Option<usize> {

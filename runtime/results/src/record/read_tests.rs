@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use rusqlite::{Row, params};
 
-use sesame_base::condition;
 use sesame_base::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
 use sesame_base::test_number::TestNumber;
+use sesame_notation as notation;
 use sesame_plan::{Activation, Choice, KnownTestId, OperationId, Span, Test, TestOperation};
 
 use crate::record::columns::{choice, finite, metric_value, perhaps_finite, position, span, unsigned};
@@ -298,7 +298,7 @@ impl Repository {
     ) -> Result<Activation, RecordError> {
         let (this, operation) = (TestNumber(test), self.plan().operation(operation));
         let read = |text: String| {
-            condition::text::read(&text, &self.plan().metrics)
+            notation::condition::read(&text, &self.plan().metrics)
                 .map_err(|problem| RecordError::damaged(&self.path, format!("a condition of {this}: {problem}")))
         };
         match (window, conditions) {

@@ -2,9 +2,9 @@
 
 use rusqlite::{Transaction, params};
 
-use sesame_base::condition;
 use sesame_base::observation::{Observation, Outcome};
 use sesame_base::test_number::TestNumber;
+use sesame_notation as notation;
 use sesame_plan::condition::{Condition, Operand};
 use sesame_plan::{Activation, CampaignPlan, Choice};
 
@@ -91,7 +91,7 @@ fn numbers_of(condition: &Condition, take: &mut impl FnMut(f64)) {
 type Switched = (Option<f64>, Option<f64>, Option<String>, Option<String>, Option<f64>, Option<u32>);
 
 fn switched(activation: &Activation, plan: &CampaignPlan) -> Switched {
-    let text = |condition| Some(condition::text::write(condition, &plan.metrics));
+    let text = |condition| Some(notation::condition::write(condition, &plan.metrics));
     match activation {
         Activation::Time { start, end } => (Some(*start), Some(*end), None, None, None, None),
         Activation::Condition { start, end, times } => (None, None, text(start), text(end), None, Some(*times)),

@@ -3,15 +3,12 @@
 //! Every number is written so that the language reads back exactly the one that was used, in the unit of its field: the
 //! block is the same test, bit for bit.
 
-use std::fmt::Write as _;
-
 use serde::Serialize;
 
-use sesame_base::condition;
-use sesame_base::decimal::{decimal, quantity};
 use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
-use sesame_plan::{Activation, CampaignPlan, Choice, MetricId, Moment, OperationKind, TestOperation};
+use sesame_notation as notation;
+use sesame_plan::{Bound, CampaignPlan, Expectation, MetricId};
 
 use crate::record::{RecordError, Repository, TestRecord};
 
@@ -65,64 +62,15 @@ pub(super) fn shrunk_block(plan: &CampaignPlan, seed: u64, record: &TestRecord, 
 }
 
 fn block(plan: &CampaignPlan, doc: &str, record: &TestRecord, name: &str) -> String {
-    let mut text = format!("/// {doc}\ntest {name} {{\n");
-    for used in &record.test.operations {
-        let operation = plan.operation(used.operation);
-        let _ = write!(text, "  {}", operation.name);
-        for (parameter, choice) in operation.parameters.iter().zip(&used.parameters) {
-            let written = |x: f64| match (&operation.kind, &parameter.unit) {
-                // Probabilities are percentages in the language.
-                (kind, _) if kind.has_probabilities() => format!("{}%", decimal(x, 2)),
-                (_, unit) => quantity(x, unit.as_deref()),
-            };
-            let _ = match choice {
-                Choice::Value { value } => write!(text, " {} {}", parameter.name, written(*value)),
-                Choice::Range { low, high } => {
-                    write!(text, " {} [{}, {}]", parameter.name, written(*low), written(*high))
-                }
-                Choice::Point { point } => {
-                    let [x, y, z] = point.map(|coordinate| decimal(coordinate, 0));
-                    let unit = parameter.unit.as_deref().unwrap_or_default();
-                    write!(text, " {} ({x}, {y}, {z}){unit}", parameter.name)
-                }
-                Choice::Text { text: chosen } => {
-                    let escaped = chosen.replace('\\', "\\\\").replace('"', "\\\"");
-                    write!(text, " {} \"{escaped}\"", parameter.name)
-                }
-            };
-        }
-        let _ = writeln!(text, " {} seed {}", activation(plan, used), used.operation_seed);
-    }
-    expectations(&mut text, plan, record);
-    text.push_str("}\n");
-    text
+    let operations = record.test.operations.iter().map(|used| notation::test_operation(plan, used));
+    notation::test_block(doc, name, operations.chain(expectations(plan, record)))
 }
 
-/// When an operation is active, in the words of the language.
-pub(super) fn activation(plan: &CampaignPlan, used: &TestOperation) -> String {
-    let seconds = |time: &f64| quantity(*time, Some("s"));
-    let words = |condition| condition::text::write(condition, &plan.metrics);
-    let often = |times: &u32| if *times == 1 { String::new() } else { format!(" at most {times} times") };
-    match &used.activation {
-        Activation::Time { start, end } => format!("from {} to {}", seconds(start), seconds(end)),
-        Activation::Condition { start, end, times } => {
-            format!("when {} until {}{}", words(start), words(end), often(times))
-        }
-        Activation::ConditionFor { start, length, times } => {
-            format!("when {} for {}{}", words(start), seconds(length), often(times))
-        }
-        Activation::Offline => match plan.operation(used.operation).kind {
-            OperationKind::Custom { moment: Moment::AfterEnd } => "after end".to_owned(),
-            _ => "before start".to_owned(),
-        },
-    }
-}
-
-fn expectations(text: &mut String, plan: &CampaignPlan, record: &TestRecord) {
+/// What is expected of the test, or a comment that says why nothing is.
+fn expectations(plan: &CampaignPlan, record: &TestRecord) -> Vec<String> {
     let outcome = &record.observation.outcome;
     if matches!(outcome, Outcome::Crash { .. } | Outcome::Timeout { .. }) {
-        let _ = writeln!(text, "  // Its run ended as a {}, so there is no value to expect.", outcome.word());
-        return;
+        return vec![format!("// Its run ended as a {}, so there is no value to expect.", outcome.word())];
     }
     let mut metrics = plan.campaign.objectives.clone();
     if metrics.is_empty() {
@@ -130,17 +78,11 @@ fn expectations(text: &mut String, plan: &CampaignPlan, record: &TestRecord) {
         metrics.sort();
         metrics.dedup();
     }
-    for id in metrics {
-        let metric = plan.metric(id);
-        match value(record, id) {
-            Some(value) => {
-                let _ = writeln!(text, "  expect {} == {}", metric.name, quantity(value, metric.unit.as_deref()));
-            }
-            None => {
-                let _ = writeln!(text, "  // `{}` has no value to expect.", metric.name);
-            }
-        }
-    }
+    let expected = metrics.into_iter().map(|metric| match value(record, metric) {
+        Some(value) => notation::expectation(&Expectation { metric, bound: Bound::Equal { value } }, &plan.metrics),
+        None => format!("// `{}` has no value to expect.", plan.metric(metric).name),
+    });
+    expected.collect()
 }
 
 fn value(record: &TestRecord, metric: MetricId) -> Option<f64> {
@@ -163,17 +105,10 @@ fn free_name(plan: &CampaignPlan, name: &str) -> String {
     names.into_iter().find(|name| !taken.contains(&name.as_str())).unwrap_or_else(|| name.to_owned())
 }
 
-/// Whether a name can be that of a test; the words of the language are refused when the block is read.
-pub fn is_name(name: &str) -> bool {
-    let mut characters = name.chars();
-    characters.next().is_some_and(|first| first.is_ascii_alphabetic() || first == '_')
-        && characters.all(|c| c.is_ascii_alphanumeric() || c == '_')
-}
-
 #[cfg(test)]
 mod tests {
     use sesame_plan::condition::ConditionEnd;
-    use sesame_plan::{OperationId, Test};
+    use sesame_plan::{Activation, Choice, Moment, OperationId, OperationKind, Test, TestOperation};
 
     use super::*;
     use crate::record::sample;

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use sesame_base::observation::Counters;
 use sesame_base::test_number::TestNumber;
+use sesame_notation as notation;
 use sesame_plan::{Activation, CampaignPlan, Choice, Span};
 
 use crate::analysis::confirmed::{ConfirmedTest, confirmed_test};
@@ -15,7 +16,6 @@ use crate::record::{
     EventKind, Judge, MetricValue, Origin, RecordError, Repetition, Repository, Tally, TestRecord, TestRow, Verdict,
     verdict, violation_spans,
 };
-use crate::report::export;
 use crate::report::facts::stacked::{Stacked, stacked_in};
 use crate::report::facts::wording;
 
@@ -287,7 +287,7 @@ fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> 
         let (planned, conditions) = match used.activation {
             Activation::Time { start, end } => (Some(Span { start, end }), None),
             Activation::Condition { .. } | Activation::ConditionFor { .. } => {
-                (None, Some(export::activation(plan, used)))
+                (None, Some(notation::activation(plan, used)))
             }
             Activation::Offline => (None, None),
         };

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use sesame_base::condition;
 use sesame_base::test_number::TestNumber;
+use sesame_notation as notation;
 use sesame_plan::{Activation, CampaignPlan, Dimension, Failing, MetricId, RequirementId, Test, TestOperation};
 use sesame_search::shrink::Shrink;
 use sesame_search::shrink::strength;
@@ -243,7 +243,7 @@ fn change(plan: &CampaignPlan, base: &Test, test: &Test) -> String {
 }
 
 fn activation(plan: &CampaignPlan, activation: &Activation) -> String {
-    let words = |condition| condition::text::write(condition, &plan.metrics);
+    let words = |condition| notation::condition::write(condition, &plan.metrics);
     let often = |times: u32| if times == 1 { String::new() } else { format!(" at most {times} times") };
     match activation {
         Activation::Time { start, end } => format!("from {} s to {} s", fixed(*start, 2), fixed(*end, 2)),

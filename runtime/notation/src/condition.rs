@@ -1,4 +1,4 @@
-//! Conditions in the notation of the language, such as `near_zone1 < 3 and (2rad < link0_high or link0_high == 0rad)`.
+//! Conditions, such as `near_zone1 < 3 and (2rad < link0_high or link0_high == 0rad)`.
 //!
 //! What is written reads back as the same condition: the same tree, the same order, every number bit for bit. `and`
 //! binds tighter than `or`, and equal operators associate to the left, so parentheses only occur where the tree needs
@@ -9,35 +9,46 @@ use std::iter::Peekable;
 use sesame_plan::condition::{Comparison, Condition, Operand};
 use sesame_plan::{Metric, MetricId};
 
-use crate::decimal::quantity;
+use crate::unit::Unit;
 
 /// A condition over these metrics. Numbers are in the unit of the variable with which they are compared.
 pub fn write(condition: &Condition, metrics: &[Metric]) -> String {
+    write_named(condition, &named(metrics))
+}
+
+/// The names and units of metrics.
+pub(crate) fn named<'a>(metrics: &'a [Metric]) -> impl Fn(MetricId) -> (&'a str, Unit<'a>) {
+    |id| {
+        let metric = &metrics[id.index()];
+        (&metric.name, Unit::named(metric.unit.as_deref()))
+    }
+}
+
+/// A condition over metrics with the names and units that a function gives, for where there is no plan yet.
+pub fn write_named<'a>(condition: &Condition, metric: &impl Fn(MetricId) -> (&'a str, Unit<'a>)) -> String {
+    let enclosed = |condition: &Condition, parentheses: bool| {
+        let text = write_named(condition, metric);
+        if parentheses { format!("({text})") } else { text }
+    };
     match condition {
         Condition::Compare { left, by, right } => {
-            let unit = [left, right].into_iter().find_map(|operand| match operand {
-                Operand::Variable(metric) => metrics[metric.index()].unit.as_deref(),
+            let unit = [left, right].into_iter().find_map(|operand| match *operand {
+                Operand::Variable(id) => Some(metric(id).1),
                 Operand::Number(_) => None,
             });
-            let side = |operand: &Operand| match operand {
-                Operand::Variable(metric) => metrics[metric.index()].name.clone(),
-                Operand::Number(number) => quantity(*number, unit),
+            let side = |operand: &Operand| match *operand {
+                Operand::Variable(id) => metric(id).0.to_owned(),
+                Operand::Number(number) => unit.unwrap_or(Unit::None).number(number),
             };
             format!("{} {} {}", side(left), by.sign(), side(right))
         }
         Condition::And(a, b) => {
+            let left = matches!(**a, Condition::Or(..));
             let right = !matches!(**b, Condition::Compare { .. });
-            format!("{} and {}", enclosed(a, matches!(**a, Condition::Or(..)), metrics), enclosed(b, right, metrics))
+            format!("{} and {}", enclosed(a, left), enclosed(b, right))
         }
-        Condition::Or(a, b) => {
-            format!("{} or {}", write(a, metrics), enclosed(b, matches!(**b, Condition::Or(..)), metrics))
-        }
+        Condition::Or(a, b) => format!("{} or {}", enclosed(a, false), enclosed(b, matches!(**b, Condition::Or(..)))),
     }
-}
-
-fn enclosed(condition: &Condition, parentheses: bool, metrics: &[Metric]) -> String {
-    let text = write(condition, metrics);
-    if parentheses { format!("({text})") } else { text }
 }
 
 /// The most levels of a condition that is read, more than one of the language may have: what comes from a file must not
@@ -131,10 +142,10 @@ fn one<'a>(
 mod tests {
     use proptest::prelude::*;
 
+    use sesame_base::condition::testing::{above, and, any_condition, below, compare, or, variable};
     use sesame_plan::testing as fixture;
 
     use super::*;
-    use crate::condition::testing::{above, and, any_condition, below, compare, or, variable};
 
     fn metrics() -> Vec<Metric> {
         let one = fixture::plan(Vec::new()).metrics.swap_remove(1);

@@ -1,12 +1,7 @@
-//! Numbers in the notation of the language: their digits read back as exactly the same number.
-
-/// A number with its unit, without a space, as in the language.
-pub fn quantity(x: f64, unit: Option<&str>) -> String {
-    format!("{}{}", decimal(x, 0), unit.unwrap_or_default())
-}
+//! Numbers: their digits read back as exactly the same number.
 
 /// The shortest decimal that reads back as this number, with the point moved right by `shift` digits.
-pub fn decimal(x: f64, shift: i32) -> String {
+pub(crate) fn decimal(x: f64, shift: i32) -> String {
     // The shortest digits that identify the number, as `d.ddde-x`.
     let scientific = format!("{:e}", x + 0.0);
     let (mantissa, exponent) = scientific.split_once('e').expect("a number in scientific notation has an exponent");

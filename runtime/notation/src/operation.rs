@@ -1,0 +1,149 @@
+//! Operations of the space: what they do, what they permit, and the clauses behind it.
+
+use sesame_plan::condition::{Constraint, Integers};
+use sesame_plan::{
+    CampaignPlan, Distribution, Domain, Drain, Metric, Operation, OperationKind, Parameter, Span, place_in_words,
+};
+
+use crate::text::{list, one_of};
+use crate::unit::Unit;
+
+/// An operation of a plan in one line, with every clause that it can have: no default is left out.
+pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
+    let mut line = format!("operation {}", operation.name);
+    if let Some(topic) = operation.topic {
+        let topic = plan.topic(topic).name.as_str();
+        let mut targets: Vec<String> =
+            operation.places.iter().map(|place| format!("{topic}{}", place_in_words(place))).collect();
+        if targets.is_empty() {
+            targets.push(topic.to_owned());
+        }
+        line = format!("{line} on {}", targets.join(", "));
+    }
+    let clauses = Clauses {
+        within: (!operation.kind.is_offline()).then_some(operation.within),
+        priority: Some(operation.priority),
+        inclusion: Some(operation.inclusion),
+        untimed: !operation.timed,
+        start_contains: operation.constraints.iter().map(|it| constraint(it, &plan.metrics)).collect(),
+    };
+    format!("{line} = {}{}", disturbance(operation), clauses.write())
+}
+
+/// The clauses behind an operation. One that is `None`, false or empty is not written.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Clauses {
+    /// The time outside of which it is never active.
+    pub within: Option<Span>,
+    /// Its priority.
+    pub priority: Option<i32>,
+    /// The probability, a fraction, that a fresh test contains it.
+    pub inclusion: Option<f64>,
+    /// Whether its active time does not count.
+    pub untimed: bool,
+    /// What its start conditions contain.
+    pub start_contains: Vec<String>,
+}
+
+impl Clauses {
+    /// The clauses, each after a space.
+    pub fn write(&self) -> String {
+        let clauses = [
+            self.within.map(|within| format!(" within {}", Unit::SECONDS.range(within.start, within.end))),
+            self.priority.map(|priority| format!(" priority {priority}")),
+            self.inclusion.map(|inclusion| format!(" inclusion {}", Unit::Share.number(inclusion))),
+            self.untimed.then(|| " untimed".to_owned()),
+            (!self.start_contains.is_empty()).then(|| format!(" start contains {}", self.start_contains.join(", "))),
+        ];
+        clauses.into_iter().flatten().collect()
+    }
+}
+
+/// What a start condition has to contain: a variable, or an integer within bounds.
+pub fn constraint(constraint: &Constraint, metrics: &[Metric]) -> String {
+    match *constraint {
+        Constraint::Variable { metric } => metrics[metric.index()].name.clone(),
+        Constraint::Integer { bounds } => integer_constraint(bounds),
+    }
+}
+
+/// The constraint that a start condition contains an integer within bounds.
+pub fn integer_constraint(bounds: Integers) -> String {
+    format!("integer [{}, {}]", bounds.lowest, bounds.highest)
+}
+
+/// What an operation does and permits.
+fn disturbance(operation: &Operation) -> String {
+    let words = operation.kind.words();
+    let permitted: Vec<String> = match (&operation.kind, axes(&operation.parameters)) {
+        (OperationKind::RandomValue { .. }, Some((unit, low, high))) => vec![unit.corners(low, high)],
+        _ => operation.parameters.iter().map(|it| permitted(&operation.kind, it)).collect(),
+    };
+    match &operation.kind {
+        OperationKind::Custom { .. } => {
+            let parameters = operation
+                .parameters
+                .iter()
+                .map(|it| format!("{}: {}  ", it.name, custom_domain(&it.domain, Unit::named(it.unit.as_deref()))));
+            format!("{words} {{ {}}}", parameters.collect::<String>())
+        }
+        OperationKind::RandomText { texts } => format!("{words} {}", list(texts)),
+        OperationKind::BurstLoss => {
+            let clauses =
+                operation.parameters.iter().zip(&permitted).map(|(it, range)| format!("{} {range}  ", it.name));
+            format!("{words} {{ {}}}", clauses.collect::<String>())
+        }
+        OperationKind::Latency { distribution, drain } => {
+            let distribution = match distribution {
+                Distribution::Fixed => "fixed",
+                Distribution::Uniform => "uniform",
+                Distribution::Normal => "normal",
+            };
+            format!("{words} {} {distribution} drain {}", permitted.join(" "), drain_word(*drain))
+        }
+        OperationKind::Reorder { drain } => format!("{words} {} drain {}", permitted.join(" "), drain_word(*drain)),
+        _ if permitted.is_empty() => words.to_owned(),
+        _ => format!("{words} {}", permitted.join(" ")),
+    }
+}
+
+/// The corners of the box that three parameters of a random point span, and their unit.
+fn axes(parameters: &[Parameter]) -> Option<(Unit<'_>, [f64; 3], [f64; 3])> {
+    let ends = parameters.iter().map(|parameter| match parameter.domain {
+        Domain::Number { low, high, .. } => Some((low, high)),
+        _ => None,
+    });
+    let ends: [(f64, f64); 3] = ends.collect::<Option<Vec<_>>>()?.try_into().ok()?;
+    let unit = Unit::named(parameters[0].unit.as_deref());
+    Some((unit, ends.map(|(low, _)| low), ends.map(|(_, high)| high)))
+}
+
+fn drain_word(drain: Drain) -> &'static str {
+    match drain {
+        Drain::Finish => "finish",
+        Drain::Flush => "flush",
+        Drain::Drop => "drop",
+    }
+}
+
+/// What is permitted for a parameter of any operation but a custom one.
+fn permitted(kind: &OperationKind, parameter: &Parameter) -> String {
+    let unit = Unit::of_parameter(kind, parameter);
+    match &parameter.domain {
+        Domain::Number { low, high, .. } => unit.range(*low, *high),
+        Domain::Point { low, high } => unit.corners(*low, *high),
+        Domain::Texts { texts: items } | Domain::Files { files: items } => one_of(items),
+    }
+}
+
+/// What a parameter of a custom operation permits, behind its name and colon.
+pub fn custom_domain(domain: &Domain, unit: Unit<'_>) -> String {
+    match domain {
+        Domain::Number { low, high, integer, .. } => {
+            format!("{} {}", if *integer { "int" } else { "real" }, unit.range(*low, *high))
+        }
+        Domain::Point { low, high } => format!("point {}", unit.corners(*low, *high)),
+        Domain::Texts { texts } => one_of(texts),
+        Domain::Files { files } => format!("file {}", one_of(files)),
+    }
+}

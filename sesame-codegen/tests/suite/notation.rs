@@ -1,0 +1,485 @@
+//! A plan that is written as text of the language reads back as the same plan, bit for bit.
+
+use std::collections::BTreeSet;
+use std::fmt::{self, Write as _};
+
+use proptest::prelude::*;
+use proptest::strategy::Union;
+use proptest::test_runner::{TestCaseResult, TestRunner};
+
+use sesame_codegen::explain;
+use sesame_dsl::diagnostic::Severity;
+use sesame_dsl::diagnostic::render::human;
+use sesame_dsl::source::SourceMap;
+use sesame_dsl::units;
+use sesame_notation::{doc_comment, expectation, test_block, test_operation};
+use sesame_plan::condition::{
+    Comparison, Condition, ConditionEnd, ConditionSpace, Constraint, Integers, Operand, Variable,
+};
+use sesame_plan::{
+    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Confirmation, Copies, Count, CoverageGoal,
+    Dimension, Domain, Expectation, GridAxis, KnownTest, Metric, MetricId, Operation, OperationId, OperationKind,
+    Parameter, Recorded, Search, Shape, Span, Statistic, StopRule, Test, TestOperation,
+};
+
+/// Units that are no symbols of their own.
+const COMPOUND: [&str; 5] = ["km/h", "rad/s^2", "kg*m/s", "N*m", "m^2/s"];
+
+/// Topics and metrics in every unit of the language; messages for what has none.
+fn system(units: &[&str]) -> String {
+    let mut topics = String::new();
+    let mut metrics = String::new();
+    for (at, unit) in units.iter().enumerate() {
+        let unit = if unit.is_empty() { String::new() } else { format!("[{unit}]") };
+        let _ = writeln!(topics, "topic t{at} = \"t{at}\" : real{unit}  topic p{at} = \"p{at}\" : point{unit}");
+        let _ = writeln!(metrics, "metric m{at}: real{unit} maximise {{ hook on t{at} }}");
+        let _ = writeln!(metrics, "metric n{at}: real{unit} minimise {{ hook on p{at} }}");
+    }
+    format!(
+        r#"space everything
+        system {{
+          simulator sim = in_process "cell_sim::Cell" {{ crate "simulator"  step 20ms }}
+          message Note {{ name: text  known: bool  at: int[ns]  level: real[mm]  spans: list of real[mm] }}
+          topic note = "notes/{{A,B}}" : Note
+          {topics}
+        }}
+        {metrics}
+        requirement R1 "nothing is hit" = m0 <= 0ns
+        "#
+    )
+}
+
+/// An operation of each kind, on every unit where the kind has numbers of a unit. The numbers are replaced.
+fn operations(units: &[&str]) -> String {
+    let mut text = String::new();
+    for (at, unit) in units.iter().enumerate() {
+        let one = format!("[0{unit}, 1{unit}]");
+        let corners = format!("[(0, 0, 0){unit}, (1, 1, 1){unit}]");
+        let _ = writeln!(text, "operation offset{at} on t{at} = random offset {one}");
+        let _ = writeln!(text, "operation moved{at} on p{at} = random absolute {corners}");
+        let _ = writeln!(text, "operation stuck{at} on t{at} = stuck at {one}");
+        let _ = writeln!(text, "operation biased{at} on p{at} = bias {corners}");
+        let _ = writeln!(text, "operation noisy{at} on t{at} = noise {one}");
+    }
+    text + r#"
+        operation drifting on note.level = drift [0m/s, 1m/s]
+        operation scaled on note.level, note.spans[2], note.spans[*] = scale [1, 2]
+        operation skewed on note.at = clock skew [0ms, 1ms]
+        operation old on note.spans = stale [0ms, 700ms]
+        operation named on note.name = stuck at one of "a", "b"
+        operation guessed on note.name = random one of "a", "b"
+        operation denied on note.known = stuck at false
+        operation broken on note.level = -infinity
+        operation frozen on note = freeze
+        operation lost on note = packet loss [0%, 1%]
+        operation bursts on note = burst loss { enter [0%, 1%]  leave [1%, 2%]  loss [5%, 9%] }
+        operation long_bursts on note = burst loss { enter [0%, 1%]  leave [1%, 2%] }
+        operation thinned on note = rate limit [1Hz, 5Hz]
+        operation late on note = latency [0s, 1s]
+        operation uneven on note = latency [0s, 1s] normal drain flush
+        operation mixed on note = reorder [0s, 1s] drain drop
+        operation twice on note = duplicate [1, 7]
+        operation cut on note = blackhole
+        operation bent on t0 = custom {
+          points: int [0, 1]  gain: real [0, 1]  reach: real[mm] [0mm, 1mm]
+          shift: point [(0, 0, 0)m, (1, 1, 1)m]  frame: one of "a", "b"
+        }
+        operation spoilt = custom before start { file: file one of "calibration.yaml", "maps/hall.yaml" }
+        operation tidied = custom after end { }
+    "#
+}
+
+/// The plan of the campaign `look` in this text.
+fn plan(text: &str) -> CampaignPlan {
+    let mut sources = SourceMap::new();
+    let file = sources.add("everything.sesame", text);
+    let analysis = sesame_dsl::analyse(&sources, file);
+    let Some(space) = analysis.model else {
+        let errors = analysis.diagnostics.into_iter().filter(|it| it.severity() == Severity::Error).take(5);
+        panic!("{}", human(&errors.collect::<Vec<_>>(), &sources, false));
+    };
+    let campaign = space.campaign("look").expect("there is a campaign");
+    sesame_codegen::lower::lower(&space, campaign, "everything.sesame", "sesamec 0.0.0").plan
+}
+
+/// A plan as the text of a file below this system.
+fn written(system: &str, plan: &CampaignPlan) -> String {
+    let explained = explain::campaign(plan);
+    let mut text = format!("{system}\n{}", explained.split("\n(* ").next().expect("there is a first part"));
+    for test in &plan.tests {
+        let operations = test.test.operations.iter().map(|used| test_operation(plan, used));
+        let expected = test.expectations.iter().map(|expected| expectation(expected, &plan.metrics));
+        text.push_str(&test_block(&test.doc, &test.name, operations.chain(expected)));
+    }
+    text
+}
+
+/// Finite numbers of every size, and those that people write.
+fn number() -> impl Strategy<Value = f64> + Clone {
+    use prop::num::f64::{NEGATIVE, NORMAL, POSITIVE, SUBNORMAL, ZERO};
+    prop_oneof![
+        3 => NORMAL | SUBNORMAL | ZERO | POSITIVE | NEGATIVE,
+        3 => (-100_000i32..100_000, 0..6).prop_map(|(digits, point)| f64::from(digits) / 10f64.powi(point)),
+        1 => Just(0.1 + 0.2),
+    ]
+}
+
+/// Fractions, of which the language writes percentages.
+fn share() -> impl Strategy<Value = f64> + Clone {
+    prop_oneof![0.0..=1.0f64, (0..=1000).prop_map(|permille| f64::from(permille) / 1e3)]
+}
+
+/// Two numbers in their order.
+fn ordered(number: impl Strategy<Value = f64> + Clone) -> impl Strategy<Value = (f64, f64)> {
+    (number.clone(), number).prop_map(|(a, b)| if a <= b { (a, b) } else { (b, a) })
+}
+
+/// Any text of the language: one line with a visible character.
+fn text() -> impl Strategy<Value = String> {
+    let characters = prop_oneof![any::<char>(), Just('"'), Just('\\'), Just('\t'), prop::char::range('a', 'z')];
+    let texts = prop::collection::vec(characters, 1..12).prop_map(String::from_iter);
+    texts.prop_filter("a line with a visible character", |text| !text.contains(['\n', '\r']) && !text.trim().is_empty())
+}
+
+fn doc() -> impl Strategy<Value = String> {
+    prop::collection::vec("[!-~]([ -~]{0,20}[!-~])?", 0..3).prop_map(|lines| lines.join("\n"))
+}
+
+/// Other numbers and texts that are permitted where these are.
+fn domain(kind: &OperationKind, parameter: &Parameter) -> BoxedStrategy<Domain> {
+    match parameter.domain.clone() {
+        Domain::Number { shape, integer, .. } => {
+            let whole = || (-1_000_000_000_000i64..1_000_000_000_000).prop_map(|whole| whole as f64);
+            let numbers = match kind {
+                OperationKind::PacketLoss | OperationKind::BurstLoss => ordered(share()).boxed(),
+                OperationKind::Duplicate => ordered((1..100u32).prop_map(f64::from)).boxed(),
+                OperationKind::RateLimit => ordered(1e-3..1e6f64).boxed(),
+                OperationKind::Latency { .. } | OperationKind::Reorder { .. } | OperationKind::Stale => {
+                    ordered(0.0..60.0f64).boxed()
+                }
+                OperationKind::Noise => ordered(number().prop_map(f64::abs)).boxed(),
+                _ if integer => ordered(whole()).boxed(),
+                _ => ordered(number()).boxed(),
+            };
+            numbers.prop_map(move |(low, high)| Domain::Number { low, high, shape, integer }).boxed()
+        }
+        Domain::Point { .. } => {
+            let axes = [(); 3].map(|()| ordered(number()));
+            axes.prop_map(|axes| Domain::Point { low: axes.map(|it| it.0), high: axes.map(|it| it.1) }).boxed()
+        }
+        Domain::Texts { .. } => {
+            let texts = prop::collection::btree_set(text(), 1..4);
+            texts.prop_map(|texts| Domain::Texts { texts: texts.into_iter().collect() }).boxed()
+        }
+        files @ Domain::Files { .. } => Just(files).boxed(),
+    }
+}
+
+/// An operation like this one, with other numbers, texts and clauses.
+fn operation(like: &Operation, end: f64, by_condition: bool) -> BoxedStrategy<Operation> {
+    let domains: Vec<_> = like.parameters.iter().map(|parameter| domain(&like.kind, parameter)).collect();
+    let texts = prop::collection::btree_set(text(), 1..4);
+    let constraints = if by_condition { 0..3 } else { 0..1 };
+    let constraint = prop_oneof![
+        Just(Constraint::Variable { metric: MetricId(0) }),
+        (-3..3i64, 3..9i64).prop_map(|(lowest, highest)| Constraint::Integer { bounds: Integers { lowest, highest } }),
+    ];
+    let clauses =
+        (ordered(0.0..end), any::<i32>(), share(), any::<bool>(), prop::collection::vec(constraint, constraints));
+    let like = like.clone();
+    (domains, texts, clauses)
+        .prop_map(move |(domains, texts, ((start, stop), priority, inclusion, timed, constraints))| {
+            let mut operation = like.clone();
+            for (parameter, domain) in operation.parameters.iter_mut().zip(domains) {
+                parameter.domain = domain;
+            }
+            if let OperationKind::RandomText { texts: offered } = &mut operation.kind {
+                *offered = texts.into_iter().collect();
+            }
+            (operation.priority, operation.inclusion) = (priority, inclusion);
+            if operation.kind.is_offline() {
+                operation.within = Span { start: 0.0, end };
+            } else {
+                operation.within = Span { start, end: stop.max(start.next_up()) };
+                (operation.timed, operation.constraints) = (timed, constraints);
+                operation.constraints.dedup();
+            }
+            operation
+        })
+        .boxed()
+}
+
+/// What a test can choose of a domain.
+fn choice(domain: &Domain) -> BoxedStrategy<Choice> {
+    match domain.clone() {
+        Domain::Number { low, high, shape, integer } => {
+            let between = move |share: f64| {
+                let x = (low + (high / 2.0 - low / 2.0) * share * 2.0).clamp(low, high);
+                if integer { x.round().clamp(low, high) } else { x }
+            };
+            let ends = ordered(share()).prop_map(move |(a, b)| (between(a), between(b)));
+            ends.prop_map(move |(a, b)| match shape {
+                Shape::Value => Choice::Value { value: a },
+                Shape::Range => Choice::Range { low: a.min(b), high: a.max(b) },
+            })
+            .boxed()
+        }
+        Domain::Point { low, high } => any::<[bool; 3]>()
+            .prop_map(move |ends| Choice::Point {
+                point: [0, 1, 2].map(|at| if ends[at] { high[at] } else { low[at] }),
+            })
+            .boxed(),
+        Domain::Texts { texts: items } | Domain::Files { files: items } => {
+            prop::sample::select(items).prop_map(|text| Choice::Text { text }).boxed()
+        }
+    }
+}
+
+/// Conditions over metrics that come in pairs of one unit: no comparison is constant.
+fn condition(metrics: u32) -> impl Strategy<Value = Condition> {
+    let by = prop::sample::select(vec![Comparison::Below, Comparison::Above, Comparison::Equal]);
+    let sides = (0..metrics / 2, number(), 0..4u8).prop_map(|(pair, number, sides)| {
+        let [one, other] = [2 * pair, 2 * pair + 1].map(|id| Operand::Variable(MetricId(id)));
+        match sides {
+            0 => (one, other),
+            1 => (other, one),
+            2 => (one, Operand::Number(number)),
+            _ => (Operand::Number(number), other),
+        }
+    });
+    let comparison = (sides, by).prop_map(|((left, right), by)| Condition::Compare { left, by, right });
+    comparison.prop_recursive(4, 12, 2, |inner| {
+        (inner.clone(), inner, any::<bool>()).prop_map(|(a, b, and)| {
+            let (a, b) = (Box::new(a), Box::new(b));
+            if and { Condition::And(a, b) } else { Condition::Or(a, b) }
+        })
+    })
+}
+
+fn bound() -> impl Strategy<Value = Bound> {
+    (number(), ordered(number()), 0..6u8).prop_map(|(value, (low, high), kind)| match kind {
+        0 => Bound::AtMost { value },
+        1 => Bound::Below { value },
+        2 => Bound::AtLeast { value },
+        3 => Bound::Above { value },
+        4 => Bound::Equal { value },
+        _ => Bound::Within { low, high },
+    })
+}
+
+/// An operation of a test.
+fn used(id: OperationId, of: &Operation, metrics: u32) -> BoxedStrategy<TestOperation> {
+    let Span { start, end } = of.within;
+    let at = move |share: f64| (start + (end - start) * share).clamp(start, end);
+    let activation = if of.kind.is_offline() {
+        Just(Activation::Offline).boxed()
+    } else {
+        let times = prop_oneof![Just(1), 1..100u32];
+        prop_oneof![
+            ordered(share()).prop_map(move |(a, b)| Activation::Time { start: at(a), end: at(b) }).prop_filter(
+                "a window that is not empty",
+                |it| matches!(it, Activation::Time { start, end } if start < end)
+            ),
+            (condition(metrics), condition(metrics), times.clone())
+                .prop_map(|(start, end, times)| Activation::Condition { start, end, times }),
+            (condition(metrics), 1e-9..1e3f64, times).prop_map(|(start, length, times)| Activation::ConditionFor {
+                start,
+                length,
+                times
+            }),
+        ]
+        .boxed()
+    };
+    let choices: Vec<_> = of.parameters.iter().map(|parameter| choice(&parameter.domain)).collect();
+    (activation, choices, any::<u64>())
+        .prop_map(move |(activation, parameters, operation_seed)| TestOperation {
+            operation: id,
+            activation,
+            parameters,
+            operation_seed,
+        })
+        .boxed()
+}
+
+/// Regression tests of these operations.
+fn tests(operations: &[Operation], metrics: u32) -> impl Strategy<Value = Vec<KnownTest>> + use<> {
+    let used = (0..).map(OperationId).zip(operations).map(|(id, operation)| used(id, operation, metrics));
+    let used = Union::new(used);
+    let expected = (0..metrics, bound()).prop_map(|(metric, bound)| Expectation { metric: MetricId(metric), bound });
+    let test = (prop::collection::vec(used, 1..12), prop::collection::vec(expected, 0..4), doc());
+    prop::collection::vec(test, 1..6).prop_map(|tests| {
+        let tests = tests.into_iter().enumerate().map(|(at, (operations, expectations, doc))| KnownTest {
+            name: format!("test{at}"),
+            doc,
+            test: Test { operations },
+            expectations,
+        });
+        tests.collect()
+    })
+}
+
+/// How conditions grow: over the first metrics, each with a range or without one.
+fn condition_space(metrics: &[Metric]) -> impl Strategy<Value = ConditionSpace> + use<> {
+    let units: Vec<Option<String>> = metrics.iter().map(|metric| metric.unit.clone()).collect();
+    let ranges = prop::collection::vec(prop::option::of((-1e9..-1e3f64, 1e3..1e9f64)), 2..4);
+    let end = prop_oneof![
+        Just(ConditionEnd::Condition),
+        ordered(1e-3..60.0f64).prop_map(|(low, high)| ConditionEnd::Length { low, high }),
+    ];
+    (ranges, 1..=ConditionSpace::MOST_DEPTH, -9..=-3i64, 9..1000i64, end, 1..9u32).prop_map(
+        move |(ranges, depth, lowest, highest, end, times)| ConditionSpace {
+            variables: (0..)
+                .zip(ranges)
+                .zip(units.clone())
+                .map(|((id, range), unit)| Variable {
+                    metric: MetricId(id),
+                    unit,
+                    low: range.map(|range| range.0),
+                    high: range.map(|range| range.1),
+                })
+                .collect(),
+            depth,
+            integers: Integers { lowest, highest },
+            end,
+            times,
+        },
+    )
+}
+
+/// A campaign like this one, with other settings.
+fn campaign(like: &Campaign, metrics: &[Metric], end_after: f64) -> impl Strategy<Value = Campaign> + use<> {
+    let activation = prop_oneof![
+        Just(ActivationMode::Time),
+        condition_space(metrics).prop_map(|space| ActivationMode::Condition { space }),
+    ];
+    let strategy = prop_oneof![
+        Just(sesame_plan::Strategy::Random),
+        (1..50u32).prop_map(|half| sesame_plan::Strategy::Nsga2 { population: 2 * half }),
+        (1..50u32).prop_map(|half| sesame_plan::Strategy::MapElites { population: 2 * half }),
+    ];
+    let axis = (ordered(share()), 1..20u32);
+    let coverage = (axis, 1..9u32, prop::option::of(share())).prop_map(|(((low, high), cells), hits, stop_at)| {
+        let high = if low < high { high } else { high + 1.0 };
+        let stop_at = stop_at.filter(|share| *share > 0.0);
+        CoverageGoal { axes: vec![GridAxis { dimension: Dimension::T1, low, high, cells }], hits, stop_at }
+    });
+    let confirmation = (1..50u32, prop::option::of(share()), any::<bool>()).prop_map(|(times, share, violations)| {
+        let by = share.filter(|share| (0.01..0.99).contains(share));
+        Confirmation { times, by: by.map_or(Statistic::Median, |share| Statistic::Quantile { share }), violations }
+    });
+    let stop = prop_oneof![
+        Just(Vec::new()),
+        (1.0..1e5f64).prop_map(|seconds| vec![StopRule::WallTime { seconds }]),
+        (0.01..0.99f64).prop_map(|share| vec![StopRule::Completeness { share }]),
+    ];
+    let copies = prop::sample::select(vec![Copies::Apart, Copies::MayOverlap, Copies::Once]);
+    let recorded = prop::option::of(prop::sample::select(vec![Recorded::Failing, Recorded::All]));
+    let (like, seeds) = (like.clone(), (any::<u64>(), 100..10_000u32, 1..5u32));
+    (activation, strategy, coverage, confirmation, stop, (copies, recorded), seeds, doc()).prop_map(
+        move |(activation, strategy, coverage, confirmation, stop, (copies, record), (seed, evaluations, min), doc)| {
+            let learns = strategy != sesame_plan::Strategy::Random;
+            Campaign {
+                doc,
+                count: Count { min, max: min + 3 },
+                copies,
+                activation,
+                search: Search::new(strategy, evaluations),
+                coverage: Some(coverage),
+                confirm: Some(confirmation),
+                neighbours: learns.then_some(min),
+                stop,
+                seed,
+                end_after,
+                record,
+                ..like.clone()
+            }
+        },
+    )
+}
+
+/// A plan like this one with some of its operations, with other numbers, texts, tests and settings.
+fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<> {
+    let (like, metrics) = (like.clone(), u32::try_from(like.metrics.len()).expect("there are a few metrics"));
+    let settings = like.clone();
+    let campaigns = (1.0..1e4f64).prop_flat_map(move |end| campaign(&settings.campaign, &settings.metrics, end));
+    let operations = prop::sample::subsequence(like.operations.clone(), 1..12);
+    (campaigns, operations)
+        .prop_flat_map(move |(mut campaign, operations)| {
+            campaign.operations = (0..).map(OperationId).take(operations.len()).collect();
+            if campaign.copies != Copies::MayOverlap {
+                campaign.count = Count { min: 1, max: u32::try_from(operations.len()).expect("there are a few") };
+            }
+            let by_condition = matches!(campaign.activation, ActivationMode::Condition { .. });
+            let operations = operations.iter().map(|it| operation(it, campaign.end_after, by_condition));
+            let like = like.clone();
+            operations.collect::<Vec<_>>().prop_map(move |operations| CampaignPlan {
+                operations,
+                campaign: campaign.clone(),
+                ..like.clone()
+            })
+        })
+        .prop_flat_map(move |plan| {
+            tests(&plan.operations, metrics).prop_map(move |tests| Shown(CampaignPlan { tests, ..plan.clone() }))
+        })
+}
+
+/// A plan that a failure shows as text.
+#[derive(Clone)]
+struct Shown(CampaignPlan);
+
+impl fmt::Debug for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&written("", &self.0))
+    }
+}
+
+/// A system in every unit, and the plan of a campaign with each operation.
+fn everything() -> (String, CampaignPlan) {
+    let units: Vec<&str> = units::symbols().chain(COMPOUND).chain([""]).collect();
+    let system = system(&units);
+    let operations = operations(&units);
+    let names = operations.split("operation ").skip(1).filter_map(|rest| rest.split(' ').next());
+    let names = names.collect::<Vec<_>>().join(", ");
+    let observed = (0..units.len()).map(|at| format!("m{at}, n{at}")).collect::<Vec<_>>().join(", ");
+    let plan = plan(&format!(
+        "{system}{operations}\n{}campaign look {{ objectives m0  observes {observed}
+           operations {names} 1 per test  search random {{ evaluations 9 }}  end after 10s }}",
+        doc_comment("As it is.")
+    ));
+    (system, plan)
+}
+
+/// Whether a plan's text reads back as the plan; the first difference.
+fn reads_back(system: &str, original: &CampaignPlan) -> TestCaseResult {
+    let again = plan(&written(system, original));
+    for (operation, as_written) in again.operations.iter().zip(&original.operations) {
+        prop_assert_eq!(operation, as_written);
+    }
+    for (test, as_written) in again.tests.iter().zip(&original.tests) {
+        prop_assert_eq!(test, as_written);
+    }
+    for (metric, as_written) in again.metrics.iter().zip(&original.metrics) {
+        prop_assert_eq!(metric, as_written);
+    }
+    prop_assert_eq!(&again.campaign, &original.campaign);
+    prop_assert!(again == *original, "another part of the plan differs");
+    Ok(())
+}
+
+#[test]
+fn each_kind_of_operation_reads_back_in_every_unit() {
+    let (system, like) = everything();
+    let kinds: BTreeSet<&str> = like.operations.iter().map(|it| it.kind.words()).collect();
+    assert!(kinds.len() > 20, "{kinds:?}");
+    reads_back(&system, &like).unwrap();
+}
+
+#[test]
+fn what_is_written_reads_back_as_the_same_plan() {
+    let (system, like) = everything();
+    let cases = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) };
+    let outcome = TestRunner::new(cases).run(&plans(&like), |Shown(original)| reads_back(&system, &original));
+    if let Err(failure) = outcome {
+        panic!("{failure}");
+    }
+}
