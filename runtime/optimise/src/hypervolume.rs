@@ -52,8 +52,8 @@ pub struct Growth {
 }
 
 /// The volume dominated by the points and bounded by the reference, always exact, however long it takes. A point counts
-/// only if it is below the reference in every objective. The reference must be finite, and the points must be as long as
-/// the reference and free of NaN; without objectives the volume is 0.
+/// only if it is below the reference in every objective. The reference must be finite, and the points must be as long
+/// as the reference and free of NaN; without objectives the volume is 0.
 pub fn hypervolume(points: &[&[f64]], reference: &[f64]) -> f64 {
     measured(points, reference, u64::MAX).value
 }
@@ -73,8 +73,8 @@ pub fn measured(points: &[&[f64]], reference: &[f64], work: u64) -> Volume {
     }
 }
 
-/// How much more the points of `now` dominate than those of `then`, each of which must be in `now` or dominated by a point
-/// of `now`; 0 if `now` dominates nothing or an infinite volume. Work is bounded as in [`measured`].
+/// How much more the points of `now` dominate than those of `then`, each of which must be in `now` or dominated by a
+/// point of `now`; 0 if `now` dominates nothing or an infinite volume. Work is bounded as in [`measured`].
 pub fn growth(now: &[&[f64]], then: &[&[f64]], reference: &[f64], work: u64) -> Growth {
     let exact = |share| Growth { share, at_most: None };
     let (Some(now), Some(then)) = (inside(now, reference), inside(then, reference)) else { return exact(0.0) };
@@ -507,7 +507,8 @@ mod tests {
 
     #[test]
     fn a_volume_that_takes_too_much_work_is_estimated_with_its_standard_error() {
-        // The first sets dominate much of their bounding box, the last one almost nothing, so both ways to draw are used.
+        // The first sets dominate much of their bounding box, the last one almost nothing, so both ways to draw are
+        // used.
         let far: Vec<Vec<f64>> = (0..6).map(|at| (0..6).map(|k| if k == at { 0.0 } else { 0.98 }).collect()).collect();
         for points in [sphere(6, 30, 1), sphere(5, 60, 2), far] {
             let reference = vec![1.0; points[0].len()];

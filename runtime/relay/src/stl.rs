@@ -36,12 +36,12 @@
 //! that begins there would be empty for all times in between. Nothing is lost by computing on these alone, and
 //! nothing is rounded but the ends of intervals, to the nearest nanosecond.
 //!
-//! The cost is constant per sample and operator, amortised, for windows of any length: minima and maxima slide on monotonic
-//! deques (Lemire 2006), `until` on a queue made of two stacks. The memory of an operator is bounded by the samples in
-//! its window, and constant for an outermost operator, bounded or not: that one is asked for one time only. An
-//! unbounded operator inside another temporal one (`always (request implies eventually granted)`) has a value at every
-//! time that depends on the end of the trace; it keeps the jumps of the trace over which the outer operator asks for
-//! it.
+//! The cost is constant per sample and operator, amortised, for windows of any length: minima and maxima slide on
+//! monotonic deques (Lemire 2006), `until` on a queue made of two stacks. The memory of an operator is bounded by the
+//! samples in its window, and constant for an outermost operator, bounded or not: that one is asked for one time only.
+//! An unbounded operator inside another temporal one (`always (request implies eventually granted)`) has a value at
+//! every time that depends on the end of the trace; it keeps the jumps of the trace over which the outer operator asks
+//! for it.
 
 use std::collections::VecDeque;
 
@@ -187,8 +187,8 @@ impl Monitor {
     }
 
     /// The least and the greatest robustness that the trace may still come to, when it breaks off at `now`, which is no
-    /// earlier than the last sample: for all values of the signals from `now` on, that time included, and whenever the trace
-    /// then ends. Never too narrow.
+    /// earlier than the last sample: for all values of the signals from `now` on, that time included, and whenever the
+    /// trace then ends. Never too narrow.
     pub fn reach(&self, now: SimTime) -> (f64, f64) {
         assert!(
             now >= self.now,

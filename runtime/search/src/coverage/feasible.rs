@@ -68,7 +68,8 @@ impl Feasible {
         self.reaches.iter().filter(|&&reaches| reaches).count()
     }
 
-    /// Whether exactly these cells are feasible. Otherwise no other cell is feasible, and some of these may not be either:
+    /// Whether exactly these cells are feasible. Otherwise no other cell is feasible, and some of these may not be
+    /// either:
     /// - where a cell needs several copies of one operation that must not be active at the same time;
     /// - where the grid has T3, and midpoints in different windows cannot meet, or there are many such windows;
     /// - where the grid has P2, and only some parameters are integers, or they have very many values;
@@ -290,8 +291,8 @@ impl Sectors {
         dimensions.iter().any(|dimension| self.axes.contains_key(dimension))
     }
 
-    /// The kinds of operations of a campaign that are active during the run, and the operations of each kind. Operations
-    /// are of one kind if the grid does not distinguish them.
+    /// The kinds of operations of a campaign that are active during the run, and the operations of each kind.
+    /// Operations are of one kind if the grid does not distinguish them.
     fn kinds(&self, plan: &CampaignPlan, test_space: &TestSpace) -> (Vec<KindOfOperation>, Vec<Vec<OperationId>>) {
         let timed = self.has(&[Dimension::T1, Dimension::T2, Dimension::T3]);
         let graded = self.has(&[Dimension::P1, Dimension::P2]);
@@ -334,8 +335,8 @@ impl Sectors {
             .collect()
     }
 
-    /// The cells of an axis that contain a value: two if it lies on the edge between them, since rounding may put it into
-    /// either.
+    /// The cells of an axis that contain a value: two if it lies on the edge between them, since rounding may put it
+    /// into either.
     fn at(&self, dimension: Dimension, value: f64) -> Vec<usize> {
         let Some((axis, stride)) = self.axes.get(&dimension) else { return vec![0] };
         let near = 1e-9 * (axis.high - axis.low);
@@ -344,7 +345,8 @@ impl Sectors {
         offsets
     }
 
-    /// The cells of an axis that contain values between these bounds; if the bounds are equal, those that contain the value.
+    /// The cells of an axis that contain values between these bounds; if the bounds are equal, those that contain the
+    /// value.
     fn between(&self, dimension: Dimension, low: f64, high: f64) -> Vec<usize> {
         if high - low <= 1e-9 {
             return self.at(dimension, f64::midpoint(low, high));
@@ -505,8 +507,8 @@ fn sums(lists: &[&[f64]]) -> Option<Vec<(f64, f64)>> {
     Some(sums.into_values().collect())
 }
 
-/// Every way to choose `fewest` to `most` operations of this number of kinds, as a count per kind; `None` if there are too
-/// many.
+/// Every way to choose `fewest` to `most` operations of this number of kinds, as a count per kind; `None` if there are
+/// too many.
 fn mixtures(kinds: usize, fewest: usize, most: usize) -> Option<Vec<Vec<usize>>> {
     let mut open: Vec<(Vec<usize>, usize)> = vec![(Vec::new(), 0)];
     for kind in 0..kinds {

@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_grid_is_refused_with_the_reason() {
+    fn text_that_is_not_a_grid_is_refused_with_the_reason() {
         let refused = |text: &str| Grid::parse(text).unwrap_err().to_string();
         assert_eq!(
             refused("T1:0:1"),
@@ -168,7 +168,7 @@ mod tests {
         assert!(refused("T1:0:1:6,T1:0:1:3").contains("T1 twice"));
         assert!(refused("T1:0:1:0").contains("at least one cell"));
         assert!(refused("T1:0:1:4000,T2:0:1:4000").contains("more than 100000 cells"));
-        assert!(refused("").contains("no axis"));
+        assert!(refused("").contains("not an axis"));
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! Variation of tests: crossover of their lists of operations, mutation of single operations and of the list.
 //!
-//! A mutated operation has a new operation seed. An operation that a child inherits unchanged keeps its seed, even if its
-//! window was moved to make room for another copy. If a child inherits copies with equal seeds, the later one gets a new
-//! seed, so that two copies never draw the same random numbers. A child never equals an earlier test of the campaign
-//! (apart from operation seeds), unless all [`Rates::tries`] attempts to change it fail.
+//! A mutated operation has a new operation seed. An operation that a child inherits unchanged keeps its seed, even if
+//! its window was moved to make room for another copy. If a child inherits copies with equal seeds, the later one gets
+//! a new seed, so that two copies never draw the same random numbers. A child never equals an earlier test of the
+//! campaign (apart from operation seeds), unless all [`Rates::tries`] attempts to change it fail.
 
 mod crossover;
 mod mutation;

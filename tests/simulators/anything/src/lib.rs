@@ -1,5 +1,5 @@
-//! A simulator of everything that a space declares, for the tests across crates: publishes a plain value on every path, and
-//! hears what it published.
+//! A simulator of everything that a space declares, for the tests across crates: publishes a plain value on every path,
+//! and hears what it published.
 //!
 //! The plan of its campaign is the file that the environment variable `PLAN` names.
 

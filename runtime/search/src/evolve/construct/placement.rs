@@ -39,8 +39,8 @@ use crate::sspr::{Class, Convention, Point, planned};
 const FROM_THE_TEST: u32 = 4;
 /// Attempts from each way to compose a test that is known to reach the cell.
 const FROM_A_WAY: u32 = 2;
-/// How much room midpoints leave for lengths above the least mean length that the cell requires, as a share of the range
-/// that the cell permits: in first attempts, and in later ones, which look for tests that are hard to reach.
+/// How much room midpoints leave for lengths above the least mean length that the cell requires, as a share of the
+/// range that the cell permits: in first attempts, and in later ones, which look for tests that are hard to reach.
 const SHARES_FOR_LENGTHS: [f64; 2] = [0.02, 1e-4];
 /// Attempts from fresh tests after those.
 const FROM_FRESH: u32 = 4;
@@ -189,8 +189,8 @@ impl CellPlacer {
         self.number(&mut test, demands, plan, stream).then_some(test)
     }
 
-    /// A fresh instance of one of these operations: if copies cannot overlap, of one that the test does not contain, where
-    /// there is one.
+    /// A fresh instance of one of these operations: if copies cannot overlap, of one that the test does not contain,
+    /// where there is one.
     fn another(&self, of: &[&OperationSpace], test: &Test, stream: &mut Stream) -> Option<TestOperation> {
         let held =
             |kind: &OperationSpace| test.operations.iter().any(|operation| operation.operation == kind.operation);
@@ -257,8 +257,8 @@ impl CellPlacer {
             });
             let Some((dimension, too_few)) = wrong else { return true };
             let operations = &test.operations;
-            // Those that may be removed: of the kind of which there are too many, or not of the kind of which there are too
-            // few.
+            // Those that may be removed: of the kind of which there are too many, or not of the kind of which there are
+            // too few.
             let leaving: Vec<usize> =
                 (0..operations.len()).filter(|&at| is(self.kind_of(&operations[at]), dimension) != too_few).collect();
             let coming: Vec<&OperationSpace> =
@@ -306,9 +306,9 @@ impl CellPlacer {
     }
 
     /// Divides the window of an operation among its copies, in the order of their starts. The first attempt divides
-    /// between copies that are already disjoint; the second gives all but one the length that the cell requires, towards
-    /// the cell's side of the window; the third divides evenly, and later ones at random. False where there are too
-    /// many copies.
+    /// between copies that are already disjoint; the second gives all but one the length that the cell requires,
+    /// towards the cell's side of the window; the third divides evenly, and later ones at random. False where there are
+    /// too many copies.
     fn divide(
         &self,
         windows: &mut [Window],

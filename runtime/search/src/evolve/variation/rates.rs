@@ -4,8 +4,8 @@
 //!
 //! Chosen on four synthetic robots with hidden phases of vulnerability, hits to be maximised and active time minimised.
 //! The measure is the hypervolume of the final front relative to that of random search with the same budget (geometric
-//! mean over the robots; 200 seeds with population 10 and 210 evaluations, 60 seeds with 20 and 1000). The default rates
-//! reach 1.51 and 1.70. The table lists for each rate the default, and the measure with other values:
+//! mean over the robots; 200 seeds with population 10 and 210 evaluations, 60 seeds with 20 and 1000). The default
+//! rates reach 1.51 and 1.70. The table lists for each rate the default, and the measure with other values:
 //!
 //! | rate        | default    | population 10, 210 evaluations   | population 20, 1000 evaluations  |
 //! |-------------|------------|----------------------------------|----------------------------------|
@@ -21,8 +21,8 @@
 //!
 //! Operations must be added much more often than removed: selection for little active time already empties lists and
 //! shortens windows, and without a steady supply of operations a small population ends in short tests that hit nothing.
-//! With `add` 0.1, `duplicate` 0.05 and `drop` 0.15 the measure is 0.92 and 1.08: worse than random search on the smaller
-//! budget.
+//! With `add` 0.1, `duplicate` 0.05 and `drop` 0.15 the measure is 0.92 and 1.08: worse than random search on the
+//! smaller budget.
 //!
 //! # Rates by condition
 //!

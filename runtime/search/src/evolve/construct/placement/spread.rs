@@ -199,8 +199,8 @@ impl<'a> FeasibleSet<'a> {
         })
     }
 
-    /// The permitted vector farthest in a direction: a linear programme, solved by a Lagrange multiplier (`price`) on the
-    /// mean.
+    /// The permitted vector farthest in a direction: a linear programme, solved by a Lagrange multiplier (`price`) on
+    /// the mean.
     fn farthest(&self, ways: &[f64]) -> Vec<f64> {
         let at = |price: f64| self.farthest_at(ways, price);
         let free = at(0.0);
@@ -228,7 +228,8 @@ impl<'a> FeasibleSet<'a> {
         self.nearest(&between(&below, &above, share))
     }
 
-    /// The farthest vector if the mean has this price: the budget is spent first on the numbers that gain most by moving.
+    /// The farthest vector if the mean has this price: the budget is spent first on the numbers that gain most by
+    /// moving.
     fn farthest_at(&self, ways: &[f64], price: f64) -> Vec<f64> {
         let mut order: Vec<usize> = (0..ways.len()).collect();
         order.sort_by(|&a, &b| (ways[b] - price).abs().total_cmp(&(ways[a] - price).abs()));
