@@ -3,12 +3,15 @@
 use proptest::prelude::*;
 
 use sesame_base::observation::{MetricObservation, Observation, Outcome, WallTime};
+use sesame_codegen::frontend::{Look, SESAME};
 use sesame_dsl::analyse;
 use sesame_dsl::source::SourceMap;
+use sesame_notation as notation;
 use sesame_plan::{Activation, Bound, CampaignPlan, Choice, Domain, OperationId, Test, TestOperation};
 use sesame_results::record::{Origin, Recorder, TestRecord};
 use sesame_results::report::export;
 use sesame_search as search;
+use sesame_tests::models::model;
 
 /// Every kind of parameter in units that are awkward to write.
 const SPACE: &str = r#"
@@ -139,6 +142,43 @@ fn every_test_that_a_search_finds_reads_back_as_it_was() {
             check(&plan, &asked.iter().map(|candidate| candidate.test.clone()).zip(values).collect::<Vec<_>>());
         }
     }
+}
+
+/// Tests that a search would try in random spaces, each below its space.
+#[test]
+fn every_test_of_a_random_space_reads_back_as_it_was() {
+    let mut checked = 0;
+    for seed in 0..120 {
+        let model = model(seed);
+        let folder = tempfile::tempdir().unwrap();
+        model.write(folder.path(), "simulator");
+        let file = folder.path().join("random.sesame");
+        let plans = |text: &str| {
+            let found = (SESAME.check)(file.to_str().unwrap(), text, Look::Human { colour: false });
+            assert_eq!(found.errors, 0, "space {seed}:\n{}", found.diagnostics);
+            found.plans.into_iter().map(|runner| runner.plan).collect::<Vec<_>>()
+        };
+        let mut text = model.text.clone();
+        let mut tried: Vec<(usize, String, Test)> = Vec::new();
+        for (campaign, plan) in plans(&text).iter().enumerate() {
+            if plan.campaign.search.strategy().is_none() {
+                continue;
+            }
+            for candidate in search::strategy(plan, seed).unwrap().ask().into_iter().take(10) {
+                let name = format!("tried_{}", tried.len());
+                let operations = candidate.test.operations.iter().map(|used| notation::test_operation(plan, used));
+                text.push_str(&notation::test_block("", &name, operations));
+                tried.push((campaign, name, candidate.test));
+            }
+        }
+        let again = plans(&text);
+        for (campaign, name, test) in &tried {
+            let known = again[*campaign].tests.iter().find(|known| known.name == *name);
+            assert_eq!(&known.unwrap_or_else(|| panic!("space {seed}: {name}\n{text}")).test, test, "space {seed}");
+        }
+        checked += tried.len();
+    }
+    assert!(checked > 200, "{checked}");
 }
 
 #[test]
