@@ -3,12 +3,15 @@
 use proptest::prelude::*;
 
 use sesame_base::observation::{MetricObservation, Observation, Outcome, WallTime};
+use sesame_codegen::frontend::{Look, SESAME};
 use sesame_dsl::analyse;
 use sesame_dsl::source::SourceMap;
+use sesame_notation as notation;
 use sesame_plan::{Activation, Bound, CampaignPlan, Choice, Domain, OperationId, Test, TestOperation};
 use sesame_results::record::{Origin, Recorder, TestRecord};
 use sesame_results::report::export;
 use sesame_search as search;
+use sesame_tests::models::model;
 
 /// Every kind of parameter in units that are awkward to write.
 const SPACE: &str = r#"
@@ -140,6 +143,40 @@ fn every_test_that_a_search_finds_reads_back_as_it_was() {
             check(&plan, &asked.iter().map(|candidate| candidate.test.clone()).zip(values).collect::<Vec<_>>());
         }
     }
+}
+
+/// Tests that a search would try in random spaces, each below its space.
+#[test]
+fn every_test_of_a_random_space_reads_back_as_it_was() {
+    let mut checked = 0;
+    for seed in 0..120 {
+        let model = model(seed);
+        let folder = tempfile::tempdir().unwrap();
+        model.write(folder.path(), "simulator");
+        let file = folder.path().join("random.sesame");
+        let plans = |text: &str| {
+            let found = (SESAME.check)(file.to_str().unwrap(), text, Look::Human { colour: false });
+            assert_eq!(found.errors, 0, "space {seed}:\n{}", found.diagnostics);
+            found.plans.into_iter().map(|runner| runner.plan).collect::<Vec<_>>()
+        };
+        for (campaign, plan) in plans(&model.text).iter().enumerate() {
+            if plan.campaign.search.strategy().is_none() {
+                continue;
+            }
+            let tried = search::strategy(plan, seed).unwrap().ask().into_iter().take(10);
+            let tried: Vec<Test> = tried.map(|candidate| candidate.test).collect();
+            let mut text = model.text.clone();
+            for (at, test) in tried.iter().enumerate() {
+                let operations = test.operations.iter().map(|used| notation::test_operation(plan, used));
+                text.push_str(&notation::test_block("", &format!("tried_{at}"), operations));
+            }
+            let again = plans(&text).swap_remove(campaign);
+            let found = again.tests.iter().filter(|known| known.name.starts_with("tried_"));
+            assert!(found.map(|known| &known.test).eq(&tried), "space {seed}:\n{text}");
+            checked += tried.len();
+        }
+    }
+    assert!(checked > 200, "{checked}");
 }
 
 #[test]
