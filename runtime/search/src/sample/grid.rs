@@ -312,9 +312,9 @@ fn equally_spaced(range: Range, levels: u32) -> Vec<f64> {
 /// The ranks of choices with so many values each, in the `index`th of all combinations of them. Along the index each
 /// value of each choice is taken once before one is taken again, as far as the numbers of values permit.
 ///
-/// With the larger choices first, the index is a number whose digits are values of the choices. Each digit is shifted by
-/// an amount that the digits before it determine, so equal indices, and no others, give equal ranks; and the shift goes
-/// through all values of the digit while the digit itself stays.
+/// With the larger choices first, the index is a number whose digits are values of the choices. Each digit is shifted
+/// by an amount that the digits before it determine, so equal indices, and no others, give equal ranks; and the shift
+/// goes through all values of the digit while the digit itself stays.
 fn spread(key: u64, index: u128, sizes: &[u128]) -> Vec<u128> {
     let mut order: Vec<usize> = (0..sizes.len()).collect();
     order.sort_by_key(|&at| std::cmp::Reverse(sizes[at]));
