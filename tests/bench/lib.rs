@@ -25,6 +25,7 @@ operation lag    on command    = latency [0ms, 500ms] uniform
 operation offset on command    = bias [-0.3rad, 0.3rad]
 operation wander on command    = drift [-0.1rad/s, 0.2rad/s]
 operation blur   on command    = noise [0rad, 0.1rad]
+operation slip   on command    = random walk [0rad, 0.1rad]
 operation gain   on command    = scale [50%, 160%]
 operation hold   on command    = freeze
 operation behind on command    = stale [0ms, 100ms]
@@ -35,7 +36,7 @@ operation twice  on command    = duplicate [1, 1]
 
 campaign all {
   objectives fuzzing_time, level
-  operations jitter, shift, lose, lag, offset, wander, blur, gain, hold, behind, bursts, thin, mix, twice   1..5 per test
+  operations jitter, shift, lose, lag, offset, wander, blur, slip, gain, hold, behind, bursts, thin, mix, twice   1..5 per test
   search     nsga2 { population 10  evaluations 210  seed 42 }
   end        after 1000s
 }

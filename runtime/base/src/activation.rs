@@ -118,6 +118,8 @@ impl Activity {
     }
 
     /// The next moment at which time alone changes it, or at which it has to be evaluated again, as far as is known.
+    // The relay asks each operation at each message.
+    #[inline]
     pub fn next_edge(&self) -> Option<SimTime> {
         let edge = match self.phase {
             Phase::Before => Some(self.window.0),

@@ -59,7 +59,7 @@ fn relay(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("per_message");
     group.throughput(Throughput::Elements(u64::from(MESSAGES)));
 
-    let cases: [(&str, &str, Value, &[&str]); 21] = [
+    let cases: [(&str, &str, Value, &[&str]); 22] = [
         ("number, untouched", "arm/command", Value::Real(1.0), &[]),
         ("number, offset", "arm/command", Value::Real(1.0), &["jitter"]),
         ("number, loss", "arm/command", Value::Real(1.0), &["lose"]),
@@ -69,6 +69,7 @@ fn relay(criterion: &mut Criterion) {
         ("number, bias", "arm/command", Value::Real(1.0), &["offset"]),
         ("number, drift", "arm/command", Value::Real(1.0), &["wander"]),
         ("number, noise", "arm/command", Value::Real(1.0), &["blur"]),
+        ("number, random walk", "arm/command", Value::Real(1.0), &["slip"]),
         ("number, scale", "arm/command", Value::Real(1.0), &["gain"]),
         ("number, freeze", "arm/command", Value::Real(1.0), &["hold"]),
         ("number, stale", "arm/command", Value::Real(1.0), &["behind"]),

@@ -1,6 +1,6 @@
 //! What the search costs without any simulation: hypervolumes of many objectives, exact and as a campaign has them; and
-//! evaluations per second of NSGA-II on published problems, and the hypervolume they reach. Beside it, where
-//! `SESAME_OPTIMISERS_PYTHON` names a Python with them, pygmo and pymoo in the same run, turn by turn.
+//! evaluations per second of NSGA-II and NSGA-III on published problems, and the hypervolume they reach. Beside them,
+//! where `SESAME_OPTIMISERS_PYTHON` names a Python with them, pygmo and pymoo in the same run, turn by turn.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -8,7 +8,7 @@ use std::time::Instant;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 
 use sesame_optimise::hypervolume::{WORK, hypervolume, measured};
-use sesame_optimise::problems::{Problem, approximate};
+use sesame_optimise::problems::{Problem, approximate, approximate_dtlz2};
 use sesame_rng::Stream;
 use sesame_tests::optimisers::{Ran, Run, ask};
 
@@ -52,60 +52,91 @@ fn volumes(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Seconds of each run, and the hypervolume of its final population.
-struct Figures {
-    seconds: Vec<f64>,
-    volumes: Vec<f64>,
+/// A problem that all implementations of an algorithm solve with the same settings.
+struct Contest {
+    algorithm: &'static str,
+    problem: &'static str,
+    population: u32,
+    evaluations: u32,
+    /// Where hypervolumes end.
+    reference: Vec<f64>,
+    /// The final population of ours with a seed.
+    ours: Box<dyn Fn(u64) -> Vec<Vec<f64>>>,
+    /// Other implementations, as requests name them.
+    others: &'static [&'static str],
 }
 
-impl Figures {
-    fn of(problem: Problem, runs: &[(f64, Vec<Vec<f64>>)]) -> Self {
+fn contests() -> Vec<Contest> {
+    let of_two = Problem::ALL.into_iter().map(|problem| Contest {
+        algorithm: "NSGA-II",
+        problem: problem.name(),
+        population: POPULATION,
+        evaluations: EVALUATIONS,
+        reference: problem.reference().to_vec(),
+        ours: Box::new(move |seed| approximate(problem, POPULATION, EVALUATIONS, seed)),
+        others: &["pygmo", "pymoo"],
+    });
+    // As many members as there are reference points, rounded up to an even number.
+    let of_many = [("dtlz2_3", 3, 92, 23_000), ("dtlz2_5", 5, 212, 42_400)].into_iter().map(
+        |(problem, objectives, population, evaluations)| Contest {
+            algorithm: "NSGA-III",
+            problem,
+            population,
+            evaluations,
+            reference: vec![1.1; objectives],
+            ours: Box::new(move |seed| approximate_dtlz2(objectives, population, evaluations, seed)),
+            others: &["pymoo nsga3"],
+        },
+    );
+    of_two.chain(of_many).collect()
+}
+
+impl Contest {
+    /// Prints a row of the table: the fastest run, how many times as fast ours is, the least and greatest hypervolume.
+    /// Returns the evaluations per second of the fastest.
+    fn row(&self, name: &str, runs: &[(f64, Vec<Vec<f64>>)], ours: Option<f64>) -> f64 {
         let volume = |front: &[Vec<f64>]| {
             let points: Vec<&[f64]> = front.iter().map(Vec::as_slice).collect();
-            hypervolume(&points, problem.reference())
+            hypervolume(&points, &self.reference)
         };
-        Figures {
-            seconds: runs.iter().map(|run| run.0).collect(),
-            volumes: runs.iter().map(|run| volume(&run.1)).collect(),
-        }
-    }
-
-    fn fastest(&self) -> f64 {
-        f64::from(EVALUATIONS) / self.seconds.iter().copied().fold(f64::INFINITY, f64::min)
-    }
-
-    fn row(&self, problem: Problem, name: &str, ours: f64) {
-        let low = self.volumes.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = self.volumes.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let (rate, times) = (self.fastest(), ours / self.fastest());
-        println!("| {} | {name} | {rate:.0} | {times:.2} | {low:.4} to {high:.4} |", problem.name());
+        let volumes: Vec<f64> = runs.iter().map(|(_, front)| volume(front)).collect();
+        let low = volumes.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = volumes.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let seconds = runs.iter().map(|(seconds, _)| *seconds).fold(f64::INFINITY, f64::min);
+        let rate = f64::from(self.evaluations) / seconds;
+        let times = ours.unwrap_or(rate) / rate;
+        let (algorithm, problem) = (self.algorithm, self.problem);
+        println!("| {algorithm} | {problem} | {name} | {rate:.0} | {times:.2} | {low:.4} to {high:.4} |");
+        rate
     }
 }
 
 fn beside_others(_: &mut Criterion) {
-    println!("| problem | implementation | evaluations per second | ours, as a multiple | hypervolume, 5 seeds |");
-    println!("|---|---|---:|---:|---:|");
-    for problem in Problem::ALL {
-        let mut figures: [Vec<(f64, Vec<Vec<f64>>)>; 3] = Default::default();
+    println!(
+        "| algorithm | problem | implementation | evaluations per second | ours, as a multiple | \
+         hypervolume, 5 seeds |\n|---|---|---|---:|---:|---:|"
+    );
+    for contest in contests() {
+        let mut ours = Vec::new();
+        let mut theirs = vec![Vec::new(); contest.others.len()];
         for seed in 1..=5 {
             let start = Instant::now();
-            let front = approximate(problem, POPULATION, EVALUATIONS, seed);
-            figures[0].push((start.elapsed().as_secs_f64(), front));
-            for (library, theirs) in ["pygmo", "pymoo"].into_iter().zip(1..) {
-                let (population, evaluations) = (POPULATION, EVALUATIONS);
-                let run = Run { library, problem: problem.name(), population, evaluations, seed };
+            let front = (contest.ours)(seed);
+            ours.push((start.elapsed().as_secs_f64(), front));
+            for (library, runs) in contest.others.iter().zip(&mut theirs) {
+                let Contest { problem, population, evaluations, .. } = contest;
+                let run = Run { library, problem, population, evaluations, seed };
                 // Python is started anew for each, and not counted.
                 let Some(ran) = ask::<Run, Ran>(&[run]) else { continue };
-                figures[theirs].extend(ran.into_iter().map(|ran| (ran.seconds, ran.front)));
+                runs.extend(ran.into_iter().map(|ran| (ran.seconds, ran.front)));
             }
         }
-        let ours = Figures::of(problem, &figures[0]);
-        ours.row(problem, "Sesame", ours.fastest());
-        for (name, runs) in ["pygmo", "pymoo"].into_iter().zip(&figures[1..]) {
+        let rate = contest.row("Sesame", &ours, None);
+        for (name, runs) in contest.others.iter().zip(&theirs) {
             if runs.is_empty() {
                 println!("no Python with {name}: set SESAME_OPTIMISERS_PYTHON to the one that `./test --long` makes");
             } else {
-                Figures::of(problem, runs).row(problem, name, ours.fastest());
+                contest.row(name, runs, Some(rate));
             }
         }
     }
