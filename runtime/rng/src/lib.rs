@@ -3,6 +3,8 @@
 //! Every stream is derived from the campaign's seed and the path of its purpose, never from another stream's state. So
 //! an additional operation or worker does not shift the random numbers of others, and no state needs to be saved to
 //! resume.
+//!
+//! The functions are inlined, since searches and relays draw in their innermost loops, and purposes are mostly constants.
 
 use rand_core::Rng as _;
 use rand_pcg::Pcg64;
@@ -21,21 +23,25 @@ impl Stream {
     }
 
     /// 64 random bits.
+    #[inline]
     pub fn bits(&mut self) -> u64 {
         self.0.next_u64()
     }
 
     /// Uniform in `[0, 1)`, with 53 random bits.
+    #[inline]
     pub fn unit(&mut self) -> f64 {
         unit_from_bits(self.bits())
     }
 
     /// Uniform in `[low, high)`, or `low` when the range is empty.
+    #[inline]
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
     /// Uniform over `0..n`; `n` must be positive.
+    #[inline]
     pub fn below(&mut self, n: usize) -> usize {
         assert!(n > 0, "a choice needs something to choose from");
         // The high half of a 64 × 64 bit product; the bias is below 2^-53 for every n that fits in memory.
@@ -45,11 +51,13 @@ impl Stream {
     }
 
     /// True with this probability.
+    #[inline]
     pub fn chance(&mut self, probability: f64) -> bool {
         self.unit() < probability
     }
 
     /// A standard normal number (Box–Muller, one of the pair).
+    #[inline]
     pub fn normal(&mut self) -> f64 {
         let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.unit()));
         radius * libm::cos(std::f64::consts::TAU * self.unit())
@@ -66,6 +74,7 @@ impl Stream {
 }
 
 /// The seed of a purpose under a seed.
+#[inline]
 pub fn derive_seed(seed: u64, purpose: &str, path: &[u64]) -> u64 {
     // FNV-1a over the purpose separates the names; `mix` after each step spreads every bit.
     let name = purpose
@@ -76,6 +85,7 @@ pub fn derive_seed(seed: u64, purpose: &str, path: &[u64]) -> u64 {
 
 /// A random number in `[0, 1)` keyed by a seed and two indices (message, field): the same key always gives the same
 /// number.
+#[inline]
 pub fn keyed_unit(seed: u64, message: u64, field: u64) -> f64 {
     unit_from_bits(mix(mix(seed ^ mix(message)) ^ field.wrapping_mul(0x9E37_79B9_7F4A_7C15)))
 }
