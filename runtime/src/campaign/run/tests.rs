@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use sesame_plan::{Confirmation, CoverageGoal, Dimension, GridAxis, Search, Statistic};
+use sesame_plan::{Confirmation, Count, CoverageGoal, Dimension, GridAxis, Search, Statistic};
 use sesame_results::record::{self, sample};
 use sesame_rng::Stream;
 
@@ -160,11 +160,30 @@ fn a_search_ends_at_the_generation_that_reaches_its_coverage() {
     goal.stop_at = Some(0.1);
     let folder = tempfile::tempdir().unwrap();
     let (end, _, events) = campaign(&plan, folder.path(), None, None);
-    let CampaignEnd::Finished(repository) = end.unwrap() else { panic!("nobody stopped it") };
+    let CampaignEnd::Finished(repository) = end.unwrap() else { panic!("it was stopped") };
     let reason = repository.campaign().stop.clone().unwrap();
     assert!(reason.starts_with("its coverage was reached: "), "{reason}");
     assert_eq!(events.last(), Some(&reason));
     assert_eq!(events.iter().filter(|event| event.starts_with("generation")).count(), 1);
+}
+
+#[test]
+fn a_search_ends_when_its_grid_is_exhausted_also_after_interruptions() {
+    let mut plan = plan();
+    plan.campaign.operations.truncate(1);
+    plan.campaign.count = Count { min: 1, max: 1 };
+    plan.campaign.search = Search::new(sesame_plan::Strategy::Grid { levels: 3 }, 1_000);
+    let tests = search::strategy(&plan, plan.campaign.seed).unwrap().tests().unwrap();
+    assert!((10..200).contains(&tests), "{tests}");
+    let whole = tempfile::tempdir().unwrap();
+    let (end, _, events) = campaign(&plan, whole.path(), None, None);
+    let CampaignEnd::Finished(repository) = end.unwrap() else { panic!("it was stopped") };
+    assert_eq!(events.last(), Some(&format!("all {tests} tests of the grid were evaluated")));
+    assert_eq!(repository.tests().unwrap().len() as u128, tests + 2, "two reference runs");
+
+    let stopped = tempfile::tempdir().unwrap();
+    while matches!(campaign(&plan, stopped.path(), Some(1), Some(7)).0.unwrap(), CampaignEnd::Interrupted) {}
+    assert_eq!(digest(stopped.path()), digest(whole.path()));
 }
 
 #[test]
