@@ -66,7 +66,7 @@ fn each_axis(point: &mut [f64; 3], mut new: impl FnMut(usize, f64) -> f64) -> bo
     changed
 }
 
-/// Numbers differ if their bits differ: the sign of a zero counts, and all NaNs are equal.
+/// Numbers differ if they compare unequal: zeros of both signs are equal, and so are all NaNs.
 fn put_real(place: &mut f64, new: f64) -> bool {
     let changed = *place != new && !(place.is_nan() && new.is_nan());
     *place = new;
