@@ -4,7 +4,8 @@
 //! an additional operation or worker does not shift the random numbers of others, and no state needs to be saved to
 //! resume.
 //!
-//! The functions are inlined, since searches and relays draw in their innermost loops, and purposes are mostly constants.
+//! The functions are inlined, since searches and relays draw in their innermost loops, and most purposes are
+//! constants.
 
 use rand_core::Rng as _;
 use rand_pcg::Pcg64;
