@@ -83,7 +83,22 @@ pub enum Copies {
     Once,
 }
 
+/// At most so many copies of one operation with disjoint windows are in one test: as short as they may be, they fill
+/// half of what is permitted. So there is always room to move.
+const MOST_APART: u32 = 500;
+
 impl Copies {
+    /// How many copies of one operation a test by time may contain; `offline` tells whether the operation
+    /// [is offline](crate::OperationKind::is_offline).
+    pub fn most(self, offline: bool) -> u32 {
+        match self {
+            Copies::Once => 1,
+            Copies::Apart if offline => 1,
+            Copies::Apart => MOST_APART,
+            Copies::MayOverlap => u32::MAX,
+        }
+    }
+
     #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
     fn is_default(&self) -> bool {
         *self == Copies::default()

@@ -6,10 +6,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Copies, KnownTestId};
 
-/// At most so many copies of one operation with disjoint windows are in one test: as short as they may be, they fill
-/// half of what is permitted. So there is always room to move.
-pub const MOST_APART: u32 = 500;
-
 /// What a campaign does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -134,13 +130,11 @@ impl Strategy {
     /// [is offline](crate::OperationKind::is_offline).
     pub fn most_copies(self, copies: Copies, offline: bool) -> u32 {
         match (self, copies) {
-            (_, Copies::Once) => 1,
             // In a grid copies differ in their windows, which begin and end at levels.
-            (_, Copies::Apart) | (Strategy::Grid { .. }, Copies::MayOverlap) if offline => 1,
+            (Strategy::Grid { .. }, _) if offline => 1,
             (Strategy::Grid { levels }, Copies::Apart) => levels.saturating_sub(1),
             (Strategy::Grid { levels }, Copies::MayOverlap) => levels.saturating_mul(levels.saturating_sub(1)) / 2,
-            (_, Copies::Apart) => MOST_APART,
-            (_, Copies::MayOverlap) => u32::MAX,
+            (_, copies) => copies.most(offline),
         }
     }
 

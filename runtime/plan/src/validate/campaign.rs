@@ -8,7 +8,7 @@ use crate::{
 
 use super::check::{
     Checked, at, at_least_one, distinct, each, filled, finite, integers, name, ordered, positive, positive_share,
-    require, share, unit,
+    require, share, unit, wrong,
 };
 
 impl CampaignPlan {
@@ -63,7 +63,7 @@ impl CampaignPlan {
             Search::Strategy { strategy, evaluations: _ } => match strategy.not_permitted() {
                 None => Ok(()),
                 Some((setting, _)) => {
-                    at("strategy", at(setting.keyword(), require(false, || format!("must be {}", setting.bounds()))))
+                    at("strategy", at(setting.keyword(), wrong(format!("must be {}", setting.bounds()))))
                 }
             },
             Search::Repeat { test, times: _ } => at("test", self.has_test(*test)),

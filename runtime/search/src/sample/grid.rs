@@ -1,4 +1,4 @@
-//! Grid search: the full factorial of equally spaced levels, in an order whose every beginning is balanced.
+//! Grid search: the full factorial of equally spaced levels, in a balanced order.
 //!
 //! Each number takes its levels: its least value, its greatest, and others equally spaced between them; of whole
 //! numbers no more than there are. Texts and files take all their values, each axis of a point takes its levels, and
@@ -16,7 +16,7 @@
 
 use std::collections::VecDeque;
 
-use sesame_plan::{Activation, CampaignPlan, Choice, Copies, OperationId, Shape, Test, TestOperation};
+use sesame_plan::{Activation, CampaignPlan, Choice, Copies, OperationId, Shape, Strategy, Test, TestOperation};
 use sesame_rng::derive_seed;
 
 use crate::SearchError;
@@ -126,7 +126,7 @@ impl FullFactorial {
         Ok(FullFactorial { seed, kinds, ways, lengths, tests })
     }
 
-    /// The next test with a number of operations; `None` if there are no further ones.
+    /// The next test with a number of operations; `None` if all were taken.
     fn next(&self, length: &mut Length, index: u32) -> Option<Test> {
         let key = derive_seed(self.seed, "grid length", &[length.operations as u64]);
         let (rank, taken) = if length.begun < length.combinations {
@@ -207,12 +207,9 @@ impl Sampling for FullFactorial {
 
 impl Kind {
     fn most_copies(&self) -> usize {
-        let Some(times) = &self.times else { return 1 };
-        match self.copies {
-            Copies::Once => 1,
-            Copies::Apart => times.len() - 1,
-            Copies::MayOverlap => times.len() * (times.len() - 1) / 2,
-        }
+        // Of a short time there may be fewer levels than the campaign asks for.
+        let levels = self.times.as_ref().map_or(0, |times| u32::try_from(times.len()).expect("levels are few"));
+        Strategy::Grid { levels }.most_copies(self.copies, self.times.is_none()) as usize
     }
 
     /// How many values each choice of so many copies has: the windows of all, then the parameters of each.

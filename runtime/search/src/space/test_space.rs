@@ -13,9 +13,7 @@
 use std::collections::BTreeSet;
 
 use sesame_plan::condition::{Condition, ConditionSpace, Constraint};
-use sesame_plan::{
-    Activation, ActivationMode, CampaignPlan, Copies, Count, MOST_APART, OperationId, Test, TestOperation,
-};
+use sesame_plan::{Activation, ActivationMode, CampaignPlan, Copies, Count, OperationId, Test, TestOperation};
 use sesame_rng::Stream;
 
 use crate::SearchError;
@@ -144,9 +142,9 @@ impl TestSpace {
     /// How many copies of an operation a test may hold.
     pub fn most_copies(&self, kind: &OperationSpace) -> usize {
         match (self.copies, &kind.activation) {
-            (Copies::Once, _) | (Copies::Apart, ActivationSpace::Offline) => 1,
-            (Copies::Apart, ActivationSpace::Time(_)) => MOST_APART as usize,
-            (Copies::Apart, ActivationSpace::Condition { .. }) | (Copies::MayOverlap, _) => usize::MAX,
+            // A copy waits while another one is active.
+            (Copies::Apart, ActivationSpace::Condition { .. }) => usize::MAX,
+            (copies, activation) => copies.most(matches!(activation, ActivationSpace::Offline)) as usize,
         }
     }
 
