@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Sender, channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 
 use super::*;
 
@@ -17,6 +17,12 @@ struct Attack {
 }
 
 impl Attack {
+    /// An attack on a port that has not begun, and what tells when it has.
+    fn on(port: &Port) -> (Attack, Receiver<()>) {
+        let (begun, has_begun) = channel();
+        (Attack { address: port.address().unwrap(), begun, done: AtomicBool::new(false) }, has_begun)
+    }
+
     /// The strangers have connected: now the worker comes.
     fn begin(&self) {
         self.begun.send(()).unwrap();
@@ -38,8 +44,7 @@ impl Attack {
 fn attacked(strangers: impl Fn(&Attack) + Sync) -> (io::Result<TcpStream>, Duration) {
     let port = Port::open().unwrap();
     let (address, token) = (port.address().unwrap(), port.token().to_owned());
-    let (begun, has_begun) = channel();
-    let attack = Attack { address, begun, done: AtomicBool::new(false) };
+    let (attack, has_begun) = Attack::on(&port);
     thread::scope(|scope| {
         scope.spawn(|| strangers(&attack));
         has_begun.recv_timeout(Duration::from_secs(60)).expect("the attack begins");
@@ -96,8 +101,7 @@ fn a_byte_every_so_often_holds_up_nobody_and_does_not_move_the_deadline() {
     survives(slow);
     // Without a worker.
     let port = Port::open().unwrap();
-    let (begun, has_begun) = channel();
-    let attack = Attack { address: port.address().unwrap(), begun, done: AtomicBool::new(false) };
+    let (attack, has_begun) = Attack::on(&port);
     thread::scope(|scope| {
         scope.spawn(|| slow(&attack));
         has_begun.recv_timeout(Duration::from_secs(60)).expect("the attack begins");
@@ -129,7 +133,7 @@ fn a_frame_of_a_gibibyte_is_refused_by_its_length() {
 }
 
 #[test]
-fn what_is_no_greeting_or_has_another_token_is_turned_away() {
+fn a_wrong_greeting_and_a_wrong_token_are_turned_away() {
     survives(|attack| {
         let wrong = serde_json::to_vec(&Hello { lock_stepped: true, token: Some("0".repeat(32)) }).unwrap();
         let none = serde_json::to_vec(&Hello { lock_stepped: true, token: None }).unwrap();
