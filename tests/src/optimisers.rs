@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use sesame_optimise::problems::approximate_dtlz2;
+
 use crate::python::asked;
 
 /// The variable that names a Python with pygmo and pymoo; `./test --long` makes one and sets it.
@@ -21,6 +23,38 @@ pub struct Run {
     pub evaluations: u32,
     /// Seed.
     pub seed: u64,
+}
+
+/// DTLZ2 with many objectives, as NSGA-III solves it in the suite and in the benchmarks.
+#[derive(Debug, Clone, Copy)]
+pub struct ManyObjectives {
+    /// The problem's name in a [`Run`].
+    pub problem: &'static str,
+    /// How many objectives.
+    pub objectives: usize,
+    /// As many members as there are reference points, rounded up to an even number.
+    pub population: u32,
+    /// Evaluations in total.
+    pub evaluations: u32,
+}
+
+impl ManyObjectives {
+    /// With three and with five objectives.
+    pub const ALL: [ManyObjectives; 2] = [
+        ManyObjectives { problem: "dtlz2_3", objectives: 3, population: 92, evaluations: 23_000 },
+        ManyObjectives { problem: "dtlz2_5", objectives: 5, population: 212, evaluations: 42_400 },
+    ];
+
+    /// The final population of Sesame's NSGA-III.
+    pub fn approximated(self, seed: u64) -> Vec<Vec<f64>> {
+        approximate_dtlz2(self.objectives, self.population, self.evaluations, seed)
+    }
+
+    /// The request that pymoo's NSGA-III does the same.
+    pub fn request(self, seed: u64) -> Run {
+        let ManyObjectives { problem, population, evaluations, .. } = self;
+        Run { library: "pymoo nsga3", problem, population, evaluations, seed }
+    }
 }
 
 /// What a library made of a run.

@@ -8,9 +8,9 @@ use sesame_optimise::crowding::distances;
 use sesame_optimise::dominance::Fitness;
 use sesame_optimise::hypervolume::hypervolume;
 use sesame_optimise::igd::igd_plus;
-use sesame_optimise::problems::{Problem, approximate, approximate_dtlz2};
+use sesame_optimise::problems::{Problem, approximate};
 use sesame_optimise::sorting::fronts;
-use sesame_tests::optimisers::{Distance, Distant, PYTHON, Ran, Run, Sort, Sorted, ask};
+use sesame_tests::optimisers::{Distance, Distant, ManyObjectives, PYTHON, Ran, Run, Sort, Sorted, ask};
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=5;
 
@@ -71,17 +71,16 @@ fn nsga3_quality(population: &[Vec<f64>]) -> (f64, f64) {
 #[test]
 #[ignore = "long: needs Python's pymoo"]
 fn nsga3_reaches_on_dtlz2_with_three_and_five_objectives_what_that_of_pymoo_reaches() {
-    for (problem, objectives, population, evaluations) in [("dtlz2_3", 3, 92, 23_000), ("dtlz2_5", 5, 212, 42_400)] {
-        let requests: Vec<Run> =
-            SEEDS.map(|seed| Run { library: "pymoo nsga3", problem, population, evaluations, seed }).collect();
+    for many in ManyObjectives::ALL {
+        let problem = many.problem;
+        let requests: Vec<Run> = SEEDS.map(|seed| many.request(seed)).collect();
         let Some(theirs) = ask::<Run, Ran>(&requests) else {
             println!("skipped: {PYTHON} names no Python with pymoo");
             assert!(std::env::var_os("CI").is_none(), "CI has Python, so it has it");
             return;
         };
         let theirs: Vec<(f64, f64)> = theirs.iter().map(|ran| nsga3_quality(&ran.front)).collect();
-        let ours: Vec<(f64, f64)> =
-            SEEDS.map(|seed| nsga3_quality(&approximate_dtlz2(objectives, population, evaluations, seed))).collect();
+        let ours: Vec<(f64, f64)> = SEEDS.map(|seed| nsga3_quality(&many.approximated(seed))).collect();
         let volumes = |of: &[(f64, f64)]| of.iter().map(|(_, volume)| *volume).collect::<Vec<_>>();
         let (low, high) = band(&volumes(&theirs));
         let distances = |of: &[(f64, f64)]| median(of.iter().map(|(distance, _)| *distance).collect());

@@ -8,9 +8,9 @@ use std::time::Instant;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 
 use sesame_optimise::hypervolume::{WORK, hypervolume, measured};
-use sesame_optimise::problems::{Problem, approximate, approximate_dtlz2};
+use sesame_optimise::problems::{Problem, approximate};
 use sesame_rng::Stream;
-use sesame_tests::optimisers::{Ran, Run, ask};
+use sesame_tests::optimisers::{ManyObjectives, Ran, Run, ask};
 
 const POPULATION: u32 = 100;
 const EVALUATIONS: u32 = 25_000;
@@ -56,39 +56,38 @@ fn volumes(criterion: &mut Criterion) {
 struct Contest {
     algorithm: &'static str,
     problem: &'static str,
-    population: u32,
     evaluations: u32,
     /// Where hypervolumes end.
     reference: Vec<f64>,
     /// The final population of ours with a seed.
     ours: Box<dyn Fn(u64) -> Vec<Vec<f64>>>,
-    /// Other implementations, as requests name them.
-    others: &'static [&'static str],
+    /// What other implementations are asked for with a seed.
+    others: Vec<Box<dyn Fn(u64) -> Run>>,
 }
 
 fn contests() -> Vec<Contest> {
-    let of_two = Problem::ALL.into_iter().map(|problem| Contest {
+    let nsga2 = Problem::ALL.into_iter().map(|problem| Contest {
         algorithm: "NSGA-II",
         problem: problem.name(),
-        population: POPULATION,
         evaluations: EVALUATIONS,
         reference: problem.reference().to_vec(),
         ours: Box::new(move |seed| approximate(problem, POPULATION, EVALUATIONS, seed)),
-        others: &["pygmo", "pymoo"],
+        others: ["pygmo", "pymoo"].map(|library| request_of(library, problem)).into(),
     });
-    // As many members as there are reference points, rounded up to an even number.
-    let of_many = [("dtlz2_3", 3, 92, 23_000), ("dtlz2_5", 5, 212, 42_400)].into_iter().map(
-        |(problem, objectives, population, evaluations)| Contest {
-            algorithm: "NSGA-III",
-            problem,
-            population,
-            evaluations,
-            reference: vec![1.1; objectives],
-            ours: Box::new(move |seed| approximate_dtlz2(objectives, population, evaluations, seed)),
-            others: &["pymoo nsga3"],
-        },
-    );
-    of_two.chain(of_many).collect()
+    let nsga3 = ManyObjectives::ALL.into_iter().map(|many| Contest {
+        algorithm: "NSGA-III",
+        problem: many.problem,
+        evaluations: many.evaluations,
+        reference: vec![1.1; many.objectives],
+        ours: Box::new(move |seed| many.approximated(seed)),
+        others: vec![Box::new(move |seed| many.request(seed))],
+    });
+    nsga2.chain(nsga3).collect()
+}
+
+fn request_of(library: &'static str, problem: Problem) -> Box<dyn Fn(u64) -> Run> {
+    let (population, evaluations) = (POPULATION, EVALUATIONS);
+    Box::new(move |seed| Run { library, problem: problem.name(), population, evaluations, seed })
 }
 
 impl Contest {
@@ -123,16 +122,15 @@ fn beside_others(_: &mut Criterion) {
             let start = Instant::now();
             let front = (contest.ours)(seed);
             ours.push((start.elapsed().as_secs_f64(), front));
-            for (library, runs) in contest.others.iter().zip(&mut theirs) {
-                let Contest { problem, population, evaluations, .. } = contest;
-                let run = Run { library, problem, population, evaluations, seed };
+            for (request, runs) in contest.others.iter().zip(&mut theirs) {
                 // Python is started anew for each, and not counted.
-                let Some(ran) = ask::<Run, Ran>(&[run]) else { continue };
+                let Some(ran) = ask::<Run, Ran>(&[request(seed)]) else { continue };
                 runs.extend(ran.into_iter().map(|ran| (ran.seconds, ran.front)));
             }
         }
         let rate = contest.row("Sesame", &ours, None);
-        for (name, runs) in contest.others.iter().zip(&theirs) {
+        for (request, runs) in contest.others.iter().zip(&theirs) {
+            let name = request(0).library;
             if runs.is_empty() {
                 println!("no Python with {name}: set SESAME_OPTIMISERS_PYTHON to the one that `./test --long` makes");
             } else {
