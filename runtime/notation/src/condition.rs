@@ -24,7 +24,7 @@ pub(crate) fn named<'a>(metrics: &'a [Metric]) -> impl Fn(MetricId) -> (&'a str,
     }
 }
 
-/// A condition over metrics with the names and units that a function gives, for where there is no plan yet.
+/// As [`write()`], with the names and units of metrics from a function: for a caller that has no plan.
 pub fn write_named<'a>(condition: &Condition, metric: &impl Fn(MetricId) -> (&'a str, Unit<'a>)) -> String {
     let enclosed = |condition: &Condition, parentheses: bool| {
         let text = write_named(condition, metric);
@@ -143,16 +143,14 @@ mod tests {
     use proptest::prelude::*;
 
     use sesame_base::condition::testing::{above, and, any_condition, below, compare, or, variable};
-    use sesame_plan::testing as fixture;
+    use sesame_plan::{MetricSource, testing as fixture};
 
     use super::*;
 
     fn metrics() -> Vec<Metric> {
-        let one = fixture::plan(Vec::new()).metrics.swap_remove(1);
         let metric = |name: &str, unit: Option<&str>| Metric {
-            name: name.to_owned(),
             unit: unit.map(str::to_owned),
-            ..one.clone()
+            ..fixture::metric(name, MetricSource::FuzzingTime)
         };
         vec![metric("speed", Some("m/s")), metric("near_zone1", None), metric("e", Some("eV"))]
     }
@@ -175,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_condition_is_refused() {
+    fn text_that_is_not_a_condition_is_refused() {
         let refused = |text| read(text, &metrics()).unwrap_err();
         assert_eq!(refused("speed > 3"), "`3` is neither a metric nor a number with its unit");
         assert_eq!(refused("speed >= 3m/s"), "`>=` is not a comparison operator");

@@ -132,7 +132,8 @@ fn campaign_text(
         } else {
             let repeated = &original.campaigns[place.0].tests[place.1];
             let over = first_end(original, place);
-            let Some(members) = held_by(writer, repeated, over).or_else(|| undisturbed(writer, repeated, end)) else {
+            let Some(members) = held_by(writer, repeated, over).or_else(|| harmless_member(writer, repeated, end))
+            else {
                 return leave_out(writer, "nothing of the test that it repeats can be said");
             };
             let name = known_test(writer, repeated, members, tests);
@@ -309,7 +310,7 @@ fn known_test(writer: &mut Writer<'_>, test: &Test, members: Vec<String>, text: 
 }
 
 /// The member of a regression test that disturbs nothing: an operation that adds 0, or loses nothing.
-fn undisturbed(writer: &mut Writer<'_>, test: &Test, end: f64) -> Option<Vec<String>> {
+fn harmless_member(writer: &mut Writer<'_>, test: &Test, end: f64) -> Option<Vec<String>> {
     if !test.operations.is_empty() {
         return None;
     }
@@ -573,7 +574,7 @@ fn settled_at(writer: &Writer<'_>, condition: &Condition, level: u32) -> Result<
         Condition::Compare(left, by, right) => {
             let named = |metric: Reference| {
                 let at = writer.original.metric(metric).filter(|&at| writer.mapped.metrics[at].is_some());
-                at.ok_or_else(|| "its condition compares what is no metric".to_owned())
+                at.ok_or_else(|| "its condition compares something that is not a metric".to_owned())
             };
             let variable = named(*left)?;
             let timed = is_timed(writer, variable);

@@ -60,7 +60,7 @@ pub(crate) fn record(
     Ok(Recorded { tests: campaign.tests.len(), sets: sets.len() })
 }
 
-/// The number of a performed test: T0 is the undisturbed run, which the original never made.
+/// The number of a performed test: T0 is the reference run, which the original never made.
 fn number_of(index: usize) -> u32 {
     u32::try_from(index + 1).expect("a file holds fewer than 2^32 tests")
 }
@@ -191,7 +191,7 @@ impl Importer<'_> {
         let metric = |reference| {
             let name = self.original.metric(reference).and_then(|at| self.mapped.metrics[at].as_deref());
             let id = name.and_then(|name| self.metrics.get(name)).copied();
-            id.ok_or_else(|| "its condition compares what is no metric".to_owned())
+            id.ok_or_else(|| "its condition compares something that is not a metric".to_owned())
         };
         Ok(match condition {
             Condition::Compare(left, by, right) => plan_condition::Condition::Compare {

@@ -22,7 +22,7 @@ use sesame_plan::{
     Parameter, Recorded, Search, Shape, Span, Statistic, StopRule, Test, TestOperation,
 };
 
-/// Units that are no symbols of their own.
+/// Units that are made up of several symbols.
 const COMPOUND: [&str; 5] = ["km/h", "rad/s^2", "kg*m/s", "N*m", "m^2/s"];
 
 /// Topics and metrics in every unit of the language; messages for what has none.

@@ -303,7 +303,7 @@ mod tests {
             let test_space = TestSpace::from_plan(&plan).unwrap();
             let trajectories = VariableTrajectories::from_observation(
                 &plan,
-                &crate::testing::synthetic_robots::SyntheticRobot::undisturbed(&plan),
+                &crate::testing::synthetic_robots::SyntheticRobot::without_disturbance(&plan),
             )
             .unwrap();
             let (mut same, mut active) = (0, 0);
@@ -354,7 +354,7 @@ mod tests {
         assert_eq!(whole, run(4));
         assert_ne!(whole, run(5));
         let mut resumed = strategy(&plan, 4).unwrap();
-        resumed.begin(&crate::testing::synthetic_robots::SyntheticRobot::undisturbed(&plan));
+        resumed.begin(&crate::testing::synthetic_robots::SyntheticRobot::without_disturbance(&plan));
         for stored in whole.chunks(10).take(5) {
             let asked: Vec<Test> = resumed.ask().into_iter().map(|candidate| candidate.test).collect();
             assert_eq!(asked, stored.iter().map(|result| result.test.clone()).collect::<Vec<_>>());

@@ -30,7 +30,7 @@ pub(crate) struct SampledSearch<S> {
     evaluations: u32,
     asked: u32,
     awaited: usize,
-    /// Whether there are no further tests to ask for.
+    /// Whether all tests were asked for.
     over: bool,
 }
 

@@ -202,7 +202,7 @@ impl SyntheticRobot {
     }
 
     /// What is recorded of a run: nothing that a test does changes what conditions see.
-    pub fn undisturbed(plan: &CampaignPlan) -> Observation {
+    pub fn without_disturbance(plan: &CampaignPlan) -> Observation {
         let series =
             |metric| (0u32..350).map(|slot| f64::from(slot) * 0.2).map(|t| (t, Self::signal(metric, t))).collect();
         let metrics = (0u32..).map(MetricId).take(plan.metrics.len());
@@ -220,7 +220,7 @@ impl SyntheticRobot {
 
     /// As [`SyntheticRobot::campaign`], of a plan that is by condition perhaps.
     pub fn campaign_of(&self, plan: &CampaignPlan, strategy: &mut dyn Strategy) -> Run {
-        let reference = Self::undisturbed(plan);
+        let reference = Self::without_disturbance(plan);
         strategy.begin(&reference);
         // Series are the same in all runs, and most of the work.
         let recorded = if strategy.reads_series() { reference } else { reference.without_series() };

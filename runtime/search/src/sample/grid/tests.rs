@@ -226,7 +226,7 @@ proptest! {
             for (counts, &rank) in counts.iter_mut().zip(&ranks) {
                 counts[place(rank)] += 1;
                 let (least, most) = (counts.iter().min().unwrap(), counts.iter().max().unwrap());
-                // Where the sizes are no multiples of each other, each change of the digit cuts a group of values off.
+                // Unless one size is a multiple of the other, each change of the digit cuts a group of values off.
                 prop_assert!(most - least <= 1 + counts.len() as u128 / 2, "{:?} after {} of {:?}", counts, index + 1, sizes);
             }
             prop_assert!(seen.insert(ranks), "{} of {:?}", index, sizes);

@@ -175,7 +175,7 @@ impl Maker {
                 }
             })
             .collect();
-        // The robustness of a formula is no condition variable: it is known only when the run is over.
+        // The robustness of a formula is not a condition variable: it is known only when the run is over.
         let readable = |metric: &&(u32, &Metric)| !matches!(metric.1.source, MetricSource::Robustness { .. });
         let variables: Vec<MetricId> =
             (0u32..).zip(metrics).collect::<Vec<_>>().iter().filter(readable).map(|it| MetricId(it.0)).collect();
