@@ -6,7 +6,7 @@
 
 use crate::{
     Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Copies, Count, Distribution, Domain, Drain,
-    Field, FieldRef, KnownTest, MessageId, MessageType, Metric, MetricId, MetricSource, Operation, OperationId,
+    Field, FieldRef, KnownTest, MessageId, MessageType, Metric, MetricId, MetricSource, Node, Operation, OperationId,
     OperationKind, Parameter, Requirement, SCHEMA, Search, Shape, Simulator, Span, Step, Strategy, Test, TestOperation,
     Topic, TopicId, Transport, Type, ValueMode,
 };
@@ -72,6 +72,11 @@ pub fn field(name: &str, ty: Type) -> Field {
 /// A topic, or a group of topics.
 pub fn topic(name: &str, paths: &[&str], ty: Type) -> Topic {
     Topic { name: name.to_owned(), doc: String::new(), paths: paths.iter().map(|&path| path.to_owned()).collect(), ty }
+}
+
+/// A node that neither publishes nor subscribes.
+pub fn node(name: &str) -> Node {
+    Node { name: name.to_owned(), doc: String::new(), publishes: Vec::new(), subscribes: Vec::new() }
 }
 
 /// A metric without a unit, a direction or a trend.

@@ -10,7 +10,6 @@ use sesame_results::record::{self, Recorder};
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled, shown};
 use crate::cli::failure::Failure;
-use crate::cli::results_folder::same_model;
 use crate::runner::Runner;
 
 /// How a campaign is run. Nothing here but the seed and the number of evaluations changes results.
@@ -79,9 +78,9 @@ pub(super) fn resume(
     let recorder = Recorder::resume(&folder, options.execution.workers())?;
     let campaign = recorder.repository().campaign();
     let (recorded, seed) = (campaign.plan.clone(), campaign.seed);
-    if !same_model(&recorded, plan) {
+    if let Some(difference) = recorded.model_difference(plan) {
         return Err(Failure(format!(
-            "the model has changed since {} was begun: start anew with `run`",
+            "the model has changed since {} was begun ({difference}): start anew with `run`",
             shown(&folder)
         )));
     }

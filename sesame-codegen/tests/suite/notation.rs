@@ -398,7 +398,7 @@ fn campaign(like: &Campaign, metrics: &[Metric], end_after: f64) -> impl Strateg
 }
 
 /// A plan like this one with some of its operations, with other numbers, texts, tests and settings.
-fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<> {
+pub(crate) fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<> {
     let (like, metrics) = (like.clone(), u32::try_from(like.metrics.len()).expect("there are a few metrics"));
     let settings = like.clone();
     let campaigns = (1.0..1e4f64).prop_flat_map(move |end| campaign(&settings.campaign, &settings.metrics, end));
@@ -425,7 +425,7 @@ fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<> {
 
 /// A plan that a failure shows as text.
 #[derive(Clone)]
-struct Shown(CampaignPlan);
+pub(crate) struct Shown(pub(crate) CampaignPlan);
 
 impl fmt::Debug for Shown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -434,7 +434,7 @@ impl fmt::Debug for Shown {
 }
 
 /// A system in every unit, and the plan of a campaign with each operation.
-fn everything() -> (String, CampaignPlan) {
+pub(crate) fn everything() -> (String, CampaignPlan) {
     let units: Vec<&str> = units::symbols().chain(COMPOUND).chain([""]).collect();
     let system = system(&units);
     let operations = operations(&units);
