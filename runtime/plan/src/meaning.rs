@@ -129,7 +129,7 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
         } = operation;
         doc.clear();
     }
-    for KnownTest { name: _, doc, test: _, expectations: _ } in tests {
+    for KnownTest { name: _, doc, test: _, expectations: _, simulator_seed: _ } in tests {
         doc.clear();
     }
     let Campaign {

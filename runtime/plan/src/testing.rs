@@ -102,7 +102,7 @@ pub fn requirement(name: &str, metric: u32, bound: Bound) -> Requirement {
 
 /// A known test that expects nothing.
 pub fn known_test(name: &str, test: Test) -> KnownTest {
-    KnownTest { name: name.to_owned(), doc: String::new(), test, expectations: Vec::new() }
+    KnownTest { name: name.to_owned(), doc: String::new(), test, expectations: Vec::new(), simulator_seed: None }
 }
 
 /// An operation that is permitted in the first ten seconds, on whole messages of a topic; on no topic if it acts beside

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use sesame_plan::{Confirmation, Count, CoverageGoal, Dimension, GridAxis, Search, Statistic};
+use sesame_plan::{Confirmation, Count, CoverageGoal, Dimension, GridAxis, KnownTest, KnownTestId, Search, Statistic};
 use sesame_results::record::{self, sample};
 use sesame_rng::Stream;
 
@@ -233,4 +233,32 @@ impl Executor for Deaf<'_> {
     fn set_timeout(&mut self, timeout: Duration) {
         self.0.set_timeout(timeout);
     }
+}
+
+#[test]
+fn a_regression_test_runs_with_the_seed_that_it_names_whatever_the_seed_of_the_campaign() {
+    let mut plan = sample::plan();
+    let seeded = KnownTest { name: "seeded".to_owned(), simulator_seed: Some(11), ..plan.tests[0].clone() };
+    plan.tests.push(seeded);
+    let task = Task::Known { tests: vec![KnownTestId(0), KnownTestId(1)] };
+    let values = |seed: u64| {
+        let folder = tempfile::tempdir().unwrap();
+        let claim = record::claim_folder(folder.path(), "known").unwrap();
+        let recorder = Recorder::create_in(claim, &plan, &task, seed, 1).unwrap();
+        let interrupted = AtomicBool::new(false);
+        let (order, waiting) = (None, Vec::new());
+        let mut executor =
+            InThread { plan: &plan, order, waiting, run: 0, stop_after: None, interrupted: &interrupted };
+        let strategy = search::strategy_of_task(&plan, &task, seed).unwrap();
+        let settings = Settings { seed, ..settings(&plan) };
+        let end = run_with(&plan, strategy, recorder, &settings, &mut executor, &interrupted, &mut |_, _| {}).unwrap();
+        let CampaignEnd::Finished(repository) = end else { panic!("it was stopped") };
+        let run = |name: &str| repository.test(repository.find(name).unwrap()).unwrap();
+        let [unseeded, seeded] = [run("known_jitter"), run("seeded")];
+        assert_eq!((unseeded.test, seeded.simulator_seed), (seeded.test, 11));
+        (unseeded.observation.metrics, seeded.observation.metrics)
+    };
+    let [one, other] = [values(1), values(7)];
+    assert_ne!(one.0, other.0);
+    assert_eq!(one.1, other.1);
 }
