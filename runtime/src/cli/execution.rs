@@ -262,6 +262,7 @@ struct Concluded<'a> {
     results: &'a Path,
     /// The page with pictures.
     report: &'a Path,
+    /// The hash of the run's content.
     digest: String,
     #[serde(flatten)]
     summary: &'a Summary,
