@@ -4,6 +4,7 @@
 //! and passes there, but not where `CI=true`.
 #![cfg(test)]
 
+mod json_page;
 mod rules;
 
 use std::fs;

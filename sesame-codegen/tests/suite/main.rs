@@ -5,6 +5,7 @@ mod command;
 mod emission;
 mod emitted;
 mod hostile_checkout;
+mod meaning;
 mod mutated_imports;
 mod notation;
 mod options;

@@ -373,7 +373,7 @@ impl<'a> Indexer<'a> {
     }
 
     fn test(&mut self, test: &'a Test, id: DefinitionId) {
-        let Test { head: _, operations, expectations, has_errors: _ } = test;
+        let Test { head: _, operations, expectations, simulator_seeds: _, has_errors: _ } = test;
         for used in operations {
             let operation = self.mention(&used.operation, id);
             for (name, _) in &used.choices {

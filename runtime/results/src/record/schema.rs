@@ -33,6 +33,8 @@ pub(super) const STANDARD_WORDS_SINCE: i64 = 7;
 pub(super) const PIECES_SINCE: i64 = 6;
 /// The first schema with the column `task`.
 pub(super) const TASK_SINCE: i64 = 7;
+/// The first schema whose digest is over the meaning of the plan; before, it was over all of its JSON.
+pub(super) const MEANING_SINCE: i64 = 7;
 
 /// Columns that this release reads from tables, and their names before [`STANDARD_WORDS_SINCE`].
 const RENAMED: [(&str, &str); 2] = [("operation_seed", "draw_seed"), ("no_effect", "void")];
@@ -42,11 +44,7 @@ pub(super) fn query(sql: &str, schema: i64) -> Cow<'_, str> {
     if schema >= STANDARD_WORDS_SINCE {
         return Cow::Borrowed(sql);
     }
-    let sql = if schema < TASK_SINCE {
-        sql.replace(", task FROM", " FROM").replace("coalesce(plan || task, plan)", "plan")
-    } else {
-        sql.to_owned()
-    };
+    let sql = if schema < TASK_SINCE { sql.replace(", task FROM", " FROM") } else { sql.to_owned() };
     Cow::Owned(RENAMED.iter().fold(sql, |sql, (now, before)| sql.replace(now, before)))
 }
 

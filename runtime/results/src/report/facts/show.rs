@@ -1,5 +1,6 @@
 //! The tests of a campaign: a line for each, or everything on one.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -34,8 +35,10 @@ pub struct ListedTest {
     pub duplicate_of: Option<TestNumber>,
     /// Whether it is on the front.
     pub front: bool,
-    /// A value per metric of the plan, in its order.
+    /// A value per metric of the plan, in the order of the list's `metrics`.
     pub values: Vec<MetricValue>,
+    /// The value of each metric, by its name; `None` where there is none.
+    pub measured: BTreeMap<String, Option<f64>>,
     /// Names of the requirements it violates.
     pub violates: Vec<String>,
     /// Its operations, as in `jitter_link0 ×2, lose_link0`.
@@ -213,6 +216,12 @@ fn listed(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow, front: bool) ->
         duplicate_of: row.duplicate_of.map(TestNumber),
         front,
         values: row.values.clone(),
+        measured: plan
+            .metrics
+            .iter()
+            .zip(&row.values)
+            .map(|(metric, shown)| (metric.name.clone(), shown.value))
+            .collect(),
         violates: wording::violated(plan, judge, row),
         operations: wording::operations(plan, row),
     }

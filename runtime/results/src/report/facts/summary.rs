@@ -34,7 +34,7 @@ pub struct Summary {
     pub counts: Counts,
     /// What the search optimised, in the campaign's order.
     pub objectives: Vec<Objective>,
-    /// The tests no other is better than: most dangerous first, see [`summary`].
+    /// The tests no other is better than: most dangerous first.
     pub front: Vec<FrontTest>,
     /// How the campaign confirms the tests of its front, if it does.
     #[serde(skip_serializing_if = "Option::is_none")]
