@@ -21,7 +21,11 @@ pub(super) fn formula(formula: &model::Formula) -> plan::Formula {
 }
 
 pub(super) fn inputs(inputs: &[model::Input]) -> Vec<plan::Input> {
-    let inputs = inputs.iter().map(|input| plan::Input { field: field(&input.field), members: input.members });
+    let inputs = inputs.iter().map(|input| plan::Input {
+        field: field(&input.field),
+        members: input.members,
+        text: input.text.clone(),
+    });
     inputs.collect()
 }
 

@@ -5,7 +5,8 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::model::condition::{
     Comparison, Condition, ConditionSpace, Constraint, Integers, Operand, ValueRange, Variable,
 };
-use crate::model::{Activation, Aggregate, End, Expression, Id as _, Metric, MetricId, MetricSource, Range};
+use crate::model::{Activation, Aggregate, BinaryFunction, End, Expression, Id as _, Metric, MetricId, MetricSource};
+use crate::model::{Range, UnaryFunction};
 use crate::span::Span;
 use crate::syntax::ast::{self, ByCondition, Contained, ExpressionKind, Relation, Trigger, TriggerEnd};
 use crate::units::{Unit, convert, dimension};
@@ -178,6 +179,7 @@ impl<'a> Resolver<'a> {
                     | ExpressionKind::Any(_) => {
                         format!("`{written}` is a condition, not a metric")
                     }
+                    ExpressionKind::Text(_) => format!("`{written}` is a text, but metrics are numbers"),
                     _ => format!("`{written}` is an expression, not a metric"),
                 };
                 let diagnostic = Diagnostic::new(Code::NOT_A_CONDITION, side.span, title)
@@ -509,11 +511,17 @@ fn known_of(metric: &Metric) -> ValueRange {
 fn never_negative(expression: &Expression) -> bool {
     match expression {
         Expression::Constant(value) => *value >= 0.0,
-        Expression::Absolute(_) | Expression::Distance { .. } => true,
+        Expression::Absolute(_) | Expression::Distance { .. } | Expression::Time => true,
         Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) => of.iter().all(never_negative),
         Expression::Max(of) => of.iter().any(never_negative),
         Expression::Divide { value, by } => never_negative(value) && never_negative(by),
-        Expression::Input(_) | Expression::Negate(_) => false,
+        Expression::Unary { function: UnaryFunction::Sqrt | UnaryFunction::Exp | UnaryFunction::Acos, .. }
+        | Expression::Binary { function: BinaryFunction::Hypot, .. } => true,
+        Expression::Input(_)
+        | Expression::Negate(_)
+        | Expression::SignedDistance { .. }
+        | Expression::Unary { .. }
+        | Expression::Binary { .. } => false,
     }
 }
 
