@@ -170,18 +170,28 @@ impl Value {
     /// or `z` of a point.
     pub fn number_at<S: AsRef<str>>(&self, path: &[S]) -> Option<f64> {
         match self.at(path) {
-            Some(Value::Real(x)) => Some(*x),
-            Some(Value::Int(n)) => Some(*n as f64),
-            Some(Value::Bool(b)) => Some(f64::from(u8::from(*b))),
-            Some(_) => None,
-            None => {
-                let (coordinate, before) = path.split_last()?;
-                let axis = ["x", "y", "z"].iter().position(|axis| *axis == coordinate.as_ref())?;
-                match self.at(before)? {
-                    Value::Point(point) => Some(point[axis]),
-                    _ => None,
-                }
-            }
+            Some(value) => value.number(),
+            None => self.coordinate_at(path),
+        }
+    }
+
+    /// This value as a number: a real, a whole number, a truth value as 0 or 1.
+    pub(crate) fn number(&self) -> Option<f64> {
+        match self {
+            Value::Real(x) => Some(*x),
+            Value::Int(n) => Some(*n as f64),
+            Value::Bool(b) => Some(f64::from(u8::from(*b))),
+            _ => None,
+        }
+    }
+
+    /// The coordinate of a point at the end of a path: `x`, `y` or `z`.
+    pub(crate) fn coordinate_at<S: AsRef<str>>(&self, path: &[S]) -> Option<f64> {
+        let (coordinate, before) = path.split_last()?;
+        let axis = ["x", "y", "z"].iter().position(|axis| *axis == coordinate.as_ref())?;
+        match self.at(before)? {
+            Value::Point(point) => Some(point[axis]),
+            _ => None,
         }
     }
 

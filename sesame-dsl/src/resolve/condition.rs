@@ -161,7 +161,15 @@ impl<'a> Resolver<'a> {
         match &side.kind {
             ExpressionKind::Number(quantity) => Some(Side::Number(quantity)),
             ExpressionKind::Field(path) if path.fields.is_empty() => {
-                let index = self.find(&path.topic, Kind::Metric)?;
+                let before = self.diagnostics.len();
+                let found = self.find(&path.topic, Kind::Metric);
+                if path.topic.text == "time"
+                    && let Some(diagnostic) = self.diagnostics.get_mut(before)
+                {
+                    let note = "to act from a time on, write a window such as `from 5s to 10s` instead of a condition";
+                    diagnostic.notes.push(note.to_owned());
+                }
+                let index = found?;
                 let id = MetricId::from_index(index);
                 self.metrics[index].is_some().then_some(())?;
                 self.known_during_a_test(id, side.span)?;
@@ -182,9 +190,15 @@ impl<'a> Resolver<'a> {
                     ExpressionKind::Text(_) => format!("`{written}` is a text, but metrics are numbers"),
                     _ => format!("`{written}` is an expression, not a metric"),
                 };
+                let note = match kind {
+                    ExpressionKind::Text(_) => format!(
+                        "a condition compares metrics; `when tower == {written} then time` is a metric, and so is `when tower != {written} then time`: the greater of the two is the state that holds"
+                    ),
+                    _ => "a condition compares metrics; declare one for what you want to compare, for example `metric near = last(near1.level)`".to_owned(),
+                };
                 let diagnostic = Diagnostic::new(Code::NOT_A_CONDITION, side.span, title)
                     .label("expected a metric or a number")
-                    .note("a condition compares metrics; declare one for what you want to compare, for example `metric near = last(near1.level)`");
+                    .note(note);
                 self.report(diagnostic);
                 None
             }

@@ -20,12 +20,14 @@ pub(super) fn hear(
     let mut all_finite = true;
     for (at, input) in inputs.iter().enumerate().filter(|(_, input)| input.field.topic == topic) {
         let path = &input.field.path;
+        let number = |number: f64| [number, 0.0, 0.0];
         let held = match (value.at(path), &input.text) {
             (Some(Value::Point(point)), None) => Some(*point),
+            (Some(value), None) => value.number().map(number),
+            (None, None) => value.coordinate_at(path).map(number),
             (Some(Value::Text(text)), Some(TextTest::Is(wanted))) => Some(truth(text == wanted.as_str())),
             (Some(Value::Text(text)), Some(TextTest::IsNot(other))) => Some(truth(text != other.as_str())),
             (_, Some(_)) => None,
-            (_, None) => value.number_at(path).map(|number| [number, 0.0, 0.0]),
         };
         let Some(held) = held else { return Err(path.join(".")) };
         let finite = held.iter().all(|x| x.is_finite());
