@@ -31,9 +31,9 @@ use std::collections::BTreeMap;
 pub use sesame_plan::stl::Interval;
 pub use sesame_plan::{
     Aggregate, Averaging, BinaryFunction, BoostedChildren, Bound, Choice, Comparison, Condition, Confirmation, Copies,
-    Dimension, Direction, Distribution, Drain, Exploration, Expression, Members, Moment, NotFinite, OperationKind,
-    OwnSetting, Point, Recorded, Region, Setting, Shape, Statistic, Step, StopRule, Strategy, StrategyKind,
-    StrategyProperties, TextTest, Trend, UnaryFunction, ValueMode,
+    Dimension, Direction, Distance, Distribution, Drain, Exploration, Expression, Members, Moment, NotFinite,
+    OperationKind, OwnSetting, Point, Recorded, Region, Setting, Shape, SignedDistance, Statistic, Step, StopRule,
+    Strategy, StrategyKind, StrategyProperties, TextTest, Trend, UnaryFunction, ValueMode,
 };
 
 use crate::span::FileId;

@@ -136,21 +136,9 @@ pub enum Expression {
     /// The greatest.
     Max(Vec<Expression>),
     /// How far two points are from each other, in the unit of the first.
-    Distance {
-        /// The first.
-        from: Point,
-        /// The second.
-        to: Point,
-        /// How many units of the first one unit of the second is.
-        scale: f64,
-    },
+    Distance(Box<Distance>),
     /// How far a point is from the boundary of a region, in its own unit: positive outside, negative inside.
-    SignedDistance {
-        /// The point.
-        from: Point,
-        /// The region, in the unit of the point.
-        to: Region,
-    },
+    SignedDistance(Box<SignedDistance>),
     /// The simulation time since the beginning of the run, in seconds.
     Time,
     /// A function of one number.
@@ -177,8 +165,8 @@ impl Expression {
         match self {
             Expression::Constant(_)
             | Expression::Input(_)
-            | Expression::Distance { .. }
-            | Expression::SignedDistance { .. }
+            | Expression::Distance(_)
+            | Expression::SignedDistance(_)
             | Expression::Time => Vec::new(),
             Expression::Negate(of) | Expression::Absolute(of) | Expression::Unary { of, .. } => vec![of],
             Expression::Divide { value: left, by: right } | Expression::Binary { left, right, .. } => vec![left, right],
@@ -191,11 +179,31 @@ impl Expression {
     /// The points that it is directly computed from, in order.
     pub fn points(&self) -> Vec<Point> {
         match self {
-            Expression::Distance { from, to, .. } => vec![*from, *to],
-            Expression::SignedDistance { from, .. } => vec![*from],
+            Expression::Distance(distance) => vec![distance.from, distance.to],
+            Expression::SignedDistance(distance) => vec![distance.from],
             _ => Vec::new(),
         }
     }
+}
+
+/// How far two points are from each other.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Distance {
+    /// The first.
+    pub from: Point,
+    /// The second.
+    pub to: Point,
+    /// How many units of the first one unit of the second is.
+    pub scale: f64,
+}
+
+/// How far a point is from the boundary of a region.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SignedDistance {
+    /// The point.
+    pub from: Point,
+    /// The region, in the unit of the point.
+    pub to: Region,
 }
 
 /// A point in space.

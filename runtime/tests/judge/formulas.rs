@@ -289,8 +289,8 @@ fn value(of: &Expression, inputs: &[f64]) -> f64 {
         Expression::Min(of) => all(of).reduce(f64::min).unwrap(),
         Expression::Max(of) => all(of).reduce(f64::max).unwrap(),
         Expression::Divide { .. }
-        | Expression::Distance { .. }
-        | Expression::SignedDistance { .. }
+        | Expression::Distance(_)
+        | Expression::SignedDistance(_)
         | Expression::Time
         | Expression::Unary { .. }
         | Expression::Binary { .. } => unreachable!("no case has these"),

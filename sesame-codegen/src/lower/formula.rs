@@ -35,7 +35,7 @@ pub(super) fn side(outbound: bool) -> plan::Side {
 
 #[cfg(test)]
 mod tests {
-    use sesame_plan::{Expression, Input, Members, Point, Region};
+    use sesame_plan::{Distance, Expression, Input, Members, Point, Region, SignedDistance};
 
     #[test]
     fn what_earlier_versions_wrote_is_read_and_written_as_it_was() {
@@ -46,7 +46,7 @@ mod tests {
         assert_eq!(serde_json::to_string(&read).unwrap(), input);
         let read: Expression = serde_json::from_str(distance).unwrap();
         let (from, to) = (Point::Input(0), Point::Input(1));
-        assert_eq!(read, Expression::Distance { from, to, scale: 0.001 });
+        assert_eq!(read, Expression::Distance(Box::new(Distance { from, to, scale: 0.001 })));
         assert_eq!(serde_json::to_string(&read).unwrap(), distance);
     }
 
@@ -55,8 +55,8 @@ mod tests {
         let from = Point::Constant([0.1, -2.0, 1e-300]);
         let to = Region::Polygon { corners: vec![[0.0, 0.0], [1.0 / 3.0, 0.0], [0.0, 7.0]] };
         for of in [
-            Expression::SignedDistance { from, to },
-            Expression::Distance { from, to: Point::Input(3), scale: 1.0 },
+            Expression::SignedDistance(Box::new(SignedDistance { from, to })),
+            Expression::Distance(Box::new(Distance { from, to: Point::Input(3), scale: 1.0 })),
             Expression::Time,
         ] {
             let text = serde_json::to_string(&of).unwrap();

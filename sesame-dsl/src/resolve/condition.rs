@@ -525,15 +525,17 @@ fn known_of(metric: &Metric) -> ValueRange {
 fn never_negative(expression: &Expression) -> bool {
     match expression {
         Expression::Constant(value) => *value >= 0.0,
-        Expression::Absolute(_) | Expression::Distance { .. } | Expression::Time => true,
+        Expression::Absolute(_)
+        | Expression::Distance(_)
+        | Expression::Time
+        | Expression::Unary { function: UnaryFunction::Sqrt | UnaryFunction::Exp | UnaryFunction::Acos, .. }
+        | Expression::Binary { function: BinaryFunction::Hypot, .. } => true,
         Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) => of.iter().all(never_negative),
         Expression::Max(of) => of.iter().any(never_negative),
         Expression::Divide { value, by } => never_negative(value) && never_negative(by),
-        Expression::Unary { function: UnaryFunction::Sqrt | UnaryFunction::Exp | UnaryFunction::Acos, .. }
-        | Expression::Binary { function: BinaryFunction::Hypot, .. } => true,
         Expression::Input(_)
         | Expression::Negate(_)
-        | Expression::SignedDistance { .. }
+        | Expression::SignedDistance(_)
         | Expression::Unary { .. }
         | Expression::Binary { .. } => false,
     }

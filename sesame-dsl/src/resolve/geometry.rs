@@ -4,7 +4,7 @@ use super::Resolver;
 use super::formula::{Number, position};
 use super::region::scaled;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
-use crate::model::{Expression, FieldPath, Input, Point, Type};
+use crate::model::{Distance, Expression, FieldPath, Input, Point, SignedDistance, Type};
 use crate::span::Span;
 use crate::syntax::ast::{self, ExpressionKind, Members, Path};
 use crate::units::{Unit, convert, dimension};
@@ -26,13 +26,13 @@ impl<'a> Resolver<'a> {
         arguments: &'a [ast::Expression],
     ) -> Option<Number> {
         let (from, to) = match arguments {
-            [pairs] => match &pairs.kind {
-                ExpressionKind::Members(Members::EachPair, word, path) => return self.pairs(inputs, path, *word),
-                _ => {
-                    self.one_point(call, pairs);
-                    return None;
+            [pairs] => {
+                if let ExpressionKind::Members(Members::EachPair, word, path) = &pairs.kind {
+                    return self.pairs(inputs, path, *word);
                 }
-            },
+                self.one_point(call, pairs);
+                return None;
+            }
             [from, to] => (from, to),
             _ => {
                 self.wrong_count(call, "distance", "two points", arguments.len());
@@ -49,16 +49,16 @@ impl<'a> Resolver<'a> {
         match (left, right) {
             (Operand::Read { at, unit, .. }, Operand::Written(point, _)) => {
                 let to = Point::Constant(self.coordinates(point, unit.as_ref(), &self.quoted(from))?);
-                Some((Expression::Distance { from: Point::Input(at), to, scale: 1.0 }, unit))
+                Some((between(Point::Input(at), to, 1.0), unit))
             }
             (Operand::Written(point, _), Operand::Read { at, unit, .. }) => {
                 let from = Point::Constant(self.coordinates(point, unit.as_ref(), &self.quoted(to))?);
-                Some((Expression::Distance { from, to: Point::Input(at), scale: 1.0 }, unit))
+                Some((between(from, Point::Input(at), 1.0), unit))
             }
             (Operand::Written(left, unit), Operand::Written(right, _)) => {
                 let left = Point::Constant(self.coordinates(left, unit.as_ref(), "this point")?);
                 let right = Point::Constant(self.coordinates(right, unit.as_ref(), &self.quoted(from))?);
-                Some((Expression::Distance { from: left, to: right, scale: 1.0 }, unit))
+                Some((between(left, right, 1.0), unit))
             }
             (
                 Operand::Read { at: from_at, field: from_field, unit },
@@ -76,7 +76,7 @@ impl<'a> Resolver<'a> {
                     self.same_members(from_field.topic, to_field.topic, call)?;
                 }
                 let scale = convert(1.0, to_unit.as_ref(), unit.as_ref());
-                Some((Expression::Distance { from: Point::Input(from_at), to: Point::Input(to_at), scale }, unit))
+                Some((between(Point::Input(from_at), Point::Input(to_at), scale), unit))
             }
         }
     }
@@ -88,9 +88,9 @@ impl<'a> Resolver<'a> {
     /// The distances among a group's members.
     fn pairs(&mut self, inputs: &mut Vec<Input>, path: &'a Path, word: Span) -> Option<Number> {
         let (field, unit) = self.point_field(path)?;
-        let [first, second] = self.pair_of(path, field, word)?;
+        let [first, second] = self.pair_of(path, &field, word)?;
         let [from, to] = [first, second].map(|input| Point::Input(position(inputs, input)));
-        Some((Expression::Distance { from, to, scale: 1.0 }, unit))
+        Some((between(from, to, 1.0), unit))
     }
 
     fn one_point(&mut self, call: Span, argument: &'a ast::Expression) {
@@ -231,6 +231,10 @@ impl<'a> Resolver<'a> {
         let written = region.corners.iter().find_map(|corner| corner.coordinates[0].unit.as_ref());
         let own = written.and_then(|name| Unit::parse(&name.text).ok());
         let to = scaled(resolved?, convert(1.0, own.as_ref(), unit.as_ref()));
-        Some((Expression::SignedDistance { from, to }, unit))
+        Some((Expression::SignedDistance(Box::new(SignedDistance { from, to })), unit))
     }
+}
+
+fn between(from: Point, to: Point, scale: f64) -> Expression {
+    Expression::Distance(Box::new(Distance { from, to, scale }))
 }

@@ -59,9 +59,9 @@ impl<'a> Resolver<'a> {
     }
 
     /// The two inputs of each pair of a group's members.
-    pub(super) fn pair_of(&mut self, path: &'a Path, field: FieldPath, word: Span) -> Option<[Input; 2]> {
-        self.is_group(path, &field, ast::Members::EachPair, word)?;
-        let count = self.members_of(&field);
+    pub(super) fn pair_of(&mut self, path: &'a Path, field: &FieldPath, word: Span) -> Option<[Input; 2]> {
+        self.is_group(path, field, ast::Members::EachPair, word)?;
+        let count = self.members_of(field);
         let pairs = count * count.saturating_sub(1) / 2;
         if pairs > MOST_PAIRS {
             let title = format!("`{}` has {pairs} pairs of members, but the limit is {MOST_PAIRS}", path.topic.text);
@@ -86,9 +86,10 @@ impl<'a> Resolver<'a> {
         };
         let (each, pairs) = (topics(&[Members::Each]), topics(&[Members::First, Members::Second]));
         if !pairs.is_empty() && (pairs.len() > 1 || !each.is_empty()) {
-            let title = match each.is_empty() {
-                true => "`each pair of` refers to two groups in one formula",
-                false => "`each pair of` and `each of` cannot be combined in one formula",
+            let title = if each.is_empty() {
+                "`each pair of` refers to two groups in one formula"
+            } else {
+                "`each pair of` and `each of` cannot be combined in one formula"
             };
             let diagnostic = Diagnostic::new(Code::UNPAIRED, whole, title)
                 .label("expected the pairs of one group")

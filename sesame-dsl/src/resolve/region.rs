@@ -253,7 +253,7 @@ mod tests {
         let spike = |at: usize| {
             let half = (at / 250, at % 250);
             // Four sides of a saw-toothed square.
-            let (along, out) = (half.1 as f64, if half.1 % 2 == 0 { 0.0 } else { -5.0 });
+            let (along, out) = (half.1 as f64, if half.1.is_multiple_of(2) { 0.0 } else { -5.0 });
             match half.0 {
                 0 => [along, out],
                 1 => [250.0 - out, along],

@@ -64,8 +64,8 @@ fn expression(of: &Expression, inputs: usize) -> Checked {
         Expression::Constant(number) => finite(*number)?,
         Expression::Input(index) => input(*index)?,
         Expression::Min(of) | Expression::Max(of) => filled(of)?,
-        Expression::Distance { scale, .. } => finite(*scale)?,
-        Expression::SignedDistance { to, .. } => region(to)?,
+        Expression::Distance(distance) => finite(distance.scale)?,
+        Expression::SignedDistance(distance) => region(&distance.to)?,
         _ => {}
     }
     of.parts().into_iter().try_for_each(|part| expression(part, inputs))

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::fmt;
 
-use sesame_plan::{BinaryFunction, Condition, Expression, Point, UnaryFunction};
+use sesame_plan::{BinaryFunction, Condition, Distance, Expression, Point, UnaryFunction};
 
 use crate::metric::region::signed_distance;
 
@@ -77,15 +77,16 @@ pub(super) fn number(of: &Expression, at: &Moment<'_>) -> f64 {
         Expression::Absolute(of) => number(of, at).abs(),
         Expression::Min(of) => of.iter().map(|operand| number(operand, at)).reduce(least).unwrap_or(f64::NAN),
         Expression::Max(of) => of.iter().map(|operand| number(operand, at)).reduce(greatest).unwrap_or(f64::NAN),
-        Expression::Distance { from, to, scale } => {
-            let [from, to] = [from, to].map(|point| at.point(*point));
+        Expression::Distance(distance) => {
+            let Distance { from, to, scale } = **distance;
+            let [from, to] = [from, to].map(|point| at.point(point));
             let square = |axis: usize| {
                 let along = from[axis] - to[axis] * scale;
                 along * along
             };
             libm::sqrt(square(0) + square(1) + square(2))
         }
-        Expression::SignedDistance { from, to } => signed_distance(at.point(*from), to),
+        Expression::SignedDistance(distance) => signed_distance(at.point(distance.from), &distance.to),
         Expression::Time => at.time,
         Expression::Unary { function, of } => {
             let of = number(of, at);
@@ -176,7 +177,8 @@ mod tests {
     #[test]
     fn a_distance_is_in_the_unit_of_the_first_point() {
         let zero: Held = [0.0; 3];
-        let apart = |scale| Expression::Distance { from: Point::Input(0), to: Point::Input(1), scale };
+        let apart =
+            |scale| Expression::Distance(Box::new(Distance { from: Point::Input(0), to: Point::Input(1), scale }));
         assert_eq!(number(&apart(1.0), &[zero, INPUTS[1]]), 13.0);
         assert_eq!(number(&apart(1000.0), &[zero, INPUTS[1]]), 13000.0);
     }
@@ -184,7 +186,8 @@ mod tests {
     #[test]
     fn a_written_point_is_as_good_as_one_of_a_message() {
         let from = Point::Constant([3.0, 0.0, 12.0]);
-        assert_eq!(number(&Expression::Distance { from, to: Point::Input(1), scale: 1.0 }, &INPUTS), 4.0);
+        let distance = Box::new(Distance { from, to: Point::Input(1), scale: 1.0 });
+        assert_eq!(number(&Expression::Distance(distance), &INPUTS), 4.0);
     }
 
     #[test]

@@ -7,8 +7,8 @@ use sesame_base::time::SimTime;
 use sesame_plan::stl::{self, Interval, Robustness};
 use sesame_plan::testing::plan;
 use sesame_plan::{
-    Aggregate, CampaignPlan, Comparison, Condition, Expression, FieldRef, Formula, Input, Members, MetricSource, Point,
-    Region, Side, TextTest, TopicId, Type, UnaryFunction,
+    Aggregate, CampaignPlan, Comparison, Condition, Distance, Expression, FieldRef, Formula, Input, Members,
+    MetricSource, Point, Region, Side, SignedDistance, TextTest, TopicId, Type, UnaryFunction,
 };
 
 use crate::metric::{MetricError, MetricTable};
@@ -57,7 +57,7 @@ fn mode(members: Members, test: TextTest) -> Input {
 }
 
 fn apart() -> Expression {
-    Expression::Distance { from: Point::Input(0), to: Point::Input(1), scale: 1.0 }
+    Expression::Distance(Box::new(Distance { from: Point::Input(0), to: Point::Input(1), scale: 1.0 }))
 }
 
 fn pairs() -> Vec<Input> {
@@ -152,7 +152,7 @@ fn time_is_that_of_the_message() {
 #[test]
 fn a_fence_is_left_by_as_much_as_the_signed_distance_says() {
     let to = Region::Polygon { corners: vec![[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]] };
-    let of = Expression::SignedDistance { from: Point::Input(0), to };
+    let of = Expression::SignedDistance(Box::new(SignedDistance { from: Point::Input(0), to }));
     let at = vec![input(POSES, &["at"], Members::Each)];
     let sent = [(0, "poses/a", 4.0), (100, "poses/b", 7.5), (200, "poses/a", 0.0)];
     assert_eq!(value(formula(at, Aggregate::Max { of }), &sent), Some(2.5));

@@ -93,8 +93,7 @@ impl<'p> RobustnessState<'p> {
             for &(input, value) in &self.heard {
                 let own = match inputs[input].members {
                     Members::Min | Members::Max | Members::Sum => true,
-                    Members::Each => member == of.0,
-                    Members::First => member == of.0,
+                    Members::Each | Members::First => member == of.0,
                     Members::Second => member == of.1,
                 };
                 if own {

@@ -41,7 +41,7 @@ pub(crate) enum ExpressionKind {
     Field(Path),
     /// `max of zones.level`; the span is that of the words before `of`.
     Members(Members, Span, Path),
-    Point(Point),
+    Point(Box<Point>),
     Region(Region),
     Negate(Box<Expression>),
     /// Two terms or more; true for one that is subtracted.

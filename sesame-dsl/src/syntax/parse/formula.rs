@@ -155,7 +155,7 @@ impl Reader<'_> {
             Rule::quantity => ExpressionKind::Number(self.quantity(&operand)),
             Rule::truth => ExpressionKind::Truth(child(&operand, Rule::k_true).is_some()),
             Rule::text => ExpressionKind::Text(self.any_text(&operand)),
-            Rule::point => ExpressionKind::Point(self.point(&operand)),
+            Rule::point => ExpressionKind::Point(Box::new(self.point(&operand))),
             Rule::region => ExpressionKind::Region(self.region(&operand)),
             Rule::members => {
                 let word = operand.clone().into_inner().next().expect("a choice of members begins with its word");
