@@ -3,7 +3,7 @@
 use sesame_base::observation::{MetricObservation, Reach};
 use sesame_base::time::SimTime;
 use sesame_plan::stl::Robustness;
-use sesame_plan::{CampaignPlan, Formula, MetricId, MetricSource, Side, Span, TopicId};
+use sesame_plan::{CampaignPlan, Formula, Members, MetricId, MetricSource, Side, Span, TopicId};
 
 use crate::metric::aggregate::FormulaState;
 use crate::metric::robustness::RobustnessState;
@@ -31,6 +31,12 @@ pub enum MetricError {
     /// A hook that the runner does not have.
     #[error("metric `{0}` has no hook in this runner: run `sesamec generate` again")]
     MissingHook(String),
+    /// A formula over each member of groups that have different numbers of members.
+    #[error(
+        "metric `{0}` reads each member of groups of different sizes; the plan was not written by sesamec: run \
+         `sesamec generate` again"
+    )]
+    UnpairedMembers(String),
     /// A temporal formula that is not valid.
     #[error("metric `{metric}`: {error}; the plan was not written by sesamec: run `sesamec generate` again")]
     Formula {
@@ -62,6 +68,13 @@ impl<'p> MetricTable<'p> {
                 MetricSource::Formula { formula } => formula.side == Side::Outbound,
                 _ => false,
             };
+            if let MetricSource::Formula { formula } = &metric.source {
+                let each = formula.inputs.iter().filter(|input| input.members == Members::Each);
+                let mut sizes = each.map(|input| plan.topic(input.field.topic).paths.len());
+                if sizes.next().is_some_and(|first| sizes.any(|size| size != first)) {
+                    return Err(MetricError::UnpairedMembers(metric.name.clone()));
+                }
+            }
             if let MetricSource::Robustness { robustness } = &metric.source {
                 let refused = |error| MetricError::Formula { metric: metric.name.clone(), error };
                 RobustnessState::new(robustness, plan).map_err(refused)?;

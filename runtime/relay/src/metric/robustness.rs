@@ -7,7 +7,8 @@ use sesame_plan::stl::{Formula, Interval, Robustness};
 use sesame_plan::{CampaignPlan, Members, TopicId};
 
 use crate::metric::Context;
-use crate::metric::expression::{Held, least, number};
+use crate::metric::aggregate::pairs_of;
+use crate::metric::expression::{Held, Moment, least, number};
 use crate::metric::held::{HeldInputs, hear};
 use crate::stl::{FormulaError, Monitor};
 use crate::value::Value;
@@ -15,9 +16,8 @@ use crate::value::Value;
 /// A robustness in one run.
 pub(super) struct RobustnessState<'p> {
     robustness: &'p Robustness,
-    /// The group of which each member has a formula of its own.
-    each: Option<TopicId>,
-    /// One for each member of that group; one for a formula without.
+    /// One for each member of the groups, or each pair of the group, of which each has a formula of its own; one for a
+    /// formula without.
     instances: Vec<Instance>,
     /// When the last message came.
     last: SimTime,
@@ -25,6 +25,8 @@ pub(super) struct RobustnessState<'p> {
 }
 
 struct Instance {
+    /// The member that it is of, twice, or the pair.
+    of: (usize, usize),
     held: HeldInputs,
     /// `None` once the run is over, or a number was not finite: then there is an outcome.
     monitor: Option<Monitor>,
@@ -57,11 +59,18 @@ impl<'p> RobustnessState<'p> {
         let monitor = Monitor::new(&robustness.formula, robustness.signals.len())?;
         let monitor = if robustness.whole_windows { monitor.over_whole_windows() } else { monitor };
         let each = robustness.inputs.iter().find(|input| input.members == Members::Each).map(|input| input.field.topic);
-        let count = each.map_or(1, |topic| plan.topic(topic).paths.len());
-        let instance =
-            || Instance { held: HeldInputs::new(&robustness.inputs, plan), monitor: Some(monitor.clone()), said: None };
-        let instances = (0..count).map(|_| instance()).collect();
-        Ok(RobustnessState { robustness, each, instances, last: SimTime::ZERO, heard: Vec::new() })
+        let instance = |of: (usize, usize)| Instance {
+            of,
+            held: HeldInputs::of_one(&robustness.inputs, plan),
+            monitor: Some(monitor.clone()),
+            said: None,
+        };
+        let mut instances: Vec<Instance> = pairs_of(&robustness.inputs, plan).map(instance).collect();
+        if instances.is_empty() {
+            let count = each.map_or(1, |topic| plan.topic(topic).paths.len());
+            instances = (0..count).map(|member| instance((member, member))).collect();
+        }
+        Ok(RobustnessState { robustness, instances, last: SimTime::ZERO, heard: Vec::new() })
     }
 
     /// A message on the `member`th path of a topic, at the context's time.
@@ -76,14 +85,18 @@ impl<'p> RobustnessState<'p> {
             }
         }
         let before = std::mem::replace(&mut self.last, context.now);
-        for (at, instance) in self.instances.iter_mut().enumerate() {
-            let Instance { held, monitor, .. } = instance;
-            // If each member has a formula, values of all members go to all formulas, and those of one member to its
-            // own.
-            let own = self.each != Some(topic) || at == member;
+        for instance in &mut self.instances {
+            let Instance { of, held, monitor, .. } = instance;
+            // If each member or pair has a formula, values of all members go to all formulas, and those of one member
+            // to its own.
             let mut finite = true;
             for &(input, value) in &self.heard {
-                if own || inputs[input].members != Members::Each {
+                let own = match inputs[input].members {
+                    Members::Min | Members::Max | Members::Sum => true,
+                    Members::Each | Members::First => member == of.0,
+                    Members::Second => member == of.1,
+                };
+                if own {
                     finite &= value.iter().all(|x| x.is_finite());
                     held.hold(inputs, &[(input, value)], member);
                 }
@@ -94,11 +107,15 @@ impl<'p> RobustnessState<'p> {
             }
             let (Some(values), Some(monitor)) = (held.values(), monitor) else { continue };
             for (at, signal) in signals.iter().enumerate() {
-                let value = number(signal, values);
+                let moment = Moment::new(values, context.now());
+                let value = number(signal, &moment);
                 // As with other formulas: if arithmetic gives no number, the last value stays.
                 if value.is_finite() {
                     monitor.push(context.now, at, value);
-                } else {
+                }
+                if let Some(undefined) = moment.undefined() {
+                    context.note(format!("{undefined} at {}", context.now));
+                } else if !value.is_finite() {
                     context.note(format!("refused the value {value} at {}", context.now));
                 }
             }
@@ -198,11 +215,11 @@ mod tests {
     }
 
     fn command() -> Input {
-        Input { field: FieldRef { topic: TopicId(0), path: Vec::new() }, members: Members::Min }
+        Input { field: FieldRef { topic: TopicId(0), path: Vec::new() }, members: Members::Min, text: None }
     }
 
     fn level(members: Members) -> Input {
-        Input { field: FieldRef { topic: TopicId(1), path: vec!["level".into()] }, members }
+        Input { field: FieldRef { topic: TopicId(1), path: vec!["level".into()] }, members, text: None }
     }
 
     fn above(signal: u32) -> Formula {
