@@ -87,29 +87,30 @@ mod tests {
 
     use super::*;
 
-    fn predicate() -> Box<Formula> {
-        Box::new(Formula::Predicate { signal: 0, comparison: Comparison::Above, constant: 0.0 })
+    const PREDICATE: Formula = Formula::Predicate { signal: 0, comparison: Comparison::Above, constant: 0.0 };
+
+    fn always() -> Formula {
+        Formula::Always { interval: Interval::UNBOUNDED, of: Box::new(PREDICATE) }
     }
 
-    fn always() -> Box<Formula> {
-        Box::new(Formula::Always { interval: Interval::UNBOUNDED, of: predicate() })
-    }
-
-    fn eventually() -> Box<Formula> {
-        Box::new(Formula::Eventually { interval: Interval::UNBOUNDED, of: predicate() })
+    fn eventually() -> Formula {
+        Formula::Eventually { interval: Interval::UNBOUNDED, of: Box::new(PREDICATE) }
     }
 
     #[test]
     fn the_outermost_quantifier_is_seen_through_connectives() {
         use Quantifier::{Always, Eventually};
+        let and = |left, right| Formula::And { left: Box::new(left), right: Box::new(right) };
+        let or = |left, right| Formula::Or { left: Box::new(left), right: Box::new(right) };
+        let implies = |left, right| Formula::Implies { left: Box::new(left), right: Box::new(right) };
         assert_eq!(quantifier(&always()), Some(Always));
         assert_eq!(quantifier(&eventually()), Some(Eventually));
-        assert_eq!(quantifier(&Formula::Not { of: eventually() }), Some(Always));
-        assert_eq!(quantifier(&Formula::And { left: always(), right: always() }), Some(Always));
-        assert_eq!(quantifier(&Formula::And { left: always(), right: eventually() }), None);
-        assert_eq!(quantifier(&Formula::Or { left: eventually(), right: eventually() }), Some(Eventually));
-        assert_eq!(quantifier(&Formula::Implies { left: always(), right: eventually() }), Some(Eventually));
-        assert_eq!(quantifier(&predicate()), None);
+        assert_eq!(quantifier(&Formula::Not { of: Box::new(eventually()) }), Some(Always));
+        assert_eq!(quantifier(&and(always(), always())), Some(Always));
+        assert_eq!(quantifier(&and(always(), eventually())), None);
+        assert_eq!(quantifier(&or(eventually(), eventually())), Some(Eventually));
+        assert_eq!(quantifier(&implies(always(), eventually())), Some(Eventually));
+        assert_eq!(quantifier(&PREDICATE), None);
     }
 
     #[test]

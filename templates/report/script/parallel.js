@@ -53,10 +53,10 @@ if (tests) {
     }
     axes.forEach(axis => {
       const decimals = decimalsOf([axis.low, axis.high]);
-      // The name may take two lines, and has all of it as its title.
-      axis.labels = [element("div", "axis-name", axis.name + (axis.unit ? " [" + axis.unit + "]" : ""))].concat(
+      // The name may take two lines, and breaks between its words.
+      axis.labels = [element("div", "axis-name", (axis.name + (axis.unit ? " [" + axis.unit + "]" : "")).replace(/_/g, "_\u200b"))].concat(
         [axis.high, axis.low].map(value => element("div", "axis-end", value.toFixed(decimals))));
-      axis.labels[0].title = axis.labels[0].textContent;
+      axis.labels[0].title = axis.name;
       field.append(...axis.labels);
     });
     field.append(canvas);

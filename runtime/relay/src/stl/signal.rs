@@ -120,8 +120,8 @@ mod tests {
     /// The value at a time, by looking at every point.
     fn at(signal: &[(SimTime, f64)], time: i64) -> Option<f64> {
         let ended = signal.last().is_none_or(|last| last.0.nanos() <= time);
-        let before = signal.iter().filter(|point| point.0.nanos() <= time);
-        before.last().filter(|_| !ended).map(|point| point.1)
+        let mut before = signal.iter().filter(|point| point.0.nanos() <= time);
+        before.next_back().filter(|_| !ended).map(|point| point.1)
     }
 
     proptest! {

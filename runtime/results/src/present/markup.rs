@@ -3,6 +3,8 @@
 //! Names of elements and attributes are the program's own (`'static`), everything else goes through one escape. What
 //! comes out is well-formed as XML too, so that any XML parser can check it.
 
+use std::fmt::Write as _;
+
 /// Markup in the making.
 #[derive(Debug, Default)]
 pub(crate) struct Markup {
@@ -71,7 +73,7 @@ impl Markup {
         for c in data.to_string().chars() {
             match c {
                 '<' | '>' | '&' | '\u{7F}'..='\u{9F}' | '\u{2028}' | '\u{2029}' | '\u{FFFE}' | '\u{FFFF}' => {
-                    self.text.push_str(&format!("\\u{:04x}", u32::from(c)));
+                    let _ = write!(self.text, "\\u{:04x}", u32::from(c));
                 }
                 c => self.text.push(c),
             }
@@ -201,7 +203,7 @@ mod tests {
             markup.close();
             let html = markup.finish();
             let document = roxmltree::Document::parse(&html).unwrap();
-            let read: String = document.descendants().filter(|node| node.is_text()).filter_map(|node| node.text()).collect();
+            let read: String = document.descendants().filter(roxmltree::Node::is_text).filter_map(|node| node.text()).collect();
             let read = read.trim_end_matches('\n').to_owned();
             let codes = document.descendants().filter(|node| node.has_tag_name("code")).count();
             let backticks = text.matches('`').count();

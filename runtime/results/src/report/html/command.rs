@@ -2,6 +2,7 @@
 //!
 //! Names come from the results, which may be anyone's, so each argument that is more than a plain name is quoted.
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use sesame_plan::CampaignPlan;
@@ -10,7 +11,7 @@ use sesame_plan::CampaignPlan;
 pub(super) fn show(plan: &CampaignPlan, run: &Path) -> (String, String) {
     let mut after = format!(" --campaign {}", quoted(&plan.campaign.name));
     if let Some(run) = below_project(run) {
-        after.push_str(&format!(" --results {}", quoted(&run)));
+        let _ = write!(after, " --results {}", quoted(&run));
     }
     (format!("sesamec show {} ", quoted(&plan.source)), after)
 }

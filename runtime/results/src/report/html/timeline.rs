@@ -341,6 +341,8 @@ fn thin(series: &[(f64, f64)], end: f64) -> Vec<(f64, f64)> {
 mod tests {
     use proptest::prelude::*;
 
+    use sesame_base::observation::Counters;
+
     use super::*;
     use crate::record::{Origin, sample};
     use crate::report::facts::show::report_on;
@@ -380,6 +382,27 @@ mod tests {
             drawn.contains(r#"when">when 1.5m/s &lt; top_speed for 0.3s at most 3 times"#),
             "beside the lane: {drawn}"
         );
+    }
+
+    #[test]
+    fn lanes_without_effect_are_folded_away_beside_others() {
+        let plan = sample::plan();
+        let mut record = sample::record(&plan, 1, Origin::Search, sample::conditional_test());
+        let drawn = |record: &TestRecord| {
+            let mut markup = Markup::default();
+            timeline(&mut markup, &plan, record, &report_on(&plan, record, &[], true));
+            markup.finish()
+        };
+        assert!(!drawn(&record).contains("<details"));
+        let idle = Counters { seen: 7, ..Counters::default() };
+        record.observation.operations[0].counters = idle;
+        let (before, folded) =
+            drawn(&record).split_once("<details class=\"idle\">").map(|(a, b)| (a.to_owned(), b.to_owned())).unwrap();
+        assert!(folded.starts_with("<summary>without effect: jitter_link0</summary>"), "{folded}");
+        assert!(!before.contains("<b>jitter_link0</b>") && before.contains("<b>cut_link1</b>"));
+        // Where none had an effect, that is what there is to see.
+        record.observation.operations.iter_mut().for_each(|operation| operation.counters = idle);
+        assert!(!drawn(&record).contains("<details"));
     }
 
     proptest! {

@@ -5,5 +5,5 @@ leave(() => {
     return element.getBoundingClientRect().right > document.documentElement.clientWidth + 1;
   });
   const heights = all("#front tbody tr").map(row => row.getBoundingClientRect().height);
-  return { beyond: beyond.slice(0, 5).map(element => element.outerHTML.slice(0, 200)), tallest: Math.max(...heights) };
+  return { width: innerWidth, beyond: beyond.slice(0, 5).map(element => element.outerHTML.slice(0, 200)), tallest: Math.max(...heights) };
 });
