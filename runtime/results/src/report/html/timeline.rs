@@ -90,9 +90,6 @@ fn lane(markup: &mut Markup, time: &Axis, operation: &OperationReport, broke_off
         markup.element("b", &[], &operation.operation);
         let choices = if operation.choices.is_empty() { operation.kind.clone() } else { choices_text(operation) };
         markup.element("span", &[("class", "quiet")], &choices);
-        if operation.conditions.is_some() {
-            markup.element("span", &[("class", "quiet when")], &planned_text(operation));
-        }
         if effect == Some(false) {
             markup.element("span", &[("class", "note")], "no effect");
         }
@@ -124,6 +121,10 @@ fn lane(markup: &mut Markup, time: &Axis, operation: &OperationReport, broke_off
         window(span, if effect == Some(false) { "seen idle" } else { "seen" }, 9.0);
     }
     markup.close();
+    // Below the lane, where long conditions have room.
+    if operation.conditions.is_some() {
+        markup.element("div", &[("class", "quiet when")], &planned_text(operation));
+    }
     markup.close();
 }
 
@@ -379,7 +380,7 @@ mod tests {
         assert_eq!(drawn.matches(r#"class="planned""#).count(), 3, "{drawn}");
         assert!(drawn.contains("planned when 1.5m/s &lt; top_speed for 0.3s at most 3 times"), "{drawn}");
         assert!(
-            drawn.contains(r#"when">when 1.5m/s &lt; top_speed for 0.3s at most 3 times"#),
+            drawn.contains(r#"quiet when">when 1.5m/s &lt; top_speed for 0.3s at most 3 times"#),
             "beside the lane: {drawn}"
         );
     }
