@@ -13,7 +13,7 @@ use rusqlite::Connection;
 
 use sesame_plan::CampaignPlan;
 
-use crate::record::schema::{DDL, PIECES_SINCE, STANDARD_WORDS_SINCE, wide_views};
+use crate::record::schema::{DDL, PIECES_SINCE, ROBUSTNESS, STANDARD_WORDS_SINCE, has_robustness, wide_views};
 use crate::record::{RecordError, series_views};
 
 /// The objects of a schema by name: the kind of each, and the words of the statement that creates it.
@@ -44,12 +44,18 @@ CREATE VIEW series AS
 /// any schema that this release reads.
 pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Result<(), RecordError> {
     static CURRENT: OnceLock<Objects> = OnceLock::new();
+    static WITH_ROBUSTNESS: OnceLock<Objects> = OnceLock::new();
     static SCHEMA_6: OnceLock<Objects> = OnceLock::new();
     static SCHEMA_5: OnceLock<Objects> = OnceLock::new();
     let sound = |made: rusqlite::Result<Objects>| {
         made.unwrap_or_else(|error| unreachable!("the schema of this program is sound: {error}"))
     };
-    let ours = if schema >= STANDARD_WORDS_SINCE {
+    let has_robustness =
+        has_robustness(connection).map_err(|error| RecordError::database("read the results", path, error))?;
+    let ours = if schema >= STANDARD_WORDS_SINCE && has_robustness {
+        let statements = [DDL, &series_views::views(), ROBUSTNESS, &series_views::robustness_views()];
+        WITH_ROBUSTNESS.get_or_init(|| sound(made_by(&statements)))
+    } else if schema >= STANDARD_WORDS_SINCE {
         CURRENT.get_or_init(|| sound(made_by(&[DDL, &series_views::views()])))
     } else if schema >= PIECES_SINCE {
         SCHEMA_6.get_or_init(|| sound(made_by(&[DDL_6, &series_views::views()])))

@@ -115,13 +115,22 @@ impl Recorder {
         let lock = Lock::acquire(folder)?;
         let connection = schema::open(&path, true)?;
         schema::check_whole(&connection, &path)?;
-        let repository = Repository::from_connection(connection, path)?;
+        let mut repository = Repository::from_connection(connection, path)?;
         match repository.campaign().stop {
             Some(_) if !finished => return Err(RecordError::Finished { path: repository.path }),
             None if finished => return Err(RecordError::Unfinished { path: repository.path }),
             _ => {}
         }
         tune(&repository.connection).map_err(|e| RecordError::database("open the results", &repository.path, e))?;
+        if !repository.has_robustness {
+            let install = || {
+                let transaction = repository.connection.unchecked_transaction()?;
+                schema::install_robustness(&transaction)?;
+                transaction.commit()
+            };
+            install().map_err(|e| RecordError::database("open the results", &repository.path, e))?;
+            repository.has_robustness = true;
+        }
         Recorder::begin_session(repository, lock, workers)
     }
 

@@ -20,6 +20,7 @@ use super::*;
 mod damage;
 mod digests;
 mod earlier;
+mod robustness;
 mod runs;
 
 fn folder() -> TempDir {
@@ -221,7 +222,7 @@ proptest! {
         let plan = sample::plan();
         let mut record = sample::record(&plan, 3, Origin::Search, Test::default());
         record.observation.end = end;
-        record.observation.metrics[0] = MetricObservation { value, set: true, reach: Reach { low, high }, not_finite, series };
+        record.observation.metrics[0] = MetricObservation { value, set: true, reach: Reach { low, high }, not_finite, series, ..MetricObservation::default() };
         let recorder = commit_all(folder.path(), std::slice::from_ref(&record));
         let read = recorder.repository().test(3).unwrap();
         prop_assert_eq!(&read, &record);
@@ -257,7 +258,7 @@ proptest! {
         };
         let shown = if whole { MetricValue::whole(shown.value, set) } else { shown };
         let MetricValue { value: measured, reach, not_finite, .. } = shown;
-        record.observation.metrics[0] = MetricObservation { value: measured, set, reach, not_finite, series: vec![] };
+        record.observation.metrics[0] = MetricObservation { value: measured, set, reach, not_finite, ..MetricObservation::default() };
         let folder = folder();
         let mut recorder = Recorder::create(folder.path(), &plan, 1, 1).unwrap();
         recorder.commit(&record).unwrap();
