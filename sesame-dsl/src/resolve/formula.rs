@@ -7,6 +7,7 @@ use crate::model::{Aggregate, Condition, Expression, FieldPath, Formula, Id as _
 use crate::model::{MetricSource, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
+use crate::synonyms::meanings;
 use crate::syntax::ast::{self, ExpressionKind, FormulaKind, Name, Path, PrefixWord};
 use crate::units::{Unit, convert, dimension, product};
 
@@ -81,11 +82,7 @@ impl<'a> Resolver<'a> {
         self.at_most_one(&formula.outbound, "outbound");
         let outbound = !formula.outbound.is_empty();
         if inputs.is_empty() {
-            let title = "this formula reads no topic";
-            let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, whole, title)
-                .label("this value is constant")
-                .note("a metric is computed from messages, so its formula must name a topic");
-            self.report(diagnostic);
+            self.reads_no_topic(whole);
             return None;
         }
         let (every, per) = (every?, per?);
@@ -152,11 +149,26 @@ impl<'a> Resolver<'a> {
         })
     }
 
+    fn reads_no_topic(&mut self, span: Span) {
+        let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, span, "this formula reads no topic")
+            .label("this value is constant")
+            .note("a metric is computed from messages, so its formula must name a topic");
+        self.report(diagnostic);
+    }
+
     fn no_aggregate(&mut self, expression: &'a ast::Expression) {
         let span = expression.span;
         let condition = self.is_condition(expression);
         if condition && of_time(expression) {
             self.no_robustness(expression);
+            return;
+        }
+        if let Some((call, name)) = aggregate_in(expression) {
+            self.nested(call, name);
+            return;
+        }
+        if !reads_a_topic(expression) {
+            self.reads_no_topic(span);
             return;
         }
         let word = if condition { "count" } else { "last" };
@@ -166,13 +178,10 @@ impl<'a> Resolver<'a> {
         } else {
             "reduce it to a single number with `last`, `min`, `max` or `mean`"
         });
-        diagnostic.suggestions.push(Suggestion {
-            message: format!(
-                "use {}",
-                if condition { "the number of messages for which it holds" } else { "its last value" }
-            ),
-            edits: vec![(Span { hi: span.lo, ..span }, format!("{word}(")), (span.end(), ")".to_owned())],
-        });
+        diagnostic.suggestions.push(Suggestion::possible(
+            format!("use {}", if condition { "the number of messages for which it holds" } else { "its last value" }),
+            vec![(Span { hi: span.lo, ..span }, format!("{word}(")), (span.end(), ")".to_owned())],
+        ));
         self.report(diagnostic);
     }
 
@@ -180,10 +189,10 @@ impl<'a> Resolver<'a> {
         let span = expression.span;
         let title = format!("`{}` is a condition, but a metric is a number", self.text(span));
         let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, span, title).label("expected a number");
-        diagnostic.suggestions.push(Suggestion {
-            message: "use its robustness: by how much it holds".to_owned(),
-            edits: vec![(Span { hi: span.lo, ..span }, "robustness(".to_owned()), (span.end(), ")".to_owned())],
-        });
+        diagnostic.suggestions.push(Suggestion::possible(
+            "use its robustness: by how much it holds".to_owned(),
+            vec![(Span { hi: span.lo, ..span }, "robustness(".to_owned()), (span.end(), ")".to_owned())],
+        ));
         self.report(diagnostic);
     }
 
@@ -430,14 +439,7 @@ impl<'a> Resolver<'a> {
             ("abs", _) => "one value",
             ("distance", _) => "two points",
             ("min" | "max", [_]) | ("last" | "mean" | "count" | "duration" | "robustness", _) => {
-                let title = format!("`{}(…)` over time cannot be nested in a formula", name.text);
-                let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, call.span, title)
-                    .label("only allowed as the outermost function of a formula")
-                    .note("inside a formula, the name of a topic stands for its last value");
-                if name.text == "min" || name.text == "max" {
-                    diagnostic = diagnostic.note(format!("to compare several values, use `{}(a, b)`", name.text));
-                }
-                self.report(diagnostic);
+                self.nested(call.span, name);
                 return None;
             }
             ("min" | "max", _) => "two values or more",
@@ -451,10 +453,23 @@ impl<'a> Resolver<'a> {
         None
     }
 
+    /// Reports an aggregate over time inside of a formula.
+    fn nested(&mut self, call: Span, name: &Name) {
+        let title = format!("`{}(…)` over time cannot be nested in a formula", name.text);
+        let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, call, title)
+            .label("only allowed as the outermost function of a formula")
+            .note("inside a formula, the name of a topic stands for its last value");
+        if name.text == "min" || name.text == "max" {
+            diagnostic = diagnostic.note(format!("to compare several values, use `{}(a, b)`", name.text));
+        }
+        self.report(diagnostic);
+    }
+
     fn unknown_function(&mut self, name: &Name, known: &[&'static str]) {
         let title = format!("no function named `{}`", name.text);
         let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("unknown function");
-        diagnostic = match most_similar(&name.text, known.iter().copied()) {
+        let synonym = meanings(&name.text, |word| known.contains(&word)).first().map(|synonym| synonym.meant);
+        diagnostic = match synonym.or_else(|| most_similar(&name.text, known.iter().copied())) {
             Some(similar) => diagnostic.did_you_mean(name.span, similar),
             None => diagnostic.note(format!("the functions allowed here are {}", super::list(known))),
         };
@@ -511,6 +526,37 @@ impl<'a> Resolver<'a> {
             return None;
         }
         Some((self.input(inputs, path, field, members)?, unit))
+    }
+}
+
+/// Whether a value depends on messages at all.
+fn reads_a_topic(expression: &ast::Expression) -> bool {
+    let reads = matches!(expression.kind, ExpressionKind::Field(_) | ExpressionKind::Members(..));
+    reads || parts(expression).any(reads_a_topic)
+}
+
+/// The first aggregate over time in an expression.
+fn aggregate_in(expression: &ast::Expression) -> Option<(Span, &Name)> {
+    if let ExpressionKind::Call(name, arguments) = &expression.kind
+        && AGGREGATES.contains(&name.text.as_str())
+        && (arguments.len() == 1 || !FUNCTIONS.contains(&name.text.as_str()))
+    {
+        return Some((expression.span, name));
+    }
+    parts(expression).find_map(aggregate_in)
+}
+
+/// The expressions that an expression is made of.
+fn parts(expression: &ast::Expression) -> Box<dyn Iterator<Item = &ast::Expression> + '_> {
+    match &expression.kind {
+        ExpressionKind::Field(_) | ExpressionKind::Members(..) => Box::new(std::iter::empty()),
+        ExpressionKind::Number(_) | ExpressionKind::Truth(_) => Box::new(std::iter::empty()),
+        ExpressionKind::Negate(of) | ExpressionKind::Prefixed(_, of) => Box::new(std::iter::once(&**of)),
+        ExpressionKind::Sum(terms) | ExpressionKind::Product(terms) => Box::new(terms.iter().map(|(_, of)| of)),
+        ExpressionKind::Compare(left, _, right)
+        | ExpressionKind::Until(left, _, right)
+        | ExpressionKind::Implies(left, right) => Box::new([&**left, &**right].into_iter()),
+        ExpressionKind::All(all) | ExpressionKind::Any(all) | ExpressionKind::Call(_, all) => Box::new(all.iter()),
     }
 }
 

@@ -393,7 +393,7 @@ impl<'a> Resolver<'a> {
                 let diagnostic = Diagnostic::new(Code::WRONG_CHOICE, span, format!("{what} must be a range in a test"))
                     .label(format!("expected a range, for example `{example}`"))
                     .note("a value is drawn from the range for each message")
-                    .suggest("use a range with this value only", span, format!("[{written}, {written}]"));
+                    .fix("use a range with this value only", span, format!("[{written}, {written}]"));
                 self.report(diagnostic);
                 return None;
             }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use crate::diagnostic::{Diagnostic, Severity, hidden};
+use crate::diagnostic::{Applicability, Diagnostic, Severity, hidden};
 use crate::place::Place;
 use crate::source::SourceMap;
 
@@ -28,6 +28,7 @@ struct Line<'a> {
 #[derive(Serialize)]
 struct Suggested<'a> {
     message: &'a str,
+    applicability: &'static str,
     edits: Vec<Edit<'a>>,
 }
 
@@ -57,6 +58,10 @@ pub fn json(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
                 .iter()
                 .map(|suggestion| Suggested {
                     message: &suggestion.message,
+                    applicability: match suggestion.applicability {
+                        Applicability::MachineApplicable => "machine_applicable",
+                        Applicability::MaybeIncorrect => "maybe_incorrect",
+                    },
                     edits: suggestion
                         .edits
                         .iter()
