@@ -26,6 +26,7 @@ mod exploration;
 mod formula;
 mod fuzz;
 mod inherit;
+mod lengths;
 mod lifecycle;
 mod message_types;
 mod metrics;
