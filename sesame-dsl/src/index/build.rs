@@ -362,8 +362,18 @@ impl<'a> Indexer<'a> {
 
     fn operation(&mut self, operation: &'a Operation, id: DefinitionId) {
         let Some(body) = &operation.body else { return };
-        let OperationBody { target, from, to, kind: _, within: _, priority: _, inclusion: _, untimed: _, contains } =
-            body;
+        let OperationBody {
+            target,
+            from,
+            to,
+            kind: _,
+            within: _,
+            lengths: _,
+            priority: _,
+            inclusion: _,
+            untimed: _,
+            contains,
+        } = body;
         for place in target.iter().flat_map(|target| &target.places) {
             let mut target = self.mention(&place.topic, id);
             for step in &place.steps {
