@@ -7,6 +7,7 @@ mod emitted;
 mod hostile_checkout;
 mod mutated_imports;
 mod notation;
+mod odd_originals;
 mod options;
 mod originals;
 mod plans;

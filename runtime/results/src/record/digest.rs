@@ -6,7 +6,8 @@ use rusqlite::Connection;
 use rusqlite::types::ValueRef;
 use sha2::{Digest as _, Sha256};
 
-use crate::record::schema::{self, PIECES_SINCE};
+use crate::record::schema::{self, PIECES_SINCE, STANDARD_WORDS_SINCE};
+use crate::record::split_operations;
 
 /// What is hashed, in this order: a name, and a query whose order of rows depends on nothing but the content.
 const CONTENT: &[(&str, &str)] = &[
@@ -94,6 +95,8 @@ const PORTION: usize = 1 << 16;
 ///
 /// The task of a run that is not the campaign is hashed with the plan, which it follows.
 ///
+/// Operations that were one operation in an imported file are hashed last, if there are any.
+///
 /// Results of an earlier schema have the digest that their release computed. Names of columns and verdicts are not
 /// hashed, so the content of a run hashes the same in schemas 6 and 7, except for two things: the plan's JSON, and the
 /// outcome of a test without effect, which is `no_effect` in schema 7 and was `void` before.
@@ -102,7 +105,9 @@ pub(super) fn of_connection(connection: &Connection, version: i64) -> rusqlite::
     let transaction = connection.unchecked_transaction()?;
     let mut hash = Sha256::new();
     let mut portion = Vec::with_capacity(2 * PORTION);
-    for &content in CONTENT {
+    let split = version >= STANDARD_WORDS_SINCE && split_operations::are_in(&transaction)?;
+    let split = split.then_some((split_operations::TABLE, split_operations::QUERY));
+    for content in CONTENT.iter().copied().chain(split) {
         let (name, sql) = if content.0 == "series_pieces" && version < PIECES_SINCE { POINTS } else { content };
         feed(&mut portion, ValueRef::Text(name.as_bytes()));
         let mut statement = transaction.prepare(&schema::query(sql, version))?;

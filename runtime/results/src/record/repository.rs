@@ -123,6 +123,8 @@ impl Repository {
     /// length in bytes as 8 bytes (little endian) and the UTF-8 bytes for a text, `B`, the length likewise and the
     /// bytes for a blob. Everything is read from the file each time: no stored hash is used.
     ///
+    /// Operations that were one operation in an imported file are hashed last, if there are any.
+    ///
     /// Results of an earlier schema have the digest that their release computed. Names of columns and verdicts are not
     /// hashed, so the content of a run hashes the same in schemas 6 and 7, except for two things: the plan's JSON, and
     /// the outcome of a test without effect, which is `no_effect` in schema 7 and was `void` before.
