@@ -1,6 +1,7 @@
 //! From the tests that a campaign performed to records of the results repository.
 
 use std::collections::BTreeMap;
+use std::mem::discriminant;
 use std::path::Path;
 
 use sesame_base::observation::{MetricObservation, Observation, OperationEffect, Outcome, WallTime};
@@ -338,8 +339,12 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
         }
         (Effect::Custom { parameters, .. }, _) => {
             let mut chosen = Vec::new();
-            for (_, at) in parameters {
-                chosen.push(match domain(*at)? {
+            for (name, at) in parameters {
+                let held = domain(*at)?;
+                if !is_permitted(template, *at, held) {
+                    return Err(format!("what it chooses for `{name}` is of another kind than its template permits"));
+                }
+                chosen.push(match held {
                     Domain::Reals(low, high) => Choice::Value { value: low.min(*high) },
                     Domain::Integers(low, high) => Choice::Value { value: *low.min(high) as f64 },
                     Domain::Points(low, _) => Choice::Point { point: *low },
@@ -355,4 +360,10 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
         (Effect::Blackhole, _) => Vec::new(),
         (Effect::Loss | Effect::Delay { .. }, _) => return Err("it does something else".to_owned()),
     })
+}
+
+/// Whether what an operation chooses from a value set is of the kind that its template has at this position.
+fn is_permitted(template: &Operation, at: usize, held: &Domain) -> bool {
+    let OperationKind::Custom { parameters } = &template.kind else { return false };
+    parameters.get(at).is_some_and(|set| discriminant(&set.domain) == discriminant(held))
 }

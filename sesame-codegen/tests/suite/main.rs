@@ -11,5 +11,6 @@ mod odd_originals;
 mod options;
 mod originals;
 mod plans;
+mod random_originals;
 mod regeneration;
 mod surroundings;
