@@ -14,7 +14,7 @@ use rusqlite::Connection;
 use sesame_plan::CampaignPlan;
 
 use crate::record::schema::{DDL, PIECES_SINCE, ROBUSTNESS, STANDARD_WORDS_SINCE, has_robustness, wide_views};
-use crate::record::{RecordError, series_views};
+use crate::record::{RecordError, series_views, split_operations};
 
 /// The objects of a schema by name: the kind of each, and the words of the statement that creates it.
 type Objects = BTreeMap<String, (String, String)>;
@@ -66,7 +66,12 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
     if let Some((name, _)) = found.iter().find(|(_, (kind, _))| kind == "trigger") {
         return Err(RecordError::damaged(path, format!("there is a trigger `{name}`, which no run makes")));
     }
-    same(ours, &found, path)
+    same(ours, &found, path)?;
+    if schema >= STANDARD_WORDS_SINCE && found.contains_key(split_operations::TABLE) {
+        let ours = sound(made_by(&["CREATE TABLE tests (number INTEGER PRIMARY KEY)", split_operations::DDL]));
+        same(&ours.into_iter().filter(|(name, _)| name == split_operations::TABLE).collect(), &found, path)?;
+    }
+    Ok(())
 }
 
 /// Checks the views that have a column for each metric of the campaign.

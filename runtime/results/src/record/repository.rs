@@ -130,6 +130,8 @@ impl Repository {
     /// out, and so is what a plan says to people only: of the plan, its [meaning](CampaignPlan::meaning) is hashed.
     /// Everything is read from the file each time: no stored hash is used.
     ///
+    /// Operations that were one operation in an imported file are hashed last, if there are any.
+    ///
     /// Results of an earlier schema have the digest that their release computed.
     pub fn digest(&self) -> Result<String, RecordError> {
         super::digest::of_connection(&self.connection, self.schema, self.plan())

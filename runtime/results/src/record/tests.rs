@@ -306,6 +306,24 @@ fn what_was_imported_keeps_its_intervals_and_names_without_counts() {
 }
 
 #[test]
+fn tests_that_are_committed_together_are_all_recorded_or_none() {
+    let plan = sample::plan();
+    let mut records = sample::records(&plan, 20);
+    let together = folder();
+    let mut recorder = Recorder::create(together.path(), &plan, 1, 0).unwrap();
+    recorder.commit_all(records.clone()).unwrap();
+    let together = recorder.repository().tests().unwrap();
+    assert_eq!(together, commit_all(folder().path(), &records).repository().tests().unwrap());
+
+    let none = folder();
+    let mut recorder = Recorder::create(none.path(), &plan, 1, 0).unwrap();
+    records.last_mut().unwrap().observation.end = f64::NAN;
+    let refused = recorder.commit_all(records).unwrap_err();
+    assert!(matches!(refused, RecordError::Unrecordable { .. }), "{refused}");
+    assert_eq!(recorder.repository().tests().unwrap(), []);
+}
+
+#[test]
 fn a_set_of_results_that_is_recorded_already_is_not_written_again() {
     let folder = folder();
     let mut recorder = commit_all(folder.path(), &sample::records(&sample::plan(), 5));
