@@ -18,6 +18,8 @@ mod first_front;
 mod free_running;
 mod hostile;
 mod import;
+#[cfg(unix)]
+mod interpreted;
 mod interruption;
 #[cfg(target_os = "linux")]
 mod killed;

@@ -1,9 +1,10 @@
 //! What a user decides about a run, and what follows from it.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 use crate::campaign::pool::PoolSettings;
+use crate::campaign::worker_program::WorkerProgram;
 
 /// A test that takes this many times as long as the reference run is taken to hang.
 const TIMEOUT_FACTOR: f64 = 20.0;
@@ -27,7 +28,7 @@ pub struct Settings {
     /// Wall time after which a test is stopped; by default a multiple of what the reference run takes.
     pub timeout: Option<Duration>,
     /// The runner's program, started again for each worker.
-    pub program: PathBuf,
+    pub program: WorkerProgram,
     /// Whether to go on although nothing receives what an operation disturbs.
     pub allow_unheard: bool,
 }

@@ -1,6 +1,6 @@
 //! `known`: runs regression tests and checks their expectations.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
@@ -9,11 +9,11 @@ use sesame_plan::{CampaignPlan, KnownTestId, Task};
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
 use crate::cli::failure::Failure;
-use crate::runner::Runner;
+use crate::cli::session::Session;
 
 /// Which regression tests are run, and how.
 #[derive(Debug, Args)]
-pub(super) struct Options {
+pub struct Options {
     /// Names of regression tests; by default all that this campaign can run
     #[arg(value_name = "NAME")]
     names: Vec<String>,
@@ -29,20 +29,16 @@ pub(super) struct Options {
     output: OutputArgs,
 }
 
-pub(super) fn known(
-    runner: &Runner,
-    plan: &CampaignPlan,
-    results: &Path,
-    options: &Options,
-) -> Result<ExitCode, Failure> {
+pub(super) fn known(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let Session { plan, results, .. } = session;
     let task = Task::Known { tests: chosen(plan, &options.names).map_err(Failure)? };
     let plan = task.plan(plan);
-    let files = claim_files(runner, &plan)?;
-    refuse_unfilled(runner, &plan, true)?;
+    let files = claim_files(&session.runner, &plan)?;
+    refuse_unfilled(&session.runner, &plan, true)?;
     let seed = options.seed.unwrap_or(plan.campaign.seed);
     let results = options.results.as_deref().unwrap_or(results);
-    let (recorder, folder) = begin(results, "known", &plan, &task, seed, &options.execution)?;
-    execute(&plan, recorder, &folder, seed, &options.execution, &options.output, files)
+    let (recorder, folder) = begin(session, results, "known", &plan, &task, seed, &options.execution)?;
+    execute(session, recorder, &folder, &options.execution, &options.output, files)
 }
 
 /// The regression tests of these names, each once and in the space's order; all of them when no name is given.

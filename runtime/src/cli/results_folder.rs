@@ -1,32 +1,40 @@
 //! Finding what was recorded, and whether this runner can still do the same.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use sesame_plan::CampaignPlan;
 use sesame_results::record::{self, Repository};
 
 use crate::cli::execution::shown;
 use crate::cli::failure::Failure;
+use crate::cli::session::Session;
 
 /// The results in this folder, or those of the campaign's latest run.
 pub(super) fn open(results: &Path, folder: Option<&Path>) -> Result<Repository, Failure> {
     let folder = match folder {
-        Some(folder) => folder.to_owned(),
+        Some(folder) => run_folder(results, folder),
         None => record::latest_folder(results)?
             .ok_or_else(|| Failure(format!("there are no results yet in {}: `run` makes some", results.display())))?,
     };
     Ok(Repository::open(&folder)?)
 }
 
+/// The folder of a run that the user names: by its path, or by its place in the folder of all results, such as `42`.
+pub(super) fn run_folder(results: &Path, named: &Path) -> PathBuf {
+    let inside = results.join(named);
+    if !named.exists() && inside.is_dir() { inside } else { named.to_owned() }
+}
+
 /// Insists that a test of these results can be run by this runner.
-pub(super) fn refuse_changed(repository: &Repository, plan: &CampaignPlan, test: u32) -> Result<(), Failure> {
-    if same_model(repository.plan(), plan) {
+pub(super) fn refuse_changed(session: &Session, repository: &Repository, test: u32) -> Result<(), Failure> {
+    if same_model(repository.plan(), &session.plan) {
         return Ok(());
     }
     Err(Failure(format!(
-        "the model has changed since {} was recorded, so T{test} cannot be run as it was: `export T{test}` writes it as a \
-         `test` for the `.sesame` file, which runs in the model of today",
-        shown(repository.path())
+        "the model has changed since {} was recorded, so T{test} cannot be run as it was. This writes it as a `test` for the \
+         `.sesame` file, which runs in the model of today:\n    {}",
+        shown(repository.path()),
+        session.caller.command("export", &[&format!("T{test}"), "--results", &shown(repository.folder())])
     )))
 }
 

@@ -13,7 +13,7 @@ use crate::cli::terminal::{Format, print, print_json, text_options};
 
 /// Which run, and how it is shown.
 #[derive(Debug, Args)]
-pub(super) struct Which {
+pub struct Which {
     /// Folder of the run, for example `results/42`; by default the latest
     #[arg(long, value_name = "DIR")]
     pub(super) results: Option<PathBuf>,

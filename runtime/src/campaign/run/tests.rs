@@ -1,6 +1,5 @@
 //! Campaigns without processes: an executor in this thread, which ends tests in the order that it is told.
 
-use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -9,6 +8,7 @@ use sesame_results::record::{self, sample};
 use sesame_rng::Stream;
 
 use super::*;
+use crate::campaign::WorkerProgram;
 use crate::campaign::executor::{ExecutorError, Job, JobResult};
 
 /// Computes what a run shows, without a simulator.
@@ -68,7 +68,7 @@ fn plan() -> CampaignPlan {
 }
 
 fn settings(plan: &CampaignPlan) -> Settings {
-    let (seed, program) = (plan.campaign.seed, PathBuf::new());
+    let (seed, program) = (plan.campaign.seed, WorkerProgram::compiled().unwrap());
     Settings { seed, workers: 1, timeout: None, program, allow_unheard: false }
 }
 
