@@ -2,8 +2,8 @@
 //!
 //! 1. [`collect`] collects names, and reports duplicates and missing declarations
 //! 2. [`system`] resolves message types (ordered so that each follows those it contains), topics, nodes, the simulator
-//! 3. [`metrics`] resolves metrics (their formulas in [`formula`], with [`function`], [`geometry`], [`region`] and [`members`])
-//!    and requirements
+//! 3. [`metrics`] resolves metrics and requirements; [`formula`] resolves formulas, with [`function`], [`geometry`],
+//!    [`region`] and [`members`]
 //! 4. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`custom`] those in the user's code)
 //!    and tests
 //! 5. [`campaign`] resolves campaigns, whose inherited clauses [`inherit`] has copied before all else; [`condition`]

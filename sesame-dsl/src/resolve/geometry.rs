@@ -11,8 +11,8 @@ use crate::units::{Unit, convert, dimension};
 
 /// An argument that is a point.
 enum Operand<'a> {
-    /// From messages: with its field and unit.
-    Read { at: u32, field: FieldPath, unit: Option<Unit> },
+    /// From messages: the position of an input, with its unit.
+    Read { at: u32, unit: Option<Unit> },
     /// In the space, with its unit.
     Written(&'a ast::Point, Option<Unit>),
 }
@@ -42,16 +42,23 @@ impl<'a> Resolver<'a> {
         if self.same_point(call, from, to) {
             return None;
         }
+        // Checked first, so that no suggestion leads to members that cannot be paired.
+        if let (Some((_, left)), Some((_, right))) = (self.group_of(from), self.group_of(to))
+            && self.members_of(&left) > 1
+            && self.members_of(&right) > 1
+        {
+            self.same_members(left.topic, right.topic, call)?;
+        }
         // Both are resolved, so that a mistake in one does not hide one in the other.
         let (left, right) = (self.operand(inputs, from), self.operand(inputs, to));
         let (left, right) = (left?, right?);
         // As with numbers, what is written takes the unit of what is read.
         match (left, right) {
-            (Operand::Read { at, unit, .. }, Operand::Written(point, _)) => {
+            (Operand::Read { at, unit }, Operand::Written(point, _)) => {
                 let to = Point::Constant(self.coordinates(point, unit.as_ref(), &self.quoted(from))?);
                 Some((between(Point::Input(at), to, 1.0), unit))
             }
-            (Operand::Written(point, _), Operand::Read { at, unit, .. }) => {
+            (Operand::Written(point, _), Operand::Read { at, unit }) => {
                 let from = Point::Constant(self.coordinates(point, unit.as_ref(), &self.quoted(to))?);
                 Some((between(from, Point::Input(at), 1.0), unit))
             }
@@ -60,10 +67,7 @@ impl<'a> Resolver<'a> {
                 let right = Point::Constant(self.coordinates(right, unit.as_ref(), &self.quoted(from))?);
                 Some((between(left, right, 1.0), unit))
             }
-            (
-                Operand::Read { at: from_at, field: from_field, unit },
-                Operand::Read { at: to_at, field: to_field, unit: to_unit },
-            ) => {
+            (Operand::Read { at: from_at, unit }, Operand::Read { at: to_at, unit: to_unit }) => {
                 let [found, wanted] = [dimension(to_unit.as_ref()), dimension(unit.as_ref())];
                 if found != wanted {
                     let [from_name, to_name] = [from, to].map(|side| self.text(side.span));
@@ -71,9 +75,6 @@ impl<'a> Resolver<'a> {
                     let label = format!("expected {}", wanted.name());
                     self.report(Diagnostic::new(Code::WRONG_UNIT, to.span, title).label(label));
                     return None;
-                }
-                if self.members_of(&from_field) > 1 && self.members_of(&to_field) > 1 {
-                    self.same_members(from_field.topic, to_field.topic, call)?;
                 }
                 let scale = convert(1.0, to_unit.as_ref(), unit.as_ref());
                 Some((between(Point::Input(from_at), Point::Input(to_at), scale), unit))
@@ -167,8 +168,8 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         }
-        let at = self.input(inputs, path, field.clone(), members, None)?;
-        Some(Operand::Read { at, field, unit })
+        let at = self.input(inputs, path, field, members, None)?;
+        Some(Operand::Read { at, unit })
     }
 
     /// A topic or field that is a point, with its unit.
@@ -218,7 +219,7 @@ impl<'a> Resolver<'a> {
         // Both are resolved, so that a mistake in one does not hide one in the other.
         let resolved = self.region(region, to.span);
         let (from, unit) = match self.operand(inputs, from)? {
-            Operand::Read { at, unit, .. } => {
+            Operand::Read { at, unit } => {
                 self.fits(region, to.span, unit.as_ref(), from)?;
                 (Point::Input(at), unit)
             }

@@ -107,19 +107,19 @@ impl<'a> Resolver<'a> {
         if of_first == of_other {
             return Some(());
         }
-        let title = "`each of` refers to two groups with different members";
+        let declared = [first, other].map(|topic| self.ast_topics().nth(topic.index()));
+        let [Some(first), Some(other)] = declared else { return None };
+        let title = format!("`{}` and `{}` have different members", first.head.name.text, other.head.name.text);
         let mut diagnostic = Diagnostic::new(Code::UNPAIRED, whole, title).label("the members cannot be paired");
         for (topic, names) in [(first, &of_first), (other, &of_other)] {
-            if let Some(topic) = self.ast_topics().nth(topic.index()) {
-                diagnostic = diagnostic.secondary(topic.path.span, format!("with the members {}", super::list(names)));
-            }
+            diagnostic = diagnostic.secondary(topic.path.span, format!("with the members {}", super::list(names)));
         }
         let sorted = |mut names: Vec<&'a str>| {
             names.sort_unstable();
             names
         };
         let note = if sorted(of_first) == sorted(of_other) {
-            "list the members of both groups in the same order"
+            "list the members of both groups in the same order: they are paired by their places"
         } else {
             "the formula is evaluated for each member, with the values that this member has in both groups"
         };

@@ -29,6 +29,8 @@ pub(super) struct FormulaState<'p> {
     keys: BTreeMap<Key, Stream>,
     /// One for each pair of a group's members, if the formula is of pairs.
     pairs: Vec<Pair>,
+    /// Per member of that group: whether it had a message in the instant that is over. Kept to be used again.
+    spoke: Vec<bool>,
     /// The values of the current message, per input.
     heard: Vec<(usize, Held)>,
 }
@@ -59,7 +61,7 @@ impl<'p> FormulaState<'p> {
             pairs_of(&formula.inputs, plan).map(|members| Pair { members, tally: Tally::default() }).collect();
         let topics = || formula.inputs.iter().map(|input| input.field.topic);
         let several = !pairs.is_empty() || topics().any(|topic| Some(topic) != topics().next());
-        FormulaState { formula, several, common, keys: BTreeMap::new(), pairs, heard: Vec::new() }
+        FormulaState { formula, several, common, keys: BTreeMap::new(), pairs, spoke: Vec::new(), heard: Vec::new() }
     }
 
     /// A message on the `member`th path of a topic, at the context's time. Returns whether the formula waits for the
@@ -120,7 +122,7 @@ impl<'p> FormulaState<'p> {
     /// All messages of the instant at the context's time are known.
     pub(super) fn settle(&mut self, context: &mut Context) {
         if !self.pairs.is_empty() {
-            self.common.settle_pairs(self.formula, &mut self.pairs, context);
+            self.common.settle_pairs(self.formula, &mut self.pairs, &mut self.spoke, context);
         } else if self.formula.per.is_none() {
             self.common.settle(self.formula, context);
         }
@@ -256,9 +258,16 @@ impl Stream {
 
     /// The instant is over: aggregates each pair of which a member had a message, or all pairs if another topic had
     /// one.
-    fn settle_pairs(&mut self, formula: &Formula, pairs: &mut [Pair], context: &mut Context) {
+    fn settle_pairs(&mut self, formula: &Formula, pairs: &mut [Pair], spoke: &mut Vec<bool>, context: &mut Context) {
+        // The last pair has the last member.
+        let count = pairs.last().map_or(0, |pair| pair.members.1 + 1);
+        spoke.clear();
+        spoke.resize(count, self.others);
+        for &member in &self.members {
+            spoke[member] = true;
+        }
         for Pair { members, tally } in pairs {
-            let concerned = self.others || self.members.iter().any(|&heard| heard == members.0 || heard == members.1);
+            let concerned = spoke[members.0] || spoke[members.1];
             if concerned && self.held.turn_to_pair(&formula.inputs, *members) {
                 step(formula, &self.held, tally, context);
             }

@@ -102,7 +102,7 @@ mod tests {
         (0..corners.len()).map(|at| [corners[at], corners[(at + 1) % corners.len()]])
     }
 
-    /// The oracle: how often the polygon goes around the point, as the sum of the angles under which its sides are seen.
+    /// The oracle: how often the polygon goes around the point, as the sum of the angles at which its sides are seen.
     fn goes_around(point: [f64; 2], corners: &[[f64; 2]]) -> bool {
         let angle: f64 = sides(corners)
             .map(|side| {

@@ -95,6 +95,7 @@ impl<'p> RobustnessState<'p> {
             // If each member or pair has a formula, values of all members go to all formulas, and those of one member
             // to its own.
             let mut finite = true;
+            let mut concerned = of.0 == of.1;
             for &(input, value) in &self.heard {
                 let own = match inputs[input].members {
                     Members::Min | Members::Max | Members::Sum => true,
@@ -102,9 +103,14 @@ impl<'p> RobustnessState<'p> {
                     Members::Second => member == of.1,
                 };
                 if own {
+                    concerned = true;
                     finite &= value.iter().all(|x| x.is_finite());
                     held.hold(inputs, &[(input, value)], member);
                 }
+            }
+            // There may be many pairs, so those of other members are left alone.
+            if !concerned {
+                continue;
             }
             if !finite {
                 instance.break_off(context.now, before);
