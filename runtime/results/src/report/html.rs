@@ -1,5 +1,6 @@
 //! Reports as HTML: the page, and its parts.
 
+mod all_tests;
 mod cells;
 mod command;
 mod front;
@@ -13,7 +14,6 @@ mod regions;
 mod scatter;
 mod shrinking;
 mod test;
-mod tests;
 mod timeline;
 
 pub use page::{page, write_page, write_page_with};

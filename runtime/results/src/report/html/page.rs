@@ -11,12 +11,12 @@ use crate::record::{Origin, RecordError, Repository, TestRow};
 use crate::report::facts::shrinking::Shrinking;
 use crate::report::facts::summary::{Summary, summarise};
 use crate::report::file::write_aside;
+use crate::report::html::all_tests::all_tests;
 use crate::report::html::front::front;
 use crate::report::html::generations::generations;
 use crate::report::html::header::header;
 use crate::report::html::policy::policy;
 use crate::report::html::test::test;
-use crate::report::html::tests::tests;
 use crate::report::html::{cells, regions, shrinking};
 use crate::report::sentences::once_sentence;
 use crate::report::tables;
@@ -57,7 +57,7 @@ fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<Strin
     }
     requirements(&mut body, &summary, &drawn);
     front(&mut body, repository, &summary, &rows, &drawn);
-    tests(&mut body, repository, &summary, &rows, &drawn)?;
+    all_tests(&mut body, repository, &summary, &rows, &drawn)?;
     generations(&mut body, repository, &summary, &rows, &drawn)?;
     if let Some(coverage) = &summary.coverage {
         cells::coverage(&mut body, repository.plan(), coverage, &drawn);

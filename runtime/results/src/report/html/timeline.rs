@@ -11,8 +11,9 @@ use sesame_plan::{Bound, CampaignPlan, Metric, MetricSource, Span};
 use crate::present::axis::Axis;
 use crate::present::markup::{Markup, coordinate, percent};
 use crate::present::number;
-use crate::record::TestRecord;
+use crate::record::{MetricValue, TestRecord};
 use crate::report::facts::show::{OperationReport, TestReport, decided_at, violated_when};
+use crate::report::facts::wording::value_text;
 use crate::report::sentences::{choices_text, effect_text, planned_text, spans_text};
 
 /// Height of a lane of an operation, in pixels.
@@ -136,16 +137,21 @@ fn shown_metrics(plan: &CampaignPlan, record: &TestRecord) -> Vec<usize> {
     for id in bounded.chain(objectives).chain(0..plan.metrics.len()) {
         // The time spent fuzzing is what the lanes above show.
         let drawn = !matches!(plan.metrics[id].source, MetricSource::FuzzingTime)
-            && record
-                .observation
-                .metrics
-                .get(id)
-                .is_some_and(|shown| !Line::of(&plan.metrics[id], shown, 0.0).is_empty());
+            && record.observation.metrics.get(id).is_some_and(|shown| {
+                let line = Line::of(&plan.metrics[id], shown, 0.0);
+                !line.points.is_empty() || (record.observation.outcome.is_whole() && violates_unset(plan, id, shown))
+            });
         if drawn && !order.contains(&id) {
             order.push(id);
         }
     }
     order
+}
+
+/// Whether a metric was never set, and a requirement is violated by its default.
+fn violates_unset(plan: &CampaignPlan, id: usize, shown: &MetricObservation) -> bool {
+    let mut bounds = plan.requirements.iter().filter(|requirement| requirement.metric.index() == id);
+    !shown.set && shown.value.is_some_and(|value| bounds.any(|requirement| !requirement.bound.holds(value)))
 }
 
 /// What is drawn of a metric: its change points, and when the last one no longer holds.
@@ -162,10 +168,6 @@ impl<'a> Line<'a> {
             (MetricSource::Robustness { .. }, None) => Line { points: &[], end },
             _ => Line { points: &shown.series, end },
         }
-    }
-
-    fn is_empty(&self) -> bool {
-        self.points.is_empty()
     }
 }
 
@@ -195,19 +197,24 @@ fn series(
         })
         .flatten()
         .collect();
-    let points = thin(points, end);
+    let points = match shown.value {
+        // What is drawn although it was never set is a default that violates a requirement, from beginning to end.
+        Some(default) if points.is_empty() => vec![(0.0, default)],
+        _ => thin(points, end),
+    };
     let values = || points.iter().map(|point| point.1).chain(lines.iter().copied());
     let extent = Axis::exact(values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max), 2);
     // The default holds until the first change; one far away (999 s for "never") would flatten all else.
     let robust = matches!(metric.source, MetricSource::Robustness { .. });
-    let default = metric.default.filter(|&default| !robust && (-1.0..=2.0).contains(&extent.share(default)));
+    let default = metric.default.filter(|_| shown.set && !robust);
+    let default = default.filter(|&default| (-1.0..=2.0).contains(&extent.share(default)));
     let reach = extent.high.max(default.unwrap_or(extent.high));
     let extent = Axis::exact(extent.low.min(default.unwrap_or(extent.low)), reach, 2);
     let height = |value: f64| MARGIN + (1.0 - extent.share(value)) * (SERIES - 2.0 * MARGIN);
 
     row(markup, |markup| {
         markup.element("b", &[], &metric.name);
-        let mut value = shown.value.map_or("unmeasured".to_owned(), |value| number::quantity(value, unit));
+        let mut value = value_text(MetricValue::whole(shown.value, shown.set), unit);
         if let Some(at) = decided_at(metric, shown) {
             let _ = write!(value, " at {at:.2} s");
         }
@@ -252,7 +259,7 @@ fn series(
     // Single times decide a series; what they mean for a robustness depends on its formula.
     let within = |time: f64| broken.iter().any(|span| (span.start..span.end).contains(&time));
     let beyond = |value: f64| bounds.iter().any(|(_, bound)| !bound.holds(value));
-    let is_bad = |(time, value): (f64, f64)| if robust { within(time) } else { beyond(value) };
+    let is_bad = |(time, value): (f64, f64)| if robust && shown.set { within(time) } else { beyond(value) };
     let bad = step_path(&points, end, height, is_bad);
     if !bad.is_empty() {
         markup.leaf("path", &[("class", "line bad"), ("d", &bad)]);
@@ -383,6 +390,24 @@ mod tests {
             drawn.contains(r#"quiet when">when 1.5m/s &lt; top_speed for 0.3s at most 3 times"#),
             "beside the lane: {drawn}"
         );
+    }
+
+    #[test]
+    fn a_default_that_violates_a_requirement_is_red_all_along() {
+        let plan = sample::plan();
+        let mut record = sample::record(&plan, 1, Origin::Search, plan.tests[0].test.clone());
+        record.observation.metrics[3] = MetricObservation::whole(Some(999.0), false, vec![]);
+        let drawn = |record: &TestRecord| {
+            let mut markup = Markup::default();
+            timeline(&mut markup, &plan, record, &report_on(&plan, record, &[], true));
+            let drawn = markup.finish();
+            drawn.split("<b>cycle_time</b>").nth(1).map(str::to_owned)
+        };
+        let row = drawn(&record).unwrap();
+        assert!(row.contains("999 s (never set)") && row.contains("R4 ≤ 70 s"), "{row}");
+        assert!(row.contains("class=\"line bad\" d=\"M0 15H70\""), "{row}");
+        record.observation.outcome = Outcome::Crash { message: "gone".to_owned() };
+        assert_eq!(drawn(&record), None, "it might have been set later");
     }
 
     #[test]

@@ -25,7 +25,7 @@ use crate::report::sentences::outcome_words;
 const MOST: usize = 20_000;
 
 /// The section with the table of all tests.
-pub(super) fn tests(
+pub(super) fn all_tests(
     body: &mut Markup,
     repository: &Repository,
     summary: &Summary,
@@ -43,7 +43,7 @@ pub(super) fn tests(
             .map(|(at, _)| at)
             .collect()
     };
-    let shown = chosen(summary, &judge, repository.plan(), rows);
+    let shown = chosen(summary, &judge, repository.plan(), rows, MOST);
     let data = data(repository, summary, &shown, drawn, violated)?;
     body.open("section", &[("id", "tests")]);
     body.element("h2", &[], "All tests");
@@ -74,9 +74,16 @@ pub(super) fn tests(
     Ok(())
 }
 
-/// The tests that the page has data of: all, or those that matter most and evenly chosen others.
-fn chosen<'r>(summary: &Summary, judge: &Judge<'_>, plan: &CampaignPlan, rows: &'r [TestRow]) -> Vec<&'r TestRow> {
-    if rows.len() <= MOST {
+/// The tests that the page has data of: all, or at most so many: those that matter, up to half, and evenly chosen
+/// others.
+fn chosen<'r>(
+    summary: &Summary,
+    judge: &Judge<'_>,
+    plan: &CampaignPlan,
+    rows: &'r [TestRow],
+    most: usize,
+) -> Vec<&'r TestRow> {
+    if rows.len() <= most {
         return rows.iter().collect();
     }
     let front: BTreeSet<u32> = summary.front.iter().map(|test| test.number).collect();
@@ -87,8 +94,8 @@ fn chosen<'r>(summary: &Summary, judge: &Judge<'_>, plan: &CampaignPlan, rows: &
             || plan.requirements.iter().any(|requirement| judge.verdict(row, requirement) == Verdict::Violated)
     };
     let (first, others): (Vec<&TestRow>, Vec<&TestRow>) = rows.iter().partition(matters);
-    let first = evenly(&first, MOST / 2);
-    let mut kept = [evenly(&others, MOST - first.len()), first].concat();
+    let first = evenly(&first, most / 2);
+    let mut kept = [evenly(&others, most - first.len()), first].concat();
     kept.sort_unstable_by_key(|row| row.number);
     kept
 }
@@ -200,5 +207,64 @@ fn rounded(value: Option<f64>) -> Value {
         Some(value) if value.fract() == 0.0 && value.abs() < 1e5 => json!(value as i64),
         Some(value) => json!(value),
         None => Value::Null,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::sample;
+    use crate::report::facts::summary::summarise;
+
+    fn with_tests<T>(count: u32, look: impl FnOnce(&Repository, &Summary, &[TestRow]) -> T) -> T {
+        let folder = tempfile::tempdir().unwrap();
+        let repository = sample::campaign(folder.path(), &sample::plan(), count);
+        let rows = repository.tests().unwrap();
+        let members = repository.latest_result_set().unwrap().unwrap().members;
+        let summary = summarise(&repository, &rows, &members).unwrap();
+        look(&repository, &summary, &rows)
+    }
+
+    #[test]
+    fn of_very_many_tests_those_that_matter_are_kept() {
+        with_tests(90, |repository, summary, rows| {
+            let plan = repository.plan();
+            let judge = repository.judge().unwrap();
+            let of = |most| chosen(summary, &judge, plan, rows, most);
+            assert_eq!(of(rows.len()).len(), rows.len());
+            let violating = |kept: &[&TestRow]| {
+                let violates = |row: &&&TestRow| {
+                    plan.requirements.iter().any(|requirement| judge.verdict(row, requirement) == Verdict::Violated)
+                };
+                kept.iter().filter(violates).count()
+            };
+            let kept = of(40);
+            assert_eq!(kept.len(), 40);
+            assert!(kept.is_sorted_by_key(|row| row.number));
+            assert!(violating(&kept) >= 10 && violating(&kept) < 40, "{}", violating(&kept));
+        });
+    }
+
+    #[test]
+    fn a_test_takes_little_of_the_page() {
+        with_tests(300, |repository, summary, rows| {
+            let all: Vec<&TestRow> = rows.iter().collect();
+            let data = data(repository, summary, &all, &[], |_| vec![0, 1]).unwrap();
+            let each = data.to_string().len() / rows.len();
+            assert!(each < 180, "{each} bytes");
+            assert_eq!(data["numbers"].as_array().unwrap().len(), rows.len());
+            for metric in data["metrics"].as_array().unwrap() {
+                assert_eq!(metric["values"].as_array().unwrap().len(), rows.len());
+            }
+        });
+    }
+
+    #[test]
+    fn numbers_have_five_digits() {
+        let short = |value| rounded(value).to_string();
+        assert_eq!(
+            [Some(1.0 / 3.0), Some(-0.0), Some(123_456.7), Some(70.0), Some(f64::NAN), None].map(short),
+            ["0.33333", "0", "123460.0", "70", "null", "null"]
+        );
     }
 }
