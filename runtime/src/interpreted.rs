@@ -1,5 +1,5 @@
-//! Runners without a crate: of a campaign whose simulator is a program and that uses no hooks, the plan says everything.
-//! So one program, `sesamec`, can run any of them at once, with nothing to generate or to compile.
+//! Runners without a crate: of a campaign whose simulator is a program and that uses no hooks, the plan says
+//! everything. So one program, `sesamec`, can run any of them at once, with nothing to generate or to compile.
 
 use std::path::{Path, PathBuf};
 
