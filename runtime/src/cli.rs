@@ -12,6 +12,7 @@ mod failure;
 mod gate;
 mod known;
 mod progress;
+mod progress_line;
 mod repeat;
 mod replay;
 mod replay_recording;

@@ -21,7 +21,8 @@ use crate::campaign::{CampaignEnd, Settings, run_campaign};
 use crate::changed_files::ChangedFiles;
 use crate::cli::failure::{Failure, STOPPED};
 use crate::cli::gate::Gate;
-use crate::cli::progress::{Display, Waiting, wait};
+use crate::cli::progress::{Display, Waiting};
+use crate::cli::progress_line::wait;
 use crate::cli::session::Session;
 use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json, say, text_options};
@@ -41,6 +42,9 @@ pub(super) struct ExecutionArgs {
     /// Seconds of wall time after which a test is stopped; by default 20 times the reference run, at least 60
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     timeout: Option<Duration>,
+    /// Seconds of wall time after which the first reference run is stopped; by default those of `--timeout`, or 600
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    reference_timeout: Option<Duration>,
     /// Go on although nothing receives what an operation disturbs: the simulator does not subscribe to its topic, and
     /// no outbound metric reads it
     #[arg(long)]
@@ -94,8 +98,14 @@ impl ExecutionArgs {
         if self.workers.is_some_and(|asked| asked.get() > workers) {
             say(format_args!("note: tests run one at a time, since operations may change files"));
         }
-        let (timeout, allow_unheard) = (self.timeout, self.allow_unheard);
-        Settings { seed, workers, timeout, program: session.program.clone(), allow_unheard }
+        Settings {
+            seed,
+            workers,
+            timeout: self.timeout,
+            reference_timeout: self.reference_timeout,
+            program: session.program.clone(),
+            allow_unheard: self.allow_unheard,
+        }
     }
 
     fn processes(&self) -> usize {
@@ -211,7 +221,7 @@ pub(super) fn execute(
     let settings = execution.settings(session, seed, &files);
     let interrupted = interruptible()?;
     let started = Instant::now();
-    let mut display = Display::new(&plan, seed);
+    let mut display = Display::new(&plan, seed, execution.workers());
     let end =
         run_campaign(&plan, recorder, &settings, &folder.join("workers"), &interrupted, &mut |event, progress| {
             display.update(event, progress);
@@ -266,6 +276,7 @@ struct Concluded<'a> {
     results: &'a Path,
     /// The page with pictures.
     report: &'a Path,
+    /// The hash of the run's content.
     digest: String,
     #[serde(flatten)]
     summary: &'a Summary,

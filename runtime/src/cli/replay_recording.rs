@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+#[cfg(feature = "mcap")]
 use sesame_plan::CampaignPlan;
 
 use crate::cli::failure::Failure;

@@ -10,7 +10,7 @@ use sesame_results::record::{self, Recorder};
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled, shown};
 use crate::cli::failure::Failure;
-use crate::cli::results_folder::{run_folder, same_model};
+use crate::cli::results_folder::run_folder;
 use crate::cli::session::Session;
 
 /// How a campaign is run. Nothing here but the seed and the number of evaluations changes results.
@@ -70,9 +70,9 @@ pub(super) fn resume(session: &Session, options: &ResumeOptions) -> Result<ExitC
         })?,
     };
     let recorder = Recorder::resume(&folder, options.execution.workers())?;
-    if !same_model(&recorder.repository().campaign().plan, plan) {
+    if let Some(difference) = recorder.repository().campaign().plan.model_difference(plan) {
         return Err(Failure(format!(
-            "the model has changed since {} was begun: start anew with `run`",
+            "the model has changed since {} was begun ({difference}): start anew with `run`",
             shown(&folder)
         )));
     }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use serde::Serialize;
 
 use sesame_results::report;
 
@@ -38,11 +39,18 @@ pub(super) fn show(results: &Path, which: &Which, test: &str) -> Result<ExitCode
     }
 }
 
+/// The hash of a run's content.
+#[derive(Serialize)]
+struct Digest {
+    /// 64 hexadecimal digits: equal runs have equal digests.
+    digest: String,
+}
+
 pub(super) fn digest(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
     let repository = open(results, which.results.as_deref())?;
     let digest = repository.digest()?;
     match which.format {
         Format::Text => print(&format!("{digest}\n")),
-        Format::Json => print_json(&serde_json::json!({ "digest": digest })),
+        Format::Json => print_json(&Digest { digest }),
     }
 }

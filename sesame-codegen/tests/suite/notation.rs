@@ -12,14 +12,14 @@ use sesame_dsl::diagnostic::Severity;
 use sesame_dsl::diagnostic::render::human;
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::units;
-use sesame_notation::{doc_comment, expectation, test_block, test_operation};
+use sesame_notation::{doc_comment, expectation, simulator_seed, test_block, test_operation};
 use sesame_plan::condition::{
     Comparison, Condition, ConditionEnd, ConditionSpace, Constraint, Integers, Operand, Variable,
 };
 use sesame_plan::{
     Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Confirmation, Copies, Count, CoverageGoal,
-    Dimension, Domain, Expectation, GridAxis, KnownTest, Metric, MetricId, Operation, OperationId, OperationKind,
-    Parameter, Recorded, Search, Shape, Span, Statistic, StopRule, Test, TestOperation,
+    Dimension, Domain, Expectation, GridAxis, KnownTest, Lengths, Metric, MetricId, Operation, OperationId,
+    OperationKind, Parameter, Recorded, Search, Shape, Span, Statistic, StopRule, Test, TestOperation,
 };
 
 /// Units that are made up of several symbols.
@@ -109,7 +109,8 @@ fn written(system: &str, plan: &CampaignPlan) -> String {
     for test in &plan.tests {
         let operations = test.test.operations.iter().map(|used| test_operation(plan, used));
         let expected = test.expectations.iter().map(|expected| expectation(expected, &plan.metrics));
-        text.push_str(&test_block(&test.doc, &test.name, operations.chain(expected)));
+        let seed = test.simulator_seed.map(simulator_seed);
+        text.push_str(&test_block(&test.doc, &test.name, operations.chain(seed).chain(expected)));
     }
     text
 }
@@ -184,11 +185,16 @@ fn operation(like: &Operation, end: f64, by_condition: bool) -> BoxedStrategy<Op
         Just(Constraint::Variable { metric: MetricId(0) }),
         (-3..3i64, 3..9i64).prop_map(|(lowest, highest)| Constraint::Integer { bounds: Integers { lowest, highest } }),
     ];
-    let clauses =
-        (ordered(0.0..end), any::<i32>(), share(), any::<bool>(), prop::collection::vec(constraint, constraints));
+    // Longer than all windows and activations, so that those of tests are permitted.
+    let lengths = (any::<bool>(), share(), 1e4..1e6f64);
+    let lengths = lengths.prop_map(move |(bounded, low, high)| {
+        (bounded && !by_condition).then_some(Lengths { low: low * 1e-12, high: high + end })
+    });
+    let constraints = prop::collection::vec(constraint, constraints);
+    let clauses = (ordered(0.0..end), any::<i32>(), share(), any::<bool>(), constraints, lengths);
     let like = like.clone();
     (domains, texts, clauses)
-        .prop_map(move |(domains, texts, ((start, stop), priority, inclusion, timed, constraints))| {
+        .prop_map(move |(domains, texts, ((start, stop), priority, inclusion, timed, constraints, lengths))| {
             let mut operation = like.clone();
             for (parameter, domain) in operation.parameters.iter_mut().zip(domains) {
                 parameter.domain = domain;
@@ -201,7 +207,7 @@ fn operation(like: &Operation, end: f64, by_condition: bool) -> BoxedStrategy<Op
                 operation.within = Span { start: 0.0, end };
             } else {
                 operation.within = Span { start, end: stop.max(start.next_up()) };
-                (operation.timed, operation.constraints) = (timed, constraints);
+                (operation.timed, operation.constraints, operation.lengths) = (timed, constraints, lengths);
                 operation.constraints.dedup();
             }
             operation
@@ -275,14 +281,16 @@ fn used(id: OperationId, of: &Operation, metrics: u32) -> BoxedStrategy<TestOper
         Just(Activation::Offline).boxed()
     } else {
         let times = prop_oneof![Just(1), 1..100u32];
+        // A condition may keep an operation active for any time.
+        let by_conditions = if of.lengths.is_some() { 0 } else { 1 };
         prop_oneof![
-            ordered(share()).prop_map(move |(a, b)| Activation::Time { start: at(a), end: at(b) }).prop_filter(
+            1 => ordered(share()).prop_map(move |(a, b)| Activation::Time { start: at(a), end: at(b) }).prop_filter(
                 "a window that is not empty",
                 |it| matches!(it, Activation::Time { start, end } if start < end)
             ),
-            (condition(metrics), condition(metrics), times.clone())
+            by_conditions => (condition(metrics), condition(metrics), times.clone())
                 .prop_map(|(start, end, times)| Activation::Condition { start, end, times }),
-            (condition(metrics), 1e-9..1e3f64, times).prop_map(|(start, length, times)| Activation::ConditionFor {
+            1 => (condition(metrics), 1e-9..1e3f64, times).prop_map(|(start, length, times)| Activation::ConditionFor {
                 start,
                 length,
                 times
@@ -306,13 +314,11 @@ fn tests(operations: &[Operation], metrics: u32) -> impl Strategy<Value = Vec<Kn
     let used = (0..).map(OperationId).zip(operations).map(|(id, operation)| used(id, operation, metrics));
     let used = Union::new(used);
     let expected = (0..metrics, bound()).prop_map(|(metric, bound)| Expectation { metric: MetricId(metric), bound });
-    let test = (prop::collection::vec(used, 1..12), prop::collection::vec(expected, 0..4), doc());
+    let seed = prop::option::of(any::<u64>());
+    let test = (prop::collection::vec(used, 1..12), prop::collection::vec(expected, 0..4), doc(), seed);
     prop::collection::vec(test, 1..6).prop_map(|tests| {
-        let tests = tests.into_iter().enumerate().map(|(at, (operations, expectations, doc))| KnownTest {
-            name: format!("test{at}"),
-            doc,
-            test: Test { operations },
-            expectations,
+        let tests = tests.into_iter().enumerate().map(|(at, (operations, expectations, doc, simulator_seed))| {
+            KnownTest { name: format!("test{at}"), doc, test: Test { operations }, expectations, simulator_seed }
         });
         tests.collect()
     })
@@ -398,7 +404,7 @@ fn campaign(like: &Campaign, metrics: &[Metric], end_after: f64) -> impl Strateg
 }
 
 /// A plan like this one with some of its operations, with other numbers, texts, tests and settings.
-fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<> {
+pub(crate) fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<> {
     let (like, metrics) = (like.clone(), u32::try_from(like.metrics.len()).expect("there are a few metrics"));
     let settings = like.clone();
     let campaigns = (1.0..1e4f64).prop_flat_map(move |end| campaign(&settings.campaign, &settings.metrics, end));
@@ -425,7 +431,7 @@ fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<> {
 
 /// A plan that a failure shows as text.
 #[derive(Clone)]
-struct Shown(CampaignPlan);
+pub(crate) struct Shown(pub(crate) CampaignPlan);
 
 impl fmt::Debug for Shown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -434,7 +440,7 @@ impl fmt::Debug for Shown {
 }
 
 /// A system in every unit, and the plan of a campaign with each operation.
-fn everything() -> (String, CampaignPlan) {
+pub(crate) fn everything() -> (String, CampaignPlan) {
     let units: Vec<&str> = units::symbols().chain(COMPOUND).chain([""]).collect();
     let system = system(&units);
     let operations = operations(&units);

@@ -362,8 +362,18 @@ impl<'a> Indexer<'a> {
 
     fn operation(&mut self, operation: &'a Operation, id: DefinitionId) {
         let Some(body) = &operation.body else { return };
-        let OperationBody { target, from, to, kind: _, within: _, priority: _, inclusion: _, untimed: _, contains } =
-            body;
+        let OperationBody {
+            target,
+            from,
+            to,
+            kind: _,
+            within: _,
+            lengths: _,
+            priority: _,
+            inclusion: _,
+            untimed: _,
+            contains,
+        } = body;
         for place in target.iter().flat_map(|target| &target.places) {
             let mut target = self.mention(&place.topic, id);
             for step in &place.steps {
@@ -385,7 +395,7 @@ impl<'a> Indexer<'a> {
     }
 
     fn test(&mut self, test: &'a Test, id: DefinitionId) {
-        let Test { head: _, operations, expectations, has_errors: _ } = test;
+        let Test { head: _, operations, expectations, simulator_seeds: _, has_errors: _ } = test;
         for used in operations {
             let operation = self.mention(&used.operation, id);
             for (name, _) in &used.choices {

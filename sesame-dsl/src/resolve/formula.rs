@@ -7,7 +7,7 @@ use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{Aggregate, Condition, Expression, FieldPath, Formula, Id as _, Input, Members};
 use crate::model::{MetricSource, TextTest, Type};
 use crate::span::Span;
-use crate::syntax::ast::{self, ExpressionKind, FormulaKind, Path, PrefixWord};
+use crate::syntax::ast::{self, ExpressionKind, FormulaKind, Name, Path, PrefixWord};
 use crate::units::{Unit, convert, dimension, product};
 
 /// The outermost functions of a formula. `last` is first: a formula without any most likely means it.
@@ -171,6 +171,14 @@ impl<'a> Resolver<'a> {
             self.no_robustness(expression);
             return;
         }
+        if let Some((call, name)) = aggregate_in(expression) {
+            self.over_time(call, name);
+            return;
+        }
+        if !reads_a_topic(expression) {
+            self.no_topic(span);
+            return;
+        }
         let word = if condition { "count" } else { "last" };
         let title = format!("`{}` changes during a test, but a metric is a single number", self.text(span));
         let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, span, title).label(if condition {
@@ -178,13 +186,10 @@ impl<'a> Resolver<'a> {
         } else {
             "reduce it to a single number with `last`, `min`, `max` or `mean`"
         });
-        diagnostic.suggestions.push(Suggestion {
-            message: format!(
-                "use {}",
-                if condition { "the number of messages for which it holds" } else { "its last value" }
-            ),
-            edits: vec![(Span { hi: span.lo, ..span }, format!("{word}(")), (span.end(), ")".to_owned())],
-        });
+        diagnostic.suggestions.push(Suggestion::possible(
+            format!("use {}", if condition { "the number of messages for which it holds" } else { "its last value" }),
+            vec![(Span { hi: span.lo, ..span }, format!("{word}(")), (span.end(), ")".to_owned())],
+        ));
         self.report(diagnostic);
     }
 
@@ -192,10 +197,10 @@ impl<'a> Resolver<'a> {
         let span = expression.span;
         let title = format!("`{}` is a condition, but a metric is a number", self.text(span));
         let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, span, title).label("expected a number");
-        diagnostic.suggestions.push(Suggestion {
-            message: "use its robustness: by how much it holds".to_owned(),
-            edits: vec![(Span { hi: span.lo, ..span }, "robustness(".to_owned()), (span.end(), ")".to_owned())],
-        });
+        diagnostic.suggestions.push(Suggestion::possible(
+            "use its robustness: by how much it holds".to_owned(),
+            vec![(Span { hi: span.lo, ..span }, "robustness(".to_owned()), (span.end(), ")".to_owned())],
+        ));
         self.report(diagnostic);
     }
 
@@ -426,6 +431,42 @@ pub(super) fn position(inputs: &mut Vec<Input>, input: Input) -> u32 {
         inputs.len() - 1
     });
     u32::try_from(at).expect("a formula has fewer than 2^32 inputs")
+}
+
+/// Whether a value depends on messages at all.
+fn reads_a_topic(expression: &ast::Expression) -> bool {
+    let reads = matches!(expression.kind, ExpressionKind::Field(_) | ExpressionKind::Members(..));
+    reads || parts(expression).any(reads_a_topic)
+}
+
+/// The first aggregate over time in an expression.
+fn aggregate_in(expression: &ast::Expression) -> Option<(Span, &Name)> {
+    if let ExpressionKind::Call(name, arguments) = &expression.kind
+        && AGGREGATES.contains(&name.text.as_str())
+        && (arguments.len() == 1 || !is_function(&name.text))
+    {
+        return Some((expression.span, name));
+    }
+    parts(expression).find_map(aggregate_in)
+}
+
+/// The expressions that an expression is made of.
+fn parts(expression: &ast::Expression) -> Box<dyn Iterator<Item = &ast::Expression> + '_> {
+    match &expression.kind {
+        ExpressionKind::Field(_)
+        | ExpressionKind::Members(..)
+        | ExpressionKind::Number(_)
+        | ExpressionKind::Truth(_)
+        | ExpressionKind::Text(_)
+        | ExpressionKind::Point(_)
+        | ExpressionKind::Region(_) => Box::new(std::iter::empty()),
+        ExpressionKind::Negate(of) | ExpressionKind::Prefixed(_, of) => Box::new(std::iter::once(&**of)),
+        ExpressionKind::Sum(terms) | ExpressionKind::Product(terms) => Box::new(terms.iter().map(|(_, of)| of)),
+        ExpressionKind::Compare(left, _, right)
+        | ExpressionKind::Until(left, _, right)
+        | ExpressionKind::Implies(left, right) => Box::new([&**left, &**right].into_iter()),
+        ExpressionKind::All(all) | ExpressionKind::Any(all) | ExpressionKind::Call(_, all) => Box::new(all.iter()),
+    }
 }
 
 /// Whether an expression has a temporal operator.

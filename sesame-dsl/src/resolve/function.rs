@@ -6,6 +6,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{BinaryFunction, Expression, Input, UnaryFunction};
 use crate::similar::most_similar;
 use crate::span::Span;
+use crate::synonyms::meanings;
 use crate::syntax::ast::{self, Name};
 use crate::units::{Dimension, Unit, convert, dimension, square_root};
 
@@ -138,7 +139,8 @@ impl<'a> Resolver<'a> {
         self.report(Diagnostic::new(Code::NOT_A_FORMULA, call, title).label(format!("expected {takes}")));
     }
 
-    fn over_time(&mut self, call: Span, name: &Name) {
+    /// Reports an aggregate over time inside of a formula.
+    pub(super) fn over_time(&mut self, call: Span, name: &Name) {
         let title = format!("`{}(…)` over time cannot be nested in a formula", name.text);
         let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, call, title)
             .label("only allowed as the outermost function of a formula")
@@ -152,7 +154,8 @@ impl<'a> Resolver<'a> {
     pub(super) fn unknown_function(&mut self, name: &Name, known: &[&'static str]) {
         let title = format!("no function named `{}`", name.text);
         let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("unknown function");
-        diagnostic = match most_similar(&name.text, known.iter().copied()) {
+        let synonym = meanings(&name.text, |word| known.contains(&word)).first().map(|synonym| synonym.meant);
+        diagnostic = match synonym.or_else(|| most_similar(&name.text, known.iter().copied())) {
             Some(similar) => diagnostic.did_you_mean(name.span, similar),
             None => diagnostic.note(format!("the functions allowed here are {}", super::list(known))),
         };

@@ -198,10 +198,9 @@ impl<'a> Resolver<'a> {
                 let [point, region] = [to, from].map(|side| self.text(side.span).to_owned());
                 let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, from.span.to(to.span), title)
                     .label("expected a point, then a region");
-                diagnostic.suggestions.push(Suggestion {
-                    message: "swap the two".to_owned(),
-                    edits: vec![(from.span, point), (to.span, region)],
-                });
+                diagnostic
+                    .suggestions
+                    .push(Suggestion::possible("swap the two", vec![(from.span, point), (to.span, region)]));
                 self.report(diagnostic);
                 return None;
             }

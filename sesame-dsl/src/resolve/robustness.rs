@@ -180,14 +180,13 @@ impl<'a> Resolver<'a> {
                 .secondary(Span { lo: alone.hi, hi: last.span.hi, ..alone }, "does the scope include this?");
             let parentheses =
                 |from: Span, to: Span| vec![(Span { hi: from.lo, ..from }, "(".to_owned()), (to.end(), ")".to_owned())];
-            diagnostic.suggestions.push(Suggestion {
-                message: format!("apply `{name}` to all of it"),
-                edits: parentheses(start, last.span),
-            });
-            diagnostic.suggestions.push(Suggestion {
-                message: format!("apply `{name}` to the first part only"),
-                edits: parentheses(alone, alone),
-            });
+            diagnostic
+                .suggestions
+                .push(Suggestion::possible(format!("apply `{name}` to all of it"), parentheses(start, last.span)));
+            diagnostic.suggestions.push(Suggestion::possible(
+                format!("apply `{name}` to the first part only"),
+                parentheses(alone, alone),
+            ));
             self.report(diagnostic);
         }
         clear

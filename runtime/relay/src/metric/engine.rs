@@ -2,6 +2,7 @@
 
 use sesame_base::observation::{MetricObservation, Reach};
 use sesame_base::time::SimTime;
+use sesame_base::verdict::ends;
 use sesame_plan::stl::Robustness;
 use sesame_plan::{CampaignPlan, Formula, Members, MetricId, MetricSource, Side, Span, TopicId};
 
@@ -307,7 +308,8 @@ impl Metrics<'_> {
     pub fn finish(mut self, busy: &[Span]) -> (Vec<MetricObservation>, Vec<String>) {
         let mut warnings = Vec::new();
         let mut observations = Vec::with_capacity(self.states.len());
-        for (state, metric) in self.states.iter_mut().zip(&self.table.plan.metrics) {
+        let requirements = &self.table.plan.requirements;
+        for (at, (state, metric)) in self.states.iter_mut().zip(&self.table.plan.metrics).enumerate() {
             let context = &mut state.context;
             if let Some(robustness) = &mut state.robustness {
                 robustness.break_off(self.now, context);
@@ -335,6 +337,14 @@ impl Metrics<'_> {
                 reach,
                 not_finite: context.not_finite.map(|(time, _)| time.seconds()),
                 series: std::mem::take(&mut context.series),
+                robustness: state.robustness.as_mut().map_or_else(Vec::new, |robustness| {
+                    let bounds = requirements.iter().filter(|requirement| requirement.metric.index() == at);
+                    let bounds = bounds.flat_map(|requirement| {
+                        let (low, _, high, _) = ends(requirement.bound);
+                        [low, high].into_iter().flatten()
+                    });
+                    robustness.signal(&bounds.collect::<Vec<f64>>())
+                }),
             });
         }
         (observations, warnings)

@@ -2,6 +2,7 @@
 //! result at the end of the run.
 
 use sesame_base::observation::Reach;
+use sesame_base::robustness::quantifier;
 use sesame_base::time::SimTime;
 use sesame_plan::stl::{Formula, Interval, Robustness};
 use sesame_plan::{CampaignPlan, Members, TopicId};
@@ -10,7 +11,7 @@ use crate::metric::Context;
 use crate::metric::aggregate::pairs_of;
 use crate::metric::expression::{Held, Moment, least, number};
 use crate::metric::held::{HeldInputs, hear};
-use crate::stl::{FormulaError, Monitor};
+use crate::stl::{FormulaError, Monitor, Signal};
 use crate::value::Value;
 
 /// A robustness in one run.
@@ -32,6 +33,8 @@ struct Instance {
     monitor: Option<Monitor>,
     /// `None` as long as there is a monitor, and if the formula was never evaluated.
     said: Option<Said>,
+    /// The robustness with its signal, where the trace had begun.
+    signal: Option<(f64, Signal)>,
 }
 
 /// The outcome of one monitor.
@@ -48,7 +51,8 @@ impl Instance {
     fn break_off(&mut self, now: SimTime, last: SimTime) {
         if let Some(monitor) = self.monitor.take() {
             let reach = monitor.reach(now);
-            self.said = Some(Said { robustness: monitor.finish(last), reach });
+            self.signal = monitor.finish_with_signal(last);
+            self.said = Some(Said { robustness: self.signal.as_ref().map(|signal| signal.0), reach });
         }
     }
 }
@@ -56,7 +60,7 @@ impl Instance {
 impl<'p> RobustnessState<'p> {
     /// Before the first message. Fails for a formula that the generator never writes.
     pub(super) fn new(robustness: &'p Robustness, plan: &CampaignPlan) -> Result<Self, FormulaError> {
-        let monitor = Monitor::new(&robustness.formula, robustness.signals.len())?;
+        let monitor = Monitor::new(&robustness.formula, robustness.signals.len())?.keeping_its_signal();
         let monitor = if robustness.whole_windows { monitor.over_whole_windows() } else { monitor };
         let each = robustness.inputs.iter().find(|input| input.members == Members::Each).map(|input| input.field.topic);
         let instance = |of: (usize, usize)| Instance {
@@ -64,6 +68,7 @@ impl<'p> RobustnessState<'p> {
             held: HeldInputs::of_one(&robustness.inputs, plan),
             monitor: Some(monitor.clone()),
             said: None,
+            signal: None,
         };
         let mut instances: Vec<Instance> = pairs_of(&robustness.inputs, plan).map(instance).collect();
         if instances.is_empty() {
@@ -134,7 +139,8 @@ impl<'p> RobustnessState<'p> {
         for instance in &mut self.instances {
             if let Some(monitor) = instance.monitor.take() {
                 // A formula without a trace says nothing about the run.
-                let robustness = monitor.finish(end);
+                instance.signal = monitor.finish_with_signal(end);
+                let robustness = instance.signal.as_ref().map(|signal| signal.0);
                 instance.said = robustness.map(|value| Said { robustness, reach: (value, value) });
             }
         }
@@ -159,6 +165,12 @@ impl<'p> RobustnessState<'p> {
             context.now = self.last;
             self.set(context);
         }
+    }
+
+    /// The signal once the run is over, in seconds. It is exact as to when it was beyond these values.
+    pub(super) fn signal(&mut self, bounds: &[f64]) -> Vec<(f64, f64)> {
+        let signals = self.instances.iter_mut().filter_map(|instance| instance.signal.take()).collect();
+        Signal::of_least(signals, quantifier(&self.robustness.formula)).thinned(bounds)
     }
 
     /// The values that it may have at the end of the run, once the run is over: the least of all instances counts. If
@@ -293,6 +305,25 @@ mod tests {
         };
         assert_eq!(value(both(), &[(0, 0, -9.0), (100, 0, 3.0), (200, 1, 7.0)]), Some(3.0));
         assert_eq!(value(both(), &[(0, 0, -9.0), (100, 0, 3.0)]), None);
+    }
+
+    #[test]
+    fn the_signal_tells_when_a_robustness_was_lost() {
+        let sent = [(0, 1, 4.0), (2_000, 1, -2.0), (3_000, 1, 1.0), (6_000, 1, -0.5)];
+        let observed = |members, formula| observed(of(vec![level(members)], formula), &sent, Some(10_000)).0;
+        let signal = observed(Members::Min, always(above(0))).robustness;
+        assert_eq!(signal, [(0.0, 4.0), (2.0, -2.0), (3.0, 1.0), (6.0, -0.5), (10.0, -0.5)]);
+        // A request without its answer counts from the request on.
+        let soon = observed(Members::Min, always(eventually(0.0, 1.0, above(0)))).robustness;
+        assert_eq!(soon.iter().copied().find(|point| point.1 < 0.0), Some((6.0, -0.5)));
+    }
+
+    #[test]
+    fn the_signal_of_a_group_is_the_least_of_its_members() {
+        let sent = [(0, 1, 4.0), (0, 2, 3.0), (2_000, 1, -2.0), (3_000, 1, 5.0), (4_000, 2, 1.0)];
+        let each = of(vec![level(Members::Each)], always(above(0)));
+        let signal = observed(each, &sent, Some(10_000)).0.robustness;
+        assert_eq!(signal, [(0.0, 3.0), (2.0, -2.0), (3.0, 3.0), (4.0, 1.0), (10.0, 1.0)]);
     }
 
     #[test]

@@ -226,7 +226,7 @@ impl Reader<'_> {
                 }
                 let message =
                     if unit.is_some() { "remove the units inside" } else { "write the unit once, after the last `)`" };
-                diagnostic.suggestions.push(Suggestion { message: message.to_owned(), edits });
+                diagnostic.suggestions.push(Suggestion::possible(message, edits));
             }
             self.report(diagnostic);
             unit = unit.or(Some(first));

@@ -165,7 +165,7 @@ impl Reader<'_> {
                 let title = format!("unknown escape `\\{escaped}` in a text");
                 let diagnostic =
                     Diagnostic::new(Code::BAD_TEXT, span, title).label("the only escapes are `\\\"` and `\\\\`");
-                self.report(diagnostic.suggest("write `\\\\` for a backslash", span, format!("\\\\{escaped}")));
+                self.report(diagnostic.fix("write `\\\\` for a backslash", span, format!("\\\\{escaped}")));
             }
         }
         Text { text, span }
