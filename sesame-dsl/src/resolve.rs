@@ -31,6 +31,7 @@ mod lifecycle;
 mod message_types;
 mod metrics;
 mod nodes;
+mod parts;
 mod physical;
 mod quantity;
 mod robustness;

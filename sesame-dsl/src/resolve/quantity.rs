@@ -115,7 +115,7 @@ impl Resolver<'_> {
             let after = &self.sources.file(number.span.file).text()[number.span.range().end..];
             after.starts_with(|c: char| matches!(c, '/' | '*' | '^' | '%') || c.is_alphanumeric())
         };
-        if numbers.iter().any(|number| glued(number)) {
+        if numbers.iter().any(glued) {
             return diagnostic;
         }
         if unit.text() == "%" && numbers.iter().all(|number| (0.0..=1.0).contains(&number.value)) {
