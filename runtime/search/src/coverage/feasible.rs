@@ -383,7 +383,7 @@ impl Sectors {
         let mean = |value: fn(&Window) -> f64| windows.iter().map(|(it, n)| value(it) * *n as f64).sum::<f64>() / n;
         let centre = mean(|window| f64::midpoint(window.start, window.end));
         let (width, shortest) = (mean(|window| window.end - window.start), mean(|window| window.shortest));
-        let greatest = mean(|window| window.longest);
+        let greatest = mean(Window::greatest_length);
         // With conditions, intervals can be anywhere in the windows, so the means can be those of any part of them.
         let reached_by_any = (
             windows.iter().map(|(it, _)| it.start).fold(f64::INFINITY, f64::min),

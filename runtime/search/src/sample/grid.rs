@@ -84,13 +84,11 @@ impl WindowLevels {
 
     /// How many ways there are to place so many copies.
     fn count(&self, copies: Copies, count: usize) -> u128 {
-        match (self, copies) {
-            (WindowLevels::Bounded(bounded), Copies::Apart) => bounded.ways(count, bounded.windows.len()),
-            _ => {
-                let (of, chosen) = self.subsets(copies, count);
-                subsets(of, chosen)
-            }
+        if let (WindowLevels::Bounded(bounded), Copies::Apart) = (self, copies) {
+            return bounded.ways(count, bounded.windows.len());
         }
+        let (of, chosen) = self.subsets(copies, count);
+        subsets(of, chosen)
     }
 
     /// The windows of so many copies are the subsets of so many things with so many members.
