@@ -108,7 +108,8 @@ impl Resolver<'_> {
         self.report(diagnostic);
     }
 
-    /// A diagnostic with what numbers without a unit may mean. Between 0 and 1, a share is probably written as a fraction.
+    /// A diagnostic with what numbers without a unit may mean. Between 0 and 1, a share is probably written as a
+    /// fraction.
     fn with_unit(&self, mut diagnostic: Diagnostic, numbers: &[&Quantity], unit: &Unit) -> Diagnostic {
         // A sign right behind a number would continue its unit: `0/h`.
         let glued = |number: &&Quantity| {
