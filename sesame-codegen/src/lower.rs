@@ -155,6 +155,7 @@ mod tests {
         operation lose on link = packet loss [0%, 50%] untimed
         operation recount on count = random absolute [-3, 3] priority 2 inclusion 40%
         operation level on zones.level = random absolute [0m, 1m]
+        operation glitch on link = freeze for [500ms, 2s]
         test early { lose loss 25% from 1s to 30s  expect seen > 3 }
         test late { lose loss 25% from 20s to 21s }
         campaign look { objectives time, collisions  operations recount, swing 1..3 per test
@@ -165,6 +166,7 @@ mod tests {
                          end after 10s }
         campaign again { repeat early 3 times { seed 9 }  observes time  end after 10s }
         campaign guard from again { passive 4 times { seed 2 }  observes seen }
+        campaign glitches from look { operations glitch, swing 1..3 per test }
     "#;
 
     fn lowered(campaign: &str) -> RunnerPlan {
@@ -199,6 +201,18 @@ mod tests {
         let names: Vec<&str> = hooks.iter().map(|hook| hook.metric.as_str()).collect();
         assert_eq!(names, ["collisions", "unused"]);
         assert_eq!(simulator_crate.as_deref(), Some("simulator"));
+    }
+
+    #[test]
+    fn a_bound_on_lengths_is_written_only_where_there_is_one() {
+        let plan = lowered("glitches").plan;
+        let glitch = plan.operations.iter().find(|operation| operation.name == "glitch").unwrap();
+        assert_eq!(glitch.lengths, Some(plan::Lengths { low: 0.5, high: 2.0 }));
+        let written = serde_json::to_string(&plan).unwrap();
+        assert_eq!(written.matches(r#""lengths":{"low":0.5,"high":2.0}"#).count(), 1);
+        assert_eq!(serde_json::from_str::<plan::CampaignPlan>(&written).unwrap(), plan);
+        let without = serde_json::to_string(&lowered("look").plan).unwrap();
+        assert!(!without.contains("lengths"), "a plan without a bound is written as before");
     }
 
     #[test]

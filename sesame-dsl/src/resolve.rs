@@ -35,6 +35,7 @@ mod members;
 mod message_types;
 mod metrics;
 mod nodes;
+mod parts;
 mod physical;
 mod quantity;
 mod region;

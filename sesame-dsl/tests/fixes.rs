@@ -7,12 +7,10 @@ use std::collections::BTreeSet;
 
 use proptest::prelude::*;
 use proptest::sample::Index;
-use sesame_dsl::analyse;
 use sesame_dsl::diagnostic::{Applicability, Code, Diagnostic, Severity, Suggestion};
-use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 
-use files::corpus;
+use files::{analyse_text, corpus};
 
 /// Spaces of the examples, in order, which mutations begin with.
 const EXAMPLES: [&str; 3] = [
@@ -22,9 +20,7 @@ const EXAMPLES: [&str; 3] = [
 ];
 
 fn diagnostics(text: &str) -> Vec<Diagnostic> {
-    let mut sources = SourceMap::new();
-    let file = sources.add("space.sesame", text.to_owned());
-    analyse(&sources, file).diagnostics
+    analyse_text("space", text).1.diagnostics
 }
 
 /// A text with a suggestion applied.

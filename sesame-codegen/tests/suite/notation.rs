@@ -282,7 +282,7 @@ fn used(id: OperationId, of: &Operation, metrics: u32) -> BoxedStrategy<TestOper
     } else {
         let times = prop_oneof![Just(1), 1..100u32];
         // A condition may keep an operation active for any time.
-        let by_conditions = if of.lengths.is_some() { 0 } else { 1 };
+        let by_conditions = u32::from(of.lengths.is_none());
         prop_oneof![
             1 => ordered(share()).prop_map(move |(a, b)| Activation::Time { start: at(a), end: at(b) }).prop_filter(
                 "a window that is not empty",

@@ -317,12 +317,12 @@ impl<'a> Resolver<'a> {
         let copies = |id: &OperationId| {
             let times = self.operations[id.index()].as_ref().map_or(Times::Offline, |operation| {
                 let within = operation.within.unwrap_or(Range { low: 0.0, high: end_after });
-                match operation.kind.is_offline() {
-                    true => Times::Offline,
-                    false => Times::Windows {
-                        room: (within.high.min(end_after) - within.low).max(0.0),
-                        lengths: operation.lengths.map(lengths::permitted),
-                    },
+                if operation.kind.is_offline() {
+                    return Times::Offline;
+                }
+                Times::Windows {
+                    room: (within.high.min(end_after) - within.low).max(0.0),
+                    lengths: operation.lengths.map(lengths::permitted),
                 }
             });
             strategy.most_copies(*copies, times)

@@ -3,6 +3,7 @@
 use super::Resolver;
 use super::depth;
 use super::function::is_function;
+use super::parts::first_part;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{Aggregate, Condition, Expression, FieldPath, Formula, Id as _, Input, Members};
 use crate::model::{MetricSource, TextTest, Type};
@@ -435,38 +436,19 @@ pub(super) fn position(inputs: &mut Vec<Input>, input: Input) -> u32 {
 
 /// Whether a value depends on messages at all.
 fn reads_a_topic(expression: &ast::Expression) -> bool {
-    let reads = matches!(expression.kind, ExpressionKind::Field(_) | ExpressionKind::Members(..));
-    reads || parts(expression).any(reads_a_topic)
+    let reads = |part: &ast::Expression| matches!(part.kind, ExpressionKind::Field(_) | ExpressionKind::Members(..));
+    first_part(expression, &|part| reads(part).then_some(())).is_some()
 }
 
 /// The first aggregate over time in an expression.
 fn aggregate_in(expression: &ast::Expression) -> Option<(Span, &Name)> {
-    if let ExpressionKind::Call(name, arguments) = &expression.kind
-        && AGGREGATES.contains(&name.text.as_str())
-        && (arguments.len() == 1 || !is_function(&name.text))
-    {
-        return Some((expression.span, name));
-    }
-    parts(expression).find_map(aggregate_in)
-}
-
-/// The expressions that an expression is made of.
-fn parts(expression: &ast::Expression) -> Box<dyn Iterator<Item = &ast::Expression> + '_> {
-    match &expression.kind {
-        ExpressionKind::Field(_)
-        | ExpressionKind::Members(..)
-        | ExpressionKind::Number(_)
-        | ExpressionKind::Truth(_)
-        | ExpressionKind::Text(_)
-        | ExpressionKind::Point(_)
-        | ExpressionKind::Region(_) => Box::new(std::iter::empty()),
-        ExpressionKind::Negate(of) | ExpressionKind::Prefixed(_, of) => Box::new(std::iter::once(&**of)),
-        ExpressionKind::Sum(terms) | ExpressionKind::Product(terms) => Box::new(terms.iter().map(|(_, of)| of)),
-        ExpressionKind::Compare(left, _, right)
-        | ExpressionKind::Until(left, _, right)
-        | ExpressionKind::Implies(left, right) => Box::new([&**left, &**right].into_iter()),
-        ExpressionKind::All(all) | ExpressionKind::Any(all) | ExpressionKind::Call(_, all) => Box::new(all.iter()),
-    }
+    first_part(expression, &|part| match &part.kind {
+        ExpressionKind::Call(name, arguments) => {
+            let aggregate = AGGREGATES.contains(&name.text.as_str());
+            (aggregate && (arguments.len() == 1 || !is_function(&name.text))).then_some((part.span, name))
+        }
+        _ => None,
+    })
 }
 
 /// Whether an expression has a temporal operator.

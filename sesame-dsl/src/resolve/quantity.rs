@@ -108,14 +108,15 @@ impl Resolver<'_> {
         self.report(diagnostic);
     }
 
-    /// A diagnostic with what numbers without a unit may mean. Between 0 and 1, a share is probably written as a fraction.
+    /// A diagnostic with what numbers without a unit may mean. Between 0 and 1, a share is probably written as a
+    /// fraction.
     fn with_unit(&self, mut diagnostic: Diagnostic, numbers: &[&Quantity], unit: &Unit) -> Diagnostic {
         // A sign right behind a number would continue its unit: `0/h`.
         let glued = |number: &&Quantity| {
             let after = &self.sources.file(number.span.file).text()[number.span.range().end..];
             after.starts_with(|c: char| matches!(c, '/' | '*' | '^' | '%') || c.is_alphanumeric())
         };
-        if numbers.iter().any(|number| glued(number)) {
+        if numbers.iter().any(glued) {
             return diagnostic;
         }
         if unit.text() == "%" && numbers.iter().all(|number| (0.0..=1.0).contains(&number.value)) {

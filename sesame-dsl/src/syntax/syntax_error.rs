@@ -194,9 +194,10 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
         let phrase = Span { hi: u32::try_from(phrase).expect("files are small"), ..span };
         for synonym in &meanings {
             let message = format!("did you mean `{}`?", synonym.meant);
-            diagnostic = match synonym.same {
-                true => diagnostic.fix(message, phrase, synonym.meant),
-                false => diagnostic.suggest(message, phrase, synonym.meant),
+            diagnostic = if synonym.same {
+                diagnostic.fix(message, phrase, synonym.meant)
+            } else {
+                diagnostic.suggest(message, phrase, synonym.meant)
             };
         }
         let similar = || crate::similar::most_similar(found.text, candidates.iter().copied());

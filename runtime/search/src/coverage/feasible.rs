@@ -24,9 +24,9 @@ const MARGIN: f64 = 1e-9;
 
 /// The cells of a grid that a test can reach if its run is completed.
 ///
-/// The campaign declares what is permitted: windows, shortest and longest intervals, ranges and numbers of operations. For each way
-/// to compose a test, timing, intensity and counts do not constrain each other, so a cell is reached if its timing, its
-/// intensity and its counts are:
+/// The campaign declares what is permitted: windows, shortest and longest intervals, ranges and numbers of operations.
+/// For each way to compose a test, timing, intensity and counts do not constrain each other, so a cell is reached if
+/// its timing, its intensity and its counts are:
 /// - an interval of length `l` has its midpoint at least `l / 2` from both ends of its window, so (T1, T2) of one
 ///   interval lies in a triangle, which the shortest and the longest permitted length cut off, and that of several in
 ///   the mean of their triangles;
@@ -383,7 +383,7 @@ impl Sectors {
         let mean = |value: fn(&Window) -> f64| windows.iter().map(|(it, n)| value(it) * *n as f64).sum::<f64>() / n;
         let centre = mean(|window| f64::midpoint(window.start, window.end));
         let (width, shortest) = (mean(|window| window.end - window.start), mean(|window| window.shortest));
-        let greatest = mean(|window| window.longest);
+        let greatest = mean(Window::greatest_length);
         // With conditions, intervals can be anywhere in the windows, so the means can be those of any part of them.
         let reached_by_any = (
             windows.iter().map(|(it, _)| it.start).fold(f64::INFINITY, f64::min),

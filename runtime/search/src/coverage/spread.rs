@@ -35,8 +35,8 @@ const MOST_VERTICES: usize = 2_000;
 ///
 /// The variance is convex, so it is greatest at a vertex of the permitted set. Where the signs of the distances are
 /// given, that set is cut out of a box by the budget and one end of the mean: so at a vertex all midpoints but two at
-/// most are as far from the middle of their window as costs nothing or as they may be. All such places are tried, equal members
-/// together. The least is zero where all midpoints can meet; else zero is a bound.
+/// most are as far from the middle of their window as costs nothing or as they may be. All such places are tried, equal
+/// members together. The least is zero where all midpoints can meet; else zero is a bound.
 pub(super) fn midpoints(groups: &[(Member, usize)], budget: f64, low: f64, high: f64) -> Spread {
     let count: usize = groups.iter().map(|(_, count)| count).sum();
     let n = count as f64;

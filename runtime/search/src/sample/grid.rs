@@ -3,9 +3,10 @@
 //! Each number takes its levels: its least value, its greatest, and others equally spaced between them; of whole
 //! numbers no more than there are. Texts and files take all their values, each axis of a point takes its levels, and
 //! the ends of sub-ranges and of windows are levels too: a sub-range begins and ends at any two, also at the same one,
-//! a window at two that differ. Where lengths of windows are bounded, a window begins at a level of the times that leave
-//! room for the longest one, and its length is a level of the permitted lengths. The grid holds each test of these that the campaign permits exactly once, where copies
-//! of one operation differ in their windows. Probabilities of inclusion do not matter to it.
+//! a window at two that differ. Where lengths of windows are bounded, a window begins at a level of the times that
+//! leave room for the longest one, and its length is a level of the permitted lengths. The grid holds each test of
+//! these that the campaign permits exactly once, where copies of one operation differ in their windows. Probabilities
+//! of inclusion do not matter to it.
 //!
 //! The order goes through the numbers of operations in turn, for each through the combinations of operations, and
 //! within a combination through the levels: each is taken once before one is taken again, as far as sizes permit. A
@@ -84,13 +85,11 @@ impl WindowLevels {
 
     /// How many ways there are to place so many copies.
     fn count(&self, copies: Copies, count: usize) -> u128 {
-        match (self, copies) {
-            (WindowLevels::Bounded(bounded), Copies::Apart) => bounded.ways(count, bounded.windows.len()),
-            _ => {
-                let (of, chosen) = self.subsets(copies, count);
-                subsets(of, chosen)
-            }
+        if let (WindowLevels::Bounded(bounded), Copies::Apart) = (self, copies) {
+            return bounded.ways(count, bounded.windows.len());
         }
+        let (of, chosen) = self.subsets(copies, count);
+        subsets(of, chosen)
     }
 
     /// The windows of so many copies are the subsets of so many things with so many members.

@@ -10,8 +10,8 @@
 //!   they were drawn with, and their places are uniform.
 //! - [`nearest`] moves given windows apart, as little as may be: among all disjoint windows in the order of the given
 //!   ones' midpoints it takes those whose ends are nearest to the given ends, by the sum of squares. Two that overlap
-//!   meet in the middle of what they shared; what is disjoint already stays as it is, to the last bit. None gets longer,
-//!   unless it was shorter than it has to be: an end moves outwards only together with the other end.
+//!   meet in the middle of what they shared; what is disjoint already stays as it is, to the last bit. None gets
+//!   longer, unless it was shorter than it has to be: an end moves outwards only together with the other end.
 
 use crate::space::range::Range;
 
@@ -35,7 +35,8 @@ pub(crate) fn spread(permitted: Range, windows: &mut [(f64, f64)]) {
 }
 
 /// Where windows must not be too long, they keep their lengths, unless these do not fit together: then what is above
-/// the shortest length shrinks in proportion. The places of windows of given lengths are uniform over all disjoint ones.
+/// the shortest length shrinks in proportion. The places of windows of given lengths are uniform over all disjoint
+/// ones.
 fn spread_bounded(permitted: Range, windows: &mut [(f64, f64)]) {
     let Range { low, high, shortest, .. } = permitted;
     let room = high - low;

@@ -11,14 +11,19 @@ pub(crate) struct Window {
     pub(crate) end: f64,
     /// How long an interval is at least.
     pub(crate) shortest: f64,
-    /// How long an interval is at most.
+    /// How long an interval is at most; infinite where `start` and `end` are the only limit.
     pub(crate) longest: f64,
 }
 
 impl Window {
     /// Intervals of any length between two shares.
     pub(crate) fn anywhere(start: f64, end: f64) -> Window {
-        Window { start, end, shortest: 0.0, longest: end - start }
+        Window { start, end, shortest: 0.0, longest: f64::INFINITY }
+    }
+
+    /// How long an interval is at most, as a number.
+    pub(crate) fn greatest_length(&self) -> f64 {
+        self.longest.min(self.end - self.start)
     }
 
     /// That of an operation in a campaign; `None` for one that acts before the start or after the end. Where conditions
@@ -32,7 +37,7 @@ impl Window {
                 start: share(range.low),
                 end: share(range.high),
                 shortest: range.shortest / within.length(),
-                longest: range.greatest_length() / within.length(),
+                longest: range.longest / within.length(),
             },
             ActivationSpace::Condition { .. } => Window::anywhere(0.0, share(within.end.min(plan.campaign.end_after))),
         })

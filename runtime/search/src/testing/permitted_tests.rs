@@ -1,7 +1,9 @@
 //! What all strategies draw: permitted tests, and the same ones.
 
 use sesame_plan::condition::ConditionEnd;
-use sesame_plan::{CampaignPlan, Copies, Count, CoverageGoal, Dimension, Exploration, Search, Strategy, Test};
+use sesame_plan::{
+    Activation, CampaignPlan, Copies, Count, CoverageGoal, Dimension, Exploration, Lengths, Search, Strategy, Test,
+};
 
 use crate::coverage::Grid;
 use crate::space::test_space::TestSpace;
@@ -143,4 +145,36 @@ fn fresh_tests_contain_copies_equally_often_with_each_strategy() {
         let expected = 0.25 / 5.0 * (1.0 / 6.0 + 4.0 / 9.0 + 13.0 / 18.0 + 49.0 / 54.0);
         assert!(shares.iter().all(|share| (share - expected).abs() < 0.02), "{shares:?} and {expected}");
     }
+}
+
+#[test]
+fn every_strategy_keeps_to_the_permitted_lengths() {
+    let bounds = [
+        (Copies::Apart, 0.0, 2.0),
+        (Copies::Apart, 20.0, 60.0),
+        (Copies::MayOverlap, 1.0, 3.0),
+        (Copies::Once, 2.5, 2.5),
+    ];
+    for (copies, low, high) in bounds {
+        for mut plan in by_time(copies, 40) {
+            plan.operations[0].lengths = Some(Lengths { low, high });
+            plan.campaign.count.max = 3;
+            assert_permitted(&plan, &tests_of(&plan, 1));
+        }
+    }
+}
+
+#[test]
+fn activations_by_condition_have_lengths_that_campaign_and_operation_permit() {
+    let nsga2 = || Search::new(Strategy::Nsga2 { population: 10 }, 200);
+    let mut plan = SYNTHETIC_ROBOTS[0].plan_by_condition(nsga2(), ConditionEnd::Length { low: 1.0, high: 15.0 });
+    plan.operations[0].lengths = Some(Lengths { low: 0.0, high: 2.0 });
+    let tests = tests_of(&plan, 1);
+    let mut lengths = [Vec::new(), Vec::new()];
+    for used in tests.iter().flat_map(|test| &test.operations) {
+        let Activation::ConditionFor { length, .. } = used.activation else { panic!("{used:?}") };
+        lengths[used.operation.index()].push(length);
+    }
+    assert!(lengths[0].iter().all(|length| (1.0..=2.0).contains(length)), "{:?}", lengths[0]);
+    assert!(lengths[1].iter().any(|&length| length > 10.0));
 }

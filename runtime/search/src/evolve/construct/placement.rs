@@ -299,7 +299,7 @@ impl CellPlacer {
                 low: share(range.low),
                 high: share(range.high),
                 shortest: range.shortest / within.length(),
-                longest: range.greatest_length() / within.length(),
+                longest: range.longest / within.length(),
                 start: share(start),
                 end: share(end),
             })
