@@ -181,14 +181,13 @@ pub(super) fn explain_code(language: &Language, code: &str) -> anyhow::Result<Ex
 /// `sesamec explain`
 pub(super) fn explainable(language: &Language) -> anyhow::Result<ExitCode> {
     let sesamec = shell::command();
-    let mut text = format!(
+    let codes: Vec<String> =
+        (language.codes)().iter().map(|(code, meaning)| format!("  {code}  {meaning}\n")).collect();
+    shell::asked_for(&format!(
         "`{sesamec} explain NAME FILE` explains what a space declares: a topic, metric, operation, campaign, …\n\
-         `{sesamec} explain CODE` explains a diagnostic:\n"
-    );
-    for (code, meaning) in (language.codes)() {
-        text.push_str(&format!("  {code}  {meaning}\n"));
-    }
-    shell::asked_for(&text)?;
+         `{sesamec} explain CODE` explains a diagnostic:\n{}",
+        codes.concat()
+    ))?;
     Ok(ExitCode::SUCCESS)
 }
 
