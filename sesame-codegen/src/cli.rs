@@ -124,7 +124,7 @@ enum Command {
     },
     /// Explain the code of a diagnostic, for example E0203; or something that a space declares, with all its uses.
     ///
-    /// A campaign is shown with every default written out, and with the space of its tests. Without anything to explain,
+    /// A campaign is shown with every default written out, and with the space of its tests. Without a code or a name,
     /// all codes are listed.
     Explain {
         /// The code, or the name: for a field or parameter with what it belongs to, as in `SafetyZone.level`.
