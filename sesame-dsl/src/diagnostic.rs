@@ -1,7 +1,8 @@
 //! What is wrong with a file, as data; [`render`] turns it into text.
 //!
 //! A diagnostic stands for one mistake. Its title says which rule is broken, the primary label adds what the title
-//! cannot know (what was found, what was expected), and suggestions are patches that can be applied as they are.
+//! cannot know (what was found, what was expected), and suggestions are patches; each says whether a program may apply
+//! it without asking.
 
 mod code;
 pub mod render;
@@ -39,6 +40,24 @@ pub struct Suggestion {
     pub message: String,
     /// What to replace with what. Spans do not overlap.
     pub edits: Vec<(Span, String)>,
+    /// Whether a program may apply it without asking.
+    pub applicability: Applicability,
+}
+
+/// How certain it is that a suggestion is what the author means, as in rustc.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Applicability {
+    /// What is written can mean nothing else: applied alone, the suggestion removes the mistake and makes no other.
+    MachineApplicable,
+    /// Applied alone, it removes the mistake, but the author may mean something else: another name, another unit.
+    MaybeIncorrect,
+}
+
+impl Suggestion {
+    /// A suggestion that the author has to agree to.
+    pub fn possible(message: impl Into<String>, edits: Vec<(Span, String)>) -> Self {
+        Suggestion { message: shortened(message.into()), edits, applicability: Applicability::MaybeIncorrect }
+    }
 }
 
 impl Diagnostic {
@@ -73,11 +92,19 @@ impl Diagnostic {
         self
     }
 
-    /// With a suggestion that replaces one span.
+    /// With a suggestion that replaces one span, and that the author has to agree to.
     pub fn suggest(mut self, message: impl Into<String>, span: Span, replacement: impl Into<String>) -> Self {
-        self.suggestions
-            .push(Suggestion { message: shortened(message.into()), edits: vec![(span, replacement.into())] });
+        self.suggestions.push(Suggestion::possible(message, vec![(span, replacement.into())]));
         self
+    }
+
+    /// With a suggestion that replaces one span, and that a program may apply without asking.
+    pub fn fix(self, message: impl Into<String>, span: Span, replacement: impl Into<String>) -> Self {
+        let mut diagnostic = self.suggest(message, span, replacement);
+        if let Some(fix) = diagnostic.suggestions.last_mut() {
+            fix.applicability = Applicability::MachineApplicable;
+        }
+        diagnostic
     }
 
     /// With the suggestion to write a name that looks like the one at `span`.

@@ -14,6 +14,7 @@ mod resolve;
 mod similar;
 pub mod source;
 pub mod span;
+mod synonyms;
 mod syntax;
 pub mod units;
 

@@ -2,7 +2,8 @@
 //!
 //! 1. [`collect`] collects names, and reports duplicates and missing declarations
 //! 2. [`system`] resolves message types (ordered so that each follows those it contains), topics, nodes, the simulator
-//! 3. [`metrics`] resolves metrics (their formulas in [`formula`]) and requirements
+//! 3. [`metrics`] resolves metrics and requirements; [`formula`] resolves formulas, with [`function`], [`geometry`],
+//!    [`region`] and [`members`]
 //! 4. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`custom`] those in the user's code)
 //!    and tests
 //! 5. [`campaign`] resolves campaigns, whose inherited clauses [`inherit`] has copied before all else; [`condition`]
@@ -24,14 +25,19 @@ mod disturbance;
 mod eddi;
 mod exploration;
 mod formula;
+mod function;
 mod fuzz;
+mod geometry;
 mod inherit;
+mod lengths;
 mod lifecycle;
+mod members;
 mod message_types;
 mod metrics;
 mod nodes;
 mod physical;
 mod quantity;
+mod region;
 mod robustness;
 mod simulator;
 mod stop;
@@ -39,7 +45,7 @@ mod system;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::diagnostic::{Code, Diagnostic, Severity};
+use crate::diagnostic::{Code, Diagnostic, Severity, Suggestion};
 use crate::import::Merged;
 use crate::index::Kind;
 use crate::model::{self, Arena, Declaration, Id, Space};
@@ -215,7 +221,12 @@ impl<'a> Resolver<'a> {
             return None;
         }
         let known = self.names_of(kind);
-        if let Some(similar) = most_similar(&name.text, known.iter().copied()) {
+        if kind == Kind::Metric
+            && name.text == "fuzzing_time"
+            && let Some(declared) = self.declared_fuzzing_time(name.span)
+        {
+            diagnostic.suggestions.push(declared);
+        } else if let Some(similar) = most_similar(&name.text, known.iter().copied()) {
             diagnostic = diagnostic.did_you_mean(name.span, similar);
         } else if known.is_empty() {
             diagnostic = diagnostic.note(format!("this space declares no {word}s"));
@@ -226,6 +237,20 @@ impl<'a> Resolver<'a> {
         }
         self.report(diagnostic);
         None
+    }
+
+    /// The suggestion to declare the metric that every space can have, after the last metric or operation of
+    /// the file that lacks it, or after its `space`.
+    fn declared_fuzzing_time(&self, lacking: Span) -> Option<Suggestion> {
+        const DECLARATION: &str = "metric fuzzing_time minimise = fuzzing_time()";
+        let here = |head: &&ast::Head| head.full_span.file == lacking.file;
+        let last = self.file.metrics.iter().map(|metric| &metric.head).rfind(here);
+        let last = last.or_else(|| self.file.operations.iter().map(|operation| &operation.head).rfind(here));
+        let last = last.or_else(|| self.file.spaces.iter().rfind(here))?.full_span;
+        Some(Suggestion::possible(
+            format!("add `{DECLARATION}`"),
+            vec![(Span { lo: last.hi, ..last }, format!("\n{DECLARATION}"))],
+        ))
     }
 
     fn names_of(&self, kind: Kind) -> Vec<&'a str> {

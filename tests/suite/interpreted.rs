@@ -44,9 +44,8 @@ fn an_interpreted_campaign_and_its_crate_have_the_same_digest() {
     assert_eq!(interpreted.digest(), built.digest());
 
     // Each continues and repeats what the other one recorded.
-    let of = ["two_robots.sesame", "--campaign", "crossing"];
-    let again = |results: &str| [&["replay"], &of[..], &["T7", "--results", results]].concat();
-    without_cargo(&project, &again("42-2")).expect(0);
+    let replay = ["replay", "two_robots.sesame", "--campaign", "crossing", "T7", "--results", "42-2"];
+    without_cargo(&project, &replay).expect(0);
     let runner = project.build("crossing");
     let mut replay = command(&runner.program);
     done(replay.args(["replay", "T7", "--results"]).arg(project.runners.join("crossing/results/42"))).expect(0);

@@ -11,6 +11,7 @@ mod custom;
 mod declarative;
 mod disk;
 mod exported;
+mod expressions;
 mod falsification;
 mod faults;
 mod first_front;

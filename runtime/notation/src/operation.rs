@@ -2,7 +2,8 @@
 
 use sesame_plan::condition::{Constraint, Integers};
 use sesame_plan::{
-    CampaignPlan, Distribution, Domain, Drain, Metric, Operation, OperationKind, Parameter, Span, place_in_words,
+    CampaignPlan, Distribution, Domain, Drain, Lengths, Metric, Operation, OperationKind, Parameter, Span,
+    place_in_words,
 };
 
 use crate::text::{list, one_of};
@@ -22,6 +23,7 @@ pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
     }
     let clauses = Clauses {
         within: (!operation.kind.is_offline()).then_some(operation.within),
+        lengths: operation.lengths,
         priority: Some(operation.priority),
         inclusion: Some(operation.inclusion),
         untimed: !operation.timed,
@@ -35,6 +37,8 @@ pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
 pub struct Clauses {
     /// The time outside of which it is never active.
     pub within: Option<Span>,
+    /// How long it is active at a time.
+    pub lengths: Option<Lengths>,
     /// Its priority.
     pub priority: Option<i32>,
     /// The probability, a fraction, that a fresh test contains it.
@@ -49,6 +53,7 @@ impl Clauses {
     /// The clauses, each after a space.
     pub fn write(&self) -> String {
         let clauses = [
+            self.lengths.map(|lengths| format!(" for {}", Unit::SECONDS.range(lengths.low, lengths.high))),
             self.within.map(|within| format!(" within {}", Unit::SECONDS.range(within.start, within.end))),
             self.priority.map(|priority| format!(" priority {priority}")),
             self.inclusion.map(|inclusion| format!(" inclusion {}", Unit::Share.number(inclusion))),

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::condition::ConditionSpace;
-use crate::{Confirmation, CoverageGoal, Exploration, MetricId, OperationId, Search, StopRule};
+use crate::{Confirmation, CoverageGoal, Exploration, Lengths, MetricId, OperationId, Search, StopRule, Times};
 
 /// A campaign.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -84,18 +84,22 @@ pub enum Copies {
 }
 
 /// At most so many copies of one operation with disjoint windows are in one test: as short as they may be, they fill
-/// half of what is permitted. So there is always room to move.
+/// half of what is permitted. So there is always room to move, unless the operation demands longer windows; then those
+/// that fit are permitted.
 const MOST_APART: u32 = 500;
 
 impl Copies {
-    /// How many copies of one operation a test by time may contain; `offline` tells whether the operation
-    /// [is offline](crate::OperationKind::is_offline).
-    pub fn most(self, offline: bool) -> u32 {
-        match self {
-            Copies::Once => 1,
-            Copies::Apart if offline => 1,
-            Copies::Apart => MOST_APART,
-            Copies::MayOverlap => u32::MAX,
+    /// How many copies of one operation a test by time may contain.
+    pub fn most(self, times: Times) -> u32 {
+        match (self, times) {
+            (Copies::Once, _) | (Copies::Apart, Times::Offline) => 1,
+            (Copies::Apart, Times::Windows { lengths: None, .. }) => MOST_APART,
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "casts to integers saturate")]
+            (Copies::Apart, Times::Windows { room, lengths: Some(Lengths { low, .. }) }) => {
+                // Rounding must not lose the last of those that fit.
+                MOST_APART.min((room / low + 1e-9) as u32).max(1)
+            }
+            (Copies::MayOverlap, _) => u32::MAX,
         }
     }
 

@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::MetricId;
+use crate::{Lengths, MetricId};
 
 /// A condition over metrics. A comparison with a variable that has no value yet does not hold.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -133,6 +133,18 @@ pub enum ConditionEnd {
         /// The longest.
         high: f64,
     },
+}
+
+impl ConditionEnd {
+    /// How long activations are of an operation whose lengths are bounded or not; `None` where the end of an activation
+    /// does not depend on its length, and where no length is permitted by both.
+    pub fn lengths(self, bound: Option<Lengths>) -> Option<Lengths> {
+        match (self, bound) {
+            (ConditionEnd::Condition, _) => None,
+            (ConditionEnd::Length { low, high }, None) => Some(Lengths { low, high }),
+            (ConditionEnd::Length { low, high }, Some(bound)) => Lengths { low, high }.shared(bound),
+        }
+    }
 }
 
 /// What the start condition of an operation has to contain, wherever a search grows it.

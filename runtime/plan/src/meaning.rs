@@ -126,6 +126,7 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
             inclusion: _,
             timed: _,
             constraints: _,
+            lengths: _,
         } = operation;
         doc.clear();
     }

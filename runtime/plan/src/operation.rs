@@ -24,6 +24,10 @@ pub struct Operation {
     /// The time outside of which it is never active (`within`); seconds, `start < end`. Of an offline operation, which
     /// is never active, the whole run.
     pub within: Span,
+    /// How long it is active at a time (`for`): the length of a window, or of an activation by condition. Without it,
+    /// `within` is the only limit, and it is not written.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lengths: Option<Lengths>,
     /// Operations of a higher priority come first on a message; equal ones in declaration order. Default 0.
     pub priority: i32,
     /// Probability that a fresh test includes it. Default 1.
@@ -58,6 +62,43 @@ impl Span {
     pub fn length(self) -> f64 {
         self.end - self.start
     }
+}
+
+/// The permitted lengths of windows, in seconds; `0 <= low <= high`, and `high` is more than 0.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Lengths {
+    /// The shortest.
+    pub low: f64,
+    /// The longest.
+    pub high: f64,
+}
+
+impl Lengths {
+    /// Whether a length is permitted, to the nanosecond: a length is the difference of two times, which are rounded.
+    pub fn contain(self, length: f64) -> bool {
+        const NANOSECOND: f64 = 1e-9;
+        self.low - NANOSECOND <= length && length <= self.high + NANOSECOND
+    }
+
+    /// The lengths that are in both, if any is.
+    pub fn shared(self, other: Lengths) -> Option<Lengths> {
+        let shared = Lengths { low: self.low.max(other.low), high: self.high.min(other.high) };
+        (shared.low <= shared.high).then_some(shared)
+    }
+}
+
+/// When a campaign by time permits an operation to be active, as far as it limits how many copies fit into a test.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Times {
+    /// Never during the run: it acts before the start or after the end.
+    Offline,
+    /// In windows of these lengths inside a stretch of so many seconds.
+    Windows {
+        /// How long the stretch is.
+        room: f64,
+        /// How long the windows are; `None` where the stretch is the only limit.
+        lengths: Option<Lengths>,
+    },
 }
 
 /// Where in a message a value is: from the message inwards; empty for the message itself.

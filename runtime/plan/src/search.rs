@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Copies, KnownTestId};
+use crate::{Copies, KnownTestId, Times};
 
 /// What a campaign does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -126,15 +126,29 @@ impl Strategy {
         }
     }
 
-    /// How many copies of one operation its tests by time may contain; `offline` tells whether the operation
-    /// [is offline](crate::OperationKind::is_offline).
-    pub fn most_copies(self, copies: Copies, offline: bool) -> u32 {
-        match (self, copies) {
+    /// How many copies of one operation its tests by time may contain.
+    pub fn most_copies(self, copies: Copies, times: Times) -> u32 {
+        match (self, copies, times) {
             // In a grid copies differ in their windows, which begin and end at levels.
-            (Strategy::Grid { .. }, _) if offline => 1,
-            (Strategy::Grid { levels }, Copies::Apart) => levels.saturating_sub(1),
-            (Strategy::Grid { levels }, Copies::MayOverlap) => levels.saturating_mul(levels.saturating_sub(1)) / 2,
-            (_, copies) => copies.most(offline),
+            (Strategy::Grid { .. }, _, Times::Offline) => 1,
+            (Strategy::Grid { levels }, Copies::Apart, Times::Windows { lengths: None, .. }) => {
+                levels.saturating_sub(1)
+            }
+            (Strategy::Grid { levels }, Copies::MayOverlap, Times::Windows { lengths: None, .. }) => {
+                levels.saturating_mul(levels.saturating_sub(1)) / 2
+            }
+            // Windows of bounded lengths begin at levels that leave room for the longest, and have a level as length.
+            (Strategy::Grid { levels }, Copies::Apart, Times::Windows { room, lengths: Some(lengths) }) => {
+                let steps = levels.saturating_sub(1);
+                let spacing = (room - lengths.high) / f64::from(steps.max(1));
+                let apart = (1..=steps).find(|&apart| f64::from(apart) * spacing >= lengths.low);
+                1 + apart.map_or(0, |apart| steps / apart)
+            }
+            (Strategy::Grid { levels }, Copies::MayOverlap, Times::Windows { room, lengths: Some(lengths) }) => {
+                let several = |some: bool| if some { levels } else { 1 };
+                several(lengths.high < room).saturating_mul(several(lengths.low < lengths.high))
+            }
+            (_, copies, times) => copies.most(times),
         }
     }
 

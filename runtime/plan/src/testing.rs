@@ -118,6 +118,7 @@ pub fn operation_with(name: &str, topic: u32, kind: OperationKind, parameters: V
         within: Span { start: 0.0, end: 10.0 },
         priority: 0,
         inclusion: 1.0,
+        lengths: None,
         timed: true,
         constraints: Vec::new(),
     }

@@ -22,8 +22,8 @@ use crate::{
 };
 
 use check::{
-    Checked, at, at_least_one, distinct, each, filled, finite, id, integers, name, ordered, positive, require, share,
-    span, unit, wrong,
+    Checked, at, at_least_one, distinct, each, filled, finite, id, integers, lengths, name, ordered, positive, require,
+    share, span, unit, wrong,
 };
 
 pub use check::PlanError;
@@ -181,6 +181,7 @@ impl CampaignPlan {
             at("domain", domain(&parameter.domain))
         })?;
         at("within", span(operation.within))?;
+        at("lengths", operation.lengths.map_or(Ok(()), |found| lengths(found, operation.within)))?;
         at("inclusion", share(operation.inclusion))?;
         each("constraints", &operation.constraints, |constraint| match constraint {
             Constraint::Variable { metric } => at("metric", self.has_metric(*metric)),

@@ -236,7 +236,7 @@ fn interval(range: Range, low: f64, high: f64, coordinates: &mut Vec<f64>) {
     let width = range.high - range.low;
     if width > 0.0 {
         coordinates.push((f64::midpoint(low, high) - range.low) / width);
-        coordinates.push((high - low) / width);
+        coordinates.push((high - low) / range.greatest_length());
     }
 }
 

@@ -147,6 +147,11 @@ fn size(operation: &OperationSpace) -> f64 {
     let pair = |steps: f64| (steps * (steps + 1.0) / 2.0).log10();
     let activation = match &operation.activation {
         ActivationSpace::Offline => 0.0,
+        // Windows of bounded lengths have a beginning and a length.
+        ActivationSpace::Time(range) if range.longest.is_finite() => {
+            let several = |width: f64| if width > 0.0 { STEPS.log10() } else { 0.0 };
+            several(range.high - range.low - range.longest) + several(range.longest - range.shortest)
+        }
         ActivationSpace::Time(_) => pair(STEPS),
         ActivationSpace::Condition { space, .. } => {
             let end = match space.end {

@@ -20,6 +20,7 @@ pub(super) fn operation(
         kind: operation.kind.clone(),
         parameters: operation.parameters.iter().map(parameter).collect(),
         within: within(operation, end_after),
+        lengths: operation.lengths.map(|lengths| plan::Lengths { low: lengths.low, high: lengths.high }),
         priority: operation.priority,
         inclusion: operation.inclusion,
         timed: operation.timed,

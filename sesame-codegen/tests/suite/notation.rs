@@ -18,8 +18,8 @@ use sesame_plan::condition::{
 };
 use sesame_plan::{
     Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Confirmation, Copies, Count, CoverageGoal,
-    Dimension, Domain, Expectation, GridAxis, KnownTest, Metric, MetricId, Operation, OperationId, OperationKind,
-    Parameter, Recorded, Search, Shape, Span, Statistic, StopRule, Test, TestOperation,
+    Dimension, Domain, Expectation, GridAxis, KnownTest, Lengths, Metric, MetricId, Operation, OperationId,
+    OperationKind, Parameter, Recorded, Search, Shape, Span, Statistic, StopRule, Test, TestOperation,
 };
 
 /// Units that are made up of several symbols.
@@ -185,11 +185,16 @@ fn operation(like: &Operation, end: f64, by_condition: bool) -> BoxedStrategy<Op
         Just(Constraint::Variable { metric: MetricId(0) }),
         (-3..3i64, 3..9i64).prop_map(|(lowest, highest)| Constraint::Integer { bounds: Integers { lowest, highest } }),
     ];
-    let clauses =
-        (ordered(0.0..end), any::<i32>(), share(), any::<bool>(), prop::collection::vec(constraint, constraints));
+    // Longer than all windows and activations, so that those of tests are permitted.
+    let lengths = (any::<bool>(), share(), 1e4..1e6f64);
+    let lengths = lengths.prop_map(move |(bounded, low, high)| {
+        (bounded && !by_condition).then_some(Lengths { low: low * 1e-12, high: high + end })
+    });
+    let constraints = prop::collection::vec(constraint, constraints);
+    let clauses = (ordered(0.0..end), any::<i32>(), share(), any::<bool>(), constraints, lengths);
     let like = like.clone();
     (domains, texts, clauses)
-        .prop_map(move |(domains, texts, ((start, stop), priority, inclusion, timed, constraints))| {
+        .prop_map(move |(domains, texts, ((start, stop), priority, inclusion, timed, constraints, lengths))| {
             let mut operation = like.clone();
             for (parameter, domain) in operation.parameters.iter_mut().zip(domains) {
                 parameter.domain = domain;
@@ -202,7 +207,7 @@ fn operation(like: &Operation, end: f64, by_condition: bool) -> BoxedStrategy<Op
                 operation.within = Span { start: 0.0, end };
             } else {
                 operation.within = Span { start, end: stop.max(start.next_up()) };
-                (operation.timed, operation.constraints) = (timed, constraints);
+                (operation.timed, operation.constraints, operation.lengths) = (timed, constraints, lengths);
                 operation.constraints.dedup();
             }
             operation
@@ -276,14 +281,16 @@ fn used(id: OperationId, of: &Operation, metrics: u32) -> BoxedStrategy<TestOper
         Just(Activation::Offline).boxed()
     } else {
         let times = prop_oneof![Just(1), 1..100u32];
+        // A condition may keep an operation active for any time.
+        let by_conditions = if of.lengths.is_some() { 0 } else { 1 };
         prop_oneof![
-            ordered(share()).prop_map(move |(a, b)| Activation::Time { start: at(a), end: at(b) }).prop_filter(
+            1 => ordered(share()).prop_map(move |(a, b)| Activation::Time { start: at(a), end: at(b) }).prop_filter(
                 "a window that is not empty",
                 |it| matches!(it, Activation::Time { start, end } if start < end)
             ),
-            (condition(metrics), condition(metrics), times.clone())
+            by_conditions => (condition(metrics), condition(metrics), times.clone())
                 .prop_map(|(start, end, times)| Activation::Condition { start, end, times }),
-            (condition(metrics), 1e-9..1e3f64, times).prop_map(|(start, length, times)| Activation::ConditionFor {
+            1 => (condition(metrics), 1e-9..1e3f64, times).prop_map(|(start, length, times)| Activation::ConditionFor {
                 start,
                 length,
                 times

@@ -22,6 +22,9 @@ pub struct Operation {
     /// The time outside of which it is never active, in seconds; `None` is the whole test, from 0 to the campaign's
     /// end.
     pub within: Option<Range>,
+    /// How long it is active at a time, in seconds, `0 <= low <= high`, and `high` is more than 0; `None` where only
+    /// `within` limits it.
+    pub lengths: Option<Range>,
     /// Operations of a higher priority come first on a message; equal ones in declaration order. Default 0.
     pub priority: i32,
     /// Probability that a fresh test includes it. Default 1.

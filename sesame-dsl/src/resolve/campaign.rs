@@ -1,10 +1,12 @@
 //! Campaigns.
 
+use sesame_plan::Times;
+
 use super::exploration::exploring;
-use super::{Kind, Resolver, list};
+use super::{Kind, Resolver, lengths, list};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
-    self, Activation, ActivationMode, Averaging, CampaignId, Copies, Id as _, MetricId, OperationId, OwnSetting,
+    self, Activation, ActivationMode, Averaging, CampaignId, Copies, Id as _, MetricId, OperationId, OwnSetting, Range,
     Search, Setting, Strategy, StrategyKind, StrategyProperties, TestId, TestTemplate,
 };
 use crate::span::Span;
@@ -73,7 +75,7 @@ impl<'a> Resolver<'a> {
             }
             (Some(search), None, None) => {
                 let explorable = self.explorable(campaign);
-                let resolved = self.search(campaign, search, template).filter(|_| explorable);
+                let resolved = self.search(campaign, search, template, end_after).filter(|_| explorable);
                 (resolved, self.seed(&search.seed))
             }
             (None, None, None) => {
@@ -185,11 +187,13 @@ impl<'a> Resolver<'a> {
             }
             if let Some(end) = end_after {
                 self.window_and_end(name, definition.index, end, campaign);
+                self.lengths_and_end(name, definition.index, end, campaign);
             }
             // It was reported for the campaign that writes both.
             let told = campaign.inherited.operations && campaign.inherited.activate;
             if let (Some(ActivationMode::Condition(space)), false) = (&activation, told) {
                 self.constraints_and_space(name, definition.index, space, campaign);
+                self.lengths_and_space(name, definition.index, space, campaign);
             }
         }
         let min = self.count(operations.min, 1, "the number of operations per test");
@@ -276,6 +280,7 @@ impl<'a> Resolver<'a> {
         campaign: &'a ast::Campaign,
         search: &'a ast::Search,
         template: Option<TestTemplate>,
+        end_after: Option<f64>,
     ) -> Option<Search> {
         let kind = search.strategy?;
         let evaluations = self.single(&search.evaluations, "evaluations").copied();
@@ -291,7 +296,7 @@ impl<'a> Resolver<'a> {
             Some(own) => self.own_setting(campaign, search, own, evaluations.zip(found))?,
         };
         let (template, strategy) = (template?, kind.with_own(value));
-        self.room_for_operations(campaign, search, &template, strategy)?;
+        self.room_for_operations(campaign, search, &template, strategy, end_after.unwrap_or(f64::INFINITY))?;
         Some(Search::Strategy { template, strategy, evaluations: found? })
     }
 
@@ -302,6 +307,7 @@ impl<'a> Resolver<'a> {
         search: &'a ast::Search,
         template: &TestTemplate,
         strategy: Strategy,
+        end_after: f64,
     ) -> Option<()> {
         let written = campaign.operations.first()?;
         let TestTemplate { operations, min, copies, activation, .. } = template;
@@ -309,8 +315,17 @@ impl<'a> Resolver<'a> {
             return Some(());
         }
         let copies = |id: &OperationId| {
-            let offline = self.operations[id.index()].as_ref().is_some_and(|operation| operation.kind.is_offline());
-            strategy.most_copies(*copies, offline)
+            let times = self.operations[id.index()].as_ref().map_or(Times::Offline, |operation| {
+                let within = operation.within.unwrap_or(Range { low: 0.0, high: end_after });
+                match operation.kind.is_offline() {
+                    true => Times::Offline,
+                    false => Times::Windows {
+                        room: (within.high.min(end_after) - within.low).max(0.0),
+                        lengths: operation.lengths.map(lengths::permitted),
+                    },
+                }
+            });
+            strategy.most_copies(*copies, times)
         };
         let most = operations.iter().map(copies).fold(0, u32::saturating_add);
         if *min <= most {

@@ -41,8 +41,9 @@ impl<'a> Resolver<'a> {
         let mut complete = true;
         if target.is_none() {
             let within = body.within.first().map(|(span, _)| (*span, "within"));
+            let lengths = body.lengths.first().map(|(span, _)| (*span, "for"));
             let contains = body.contains.first().map(|(span, _)| (*span, "start contains"));
-            for (span, word) in within.into_iter().chain(contains) {
+            for (span, word) in within.into_iter().chain(lengths).chain(contains) {
                 let title =
                     format!("`{word}` has no effect on an operation before the start or after the end of a run");
                 self.report(Diagnostic::new(Code::BAD_WINDOW, span, title).label("remove this"));

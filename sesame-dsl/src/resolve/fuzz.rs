@@ -26,6 +26,10 @@ impl<'a> Resolver<'a> {
             Some(range) => self.within(range).map(Some),
             None => Some(None),
         };
+        let lengths = match self.single(&body.lengths, "for") {
+            Some(range) => self.window_lengths(range, within.flatten()).map(Some),
+            None => Some(None),
+        };
         let priority = match self.single(&body.priority, "priority") {
             Some(quantity) => self.priority(quantity),
             None => Some(0),
@@ -44,6 +48,7 @@ impl<'a> Resolver<'a> {
             kind,
             parameters,
             within: within?,
+            lengths: lengths?,
             priority: priority?,
             inclusion: inclusion?,
             timed: body.untimed.is_empty(),
@@ -236,7 +241,11 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         }
-        Some((OperationId::from_index(index), choices?, activation?))
+        let activation = activation?;
+        if !self.fits_lengths(test, index, &operation, &activation) {
+            return None;
+        }
+        Some((OperationId::from_index(index), choices?, activation))
     }
 
     fn test_window(&mut self, window: &ast::Range) -> Option<Range> {
@@ -398,7 +407,7 @@ impl<'a> Resolver<'a> {
                 let diagnostic = Diagnostic::new(Code::WRONG_CHOICE, span, format!("{what} must be a range in a test"))
                     .label(format!("expected a range, for example `{example}`"))
                     .note("a value is drawn from the range for each message")
-                    .suggest("use a range with this value only", span, format!("[{written}, {written}]"));
+                    .fix("use a range with this value only", span, format!("[{written}, {written}]"));
                 self.report(diagnostic);
                 return None;
             }

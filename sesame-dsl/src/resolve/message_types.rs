@@ -7,6 +7,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{self, Id as _, MessageId, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
+use crate::synonyms::meanings;
 use crate::syntax::ast::{self, Name, TypeKind};
 
 impl<'a> Resolver<'a> {
@@ -188,17 +189,6 @@ impl<'a> Resolver<'a> {
 
     fn find_type(&mut self, name: &'a Name) -> Option<usize> {
         const SCALARS: [&str; 5] = ["bool", "int", "real", "text", "point"];
-        const ELSEWHERE: [(&str, &str); 9] = [
-            ("float", "real"),
-            ("double", "real"),
-            ("number", "real"),
-            ("f64", "real"),
-            ("integer", "int"),
-            ("i64", "int"),
-            ("string", "text"),
-            ("String", "text"),
-            ("boolean", "bool"),
-        ];
         if self.names.contains_key(name.text.as_str()) || self.silent.contains(name.text.as_str()) {
             return self.find(name, Kind::Message);
         }
@@ -208,14 +198,11 @@ impl<'a> Resolver<'a> {
         }
         let comparable = self.compared.more(self.names.len());
         let messages = if comparable { self.names_of(Kind::Message) } else { Vec::new() };
-        let similar = ELSEWHERE
-            .iter()
-            .find(|(word, _)| *word == name.text)
-            .map(|(_, meant)| *meant)
-            .or_else(|| most_similar(&name.text, messages.iter().copied().chain(SCALARS)));
         let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, format!("no type named `{}`", name.text))
             .label("not a built-in type and not a message of this space");
-        diagnostic = match similar {
+        // What reads the field or topic is not checked while its type is unknown, so even a synonym is only likely.
+        let synonym = meanings(&name.text, |word| SCALARS.contains(&word)).first().map(|synonym| synonym.meant);
+        diagnostic = match synonym.or_else(|| most_similar(&name.text, messages.iter().copied().chain(SCALARS))) {
             Some(similar) => diagnostic.did_you_mean(name.span, similar),
             None => diagnostic.note(
                 "the types are `bool`, `int`, `real`, `text`, `point`, `list of …` and the messages of this space",

@@ -116,7 +116,7 @@ impl<'a> Resolver<'a> {
                 let title = format!("a metric must be a real number, not {}", super::system::type_in_words(&other));
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, ty.span, title)
                     .label("expected `real` or, with a unit, for example `real[m]`")
-                    .suggest("use `real`", ty.span, "real");
+                    .fix("use `real`", ty.span, "real");
                 self.report(diagnostic);
                 None
             }

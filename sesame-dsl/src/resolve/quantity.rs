@@ -62,9 +62,9 @@ impl Resolver<'_> {
         let diagnostic = match (from, unit) {
             (None, Some(unit)) => {
                 let is = wanted(unit);
-                Diagnostic::new(Code::WRONG_UNIT, quantity.span, format!("`{written}` has no unit"))
-                    .label(format!("{what} is {is}"))
-                    .suggest(format!("add the unit `{}`", unit.text()), quantity.span.end(), unit.text())
+                let diagnostic = Diagnostic::new(Code::WRONG_UNIT, quantity.span, format!("`{written}` has no unit"))
+                    .label(format!("{what} is {is}"));
+                self.with_unit(diagnostic, &[quantity], unit)
             }
             (Some(from), None) => {
                 let title = format!("`{written}` is {}, but {what} is a plain number", from.dimension().name());
@@ -102,13 +102,32 @@ impl Resolver<'_> {
     /// Reports a range whose ends both have no unit as one mistake.
     fn without_units(&mut self, range: &ast::Range, unit: &Unit, what: &str) {
         let title = format!("`{}` has no units", self.text(range.span));
-        let mut diagnostic =
+        let diagnostic =
             Diagnostic::new(Code::WRONG_UNIT, range.span, title).label(format!("{what} is {}", wanted(unit)));
-        diagnostic.suggestions.push(Suggestion {
-            message: format!("add the unit `{}`", unit.text()),
-            edits: [&range.low, &range.high].map(|end| (end.span.end(), unit.text().to_owned())).into(),
-        });
+        let diagnostic = self.with_unit(diagnostic, &[&range.low, &range.high], unit);
         self.report(diagnostic);
+    }
+
+    /// A diagnostic with what numbers without a unit may mean. Between 0 and 1, a share is probably written as a fraction.
+    fn with_unit(&self, mut diagnostic: Diagnostic, numbers: &[&Quantity], unit: &Unit) -> Diagnostic {
+        // A sign right behind a number would continue its unit: `0/h`.
+        let glued = |number: &&Quantity| {
+            let after = &self.sources.file(number.span.file).text()[number.span.range().end..];
+            after.starts_with(|c: char| matches!(c, '/' | '*' | '^' | '%') || c.is_alphanumeric())
+        };
+        if numbers.iter().any(|number| glued(number)) {
+            return diagnostic;
+        }
+        if unit.text() == "%" && numbers.iter().all(|number| (0.0..=1.0).contains(&number.value)) {
+            let percentage = |number: f64| sesame_notation::Unit::Share.number(number);
+            let percentages = numbers.iter().map(|number| (number.span, percentage(number.value)));
+            let message = "write the fraction as a percentage";
+            diagnostic.suggestions.push(Suggestion::possible(message, percentages.collect()));
+        }
+        let units = numbers.iter().map(|number| (number.span.end(), unit.text().to_owned()));
+        let message = format!("add the unit `{}`", unit.text());
+        diagnostic.suggestions.push(Suggestion::possible(message, units.collect()));
+        diagnostic
     }
 
     pub(super) fn reversed(&mut self, range: &ast::Range, title: &str) {
@@ -116,10 +135,10 @@ impl Resolver<'_> {
         let [low, high] = [&range.low, &range.high].map(|end| self.text(end.span));
         let mut diagnostic =
             Diagnostic::new(code, range.span, title).label(format!("`{low}` is greater than `{high}`"));
-        diagnostic.suggestions.push(Suggestion {
-            message: "swap the two ends".to_owned(),
-            edits: vec![(range.low.span, high.to_owned()), (range.high.span, low.to_owned())],
-        });
+        diagnostic.suggestions.push(Suggestion::possible(
+            "swap the two ends".to_owned(),
+            vec![(range.low.span, high.to_owned()), (range.high.span, low.to_owned())],
+        ));
         self.report(diagnostic);
     }
 

@@ -77,11 +77,11 @@ impl<'a> Resolver<'a> {
         if !program.text.contains(char::is_whitespace) || first.contains('/') {
             return Some(program.text.clone());
         }
-        let parts: Vec<String> = program.text.split_whitespace().map(|part| format!("\"{part}\"")).collect();
+        let parts: Vec<String> = program.text.split_whitespace().map(|part| sesame_notation::quoted(part)).collect();
         let title = format!("`{}` is not a program", program.text);
         let diagnostic = Diagnostic::new(Code::BAD_PATH, program.span, title)
             .label("write the program and each argument as a text of its own; no shell splits them")
-            .suggest("split the command into a program and its arguments", program.span, parts.join(" "));
+            .fix("split the command into a program and its arguments", program.span, parts.join(" "));
         self.report(diagnostic);
         None
     }

@@ -5,13 +5,15 @@
 //! of that reading is the mistake, and the rules it names are what would fit.
 
 use pest::error::{ErrorVariant, InputLocation};
+use pest::iterators::Pairs;
 use sesame_grammar::Rule;
 
 use super::blocks::{self, Block};
 use super::limits::parse_bounded;
 use super::token::{Token, TokenKind, is_keyword, token_at};
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Applicability, Code, Diagnostic, Suggestion};
 use crate::span::{FileId, Span};
+use crate::synonyms::{self, Synonym};
 use crate::units::Unit;
 
 /// The furthest failure of a reading: where, and which rules would have fitted.
@@ -32,7 +34,57 @@ fn read(text: &str, lo: usize, hi: usize, rule: Rule) -> Option<Failure> {
 }
 
 /// Explains a swallowed stretch, given the good construct before it.
+///
+/// A fix that leaves the stretch unreadable may not be what its author means, so only one after which it can be read is
+/// for a program to apply.
 pub(super) fn explain(file: FileId, text: &str, region: Span, block: &Block, previous: Option<Span>) -> Diagnostic {
+    let mut diagnostic = explained(file, text, region, block, previous);
+    let after = token_at(text, region.hi as usize);
+    let member = block.begins_with(after.text) || (block.begins_with_a_name() && after.kind == TokenKind::Word);
+    let ends = member || matches!(after.kind, TokenKind::End | TokenKind::Doc) || after.text == "}";
+    let starts = || std::iter::once(region.lo).chain(previous.map(|previous| previous.lo));
+    diagnostic.suggestions.retain_mut(|suggestion| {
+        let inside = |lo: u32| suggestion.edits.iter().all(|(span, _)| lo <= span.lo && span.hi <= region.hi);
+        let readings: Vec<Reading> =
+            starts().filter(|&lo| inside(lo)).map(|lo| reading(text, lo, region.hi, suggestion, block)).collect();
+        if !ends || !readings.contains(&Reading::Whole) {
+            suggestion.applicability = Applicability::MaybeIncorrect;
+        }
+        readings.is_empty() || readings.iter().any(|reading| *reading != Reading::NotEvenTheSuggestion)
+    });
+    diagnostic
+}
+
+/// How far a stretch can be read with a suggestion applied.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Reading {
+    Whole,
+    Beyond,
+    NotEvenTheSuggestion,
+}
+
+fn reading(text: &str, lo: u32, hi: u32, suggestion: &Suggestion, block: &Block) -> Reading {
+    let mut mended = text[lo as usize..hi as usize].to_owned();
+    let mut written = 0;
+    for (span, replacement) in suggestion.edits.iter().rev() {
+        let from = (span.lo - lo) as usize;
+        mended.replace_range(from..(span.hi - lo) as usize, replacement);
+        written = written.max(from + replacement.len());
+    }
+    if mended.trim().is_empty() {
+        return Reading::Whole;
+    }
+    // Settings that cannot be read are swallowed, so what contains some can be read as well.
+    let swallows = |pairs: Pairs<'_, Rule>| pairs.flatten().any(|pair| rule_name(pair.as_rule()).starts_with("error_"));
+    match read(&mended, 0, mended.len(), block.one) {
+        None if parse_bounded(block.one, &mended).is_ok_and(swallows) => Reading::Beyond,
+        None => Reading::Whole,
+        Some(failure) if failure.at < written => Reading::NotEvenTheSuggestion,
+        Some(_) => Reading::Beyond,
+    }
+}
+
+fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Option<Span>) -> Diagnostic {
     let span_of = |token: Token<'_>| Span {
         file,
         lo: u32::try_from(token.lo).expect("files are small"),
@@ -47,7 +99,7 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, block: &Block, pre
         let doc = token_at(text, lo);
         return Diagnostic::new(Code::SYNTAX, span_of(doc), "this doc comment documents nothing")
             .label("expected a declaration after it")
-            .suggest("use a plain comment", Span { hi: region.lo + 3, ..region }, "//");
+            .fix("use a plain comment", Span { hi: region.lo + 3, ..region }, "//");
     }
     if first.text == "}" {
         let title = "unmatched `}`";
@@ -74,11 +126,32 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, block: &Block, pre
 
     let before = text[..found.lo].chars().next_back();
     let after = text[found.hi()..].chars().next();
+    let counts = |rule: Rule| failure.expected.contains(&rule);
+    let counted = match found.text {
+        "[" if counts(Rule::comma) && (counts(Rule::count) || counts(Rule::number)) => counted_in_brackets(text, found),
+        _ if counts(Rule::dots) => counted_otherwise(text, found),
+        _ => None,
+    };
+    if let Some((range, join, count)) = counted {
+        let place = |at: usize| u32::try_from(at).expect("files are small");
+        let join = Span { lo: place(join.start), hi: place(join.end), ..span };
+        return Diagnostic::new(Code::SYNTAX, span, format!("unexpected `{}`", found.text))
+            .label(format!("expected {expected}"))
+            .fix(format!("write `{range}`"), join, count);
+    }
     let joins = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
     if found.text == "-" && joins(before) && joins(after) {
-        return Diagnostic::new(Code::NOT_A_NAME, span, "a name cannot contain `-`")
-            .label("names consist of letters, digits and `_`")
-            .suggest("use `_`", span, "_");
+        let diagnostic = Diagnostic::new(Code::NOT_A_NAME, span, "a name cannot contain `-`")
+            .label("names consist of letters, digits and `_`");
+        let from = text[..found.lo].rfind(|c| !joins(Some(c))).map_or(0, |at| at + 1);
+        let to = token_at(text, found.hi()).hi();
+        let meanings = synonyms::meanings(&text[from..to], |_| true);
+        let place = |at: usize| u32::try_from(at).expect("files are small");
+        let whole = Span { lo: place(from), hi: place(to), ..span };
+        return match meanings.first() {
+            Some(synonym) => diagnostic.did_you_mean(whole, synonym.meant),
+            None => diagnostic.suggest("use `_`", span, "_"),
+        };
     }
     if found.kind == TokenKind::OpenText {
         let title = "this text does not end on its line";
@@ -117,8 +190,20 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, block: &Block, pre
         let candidates: Vec<&str> = candidates.collect();
         // A word of the language is not a misspelling of another.
         let known = Rule::all_rules().iter().any(|&rule| keyword_of(rule) == Some(found.text));
-        let similar = || crate::similar::most_similar(found.text, candidates.iter().copied()).filter(|_| !known);
-        if let Some(meant) = word_for(found.text, &candidates).or_else(similar) {
+        let (phrase, meanings) = foreign_words(text, found, &candidates);
+        let phrase = Span { hi: u32::try_from(phrase).expect("files are small"), ..span };
+        for synonym in &meanings {
+            let message = format!("did you mean `{}`?", synonym.meant);
+            diagnostic = match synonym.same {
+                true => diagnostic.fix(message, phrase, synonym.meant),
+                false => diagnostic.suggest(message, phrase, synonym.meant),
+            };
+        }
+        let similar = || crate::similar::most_similar(found.text, candidates.iter().copied());
+        if meanings.is_empty()
+            && !known
+            && let Some(meant) = similar()
+        {
             diagnostic = diagnostic.did_you_mean(span, meant);
         }
         let number_before = before.is_some_and(char::is_whitespace)
@@ -126,16 +211,63 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, block: &Block, pre
         if number_before && Unit::parse(found.text).is_ok() {
             let gap = text[..found.lo].trim_end().len();
             let gap = Span { lo: u32::try_from(gap).expect("files are small"), hi: span.lo, ..span };
-            diagnostic = diagnostic.suggest("remove the space before the unit", gap, "");
+            diagnostic = diagnostic.fix("remove the space before the unit", gap, "");
         }
         if block.rule == Rule::file && in_system {
             diagnostic = diagnostic.note(format!("`{}` is declared inside `system {{ … }}`", found.text));
         }
     }
     if found.kind == TokenKind::Sign && found.text == "=" && failure.expected.contains(&Rule::equal_to) {
-        diagnostic = diagnostic.suggest("use `==` to compare", span, "==");
+        diagnostic = diagnostic.fix("use `==` to compare", span, "==");
     }
     diagnostic
+}
+
+/// What foreign words at a token mean, of what can stand there, and where they end: two words that belong together,
+/// such as `gaussian noise` or `nsga-ii`, or otherwise one.
+fn foreign_words(text: &str, found: Token<'_>, candidates: &[&str]) -> (usize, Vec<Synonym>) {
+    let expected = |word: &str| candidates.contains(&word);
+    let next = token_at(text, found.hi());
+    let last = if next.text == "-" { token_at(text, next.hi()) } else { next };
+    if matches!(last.kind, TokenKind::Word | TokenKind::Number) && !text[found.lo..last.hi()].contains(['\n', '/']) {
+        let phrase = synonyms::meanings(&text[found.lo..last.hi()], expected);
+        if !phrase.is_empty() {
+            return (last.hi(), phrase);
+        }
+    }
+    (found.hi(), synonyms::meanings(found.text, expected))
+}
+
+/// Two numbers of a count, where they stand, and what to write there.
+type Counted = (String, std::ops::Range<usize>, String);
+
+fn is_count(token: Token<'_>) -> bool {
+    token.kind == TokenKind::Number && token.text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// Two numbers of a count that are not joined by `..`: `1-5`, `1 to 5`.
+fn counted_otherwise(text: &str, found: Token<'_>) -> Option<Counted> {
+    let mut last = token_at(text, found.hi());
+    while last.text == "." {
+        last = token_at(text, last.hi());
+    }
+    let joined = matches!(found.text, "-" | "–" | "—" | "…" | "~" | ":" | "." | "to" | "until");
+    let gap = text[..found.lo].trim_end().len();
+    let first = text[..gap].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| at + 1);
+    let whole = !text[..first].ends_with(|c: char| c == '.' || c.is_alphanumeric());
+    let both = joined && is_count(last) && first < gap && whole;
+    both.then(|| (format!("{}..{}", &text[first..gap], last.text), gap..last.lo, "..".to_owned()))
+}
+
+/// Two numbers of a count that are written as a range of quantities: `[1, 5]`.
+fn counted_in_brackets(text: &str, open: Token<'_>) -> Option<Counted> {
+    let first = token_at(text, open.hi());
+    let comma = token_at(text, first.hi());
+    let last = token_at(text, comma.hi());
+    let close = token_at(text, last.hi());
+    let range = format!("{}..{}", first.text, last.text);
+    let both = is_count(first) && comma.text == "," && is_count(last) && close.text == "]";
+    both.then(|| (range.clone(), open.lo..close.hi(), range))
 }
 
 /// What would fit, in phrases: those with words of the language first, otherwise in the order of the grammar.
@@ -189,28 +321,6 @@ fn first_word(phrase: &str) -> Option<&str> {
     let quoted = phrase.strip_prefix('`')?;
     let end = quoted.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))?;
     (end > 0).then(|| &quoted[..end])
-}
-
-/// Words that other tools and fields use, each with the words of the language for the same.
-const FOREIGN_WORDS: &[(&str, &str)] = &[
-    ("gaussian", "noise"),
-    ("gaussian", "normal"),
-    ("delay", "latency"),
-    ("dropout", "packet loss"),
-    ("packet_loss", "packet loss"),
-    ("gain", "scale"),
-    ("brownian", "random walk"),
-    ("wander", "random walk"),
-    ("random_walk", "random walk"),
-    ("hold", "freeze"),
-    ("skew", "clock skew"),
-];
-
-/// What the language calls a foreign word, if one of the candidates begins it.
-fn word_for(foreign: &str, candidates: &[&str]) -> Option<&'static str> {
-    let lower = foreign.to_lowercase();
-    let fits = |words: &str| words.split(' ').next().is_some_and(|first| candidates.contains(&first));
-    FOREIGN_WORDS.iter().find(|(word, words)| *word == lower && fits(words)).map(|(_, words)| *words)
 }
 
 /// The word a keyword rule stands for.
@@ -280,6 +390,7 @@ fn phrases_of(rule: Rule) -> Vec<String> {
             &["the permitted values, such as `int [3, 20]`"]
         }
         Rule::point => &["a point such as `(1, 0, -0.5)m`"],
+        Rule::corner => &["a corner such as `(0, 50)`"],
         Rule::coordinate => &["a number without a unit"],
         Rule::draw_seed => &["`seed`"],
         Rule::dimension => &["a dimension such as `T1 [0, 1] cells 6`"],
@@ -344,6 +455,7 @@ fn phrases_of(rule: Rule) -> Vec<String> {
         | Rule::product
         | Rule::factor
         | Rule::call
+        | Rule::region
         | Rule::function
         | Rule::members
         | Rule::truth => &["a value such as `link0 - 2.5rad`"],
@@ -363,6 +475,7 @@ fn phrases_of(rule: Rule) -> Vec<String> {
         | Rule::k_implies
         | Rule::k_node
         | Rule::k_parameter
+        | Rule::k_pair
         | Rule::element => &[],
         _ => {
             let members: Vec<String> = blocks::members(rule).map(blocks::Member::phrase).collect();

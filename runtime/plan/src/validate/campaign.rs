@@ -26,6 +26,11 @@ impl CampaignPlan {
         at("count", require(min <= max, || format!("runs from {min} to {max}")))?;
         if let ActivationMode::Condition { space } = &campaign.activation {
             at("activation.space", self.condition_space(space))?;
+            each("operations", &campaign.operations, |&id| {
+                let operation = self.operation(id);
+                let fits = operation.lengths.is_none_or(|lengths| space.end.lengths(Some(lengths)).is_some());
+                require(fits, || format!("no activation of `{}` has a permitted length", operation.name))
+            })?;
         }
         at("search", self.sound_search(&campaign.search))?;
         at("coverage", campaign.coverage.as_ref().map_or(Ok(()), coverage))?;

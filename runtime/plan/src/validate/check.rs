@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use crate::Span;
 use crate::condition::Integers;
+use crate::{Lengths, Span};
 
 /// What is wrong with a plan, and where in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -85,6 +85,15 @@ pub(super) fn ordered(low: f64, high: f64) -> Checked {
 pub(super) fn span(span: Span) -> Checked {
     require(span.start >= 0.0, || format!("begins at {}, before the start", span.start))?;
     ordered(span.start, span.end)
+}
+
+pub(super) fn lengths(lengths: Lengths, within: Span) -> Checked {
+    let Lengths { low, high } = lengths;
+    ordered(low, high)?;
+    require(low >= 0.0, || format!("{low} is below 0"))?;
+    positive(high)?;
+    let room = within.length();
+    require(low <= room || lengths.contain(room), || format!("windows of {low} s do not fit into {room} s"))
 }
 
 pub(super) fn integers(integers: Integers) -> Checked {

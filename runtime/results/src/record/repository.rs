@@ -21,6 +21,8 @@ pub struct Repository {
     pub(super) path: PathBuf,
     /// The schema of the file, which may be an earlier one.
     pub(super) schema: i64,
+    /// Whether the file has a table of robustness signals.
+    pub(super) has_robustness: bool,
     pub(super) facts: CampaignFacts,
 }
 
@@ -73,7 +75,15 @@ impl Repository {
         recognise::views(&connection, &path, &plan)?;
         let seed = seed.parse().map_err(|_| RecordError::damaged(&path, format!("`{seed}` is not a seed")))?;
         connection.set_prepared_statement_cache_capacity(STATEMENTS);
-        Ok(Repository { connection, path, schema, facts: CampaignFacts { plan, task, seed, runtime, stop } })
+        let has_robustness = schema::has_robustness(&connection)
+            .map_err(|error| RecordError::database("read the results", &path, error))?;
+        Ok(Repository {
+            connection,
+            path,
+            schema,
+            has_robustness,
+            facts: CampaignFacts { plan, task, seed, runtime, stop },
+        })
     }
 
     /// The database's file.
@@ -119,6 +129,8 @@ impl Repository {
     /// Wall times and limits of wall time, hosts, processes, session notes, paths, and the order of writing are left
     /// out, and so is what a plan says to people only: of the plan, its [meaning](CampaignPlan::meaning) is hashed.
     /// Everything is read from the file each time: no stored hash is used.
+    ///
+    /// Operations that were one operation in an imported file are hashed last, if there are any.
     ///
     /// Results of an earlier schema have the digest that their release computed.
     pub fn digest(&self) -> Result<String, RecordError> {

@@ -24,6 +24,9 @@ pub(crate) const APPLICATION_ID: i64 = 0x5345_534D;
 
 pub(super) const DDL: &str = include_str!("schema.sql");
 
+/// The table of robustness signals. Results that this schema's first releases wrote have none.
+pub(super) const ROBUSTNESS: &str = include_str!("robustness.sql");
+
 /// The first schema with the standard words for outcomes, verdicts and columns: `no_effect`, `satisfied`,
 /// `inconclusive`, `conclusive`, `operation_seed`. Before, these were `void`, `kept`, `unsaid`, `said` and `draw_seed`.
 /// Verdicts are only in views, which nothing here reads.
@@ -59,6 +62,7 @@ pub(crate) fn install(
     let transaction = connection.transaction()?;
     transaction.execute_batch(DDL)?;
     transaction.execute_batch(&series_views::views())?;
+    install_robustness(&transaction)?;
     transaction.execute_batch(&wide_views(plan))?;
     transaction.execute(
         "INSERT INTO campaign (id, space, name, source, generator, runtime, seed, evaluations, end_after_s, plan, task) \
@@ -113,6 +117,18 @@ pub(crate) fn install(
     transaction.pragma_update(None, "application_id", APPLICATION_ID)?;
     transaction.pragma_update(None, "user_version", SCHEMA)?;
     transaction.commit()
+}
+
+/// Makes the table of robustness signals with its views.
+pub(super) fn install_robustness(connection: &Connection) -> rusqlite::Result<()> {
+    connection.execute_batch(ROBUSTNESS)?;
+    connection.execute_batch(&series_views::robustness_views())
+}
+
+/// Whether there is a table of robustness signals.
+pub(super) fn has_robustness(connection: &Connection) -> rusqlite::Result<bool> {
+    connection
+        .query_row("SELECT EXISTS (SELECT 1 FROM sqlite_schema WHERE name = 'robustness_pieces')", [], |row| row.get(0))
 }
 
 /// The views with a column per metric, which only a plan can name: `results` has a row per test, `front` those of the

@@ -24,11 +24,12 @@ const MARGIN: f64 = 1e-9;
 
 /// The cells of a grid that a test can reach if its run is completed.
 ///
-/// The campaign declares what is permitted: windows, shortest intervals, ranges and numbers of operations. For each way
+/// The campaign declares what is permitted: windows, shortest and longest intervals, ranges and numbers of operations. For each way
 /// to compose a test, timing, intensity and counts do not constrain each other, so a cell is reached if its timing, its
 /// intensity and its counts are:
 /// - an interval of length `l` has its midpoint at least `l / 2` from both ends of its window, so (T1, T2) of one
-///   interval lies in a triangle, and that of several in the mean of their triangles;
+///   interval lies in a triangle, which the shortest and the longest permitted length cut off, and that of several in
+///   the mean of their triangles;
 /// - inside a cell of T1 and T2, T3 takes all values between a minimum and a maximum;
 /// - P1 takes all values, and P2 all from 0 to a maximum that depends on P1;
 /// - integer parameters take their possible values.
@@ -302,10 +303,10 @@ impl Sectors {
         for it in test_space.operations() {
             let operation = plan.operation(it.operation);
             let Some(window) = Window::of(plan, it) else { continue };
-            let window = if self.one_interval_each { window } else { Window { shortest: 0.0, ..window } };
+            let window = if self.one_interval_each { window } else { Window::anywhere(window.start, window.end) };
             let parameters = operation.parameters.iter().zip(&it.parameters);
             let kind = KindOfOperation {
-                window: if timed { window } else { Window { start: 0.0, end: 1.0, shortest: 0.0 } },
+                window: if timed { window } else { Window::anywhere(0.0, 1.0) },
                 parameters: parameters
                     .filter(|_| graded)
                     .flat_map(|(parameter, parameter_space)| Values::of(&parameter.domain, parameter_space))
@@ -382,6 +383,7 @@ impl Sectors {
         let mean = |value: fn(&Window) -> f64| windows.iter().map(|(it, n)| value(it) * *n as f64).sum::<f64>() / n;
         let centre = mean(|window| f64::midpoint(window.start, window.end));
         let (width, shortest) = (mean(|window| window.end - window.start), mean(|window| window.shortest));
+        let greatest = mean(|window| window.longest);
         // With conditions, intervals can be anywhere in the windows, so the means can be those of any part of them.
         let reached_by_any = (
             windows.iter().map(|(it, _)| it.start).fold(f64::INFINITY, f64::min),
@@ -391,28 +393,44 @@ impl Sectors {
             .iter()
             .map(|(it, n)| {
                 let reach = (it.end - it.start - it.shortest) / 2.0;
-                (Member { centre: f64::midpoint(it.start, it.end), reach }, *n)
+                let free = (it.end - it.start - it.longest).max(0.0) / 2.0;
+                (Member { centre: f64::midpoint(it.start, it.end), reach, free }, *n)
             })
             .collect();
+        let free: f64 = members.iter().map(|(member, n)| member.free * *n as f64).sum();
         let mut reached = Reached { cells: Vec::new(), exact: true };
         for t2 in self.slices(Dimension::T2) {
-            let (centre, width) = if self.one_interval_each {
-                (centre, width)
+            let (centre, width, greatest) = if self.one_interval_each {
+                (centre, width, greatest)
             } else {
                 let (start, end) = reached_by_any;
-                (f64::midpoint(start, end), end - start)
+                (f64::midpoint(start, end), end - start, end - start)
             };
             // The shortest intervals in the cell leave most room for their midpoints.
             let length = t2.low.max(shortest);
             // Disjoint copies can touch, so the whole length can be reached too.
             let too_long = self.one_interval_each && length > longest / n + MARGIN;
-            if too_long || t2.high.min(width) - length <= self.margin {
+            // Where only one length is possible, the cell that contains it is reached.
+            let one_length = self.one_interval_each && greatest - shortest <= 1e-9;
+            let reaches_length = if one_length {
+                self.at(Dimension::T2, shortest).contains(&t2.offset)
+            } else {
+                t2.high.min(greatest) - length > self.margin
+            };
+            if too_long || !reaches_length {
                 continue;
             }
+            let length = if one_length { shortest } else { length };
             let room = (width - length) / 2.0;
             for t1 in self.slices(Dimension::T1) {
                 let (low, high) = (t1.low.max(centre - room), t1.high.min(centre + room));
-                if high - low <= self.margin {
+                let one_place = one_length && room <= 1e-9;
+                let reaches_midpoint = if one_place {
+                    self.at(Dimension::T1, centre).contains(&t1.offset)
+                } else {
+                    high - low > self.margin
+                };
+                if !reaches_midpoint {
                     continue;
                 }
                 let base = t1.offset + t2.offset;
@@ -425,7 +443,7 @@ impl Sectors {
                 } else if count == 1 {
                     spread::Spread { least: 0.0, greatest: 0.0, exact: true }
                 } else {
-                    spread::midpoints(&members, n * room, low, high)
+                    spread::midpoints(&members, n * room - free, low, high)
                 };
                 reached.exact &= spread.exact;
                 // Disjoint copies can touch; then the extreme values are reached too.

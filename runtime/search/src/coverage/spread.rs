@@ -7,6 +7,15 @@ pub(super) struct Member {
     pub(super) centre: f64,
     /// Farthest that the midpoint can be from there: half of the window less half of the shortest interval.
     pub(super) reach: f64,
+    /// So far it can be from there with the longest interval: this much of a distance costs nothing.
+    pub(super) free: f64,
+}
+
+impl Member {
+    /// How much of the budget a distance from the middle costs.
+    fn cost(self, distance: f64) -> f64 {
+        (distance.abs() - self.free).max(0.0)
+    }
 }
 
 /// The least and the greatest standard deviation that midpoints can have.
@@ -22,11 +31,11 @@ pub(super) struct Spread {
 const MOST_VERTICES: usize = 2_000;
 
 /// The extreme standard deviations of midpoints `m` with `|m - centre| <= reach` for each, the sum of those distances
-/// at most `budget`, and the mean of all in `low..=high`.
+/// beyond `free` at most `budget`, and the mean of all in `low..=high`.
 ///
 /// The variance is convex, so it is greatest at a vertex of the permitted set. Where the signs of the distances are
 /// given, that set is cut out of a box by the budget and one end of the mean: so at a vertex all midpoints but two at
-/// most are at the middle of their window or as far from it as they may be. All such places are tried, equal members
+/// most are as far from the middle of their window as costs nothing or as they may be. All such places are tried, equal members
 /// together. The least is zero where all midpoints can meet; else zero is a bound.
 pub(super) fn midpoints(groups: &[(Member, usize)], budget: f64, low: f64, high: f64) -> Spread {
     let count: usize = groups.iter().map(|(_, count)| count).sum();
@@ -34,13 +43,15 @@ pub(super) fn midpoints(groups: &[(Member, usize)], budget: f64, low: f64, high:
     let meeting = groups
         .iter()
         .fold((low, high), |(low, high), (it, _)| (low.max(it.centre - it.reach), high.min(it.centre + it.reach)));
-    let distance = |t: f64| groups.iter().map(|(it, count)| *count as f64 * (t - it.centre).abs()).sum::<f64>();
-    // The sum of distances is convex, and least at a centre or at an end of what is left.
-    let places = groups.iter().map(|(it, _)| it.centre.clamp(meeting.0, meeting.1.max(meeting.0)));
+    let distance = |t: f64| groups.iter().map(|(it, count)| *count as f64 * it.cost(t - it.centre)).sum::<f64>();
+    // The sum of costs is convex, and least where a distance begins to cost, or at an end of what is left.
+    let kinks = groups.iter().flat_map(|(it, _)| [it.centre - it.free, it.centre + it.free]);
+    let places = kinks.map(|kink| kink.clamp(meeting.0, meeting.1.max(meeting.0)));
     let nearest = places.map(distance).fold(f64::INFINITY, f64::min);
     let meet = meeting.0 <= meeting.1 + 1e-12 && nearest <= budget + 1e-9;
-    // A group of n in one of three places has (n + 1)(n + 2) / 2 ways.
-    let ways = groups.iter().map(|(_, n)| (n + 1) * (n + 2) / 2).try_fold(1usize, usize::checked_mul);
+    // A group of n in one of three places has (n + 1)(n + 2) / 2 ways, in one of four (n + 3) / 3 times as many.
+    let mut ways = groups.iter().map(|(it, n)| (n + 1) * (n + 2) / 2 * if it.free > 0.0 { n + 3 } else { 3 } / 3);
+    let ways = ways.try_fold(1usize, usize::checked_mul);
     let pairs = groups.len() * groups.len() + groups.len() + 1;
     if ways.and_then(|ways| ways.checked_mul(pairs)).is_none_or(|all| all > MOST_VERTICES) {
         let ends = groups.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (it, _)| {
@@ -62,12 +73,12 @@ struct Placed {
 }
 
 impl Placed {
-    fn with(self, midpoint: f64, centre: f64, times: usize) -> Placed {
+    fn with(self, midpoint: f64, member: Member, times: usize) -> Placed {
         let times = times as f64;
         Placed {
             sum: self.sum + times * midpoint,
             squares: self.squares + times * midpoint * midpoint,
-            distance: self.distance + times * (midpoint - centre).abs(),
+            distance: self.distance + times * member.cost(midpoint - member.centre),
         }
     }
 }
@@ -85,7 +96,7 @@ impl Vertices<'_> {
     /// Places the groups from this one on; `free` are members that the budget and the mean will place.
     fn place(&mut self, at: usize, placed: Placed, free: [Option<Member>; 2]) {
         let Some(&(member, count)) = self.groups.get(at) else { return self.finish(placed, free) };
-        let Member { centre, reach } = member;
+        let Member { centre, reach, free: costless } = member;
         let open = free.iter().filter(|slot| slot.is_none()).count();
         for left_open in 0..=open.min(count) {
             let mut free = free;
@@ -96,11 +107,15 @@ impl Vertices<'_> {
             for above in 0..=fixed {
                 for below in 0..=fixed - above {
                     let middle = fixed - above - below;
-                    let placed = placed
-                        .with(centre + reach, centre, above)
-                        .with(centre - reach, centre, below)
-                        .with(centre, centre, middle);
-                    self.place(at + 1, placed, free);
+                    // Without anything that costs nothing, both places are the middle itself.
+                    for right in if costless > 0.0 { 0..=middle } else { 0..=0 } {
+                        let placed = placed
+                            .with(centre + reach, member, above)
+                            .with(centre - reach, member, below)
+                            .with(centre + costless, member, right)
+                            .with(centre - costless, member, middle - right);
+                        self.place(at + 1, placed, free);
+                    }
                 }
             }
         }
@@ -111,8 +126,8 @@ impl Vertices<'_> {
         match free {
             [None, None] => self.try_vertex(placed, &[]),
             [Some(one), None] | [None, Some(one)] => {
-                self.try_vertex(placed, &[(one, one.centre + left)]);
-                self.try_vertex(placed, &[(one, one.centre - left)]);
+                self.try_vertex(placed, &[(one, one.centre + one.free + left)]);
+                self.try_vertex(placed, &[(one, one.centre - one.free - left)]);
                 for sum in self.sums {
                     self.try_vertex(placed, &[(one, sum - placed.sum)]);
                 }
@@ -122,6 +137,14 @@ impl Vertices<'_> {
                     // Distances to opposite sides add up to the budget, and midpoints to the sum; on one side both
                     // would say the same.
                     let shift = sum - placed.sum - first.centre - second.centre;
+                    // One takes the whole budget, and the other is where the sum has it, at no cost.
+                    for (one, other) in [(first, second), (second, first)] {
+                        for far in [one.free + left, -one.free - left] {
+                            let rest = [(one, one.centre + far), (other, other.centre + shift - far)];
+                            self.try_vertex(placed, &rest);
+                        }
+                    }
+                    let left = left + first.free + second.free;
                     let (up, down) = (f64::midpoint(left, shift), f64::midpoint(-left, shift));
                     self.try_vertex(placed, &[(first, first.centre + up), (second, second.centre + down)]);
                     self.try_vertex(placed, &[(first, first.centre + down), (second, second.centre + up)]);
@@ -137,7 +160,7 @@ impl Vertices<'_> {
             if (midpoint - member.centre).abs() > member.reach + SLACK {
                 return;
             }
-            all = all.with(midpoint, member.centre, 1);
+            all = all.with(midpoint, member, 1);
         }
         let [low, high] = self.sums;
         if all.distance <= self.budget + SLACK && low - SLACK <= all.sum && all.sum <= high + SLACK {
@@ -178,7 +201,7 @@ mod tests {
             let midpoints: Vec<f64> = members.iter().zip(x).map(|(it, x)| it.centre + x).collect();
             let mean = midpoints.iter().sum::<f64>() / n;
             let kept = members.iter().zip(x).all(|(it, x)| x.abs() <= it.reach)
-                && x.iter().map(|x| x.abs()).sum::<f64>() <= budget
+                && members.iter().zip(x).map(|(it, x)| it.cost(*x)).sum::<f64>() <= budget
                 && (low..=high).contains(&mean);
             kept.then(|| (midpoints.iter().map(|m| (m - mean) * (m - mean)).sum::<f64>() / n).sqrt())
         };
@@ -186,9 +209,10 @@ mod tests {
         let mut best: f64 = 0.0;
         for _ in 0..12 {
             let mut x: Vec<f64> = members.iter().map(|member| stream.uniform(-member.reach, member.reach)).collect();
-            let used: f64 = x.iter().map(|x| x.abs()).sum();
-            for x in &mut x {
-                *x *= (budget / used).min(1.0);
+            let used: f64 = members.iter().zip(&x).map(|(it, x)| it.cost(*x)).sum();
+            for (x, member) in x.iter_mut().zip(&members) {
+                let within = x.abs().min(member.free) + member.cost(*x) * (budget / used).min(1.0);
+                *x = x.signum() * within;
             }
             let mut now = spread(&x);
             for round in 0..4_000 {
@@ -214,7 +238,12 @@ mod tests {
     }
 
     fn groups() -> impl Strategy<Value = Vec<(Member, usize)>> {
-        let member = (0.2..0.8f64, 0.05..0.2f64).prop_map(|(centre, reach)| Member { centre, reach });
+        let free = prop_oneof![Just(0.0), 0.0..1.0f64];
+        let member = (0.2..0.8f64, 0.05..0.2f64, free).prop_map(|(centre, reach, free)| Member {
+            centre,
+            reach,
+            free: free * reach,
+        });
         prop::collection::vec((member, 1usize..4), 1..3)
     }
 
@@ -227,7 +256,7 @@ mod tests {
         ) {
             let count: usize = groups.iter().map(|(_, count)| count).sum();
             prop_assume!(count > 1);
-            let budget = share * groups.iter().map(|(it, n)| it.reach * *n as f64).sum::<f64>();
+            let budget = share * groups.iter().map(|(it, n)| it.cost(it.reach) * *n as f64).sum::<f64>();
             let mean = groups.iter().map(|(it, n)| it.centre * *n as f64).sum::<f64>() / count as f64;
             // Means that can be reached, somewhere around the mean of the centres.
             let half = budget / count as f64;
@@ -260,7 +289,7 @@ mod tests {
         assert!((shares(3, 0.0, 1.0) - (2.0f64 / 9.0).sqrt()).abs() < 1e-12);
         assert!((shares(2, 0.1, 0.2) - 0.2).abs() < 1e-12);
         // Two points at the ends of a window, and no further with less to spend.
-        let window = Member { centre: 0.5, reach: 0.5 };
+        let window = Member { centre: 0.5, reach: 0.5, free: 0.0 };
         assert_eq!(midpoints(&[(window, 2)], 1.0, 0.0, 1.0).greatest, 0.5);
         assert_eq!(midpoints(&[(window, 2)], 0.5, 0.0, 1.0).greatest, 0.25);
     }

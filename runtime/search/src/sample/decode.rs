@@ -25,7 +25,7 @@ pub(super) fn decoded(test_space: &TestSpace, seed: u64, index: u32, mut number:
         .map(|(slot, kind)| {
             let activation = match kind.activation {
                 ActivationSpace::Time(window) => {
-                    let (start, end) = interval(window, [value(), value()]);
+                    let (start, end) = window.interval_at([value(), value()]);
                     Activation::Time { start, end }
                 }
                 _ => Activation::Offline,
@@ -43,15 +43,6 @@ pub(super) fn decoded(test_space: &TestSpace, seed: u64, index: u32, mut number:
 /// The greatest number below 1.
 pub(super) const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
-/// An interval, uniform over all that fit: the first value decides its length, the second where it lies.
-fn interval(range: Range, [length, place]: [f64; 2]) -> (f64, f64) {
-    let room = range.high - range.low - range.shortest;
-    // Of all pairs of ends, the share that is longer than x is (1 - x)².
-    let length = range.shortest + room * (1.0 - libm::sqrt(1.0 - length));
-    let start = range.low + (range.high - range.low - length) * place;
-    (start.max(range.low), (start + length).min(range.high))
-}
-
 fn choice(parameter_space: &ParameterSpace, value: &mut impl FnMut() -> f64) -> Choice {
     let number = |range: &Range, value: f64| {
         if range.integer {
@@ -63,7 +54,7 @@ fn choice(parameter_space: &ParameterSpace, value: &mut impl FnMut() -> f64) -> 
     match parameter_space {
         ParameterSpace::Number(range, Shape::Value) => Choice::Value { value: number(range, value()) },
         ParameterSpace::Number(range, Shape::Range) => {
-            let (low, high) = interval(*range, [value(), value()]);
+            let (low, high) = range.interval_at([value(), value()]);
             let whole = |x: f64| if range.integer { libm::rint(x) } else { x };
             Choice::Range { low: whole(low), high: whole(high) }
         }

@@ -3,7 +3,8 @@
 //! Each number takes its levels: its least value, its greatest, and others equally spaced between them; of whole
 //! numbers no more than there are. Texts and files take all their values, each axis of a point takes its levels, and
 //! the ends of sub-ranges and of windows are levels too: a sub-range begins and ends at any two, also at the same one,
-//! a window at two that differ. The grid holds each test of these that the campaign permits exactly once, where copies
+//! a window at two that differ. Where lengths of windows are bounded, a window begins at a level of the times that leave
+//! room for the longest one, and its length is a level of the permitted lengths. The grid holds each test of these that the campaign permits exactly once, where copies
 //! of one operation differ in their windows. Probabilities of inclusion do not matter to it.
 //!
 //! The order goes through the numbers of operations in turn, for each through the combinations of operations, and
@@ -16,7 +17,7 @@
 
 use std::collections::VecDeque;
 
-use sesame_plan::{Activation, CampaignPlan, Choice, Copies, OperationId, Shape, Strategy, Test, TestOperation};
+use sesame_plan::{Activation, CampaignPlan, Choice, Copies, OperationId, Shape, Test, TestOperation};
 use sesame_rng::derive_seed;
 
 use crate::SearchError;
@@ -47,10 +48,148 @@ pub(crate) struct FullFactorial {
 #[derive(Debug, Clone)]
 struct Kind {
     operation: OperationId,
-    /// At which its windows begin and end; `None` for an offline operation.
-    times: Option<Vec<f64>>,
+    /// `None` for an offline operation.
+    times: Option<WindowLevels>,
     copies: Copies,
     parameters: Vec<Levels>,
+}
+
+/// The levels of an operation's windows.
+#[derive(Debug, Clone)]
+enum WindowLevels {
+    /// At which windows begin and end.
+    Ends(Vec<f64>),
+    /// Windows of bounded lengths.
+    Bounded(BoundedWindows),
+}
+
+impl WindowLevels {
+    fn new(range: Range, levels: u32) -> Self {
+        if range.longest.is_finite() {
+            WindowLevels::Bounded(BoundedWindows::new(range, levels))
+        } else {
+            WindowLevels::Ends(equally_spaced(range, levels))
+        }
+    }
+
+    fn most_copies(&self, copies: Copies) -> usize {
+        match (self, copies) {
+            (_, Copies::Once) => 1,
+            (WindowLevels::Ends(times), Copies::Apart) => times.len().saturating_sub(1),
+            (WindowLevels::Ends(times), Copies::MayOverlap) => times.len() * times.len().saturating_sub(1) / 2,
+            (WindowLevels::Bounded(bounded), Copies::Apart) => bounded.disjoint.len() - 1,
+            (WindowLevels::Bounded(bounded), Copies::MayOverlap) => bounded.windows.len(),
+        }
+    }
+
+    /// How many ways there are to place so many copies.
+    fn count(&self, copies: Copies, count: usize) -> u128 {
+        match (self, copies) {
+            (WindowLevels::Bounded(bounded), Copies::Apart) => bounded.ways(count, bounded.windows.len()),
+            _ => {
+                let (of, chosen) = self.subsets(copies, count);
+                subsets(of, chosen)
+            }
+        }
+    }
+
+    /// The windows of so many copies are the subsets of so many things with so many members.
+    fn subsets(&self, copies: Copies, count: usize) -> (usize, usize) {
+        match (self, copies) {
+            // The ends of disjoint windows rise, where one may begin when the one before it ends.
+            (WindowLevels::Ends(times), Copies::Apart) => (times.len() + count - 1, 2 * count),
+            (WindowLevels::Ends(times), Copies::MayOverlap | Copies::Once) => {
+                (times.len() * (times.len() - 1) / 2, count)
+            }
+            (WindowLevels::Bounded(bounded), _) => (bounded.windows.len(), count),
+        }
+    }
+
+    /// The windows of so many copies of a rank below their reached [`WindowLevels::count`], in their order.
+    fn windows(&self, copies: Copies, count: usize, rank: u128) -> Vec<(f64, f64)> {
+        let size = reached(self.count(copies, count));
+        if let (WindowLevels::Bounded(bounded), Copies::Apart) = (self, copies) {
+            return bounded.disjoint_windows(count, size, rank);
+        }
+        let (of, chosen) = self.subsets(copies, count);
+        let members = subset(of, chosen, size, rank);
+        match self {
+            WindowLevels::Bounded(bounded) => members.iter().map(|&window| bounded.windows[window]).collect(),
+            WindowLevels::Ends(times) if copies == Copies::Apart => {
+                members.chunks(2).zip(0..).map(|(ends, at)| (times[ends[0] - at], times[ends[1] - at])).collect()
+            }
+            WindowLevels::Ends(times) => {
+                let ends = members.iter().map(|&window| pair(times.len(), window as u128));
+                ends.map(|(start, end)| (times[start], times[end])).collect()
+            }
+        }
+    }
+}
+
+/// Windows whose beginning is a level of the times that leave room for the longest one, and whose length is a level of
+/// the permitted lengths.
+#[derive(Debug, Clone)]
+struct BoundedWindows {
+    /// In the order of their ends.
+    windows: Vec<(f64, f64)>,
+    /// Per window, how many windows end before it begins: the first ones.
+    before: Vec<usize>,
+    /// Per number of copies, in how many ways so many disjoint windows can be chosen of none, the first, the first two,
+    /// and so on. The last number of copies is the greatest for which there is a way.
+    disjoint: Vec<Vec<u128>>,
+}
+
+impl BoundedWindows {
+    fn new(range: Range, levels: u32) -> Self {
+        // What rounding leaves beside a window that takes all of the time is not a place to begin.
+        let spare = range.high - range.low - range.longest;
+        let last = if spare > 1e-9 * range.longest { range.high - range.longest } else { range.low };
+        let starts = equally_spaced(Range::between(range.low, last), levels);
+        let lengths = equally_spaced(Range::between(range.shortest, range.longest), levels);
+        let ends = |start: f64| lengths.iter().map(move |length| (start, (start + length).min(range.high)));
+        let mut windows: Vec<(f64, f64)> = starts.into_iter().flat_map(ends).collect();
+        windows.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.total_cmp(&b.0)));
+        let before: Vec<usize> =
+            windows.iter().map(|(start, _)| windows.partition_point(|(_, end)| end <= start)).collect();
+        let mut disjoint = vec![vec![1; windows.len() + 1]];
+        loop {
+            let fewer = &disjoint[disjoint.len() - 1];
+            let mut ways: Vec<u128> = vec![0];
+            for &before in &before {
+                // Without this window, or with it and others before it.
+                ways.push((ways[ways.len() - 1] + fewer[before]).min(COUNTED));
+            }
+            if ways[ways.len() - 1] == 0 {
+                return BoundedWindows { windows, before, disjoint };
+            }
+            disjoint.push(ways);
+        }
+    }
+
+    /// In how many ways so many disjoint windows can be chosen of the first ones.
+    fn ways(&self, copies: usize, of: usize) -> u128 {
+        self.disjoint.get(copies).map_or(0, |ways| ways[of])
+    }
+
+    /// The disjoint windows of a rank below `size`, in their order.
+    fn disjoint_windows(&self, copies: usize, mut size: u128, mut rank: u128) -> Vec<(f64, f64)> {
+        let (mut left, mut of) = (copies, self.windows.len());
+        let mut chosen = Vec::with_capacity(copies);
+        while left > 0 {
+            let last = of - 1;
+            let weights = [self.ways(left, last), self.ways(left - 1, self.before[last])];
+            let taken;
+            (taken, size, rank) = split(&weights, size, rank);
+            if taken == 1 {
+                chosen.push(self.windows[last]);
+                (left, of) = (left - 1, self.before[last]);
+            } else {
+                of = last;
+            }
+        }
+        chosen.reverse();
+        chosen
+    }
 }
 
 /// The levels of a parameter.
@@ -90,7 +229,7 @@ impl FullFactorial {
             .map(|kind| Kind {
                 operation: kind.operation,
                 times: match kind.activation {
-                    ActivationSpace::Time(range) => Some(equally_spaced(range, levels)),
+                    ActivationSpace::Time(range) => Some(WindowLevels::new(range, levels)),
                     _ => None,
                 },
                 copies: space.copies(),
@@ -208,8 +347,7 @@ impl Sampling for FullFactorial {
 impl Kind {
     fn most_copies(&self) -> usize {
         // Of a short time there may be fewer levels than the campaign asks for.
-        let levels = self.times.as_ref().map_or(0, |times| u32::try_from(times.len()).expect("levels are few"));
-        Strategy::Grid { levels }.most_copies(self.copies, self.times.is_none()) as usize
+        self.times.as_ref().map_or(1, |times| times.most_copies(self.copies))
     }
 
     /// How many values each choice of so many copies has: the windows of all, then the parameters of each.
@@ -217,35 +355,16 @@ impl Kind {
         if copies == 0 {
             return Vec::new();
         }
-        let windows = self.times.as_ref().map_or(1, |times| {
-            let (of, chosen) = self.windows(times.len(), copies);
-            subsets(of, chosen)
-        });
+        let windows = self.times.as_ref().map_or(1, |times| times.count(self.copies, copies));
         let parameters: Vec<u128> = self.parameters.iter().flat_map(Levels::sizes).collect();
         [windows].into_iter().chain(std::iter::repeat_n(parameters, copies).flatten()).collect()
-    }
-
-    /// The windows of so many copies are the subsets of so many things with so many members, given the number of times.
-    fn windows(&self, times: usize, copies: usize) -> (usize, usize) {
-        match self.copies {
-            // The ends of disjoint windows rise, where one may begin when the one before it ends.
-            Copies::Apart => (times + copies - 1, 2 * copies),
-            Copies::MayOverlap | Copies::Once => (times * (times - 1) / 2, copies),
-        }
     }
 
     /// When so many copies are active, in the order of their windows.
     fn activations(&self, copies: usize, rank: u128) -> Vec<Activation> {
         let Some(times) = &self.times else { return vec![Activation::Offline] };
-        let (of, chosen) = self.windows(times.len(), copies);
-        let members = subset(of, chosen, reached(subsets(of, chosen)), rank);
-        let ends: Vec<(usize, usize)> = match self.copies {
-            Copies::Apart => members.chunks(2).zip(0..).map(|(ends, at)| (ends[0] - at, ends[1] - at)).collect(),
-            Copies::MayOverlap | Copies::Once => {
-                members.iter().map(|&window| pair(times.len(), window as u128)).collect()
-            }
-        };
-        ends.into_iter().map(|(start, end)| Activation::Time { start: times[start], end: times[end] }).collect()
+        let windows = times.windows(self.copies, copies, rank).into_iter();
+        windows.map(|(start, end)| Activation::Time { start, end }).collect()
     }
 }
 

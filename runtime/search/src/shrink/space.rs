@@ -1,7 +1,9 @@
 //! What smaller means: the shortest windows, the neutral end of each parameter, and how far one step goes.
 
-use sesame_plan::condition::{Condition, ConditionEnd, ConditionSpace};
-use sesame_plan::{Activation, ActivationMode, CampaignPlan, Choice, Domain, OperationId, Shape, Test, TestOperation};
+use sesame_plan::condition::{Condition, ConditionSpace};
+use sesame_plan::{
+    Activation, ActivationMode, CampaignPlan, Choice, Domain, Lengths, OperationId, Shape, Test, TestOperation,
+};
 
 use crate::space::condition::is_allowed;
 use crate::space::parameter_space::ParameterSpace;
@@ -25,6 +27,7 @@ pub(super) struct ShrinkSpace {
 #[derive(Debug, Clone)]
 struct Bounds {
     window: Range,
+    lengths: Option<Lengths>,
     constraints: Vec<sesame_plan::condition::Constraint>,
     parameters: Vec<Option<Parameter>>,
 }
@@ -56,7 +59,10 @@ impl ShrinkSpace {
             ActivationMode::Condition { space } => Some(space.clone()),
         };
         let operations = plan.operations.iter().map(|operation| {
-            let end = operation.within.end.min(campaign.end_after).max(operation.within.start);
+            let whole = || {
+                let end = operation.within.end.min(campaign.end_after).max(operation.within.start);
+                Range::window(operation.within.start, end)
+            };
             let parameters = operation.parameters.iter().map(|parameter| {
                 let neutral = |range: Range, shape| {
                     let step = (range.high - range.low) * resolution;
@@ -77,7 +83,8 @@ impl ShrinkSpace {
                 }
             });
             Bounds {
-                window: Range::window(operation.within.start, end),
+                window: Range::windows_of(operation, campaign.end_after).unwrap_or_else(whole),
+                lengths: operation.lengths,
                 constraints: operation.constraints.clone(),
                 parameters: parameters.collect(),
             }
@@ -101,16 +108,13 @@ impl ShrinkSpace {
 
     /// The shortest activation by condition of an operation, in seconds.
     pub(super) fn shortest_length(&self, operation: OperationId) -> f64 {
-        match &self.conditions {
-            Some(ConditionSpace { end: ConditionEnd::Length { low, .. }, .. }) => *low,
-            _ => self.shortest(operation),
-        }
+        let by_condition = self.conditions.as_ref().and_then(|space| space.end.lengths(self.bounds(operation).lengths));
+        by_condition.map_or_else(|| self.shortest(operation), |lengths| lengths.low)
     }
 
     /// How much of a window or length one step takes away, in seconds.
     pub(super) fn time_step(&self, operation: OperationId) -> f64 {
-        let window = self.bounds(operation).window;
-        (window.high - window.low) * self.resolution
+        self.bounds(operation).window.greatest_length() * self.resolution
     }
 
     /// What is milder of a number; `None` where nothing is, and for a point.

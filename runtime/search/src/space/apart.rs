@@ -6,10 +6,12 @@
 //!
 //! - [`spread`] makes fresh windows of independent ones. All disjoint windows are equally likely then: of `k` windows
 //!   the `2k` ends are independent uniform numbers but for their order, so their ends are sorted and paired. No copy is
-//!   likelier to be late or short than another.
+//!   likelier to be late or short than another. Where lengths are bounded from above, windows keep the lengths that
+//!   they were drawn with, and their places are uniform.
 //! - [`nearest`] moves given windows apart, as little as may be: among all disjoint windows in the order of the given
 //!   ones' midpoints it takes those whose ends are nearest to the given ends, by the sum of squares. Two that overlap
-//!   meet in the middle of what they shared; what is disjoint already stays as it is, to the last bit.
+//!   meet in the middle of what they shared; what is disjoint already stays as it is, to the last bit. None gets longer,
+//!   unless it was shorter than it has to be: an end moves outwards only together with the other end.
 
 use crate::space::range::Range;
 
@@ -19,6 +21,9 @@ pub(crate) fn spread(permitted: Range, windows: &mut [(f64, f64)]) {
     if windows.len() < 2 {
         return;
     }
+    if permitted.longest.is_finite() {
+        return spread_bounded(permitted, windows);
+    }
     let Range { low, high, shortest, .. } = permitted;
     // An independent window leaves out the shortest length once, `copies` disjoint ones do so as often.
     let scale = (high - low - copies * shortest) / (high - low - shortest);
@@ -27,6 +32,36 @@ pub(crate) fn spread(permitted: Range, windows: &mut [(f64, f64)]) {
     ends.sort_by(f64::total_cmp);
     let order = by_midpoint(windows);
     place(permitted, windows, &order, &ends);
+}
+
+/// Where windows must not be too long, they keep their lengths, unless these do not fit together: then what is above
+/// the shortest length shrinks in proportion. The places of windows of given lengths are uniform over all disjoint ones.
+fn spread_bounded(permitted: Range, windows: &mut [(f64, f64)]) {
+    let Range { low, high, shortest, .. } = permitted;
+    let room = high - low;
+    // Where a window lies, as a share of what its length leaves; in their order these are the gaps.
+    let mut drawn: Vec<(f64, f64, usize)> = windows
+        .iter()
+        .enumerate()
+        .map(|(at, (start, end))| {
+            let left = room - (end - start);
+            (if left > 0.0 { ((start - low) / left).clamp(0.0, 1.0) } else { 0.0 }, end - start, at)
+        })
+        .collect();
+    drawn.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+    let all: f64 = drawn.iter().map(|(_, length, _)| length).sum();
+    let least = shortest * drawn.len() as f64;
+    // Half of the time stays free, as it is certain to do with the shortest windows.
+    let fitting = if all > room / 2.0 { ((room / 2.0 - least) / (all - least)).clamp(0.0, 1.0) } else { 1.0 };
+    let lengths: Vec<f64> = drawn.iter().map(|(_, length, _)| shortest + (length - shortest) * fitting).collect();
+    let free = (room - lengths.iter().sum::<f64>()).max(0.0);
+    let (mut before, mut earliest) = (0.0, low);
+    for (&(place, _, window), length) in drawn.iter().zip(lengths) {
+        let start = (low + place * free + before).clamp(earliest, high);
+        let end = (start + length).min(high);
+        windows[window] = (start, end);
+        (before, earliest) = (before + length, end);
+    }
 }
 
 /// The nearest disjoint windows in the order of the given ones' midpoints.
@@ -73,12 +108,12 @@ fn by_midpoint(windows: &[(f64, f64)]) -> Vec<usize> {
 /// Gives windows, in this order, these rising ends, which count from the permitted beginning without the shortest
 /// lengths.
 fn place(permitted: Range, windows: &mut [(f64, f64)], order: &[usize], ends: &[f64]) {
-    let Range { low, high, shortest, .. } = permitted;
+    let Range { low, high, shortest, longest, .. } = permitted;
     let mut free = low;
     for (at, &window) in order.iter().enumerate() {
         // Rounding must carry no window into the one before it or beyond what is permitted.
         let start = (low + (ends[2 * at] + at as f64 * shortest)).clamp(free, high);
-        let end = (low + (ends[2 * at + 1] + (at + 1) as f64 * shortest)).clamp(start, high);
+        let end = (low + (ends[2 * at + 1] + (at + 1) as f64 * shortest)).clamp(start, high).min(start + longest);
         windows[window] = (start, end);
         free = end;
     }
@@ -123,6 +158,22 @@ mod tests {
                 let before = windows.clone();
                 nearest(range, &mut windows);
                 prop_assert_eq!(&windows, &before, "what is disjoint stays");
+            }
+        }
+
+        #[test]
+        fn windows_of_bounded_lengths_come_out_disjoint_and_of_permitted_lengths(
+            copies in 1usize..7, low in 0.0..1.6f64, more in 0.0..3.0f64, seed: u64,
+        ) {
+            let range = Range { shortest: low.max(0.01), longest: low.max(0.01) + more, ..Range::window(2.0, 12.0) };
+            let mut stream = Stream::derive(seed, "test", &[]);
+            let given: Vec<(f64, f64)> = (0..copies).map(|_| range.interval(&mut stream)).collect();
+            for apart in [spread, nearest] {
+                let mut windows = given.clone();
+                apart(range, &mut windows);
+                prop_assert!(!wrong(range, &windows), "{given:?} {windows:?}");
+                let long = windows.iter().any(|(start, end)| end - start > range.longest + 1e-9);
+                prop_assert!(!long, "{given:?} {windows:?}");
             }
         }
 

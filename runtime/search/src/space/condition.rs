@@ -159,7 +159,13 @@ fn integer(bounds: Integers, stream: &mut Stream) -> Operand {
 }
 
 fn range(integers: Integers) -> Range {
-    Range { low: integers.lowest as f64, high: integers.highest as f64, shortest: 0.0, integer: true }
+    Range {
+        low: integers.lowest as f64,
+        high: integers.highest as f64,
+        shortest: 0.0,
+        longest: f64::INFINITY,
+        integer: true,
+    }
 }
 
 /// Puts what a constraint demands into a random comparison: a variable on the right, a number on the left.

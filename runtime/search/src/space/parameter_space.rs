@@ -24,7 +24,7 @@ impl ParameterSpace {
                 Some(ParameterSpace::Number(Range::numbers(*low, *high, *integer)?, *shape))
             }
             Domain::Point { low, high } => {
-                let axis = |axis: usize| Range { low: low[axis], high: high[axis], shortest: 0.0, integer: false };
+                let axis = |axis: usize| Range::between(low[axis], high[axis]);
                 Some(ParameterSpace::Point([axis(0), axis(1), axis(2)]))
             }
             Domain::Texts { texts: items } | Domain::Files { files: items } => {

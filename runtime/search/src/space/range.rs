@@ -1,5 +1,6 @@
 //! Drawing and moving numbers and intervals inside what is permitted: windows, sub-ranges and single values alike.
 
+use sesame_plan::{Operation, Span};
 use sesame_rng::Stream;
 
 /// The share of a permitted window that a test's window has at least: shorter ones rarely meet a message, so trying
@@ -15,6 +16,9 @@ pub struct Range {
     pub high: f64,
     /// How long an interval inside is at least; at most `high - low`, and 0 for whole numbers.
     pub shortest: f64,
+    /// How long an interval inside is at most, at least `shortest`; infinite where `low` and `high` are the only limit,
+    /// as for whole numbers.
+    pub longest: f64,
     /// Whether only whole numbers are permitted; then both ends are whole.
     pub integer: bool,
 }
@@ -32,18 +36,47 @@ pub struct StepSizes {
 impl Range {
     /// The permitted window of an operation, in seconds.
     pub fn window(start: f64, end: f64) -> Self {
-        Range { low: start, high: end, shortest: (end - start) * SHORTEST_WINDOW, integer: false }
+        Range {
+            low: start,
+            high: end,
+            shortest: (end - start) * SHORTEST_WINDOW,
+            longest: f64::INFINITY,
+            integer: false,
+        }
+    }
+
+    /// The windows of an operation in tests that end at a time; `None` where it can never be active.
+    pub fn windows_of(operation: &Operation, end_after: f64) -> Option<Self> {
+        let Span { start, end } = operation.within;
+        let end = end.min(end_after);
+        if start >= end {
+            return None;
+        }
+        let all = Range::window(start, end);
+        let Some(lengths) = operation.lengths else { return Some(all) };
+        let room = end - start;
+        if lengths.low > room && !lengths.contain(room) {
+            return None;
+        }
+        let longest = lengths.high.min(room);
+        let shortest = lengths.low.min(room).max(longest * SHORTEST_WINDOW);
+        Some(Range { shortest, longest, ..all })
+    }
+
+    /// How long an interval inside is at most, as a number.
+    pub fn greatest_length(self) -> f64 {
+        self.longest.min(self.high - self.low)
     }
 
     /// All numbers between two, both included.
     pub fn between(low: f64, high: f64) -> Self {
-        Range { low, high, shortest: 0.0, integer: false }
+        Range { low, high, shortest: 0.0, longest: f64::INFINITY, integer: false }
     }
 
     /// A range of numbers; `None` where they must be whole and no whole number is in it.
     pub fn numbers(low: f64, high: f64, integer: bool) -> Option<Self> {
         let (low, high) = if integer { (libm::ceil(low), libm::floor(high)) } else { (low, high) };
-        (low <= high).then_some(Range { low, high, shortest: 0.0, integer })
+        (low <= high).then_some(Range { low, high, shortest: 0.0, longest: f64::INFINITY, integer })
     }
 
     /// Whether a test has no number to choose.
@@ -82,9 +115,30 @@ impl Range {
             let (low, high) = if column <= row { (column, row) } else { (row, column - 1.0) };
             return ((self.low + low).min(self.high), (self.low + high).min(self.high));
         }
+        if self.longest.is_finite() {
+            return self.interval_at([stream.unit(), stream.unit()]);
+        }
         let starts = Range { high: (self.high - self.shortest).max(self.low), ..self };
         let (a, b) = (starts.number(stream), starts.number(stream));
         (a.min(b), (a.max(b) + self.shortest).min(self.high))
+    }
+
+    /// The interval at two shares in `0..=1`: the first decides its length, the second where it lies. Shares that are
+    /// uniform and independent give intervals that are uniform over all that fit.
+    pub fn interval_at(self, [length, place]: [f64; 2]) -> (f64, f64) {
+        let room = self.high - self.low - self.shortest;
+        // Of all pairs of ends, the share that is longer than x is (1 - x)²; of those that are not too long, `beyond`
+        // is left out.
+        let beyond = if self.longest.is_finite() {
+            let left = 1.0 - ((self.longest - self.shortest) / room).clamp(0.0, 1.0);
+            if room > 0.0 { left * left } else { 0.0 }
+        } else {
+            0.0
+        };
+        let length = self.shortest + room * (1.0 - libm::sqrt(1.0 - length * (1.0 - beyond)));
+        let length = length.min(self.longest);
+        let start = self.low + (self.high - self.low - length) * place;
+        (start.max(self.low), (start + length).min(self.high))
     }
 
     /// A number near another. It differs unless the step ends where it began, at an end of the range.
@@ -96,13 +150,16 @@ impl Range {
     pub fn interval_near(self, (low, high): (f64, f64), steps: StepSizes, stream: &mut Stream) -> (f64, f64) {
         let way = stream.below(3);
         let step = self.step(steps, stream);
+        // Where lengths are bounded, the size of a change of length is a share of the longest.
+        let step =
+            if way > 0 && self.longest.is_finite() { step * self.longest / (self.high - self.low) } else { step };
         match way {
             0 => {
                 let step = step.clamp(self.low - low, self.high - high);
                 ((low + step).max(self.low), (high + step).min(self.high))
             }
-            1 => ((low + step).min(high - self.shortest).max(self.low), high),
-            _ => (low, (high + step).max(low + self.shortest).min(self.high)),
+            1 => ((low + step).min(high - self.shortest).max(high - self.longest).max(self.low), high),
+            _ => (low, (high + step).max(low + self.shortest).min(low + self.longest).min(self.high)),
         }
     }
 
@@ -127,7 +184,7 @@ mod tests {
 
     #[test]
     fn intervals_are_uniform_over_the_triangle_of_feasible_pairs() {
-        let range = Range { low: 10.0, high: 20.0, shortest: 0.0, integer: false };
+        let range = Range { low: 10.0, high: 20.0, shortest: 0.0, longest: f64::INFINITY, integer: false };
         let mut stream = Stream::derive(1, "test", &[]);
         let n = 40_000;
         let pairs: Vec<(f64, f64)> = (0..n).map(|_| range.interval(&mut stream)).collect();
@@ -141,9 +198,51 @@ mod tests {
         assert!((share(|low, high| low + high > 30.0) - 0.5).abs() < 0.01);
     }
 
+    /// Beside intervals drawn anew until they are short enough, which are uniform by definition.
+    #[test]
+    fn intervals_of_bounded_lengths_are_as_uniform_as_rejected_ones() {
+        let range = Range { shortest: 0.5, longest: 3.0, ..Range::between(10.0, 20.0) };
+        let free = Range { longest: f64::INFINITY, ..range };
+        let mut stream = Stream::derive(1, "test", &[]);
+        let n = 40_000;
+        let mut sums = [[0.0; 4]; 2];
+        for _ in 0..n {
+            let ours = range.interval(&mut stream);
+            assert!(10.0 <= ours.0 && ours.1 <= 20.0 && (0.5..=3.0).contains(&(ours.1 - ours.0)), "{ours:?}");
+            let naive = loop {
+                let drawn = free.interval(&mut stream);
+                if drawn.1 - drawn.0 <= 3.0 {
+                    break drawn;
+                }
+            };
+            for (sums, (low, high)) in sums.iter_mut().zip([ours, naive]) {
+                let values = [low, high - low, (high - low) * (high - low), low * (high - low)];
+                sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value / f64::from(n));
+            }
+        }
+        let [ours, naive] = sums;
+        assert!(ours.iter().zip(naive).all(|(a, b)| (a / b - 1.0).abs() < 0.01), "{ours:?} {naive:?}");
+    }
+
+    #[test]
+    fn moved_windows_keep_to_bounded_lengths_and_reach_both() {
+        let range = Range { shortest: 0.002, longest: 2.0, ..Range::window(0.0, 65.0) };
+        let mut stream = Stream::derive(1, "test", &[]);
+        let mut window = (30.0, 31.0);
+        let (mut short, mut long) = (false, false);
+        for _ in 0..3_000 {
+            window = range.interval_near(window, STEPS, &mut stream);
+            let length = window.1 - window.0;
+            assert!(0.0 <= window.0 && window.1 <= 65.0 && (0.001..=2.000_001).contains(&length), "{window:?}");
+            short |= length < 0.01;
+            long |= length > 1.99;
+        }
+        assert!(short && long);
+    }
+
     #[test]
     fn whole_intervals_are_uniform_over_the_feasible_pairs() {
-        let range = Range { low: -1.0, high: 2.0, shortest: 0.0, integer: true };
+        let range = Range { low: -1.0, high: 2.0, shortest: 0.0, longest: f64::INFINITY, integer: true };
         let mut stream = Stream::derive(1, "test", &[]);
         let mut counts = std::collections::BTreeMap::new();
         for _ in 0..20_000 {
@@ -157,7 +256,7 @@ mod tests {
 
     #[test]
     fn whole_numbers_are_uniform_with_both_ends() {
-        let range = Range { low: 3.0, high: 6.0, shortest: 0.0, integer: true };
+        let range = Range { low: 3.0, high: 6.0, shortest: 0.0, longest: f64::INFINITY, integer: true };
         let mut stream = Stream::derive(1, "test", &[]);
         let mut counts = [0u32; 4];
         for _ in 0..20_000 {
@@ -170,7 +269,7 @@ mod tests {
 
     #[test]
     fn a_whole_number_in_the_middle_always_moves() {
-        let range = Range { low: 0.0, high: 10.0, shortest: 0.0, integer: true };
+        let range = Range { low: 0.0, high: 10.0, shortest: 0.0, longest: f64::INFINITY, integer: true };
         let mut stream = Stream::derive(1, "test", &[]);
         for _ in 0..1_000 {
             let near = range.number_near(5.0, STEPS, &mut stream);

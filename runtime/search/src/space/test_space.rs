@@ -12,8 +12,10 @@
 
 use std::collections::BTreeSet;
 
-use sesame_plan::condition::{Condition, ConditionSpace, Constraint};
-use sesame_plan::{Activation, ActivationMode, CampaignPlan, Copies, Count, OperationId, Test, TestOperation};
+use sesame_plan::condition::{Condition, ConditionEnd, ConditionSpace, Constraint};
+use sesame_plan::{
+    Activation, ActivationMode, CampaignPlan, Copies, Count, Lengths, OperationId, Test, TestOperation, Times,
+};
 use sesame_rng::Stream;
 
 use crate::SearchError;
@@ -54,7 +56,7 @@ pub struct OperationSpace {
 pub enum ActivationSpace {
     /// Never, as it acts before the start or after the end: there is nothing to choose.
     Offline,
-    /// In a window of time inside this range, which lies in `within` and the campaign.
+    /// In a window of time inside this range, which lies in `within` and the campaign, and as long as it permits.
     Time(Range),
     /// As conditions say.
     Condition {
@@ -68,6 +70,18 @@ pub enum ActivationSpace {
 }
 
 impl ActivationSpace {
+    /// What limits how many copies fit into a test.
+    pub fn times(&self) -> Times {
+        match self {
+            ActivationSpace::Offline => Times::Offline,
+            ActivationSpace::Time(range) => Times::Windows {
+                room: range.high - range.low,
+                lengths: range.longest.is_finite().then_some(Lengths { low: range.shortest, high: range.longest }),
+            },
+            ActivationSpace::Condition { .. } => Times::Windows { room: f64::INFINITY, lengths: None },
+        }
+    }
+
     /// What the start conditions of an operation contain.
     pub fn constraints(&self) -> &[Constraint] {
         match self {
@@ -94,8 +108,8 @@ impl TestSpace {
         for &id in &campaign.operations {
             let operation = plan.operation(id);
             let offline = operation.kind.is_offline();
-            let end = operation.within.end.min(campaign.end_after);
-            if !offline && operation.within.start >= end {
+            let windows = Range::windows_of(operation, campaign.end_after);
+            if !offline && windows.is_none() {
                 continue;
             }
             let mut parameters = Vec::new();
@@ -107,15 +121,20 @@ impl TestSpace {
             }
             operations.push(OperationSpace {
                 operation: id,
-                activation: match &conditions {
+                activation: match (&conditions, windows) {
                     _ if offline => ActivationSpace::Offline,
-                    None => ActivationSpace::Time(Range::window(operation.within.start, end)),
-                    Some(space) => {
+                    (_, None) => continue,
+                    (None, Some(windows)) => ActivationSpace::Time(windows),
+                    (Some(space), Some(_)) => {
+                        let mut space = space.clone();
+                        if let Some(Lengths { low, high }) = space.end.lengths(operation.lengths) {
+                            space.end = ConditionEnd::Length { low, high };
+                        }
                         let none = || SearchError::NoCondition { campaign: name(), operation: operation.name.clone() };
                         ActivationSpace::Condition {
-                            space: space.clone(),
                             constraints: operation.constraints.clone(),
-                            first: Box::new(first_conditions(space, &operation.constraints).ok_or_else(none)?),
+                            first: Box::new(first_conditions(&space, &operation.constraints).ok_or_else(none)?),
+                            space,
                         }
                     }
                 },
@@ -144,7 +163,7 @@ impl TestSpace {
         match (self.copies, &kind.activation) {
             // A copy waits while another one is active.
             (Copies::Apart, ActivationSpace::Condition { .. }) => usize::MAX,
-            (copies, activation) => copies.most(matches!(activation, ActivationSpace::Offline)) as usize,
+            (copies, activation) => copies.most(activation.times()) as usize,
         }
     }
 
@@ -306,16 +325,29 @@ pub(crate) mod tests {
         let files = (1usize..3).prop_map(move |n| Domain::Files { files: items(n) });
         let domain = prop_oneof![4 => parameter, 1 => point, 1 => texts, 1 => files];
         let parameter = domain.prop_map(|domain| sesame_plan::testing::parameter("p", domain));
-        let operation = (ends(), proptest::collection::vec(parameter, 0..4), 0.0..=1.0f64, 0u32..5).prop_map(
-            |((start, end), parameters, inclusion, kind)| {
+        let lengths = prop_oneof![3 => Just(None), 1 => (0.0..0.5f64, 0.001..1.5f64).prop_map(Some)];
+        let operation = (ends(), proptest::collection::vec(parameter, 0..4), 0.0..=1.0f64, 0u32..5, lengths).prop_map(
+            |((start, end), parameters, inclusion, kind, lengths)| {
                 // What is varied follows from the parameters, and from the kind only whether there is a window.
+                const BEFORE_START: OperationKind = OperationKind::Custom { moment: sesame_plan::Moment::BeforeStart };
                 let kind = if kind == 0 {
-                    OperationKind::Custom { moment: sesame_plan::Moment::BeforeStart }
+                    BEFORE_START
                 } else {
                     OperationKind::Latency { distribution: sesame_plan::Distribution::Fixed, drain: Drain::Finish }
                 };
                 let within = Span { start, end: end + 0.01 };
-                Operation { within, inclusion, ..sesame_plan::testing::operation_with("o", 0, kind, parameters) }
+                // Shares of the permitted window, the least and what the greatest is more; none before the start.
+                let lengths = lengths.filter(|_| kind != BEFORE_START).map(|(low, more)| {
+                    let low = if low < 0.1 { 0.0 } else { low * within.length() };
+                    Lengths { low, high: low + if more < 0.1 { 0.0 } else { more * within.length() } }
+                });
+                let lengths = lengths.filter(|lengths| lengths.high > 0.0);
+                Operation {
+                    within,
+                    lengths,
+                    inclusion,
+                    ..sesame_plan::testing::operation_with("o", 0, kind, parameters)
+                }
             },
         );
         let copies = prop_oneof![Just(Copies::Apart), Just(Copies::MayOverlap), Just(Copies::Once)];
@@ -343,6 +375,9 @@ pub(crate) mod tests {
         let conditional =
             (any_timed_plan(), any_space(), any_constraints()).prop_map(|(mut plan, space, constraints)| {
                 plan.operations[0].constraints = constraints;
+                for operation in &mut plan.operations {
+                    operation.lengths = operation.lengths.filter(|_| space.end.lengths(operation.lengths).is_some());
+                }
                 plan.campaign.activation = ActivationMode::Condition { space };
                 plan
             });
@@ -419,13 +454,20 @@ pub(crate) mod tests {
                 }
                 (&Activation::Time { start, end }, ActivationMode::Time) => {
                     let within = operation.within;
-                    let shortest = (within.end.min(plan.campaign.end_after) - within.start) * 0.000_999;
-                    if end - start < shortest {
+                    let room = within.end.min(plan.campaign.end_after) - within.start;
+                    let longest = operation.lengths.map_or(room, |lengths| lengths.high.min(room));
+                    if end - start < longest * 0.000_999 || operation.lengths.is_some_and(|it| !it.contain(end - start))
+                    {
                         return Some(format!("window {start} to {end}"));
                     }
                     if !(within.start <= start && start < end && end <= within.end && start < plan.campaign.end_after) {
                         return Some(format!("window {start} to {end}"));
                     }
+                }
+                (&Activation::ConditionFor { length, .. }, _)
+                    if operation.lengths.is_some_and(|lengths| !lengths.contain(length)) =>
+                {
+                    return Some(format!("length {length}"));
                 }
                 (activation, ActivationMode::Condition { space }) => {
                     let broken = broken_condition(space, &operation.constraints, activation);

@@ -32,9 +32,7 @@ pub fn extent(plan: &CampaignPlan, test_space: &TestSpace, dimension: Dimension)
     let several = most > 1 || by_condition;
     match dimension {
         Dimension::T1 => Some(midpoints),
-        Dimension::T2 => {
-            Some((least(|timing| timing.window.shortest), greatest(|timing| timing.window.end - timing.window.start)))
-        }
+        Dimension::T2 => Some((least(|timing| timing.window.shortest), greatest(|timing| timing.window.longest))),
         Dimension::T3 => Some((0.0, if several { (midpoints.1 - midpoints.0) / 2.0 } else { 0.0 })),
         Dimension::P1 => shares(plan, test_space).into_iter().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))),
         Dimension::P2 => {

@@ -11,9 +11,16 @@ pub(crate) struct Window {
     pub(crate) end: f64,
     /// How long an interval is at least.
     pub(crate) shortest: f64,
+    /// How long an interval is at most.
+    pub(crate) longest: f64,
 }
 
 impl Window {
+    /// Intervals of any length between two shares.
+    pub(crate) fn anywhere(start: f64, end: f64) -> Window {
+        Window { start, end, shortest: 0.0, longest: end - start }
+    }
+
     /// That of an operation in a campaign; `None` for one that acts before the start or after the end. Where conditions
     /// switch an operation, its intervals may be as short as they like.
     pub(crate) fn of(plan: &CampaignPlan, operation_space: &OperationSpace) -> Option<Window> {
@@ -21,12 +28,13 @@ impl Window {
         let share = |time: f64| (time - within.start) / within.length();
         Some(match &operation_space.activation {
             ActivationSpace::Offline => return None,
-            ActivationSpace::Time(range) => {
-                Window { start: share(range.low), end: share(range.high), shortest: range.shortest / within.length() }
-            }
-            ActivationSpace::Condition { .. } => {
-                Window { start: 0.0, end: share(within.end.min(plan.campaign.end_after)), shortest: 0.0 }
-            }
+            ActivationSpace::Time(range) => Window {
+                start: share(range.low),
+                end: share(range.high),
+                shortest: range.shortest / within.length(),
+                longest: range.greatest_length() / within.length(),
+            },
+            ActivationSpace::Condition { .. } => Window::anywhere(0.0, share(within.end.min(plan.campaign.end_after))),
         })
     }
 }

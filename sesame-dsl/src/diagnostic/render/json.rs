@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use crate::diagnostic::{Diagnostic, Severity, hidden};
+use crate::diagnostic::{Applicability, Diagnostic, Severity, hidden};
 use crate::place::Place;
 use crate::source::SourceMap;
 
@@ -41,6 +41,9 @@ struct Line<'a> {
 struct Suggested<'a> {
     /// What to do.
     message: &'a str,
+    /// `machine_applicable` if a program may apply the edits without asking; `maybe_incorrect` if they remove the
+    /// mistake, but the author may mean something else.
+    applicability: &'static str,
     /// The changes of the source that do it, which can be applied as they are.
     edits: Vec<Edit<'a>>,
 }
@@ -74,6 +77,10 @@ pub fn json(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
                 .iter()
                 .map(|suggestion| Suggested {
                     message: &suggestion.message,
+                    applicability: match suggestion.applicability {
+                        Applicability::MachineApplicable => "machine_applicable",
+                        Applicability::MaybeIncorrect => "maybe_incorrect",
+                    },
                     edits: suggestion
                         .edits
                         .iter()

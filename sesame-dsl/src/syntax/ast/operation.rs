@@ -20,6 +20,8 @@ pub(crate) struct OperationBody {
     pub(crate) to: Option<(Span, Vec<Name>)>,
     pub(crate) kind: OperationKind,
     pub(crate) within: Vec<(Span, Range)>,
+    /// `for`
+    pub(crate) lengths: Vec<(Span, Range)>,
     pub(crate) priority: Vec<(Span, Quantity)>,
     pub(crate) inclusion: Vec<(Span, Quantity)>,
     pub(crate) untimed: Vec<Span>,

@@ -26,9 +26,14 @@ impl Reader<'_> {
         };
         let priority = signed(Rule::priority);
         let inclusion = signed(Rule::inclusion);
-        let within = children(pair, Rule::within)
-            .map(|within| (self.keyword_span(&within), self.range(&expect_child(&within, Rule::range))))
-            .collect();
+        let mut ranges = |rule| {
+            let clauses = children(pair, rule);
+            clauses
+                .map(|clause| (self.keyword_span(&clause), self.range(&expect_child(&clause, Rule::range))))
+                .collect()
+        };
+        let within = ranges(Rule::within);
+        let lengths = ranges(Rule::for_lengths);
         let contains = children(pair, Rule::start_contains)
             .map(|clause| (self.keyword_span(&clause), self.contained(&clause)))
             .collect();
@@ -39,7 +44,18 @@ impl Reader<'_> {
         let target = child(pair, Rule::targets).map(|targets| self.target(&targets));
         Operation {
             head,
-            body: Some(OperationBody { target, from, to, kind, within, priority, inclusion, untimed, contains }),
+            body: Some(OperationBody {
+                target,
+                from,
+                to,
+                kind,
+                within,
+                lengths,
+                priority,
+                inclusion,
+                untimed,
+                contains,
+            }),
         }
     }
 

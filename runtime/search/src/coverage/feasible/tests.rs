@@ -1,6 +1,8 @@
 use proptest::prelude::*;
 
-use sesame_plan::{Choice, Copies, Count, Dimension, Distribution, Drain, OperationKind, Search, Test, ValueMode};
+use sesame_plan::{
+    Choice, Copies, Count, Dimension, Distribution, Drain, Lengths, OperationKind, Search, Test, ValueMode,
+};
 use sesame_rng::Stream;
 
 use super::*;
@@ -37,7 +39,7 @@ fn found(plan: &CampaignPlan, grid: &Grid, tests: u64) -> BTreeSet<usize> {
                 let window = window_of(kind);
                 let whole = window.high - window.low;
                 let share = same.unwrap_or_else(|| stream.unit());
-                let length = (whole * share * share).max(window.shortest);
+                let length = (whole * share * share).max(window.shortest).min(window.longest);
                 let start = window.low + (whole - length) * [0.0, 1.0, stream.unit()][stream.below(3)];
                 it.activation = sesame_plan::Activation::Time { start, end: (start + length).min(window.high) };
             }
@@ -115,7 +117,9 @@ fn climbs_into(plan: &CampaignPlan, grid: &Grid, cell: usize) -> bool {
 
 /// Campaigns as in other tests, with kinds of all classes, every operation as likely as another, and few per test.
 fn campaigns() -> impl Strategy<Value = CampaignPlan> {
-    (any_timed_plan(), 1u32..4, any::<bool>()).prop_map(|(mut plan, most, alike)| {
+    let lengths = (0.0..0.3f64, 0.05..0.7f64);
+    let lengths = prop_oneof![Just(None), Just(None), lengths.prop_map(Some)];
+    (any_timed_plan(), 1u32..4, any::<bool>(), lengths).prop_map(|(mut plan, most, alike, lengths)| {
         let kinds = [
             OperationKind::PacketLoss,
             OperationKind::RandomValue { mode: ValueMode::Offset, integer: false },
@@ -128,6 +132,12 @@ fn campaigns() -> impl Strategy<Value = CampaignPlan> {
         if alike {
             let within = plan.operations[0].within;
             plan.operations.iter_mut().for_each(|operation| operation.within = within);
+        }
+        for operation in plan.operations.iter_mut().filter(|operation| !operation.kind.is_offline()) {
+            let room = operation.within.end.min(plan.campaign.end_after) - operation.within.start;
+            operation.lengths = lengths
+                .filter(|_| room > 0.0)
+                .map(|(low, more)| Lengths { low: low * room, high: (low + more) * room });
         }
         let min = plan.campaign.count.min.min(most);
         plan.campaign.count = Count { min, max: most };
@@ -182,6 +192,28 @@ proptest! {
 
 fn table_3() -> Grid {
     Grid::parse("T1:0:1:6,T2:0:0.5:6,P1:0:1:3").unwrap()
+}
+
+#[test]
+fn windows_of_two_seconds_reach_the_cells_of_short_windows_only() {
+    let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 1));
+    let grid = Grid::parse("T1:0:1:4,T2:0:1:65").unwrap();
+    let lengths = |plan: &CampaignPlan| {
+        let feasible = Feasible::from_plan(plan, &grid);
+        assert!(feasible.is_exact());
+        let reached = (0..grid.len()).filter(|&cell| feasible.reaches(cell)).map(|cell| cell % 65);
+        reached.collect::<BTreeSet<usize>>().len()
+    };
+    plan.campaign.copies = Copies::MayOverlap;
+    assert_eq!(lengths(&plan), 65);
+    let bounded = |plan: &mut CampaignPlan, low, high| {
+        plan.operations.iter_mut().for_each(|operation| operation.lengths = Some(Lengths { low, high }));
+    };
+    // Cells are one second wide.
+    bounded(&mut plan, 0.0, 2.0);
+    assert_eq!(lengths(&plan), 2);
+    bounded(&mut plan, 2.5, 2.5);
+    assert_eq!(lengths(&plan), 1, "one length is in one cell");
 }
 
 #[test]

@@ -73,6 +73,7 @@ struct Window {
     low: f64,
     high: f64,
     shortest: f64,
+    longest: f64,
     start: f64,
     end: f64,
 }
@@ -298,6 +299,7 @@ impl CellPlacer {
                 low: share(range.low),
                 high: share(range.high),
                 shortest: range.shortest / within.length(),
+                longest: range.greatest_length() / within.length(),
                 start: share(start),
                 end: share(end),
             })
@@ -395,7 +397,8 @@ impl CellPlacer {
         // midpoints' distances from the middles of their windows add up to at most this budget.
         let shortest = windows.iter().map(|window| window.shortest).sum::<f64>() / n;
         let width = windows.iter().map(|window| window.high - window.low).sum::<f64>() / n;
-        let longest = t2.1.min(width);
+        let greatest = windows.iter().map(|window| window.longest.min(window.high - window.low)).sum::<f64>() / n;
+        let longest = t2.1.min(greatest);
         let share = SHARES_FOR_LENGTHS[usize::from(attempt > 0)];
         let length = if t2.0 > shortest { t2.0 + share * (longest - t2.0) } else { shortest };
         if length > longest {
@@ -418,8 +421,8 @@ impl CellPlacer {
             .zip(&midpoints)
             .map(|(window, midpoint)| {
                 let room = 2.0 * (midpoint - window.low).min(window.high - midpoint);
-                let Window { start, end, shortest, .. } = *window;
-                Member { now: end - start, low: shortest, high: room.max(shortest), step: None }
+                let Window { start, end, shortest, longest, .. } = *window;
+                Member { now: end - start, low: shortest, high: room.min(longest).max(shortest), step: None }
             })
             .collect();
         let wanted = Wanted { mean: t2, spread: None, budget: f64::INFINITY };
@@ -433,6 +436,7 @@ impl CellPlacer {
             let part = (time(window.low).max(range.low), time(window.high).min(range.high));
             let inside = |share: f64| time(share).max(part.0).min(part.1);
             let (start, end) = (inside(midpoint - length / 2.0), inside(midpoint + length / 2.0));
+            let end = end.min(start + range.longest);
             if start >= end {
                 return false;
             }

@@ -79,15 +79,23 @@ fn retarget(operation: &mut TestOperation, kind: &OperationSpace, stream: &mut S
     let mut fresh = fresh_operation(kind, stream);
     match (&operation.activation, &kind.activation) {
         (&Activation::Time { start, end }, ActivationSpace::Time(window)) => {
-            let (start, end) = (start.max(window.low), end.min(window.high));
+            let start = start.max(window.low);
+            let end = end.min(window.high).min(start + window.longest);
             if end - start >= window.shortest {
                 fresh.activation = Activation::Time { start, end };
             }
         }
         (
             kept @ (Activation::Condition { start, .. } | Activation::ConditionFor { start, .. }),
-            ActivationSpace::Condition { constraints, .. },
-        ) if constraints.iter().all(|constraint| contains(start, constraint)) => fresh.activation = kept.clone(),
+            ActivationSpace::Condition { constraints, space, .. },
+        ) if constraints.iter().all(|constraint| contains(start, constraint)) => {
+            fresh.activation = kept.clone();
+            if let (Activation::ConditionFor { length, .. }, ConditionEnd::Length { low, high }) =
+                (&mut fresh.activation, space.end)
+            {
+                *length = length.clamp(low, high);
+            }
+        }
         // What is kept is not permitted there, or one of them is offline and has nothing to keep or to be given.
         _ => {}
     }

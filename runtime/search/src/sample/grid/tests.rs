@@ -66,6 +66,14 @@ fn levels_of(range: &Range, levels: u32) -> Vec<f64> {
 fn instances(kind: &OperationSpace, levels: u32) -> Vec<(Option<[i64; 2]>, Vec<i64>)> {
     let mut windows = Vec::new();
     match kind.activation {
+        ActivationSpace::Time(range) if range.longest.is_finite() => {
+            let between = |low, high| levels_of(&Range::between(low, high), levels);
+            let last = range.high - range.longest;
+            for start in between(range.low, if rounded(last) > rounded(range.low) { last } else { range.low }) {
+                let lengths = between(range.shortest, range.longest).into_iter();
+                windows.extend(lengths.map(|length| Some([rounded(start), rounded(start + length)])));
+            }
+        }
         ActivationSpace::Time(range) => {
             let times = levels_of(&range, levels);
             for end in 0..times.len() {
@@ -203,6 +211,21 @@ proptest! {
     }
 
     #[test]
+    fn as_many_copies_of_bounded_windows_fit_as_the_plan_says(
+        levels in 2u32..20, room in 1u32..100, low in 0u32..20, more in 0u32..20, copies in 0..2,
+    ) {
+        let copies = if copies == 0 { Copies::Apart } else { Copies::MayOverlap };
+        let [room, low, more] = [room, low, more].map(|eighths| f64::from(eighths) / 8.0);
+        // Beginnings that rounding cannot put before the end of another window.
+        let lengths = sesame_plan::Lengths { low: low + 0.001, high: low + more + 0.01 };
+        prop_assume!(lengths.high < room);
+        let range = Range { shortest: lengths.low, longest: lengths.high, ..Range::window(0.0, room) };
+        let placed = WindowLevels::new(range, levels).most_copies(copies);
+        let times = sesame_plan::Times::Windows { room, lengths: Some(lengths) };
+        prop_assert_eq!(placed, Strategy::Grid { levels }.most_copies(copies, times) as usize);
+    }
+
+    #[test]
     fn tests_of_every_grid_are_permitted_and_differ(plan in any_timed_plan(), levels in 2u32..=64, seed: u64) {
         let space = TestSpace::from_plan(&plan).unwrap();
         let Ok(mut grid) = grid(&plan, levels, seed) else { return Ok(()) };
@@ -252,8 +275,8 @@ proptest! {
 
 #[test]
 fn numbers_take_both_ends_and_whole_numbers_are_not_repeated() {
-    let range = |low, high| Range { low, high, shortest: 0.0, integer: false };
-    let whole = |low, high| Range { low, high, shortest: 0.0, integer: true };
+    let range = |low, high| Range { low, high, shortest: 0.0, longest: f64::INFINITY, integer: false };
+    let whole = |low, high| Range { low, high, shortest: 0.0, longest: f64::INFINITY, integer: true };
     assert_eq!(equally_spaced(range(-1.0, 1.0), 2), [-1.0, 1.0]);
     assert_eq!(equally_spaced(range(0.0, 8.0), 5), [0.0, 2.0, 4.0, 6.0, 8.0]);
     assert_eq!(equally_spaced(range(0.3, 0.3), 5), [0.3]);

@@ -97,7 +97,7 @@ fn witnessed(plan: &CampaignPlan, grid: &Grid, tests: u64) -> std::collections::
             let ActivationSpace::Time(window) = kind.activation else { panic!("by time") };
             let whole = window.high - window.low;
             let share = like.unwrap_or_else(|| stream.unit());
-            let length = (whole * share * share).max(window.shortest);
+            let length = (whole * share * share).max(window.shortest).min(window.longest);
             let at = place.unwrap_or_else(|| [0.0, 1.0, stream.unit()][stream.below(3)]);
             let start = window.low + (whole - length) * (at + 0.05 * stream.normal()).clamp(0.0, 1.0);
             it.activation = Activation::Time { start, end: (start + length).min(window.high) };
