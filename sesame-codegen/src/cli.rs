@@ -124,11 +124,12 @@ enum Command {
     },
     /// Explain the code of a diagnostic, for example E0203; or something that a space declares, with all its uses.
     ///
-    /// A campaign is shown with every default written out, and with the space of its tests.
+    /// A campaign is shown with every default written out, and with the space of its tests. Without a code or a name,
+    /// all codes are listed.
     Explain {
         /// The code, or the name: for a field or parameter with what it belongs to, as in `SafetyZone.level`.
         #[arg(value_name = "CODE or NAME")]
-        what: String,
+        what: Option<String>,
         /// The `.sesame` file that declares the name.
         file: Option<PathBuf>,
         /// How a definition and its uses are shown: as text, or as one JSON object.
@@ -195,10 +196,11 @@ pub fn run(
         Command::Internal(command) => Ok(sesame_runtime::cli::serve(&command)),
         Command::Results(asked) => results::results(shell, asked),
         Command::Import { file, out } => import::import(shell, language, &file, &out),
-        Command::Explain { what, file: Some(file), format } => {
+        Command::Explain { what: Some(what), file: Some(file), format } => {
             commands::explain_name(shell, language, &what, &file, format)
         }
-        Command::Explain { what, file: None, .. } => commands::explain_code(language, &what),
+        Command::Explain { what: Some(what), .. } => commands::explain_code(language, &what),
+        Command::Explain { what: None, .. } => commands::explainable(language),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut command_line(), "sesamec", &mut script);

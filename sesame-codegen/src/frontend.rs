@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use sesame_dsl::Analysis;
-use sesame_dsl::diagnostic::{Diagnostic, Severity, page, render};
+use sesame_dsl::diagnostic::{Diagnostic, MEANINGS, Severity, page, render};
 use sesame_dsl::index::Kind;
 use sesame_dsl::model::Space;
 use sesame_dsl::source::SourceMap;
@@ -24,6 +24,8 @@ pub struct Language {
     pub format: fn(file: &str, text: &str, look: Look) -> Result<String, Diagnosed>,
     /// The page of a diagnostic's code.
     pub explain: fn(code: &str) -> Option<&'static str>,
+    /// Every code of a diagnostic, with what it is about.
+    pub codes: fn() -> Vec<(&'static str, &'static str)>,
     /// What a space declares by a name, and what mentions it, even if the space has errors; or why that cannot be told.
     pub find: fn(file: &str, text: &str, name: &str) -> Result<Found, String>,
 }
@@ -86,7 +88,11 @@ pub struct Checked {
 }
 
 /// The language of this version.
-pub const SESAME: Language = Language { check, format, explain: page, find };
+pub const SESAME: Language = Language { check, format, explain: page, codes, find };
+
+fn codes() -> Vec<(&'static str, &'static str)> {
+    MEANINGS.iter().map(|(code, meaning)| (code.text(), *meaning)).collect()
+}
 
 /// What the plan names as its generator.
 const GENERATOR: &str = concat!("sesamec ", env!("CARGO_PKG_VERSION"));

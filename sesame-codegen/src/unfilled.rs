@@ -16,12 +16,12 @@ pub fn unfilled_objectives(runner: &RunnerPlan, hooks: &Path) -> Vec<(String, Pa
     objectives
         .filter(|&name| runner.hooks.iter().any(|hook| hook.metric == *name))
         .map(|name| (name.clone(), hooks.join(format!("{}.rs", names::snake(name)))))
-        .filter(|(_, file)| input::text(file).is_ok_and(|text| calls_unimplemented(&text)))
+        .filter(|(_, file)| input::text(file).is_ok_and(|text| is_stub(&text)))
         .collect()
 }
 
-/// Whether Rust code calls a method `unimplemented`; comments and texts do not count.
-fn calls_unimplemented(code: &str) -> bool {
+/// Whether a hook is still a stub: whether its code calls a method `unimplemented`; comments and texts do not count.
+pub fn is_stub(code: &str) -> bool {
     code.parse::<TokenStream>().is_ok_and(calls)
 }
 
@@ -48,9 +48,9 @@ mod tests {
 
     #[test]
     fn only_a_call_counts() {
-        assert!(calls_unimplemented("fn on_speed(ctx: &mut Context) { let _ = 1; ctx.unimplemented(); }"));
-        assert!(!calls_unimplemented("// ctx.unimplemented();\nfn f() { ctx.set(1.0); }"));
-        assert!(!calls_unimplemented("fn f() { let text = \"ctx.unimplemented()\"; unimplemented!() }"));
-        assert!(!calls_unimplemented("not Rust {"));
+        assert!(is_stub("fn on_speed(ctx: &mut Context) { let _ = 1; ctx.unimplemented(); }"));
+        assert!(!is_stub("// ctx.unimplemented();\nfn f() { ctx.set(1.0); }"));
+        assert!(!is_stub("fn f() { let text = \"ctx.unimplemented()\"; unimplemented!() }"));
+        assert!(!is_stub("not Rust {"));
     }
 }

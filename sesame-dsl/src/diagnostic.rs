@@ -9,7 +9,7 @@ pub mod render;
 
 use std::borrow::Cow;
 
-pub use code::{CODES, Code, Severity, page};
+pub use code::{CODES, Code, MEANINGS, Severity, page};
 
 use crate::span::Span;
 

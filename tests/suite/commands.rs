@@ -135,7 +135,8 @@ fn an_exported_test_reproduces_its_values_in_the_space_it_is_written_into() {
     runner.run(&["export", "T5", "--results", "r/5", "--name", "5"]).expect(2);
 
     let text = fs::read_to_string(&project.space).unwrap();
-    fs::write(&project.space, format!("{text}\n{block}\n{}", named["block"].as_str().unwrap())).unwrap();
+    let described = format!("// A remark.\n{}", text.replace("/// ", "/// Corrected: "));
+    fs::write(&project.space, format!("{described}\n{block}\n{}", named["block"].as_str().unwrap())).unwrap();
     let runner = project.build("coverage_experiment");
     let kept = runner.run(&["known", "coverage_experiment_T4", "five", "--results", "r"]).expect(0);
     assert!(kept.out.contains("4 expectations satisfied"), "{}", kept.out);
@@ -146,13 +147,14 @@ fn an_exported_test_reproduces_its_values_in_the_space_it_is_written_into() {
         assert_eq!(again.test, found.test);
         assert_eq!(again.observation.metrics, found.observation.metrics, "the series as well");
     }
-    // More known tests are no other model: what was found before can still be replayed.
+    // More known tests and other comments are not another model: what was found before can still be replayed.
     runner.run(&["replay", "T4", "--results", "r/5"]).expect(0);
 
     let text = fs::read_to_string(&project.space).unwrap();
     fs::write(&project.space, text.replace("cycle_time <= 70s", "cycle_time <= 69s")).unwrap();
     let changed = project.build("coverage_experiment").run(&["replay", "T4", "--results", "r/5"]).expect(1);
     assert!(changed.err.contains("the model has changed"), "{}", changed.err);
+    assert!(changed.err.contains("(requirement `"), "{}", changed.err);
     assert!(changed.err.contains("`export T4`"), "{}", changed.err);
 }
 

@@ -88,7 +88,9 @@ fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
 impl Source {
     fn read() -> Self {
         let mut files = Vec::new();
-        CRATES.iter().for_each(|(_, folder)| rust_files(&workspace().join(folder), &mut files));
+        for (_, folder) in CRATES {
+            rust_files(&workspace().join(folder), &mut files);
+        }
         files.sort();
         let mut source = Source { types: BTreeMap::new(), imports: BTreeMap::new() };
         for path in files {
@@ -187,7 +189,8 @@ fn doc(attributes: &[Attribute]) -> String {
         let Some((name, after)) = linked.split_once(']') else { break };
         plain.push_str(before);
         let of_source = name.starts_with('`') || after.starts_with('(');
-        plain.push_str(&if of_source { name.to_owned() } else { format!("[{name}]") });
+        let [open, close] = if of_source { ["", ""] } else { ["[", "]"] };
+        plain.extend([open, name, close]);
         rest = after;
         if after.starts_with('(') {
             rest = after.split_once(')').map_or("", |(_, rest)| rest);

@@ -112,8 +112,8 @@ pub(crate) fn without_purpose(files: &[File]) -> Vec<String> {
 /// Pages of documentation that its index does not list, and entries of the index without a page.
 pub(crate) fn not_in_the_index(files: &[File]) -> Vec<String> {
     const INDEX: &str = "docs/README.md";
-    let pages = files.iter().filter_map(|file| file.path.strip_prefix("docs/")).filter(|name| name.ends_with(".md"));
-    let pages: Vec<&str> = pages.filter(|name| *name != "README.md").collect();
+    let pages = files.iter().filter(|file| file.ending() == Some("md") && file.path != INDEX);
+    let pages: Vec<&str> = pages.filter_map(|file| file.path.strip_prefix("docs/")).collect();
     let index = files.iter().find(|file| file.path == INDEX).map_or("", |file| file.text.as_str());
     let linked: Vec<&str> = index.split("](").skip(1).filter_map(|rest| rest.split(')').next()).collect();
     let unlisted = pages.iter().filter(|page| !linked.contains(page));

@@ -55,8 +55,19 @@ impl Selection {
     }
 }
 
+/// Who reads a table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Readers {
+    /// People, on lines that are not too long.
+    People,
+    /// Programs, who are given everything.
+    Programs,
+}
+
 /// What each file holds, one row per file, in their order.
-pub fn campaigns(repositories: &[Repository]) -> Result<Table, RecordError> {
+///
+/// Of more than three result sets, a table for people has only the first, the last and their number.
+pub fn campaigns(repositories: &[Repository], readers: Readers) -> Result<Table, RecordError> {
     let columns = ["file", "space", "campaign", "search", "seed", "tests", "front", "objectives", "sets", "ended"];
     let mut dataset = Table::new(columns.map(str::to_owned));
     for repository in repositories {
@@ -74,7 +85,12 @@ pub fn campaigns(repositories: &[Repository]) -> Result<Table, RecordError> {
             Datum::count(repository.evaluated()?),
             sets.last().map_or(Datum::Missing, |(_, size)| Datum::count(*size)),
             Datum::Text(objectives.join(" ")),
-            Datum::Text(names.join(" ")),
+            Datum::Text(match (&names[..], readers) {
+                ([first, _, .., last], Readers::People) if names.len() > 3 => {
+                    format!("{first} … {last} ({})", names.len())
+                }
+                _ => names.join(" "),
+            }),
             facts.stop.clone().map_or(Datum::Missing, Datum::Text),
         ]);
     }

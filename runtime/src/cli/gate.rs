@@ -140,9 +140,9 @@ fn seed_note(summary: &Summary, plan: &CampaignPlan, task: &Task, seed: u64) -> 
     names.dedup();
     (!names.is_empty()).then(|| {
         format!(
-            "these tests name no `simulator seed`, so they ran with that of seed {seed}: {}. Values that were measured \
-             with another seed may differ: `known --seed N` runs the tests with that one, and `export` writes the seed of a \
-             test into its block",
+            "these tests ran with the simulator's seed of seed {seed}, not with a `simulator seed` of their own: {}. Values \
+             that were measured with another seed may differ: `known --seed N` runs the tests with that one, and `export` \
+             writes the seed of a test into its block",
             names.join(", ")
         )
     })
@@ -275,7 +275,7 @@ mod tests {
         assert_eq!(seed_note(&summary, &plan, &known, 7), None);
         summary.expectations = vec![expected(Verdict::Violated), expected(Verdict::Violated)];
         let note = seed_note(&summary, &plan, &known, 7).unwrap();
-        assert!(note.contains("that of seed 7: `known_jitter`. "), "{note}");
+        assert!(note.contains("of seed 7, ") && note.contains(": `known_jitter`. "), "{note}");
         assert_eq!(seed_note(&summary, &plan, &Task::Campaign, 7), None, "expectations are of `known`");
         plan.tests[0].simulator_seed = Some(11);
         assert_eq!(seed_note(&summary, &plan, &known, 7), None);

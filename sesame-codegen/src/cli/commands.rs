@@ -1,5 +1,6 @@
 //! What each subcommand does.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -16,7 +17,7 @@ use crate::frontend::{Checked, Language};
 use crate::input;
 use crate::output::{self, Change, Mode, Orphan, Report};
 use crate::plan::{OperationPlan, RunnerPlan};
-use crate::{emit, project};
+use crate::{emit, project, unfilled};
 
 /// `sesamec new`
 pub(super) fn new(
@@ -177,6 +178,19 @@ pub(super) fn explain_code(language: &Language, code: &str) -> anyhow::Result<Ex
     )
 }
 
+/// `sesamec explain`
+pub(super) fn explainable(language: &Language) -> anyhow::Result<ExitCode> {
+    let sesamec = shell::command();
+    let codes: Vec<String> =
+        (language.codes)().iter().map(|(code, meaning)| format!("  {code}  {meaning}\n")).collect();
+    shell::asked_for(&format!(
+        "`{sesamec} explain NAME FILE` explains what a space declares: a topic, metric, operation, campaign, …\n\
+         `{sesamec} explain CODE` explains a diagnostic:\n{}",
+        codes.concat()
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
 /// `sesamec explain NAME FILE`
 pub(super) fn explain_name(
     shell: Shell,
@@ -287,12 +301,30 @@ pub(super) fn all(errors: &[impl std::fmt::Display]) -> anyhow::Error {
     anyhow!(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\u{1e}"))
 }
 
+/// What is said of a new hook: a stub is to be filled in, a copy of one that is filled in is not.
+fn created_hook(path: &Path, contents: &str) -> (&'static str, String) {
+    if unfilled::is_stub(contents) {
+        ("Stub", format!("{}: fill this in", path.display()))
+    } else {
+        ("Copied", path.display().to_string())
+    }
+}
+
+/// What these trees hold in a file of the output folder.
+fn contents<'a>(trees: &'a [Tree], path: &str) -> Cow<'a, str> {
+    let in_tree = |tree: &'a Tree| {
+        let below = if tree.folder.is_empty() { Some(path) } else { path.strip_prefix(&format!("{}/", tree.folder)) };
+        tree.files.get(below?)
+    };
+    trees.iter().find_map(in_tree).map_or_else(Cow::default, |file| file.text())
+}
+
 /// What was generated.
 fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode, space: &RunnerPlan) {
     let written = |files: &[&output::FileReport]| {
         files.iter().filter(|file| matches!(file.change, Change::Created | Change::Updated)).count()
     };
-    let stubs: Vec<_> =
+    let created: Vec<_> =
         report.files.iter().filter(|file| file.owner == Owner::User && file.change == Change::Created).collect();
     let kept = report.files.iter().filter(|file| file.owner == Owner::User && file.change == Change::Kept).count();
     let writes = matches!(mode, Mode::Write | Mode::Force);
@@ -313,8 +345,9 @@ fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode, s
         shell.did(verb, format!("{}: {} files{changed}{hooks}", out.join(&tree.folder).display(), files.len()));
     }
     if writes {
-        for stub in stubs {
-            shell.did("Stub", format!("{}: fill this in", out.join(&stub.path).display()));
+        for hook in created {
+            let (verb, what) = created_hook(&out.join(&hook.path), &contents(trees, &hook.path));
+            shell.did(verb, what);
         }
     }
     for hook in &report.changed_hooks {
@@ -352,4 +385,18 @@ fn declares(space: &RunnerPlan, of: &str) -> bool {
     let metrics = space.hooks.iter().map(|hook| format!("metric `{}`", hook.metric));
     let operations = space.operations.iter().map(|operation| format!("operation `{}`", operation.operation));
     metrics.chain(operations).any(|declared| declared == of)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_copy_of_a_hook_that_is_filled_in_is_not_called_a_stub() {
+        let path = Path::new("find/src/hooks/close_calls.rs");
+        let stub = "fn on_clearance(ctx: &mut Context) { ctx.unimplemented(); }";
+        assert_eq!(created_hook(path, stub), ("Stub", format!("{}: fill this in", path.display())));
+        let filled = "fn on_clearance(ctx: &mut Context) { ctx.add(1.0); }";
+        assert_eq!(created_hook(path, filled), ("Copied", path.display().to_string()));
+    }
 }

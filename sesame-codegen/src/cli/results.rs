@@ -194,7 +194,9 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
                 found.extend(gathered(file)?);
             }
             let repositories = found.iter().map(|file| Repository::open(file)).collect::<Result<Vec<_>, _>>()?;
-            print(&analysis::campaigns(&repositories)?, &output)
+            let people = matches!(output.format, Format::Table);
+            let readers = if people { analysis::Readers::People } else { analysis::Readers::Programs };
+            print(&analysis::campaigns(&repositories, readers)?, &output)
         }
         Results::Tests { input, output } => {
             let (repository, selection) = open(&input)?;

@@ -37,7 +37,13 @@ fn find(_file: &str, text: &str, name: &str) -> Result<Found, String> {
     Ok(Found { campaign, text: String::new(), uses: String::new(), json: String::new(), errors })
 }
 
-const LANGUAGE: Language = Language { check, format, explain: |code| (code == "E0203").then_some("# E0203"), find };
+const LANGUAGE: Language = Language {
+    check,
+    format,
+    explain: |code| (code == "E0203").then_some("# E0203"),
+    codes: || vec![("E0203", "There is no such name.")],
+    find,
+};
 
 pub(crate) fn sesamec(arguments: &[&str]) -> bool {
     let arguments = ["sesamec"].iter().chain(arguments);

@@ -44,6 +44,9 @@ macro_rules! codes {
         pub const CODES: &[(Code, &str)] = &[
             $((Code::$name, include_str!(concat!("codes/", $text, ".md"))),)*
         ];
+
+        /// What each code is about, in a sentence, sorted by code.
+        pub const MEANINGS: &[(Code, &str)] = &[$((Code::$name, $what),)*];
     };
 }
 

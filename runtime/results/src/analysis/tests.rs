@@ -2,7 +2,7 @@ use sesame_plan::{CoverageGoal, GridAxis};
 
 use super::*;
 use crate::present::table::TextOptions;
-use crate::record::sample;
+use crate::record::{Recorder, ResultSet, Status, sample};
 
 fn repository() -> (tempfile::TempDir, Repository) {
     let folder = tempfile::tempdir().unwrap();
@@ -118,11 +118,38 @@ fn coverage_afterwards_is_what_the_campaign_reports() {
 #[test]
 fn campaigns_tell_what_a_file_holds() {
     let (_folder, repository) = repository();
-    let dataset = campaigns(&[repository]).unwrap();
+    let dataset = campaigns(&[repository], Readers::Programs).unwrap();
     let row = &dataset.rows()[0];
     assert_eq!(row[2], Datum::Text("coverage_experiment".to_owned()));
     assert_eq!(row[5], Datum::Whole(61));
     assert_eq!(row[8], Datum::Text("generation-0 front".to_owned()));
+}
+
+#[test]
+fn people_are_shown_the_first_and_the_last_of_many_result_sets_and_programs_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut recorder = Recorder::create(folder.path(), &sample::plan(), 1, 1).unwrap();
+    let sets = |recorder: &Recorder, readers| {
+        let repository = Repository::open(recorder.repository().path()).unwrap();
+        match &campaigns(&[repository], readers).unwrap().rows()[0][8] {
+            Datum::Text(names) => names.clone(),
+            other => panic!("{other:?}"),
+        }
+    };
+    for generation in 0..40 {
+        let name = format!("generation-{generation}");
+        let status = Status::Intermediate;
+        recorder
+            .put_result_set(&ResultSet { name, generation: Some(generation), status, members: Vec::new() })
+            .unwrap();
+        let people = sets(&recorder, Readers::People);
+        assert!(people.len() < 50, "{people}");
+        if generation < 3 {
+            assert_eq!(people, sets(&recorder, Readers::Programs));
+        }
+    }
+    assert_eq!(sets(&recorder, Readers::People), "generation-0 … generation-39 (40)");
+    assert_eq!(sets(&recorder, Readers::Programs).split(' ').count(), 40);
 }
 
 #[test]
