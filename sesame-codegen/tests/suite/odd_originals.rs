@@ -19,7 +19,7 @@ fn with(changes: &[(&str, &str)]) -> String {
 /// The results of the campaign at a position.
 fn recorded(imported: &mut Imported, at: usize) -> (TempDir, Repository) {
     let (_, name) = imported.performed().find(|(found, _)| *found == at).expect("the campaign performed tests");
-    let plan = plan(imported, &name.to_owned());
+    let plan = plan(imported, name);
     let folder = tempfile::tempdir().unwrap();
     imported.record(at, &plan, folder.path()).unwrap();
     let repository = Repository::open(folder.path()).unwrap();

@@ -376,7 +376,7 @@ const OLD: [(&str, &str); 10] = [
 fn made(seed: u64) -> String {
     let mut draws = Draws(seed);
     let metrics = 1 + draws.below(4);
-    let variables = (0..1 + draws.below(4)).map(|_| draws.below(TYPES.len())).collect();
+    let variables = (0..=draws.below(4)).map(|_| draws.below(TYPES.len())).collect();
     let paths = draws.below(3) == 0;
     let mut maker = Maker { draws, text: String::new(), metrics, variables, paths };
     maker.say("<?xml version=\"1.0\" encoding=\"ASCII\"?>\n");
@@ -391,7 +391,7 @@ fn made(seed: u64) -> String {
         let conditional = maker.chance(6);
         maker.operation("possibleFuzzingOperations", template, None, &format!(" xmi:id=\"_o{at}\""), conditional);
     }
-    for at in 0..1 + maker.draws.below(3) {
+    for at in 0..=maker.draws.below(3) {
         maker.campaign(at, &templates);
     }
     maker.system();

@@ -21,7 +21,7 @@ impl GivenFront {
     /// Reads points from a text, for the objectives of a plan. The error says what is wrong with it.
     ///
     /// The text is CSV or JSON, as `sesamec results front` writes them, with a column or key for each objective; or
-    /// rows of numbers in the order of the objectives, apart by commas or blanks, as NumPy's `savetxt` writes them, or
+    /// rows of numbers in the order of the objectives, apart by commas or blanks, as `numpy.savetxt` writes them, or
     /// as JSON lists. Values are those of the metrics: none is negated because more is sought.
     pub fn read(text: &str, plan: &CampaignPlan) -> Result<GivenFront, String> {
         let points = if text.trim_start().starts_with('[') { from_json(text, plan) } else { from_rows(text, plan) }?;
