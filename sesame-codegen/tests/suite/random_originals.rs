@@ -511,3 +511,26 @@ fn what_a_random_file_holds_is_in_the_results_or_in_a_note() {
 fn what_two_thousand_random_files_hold_is_in_the_results_or_in_a_note() {
     imports(2, 2000);
 }
+
+#[test]
+fn what_the_platforms_own_files_hold_is_in_the_results_or_in_a_note() {
+    let Some(files) = std::env::var_os("SESAME_LEGACY_DIR") else {
+        eprintln!("skipped: SESAME_LEGACY_DIR names no folder of files of the original platform");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let mut found = 0;
+    for entry in fs::read_dir(files).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+        // One holds a merge conflict, and is not XML.
+        if path.extension().is_none_or(|extension| extension != "model") || name == "merge-markers.model" {
+            continue;
+        }
+        let (held, lost) = accounted(&fs::read_to_string(&path).unwrap(), folder.path(), &|| name.clone());
+        println!("{name}: {held:?}, of these only noted {lost:?}");
+        assert_eq!(lost.tests, 0, "{name}");
+        found += held.tests;
+    }
+    assert!(found > 0);
+}
