@@ -182,6 +182,19 @@ fn a_campaign_of_which_nothing_can_be_said_observes_and_keeps_its_results() {
 }
 
 #[test]
+fn a_campaign_without_operations_may_use_those_that_act_before_its_end() {
+    let campaign = r#"
+  <campaigns name="short" metrics="_m1">
+    <performedTests name="Test_idle"><metrics metric="_m1"><result name="hits" value="3.0"/></metrics></performedTests>
+    <endTrigger xsi:type="TestingMM:TimeBasedEnd" timeLimitSeconds="8"/>
+  </campaigns>"#;
+    let mut imported = imported(&space(NUMBERED, &[METRICS, OPERATIONS, CAMPAIGN, campaign, SYSTEM].concat()));
+    let (_folder, repository) = recorded(&mut imported, 2);
+    let operations: Vec<&str> = repository.plan().operations.iter().map(|operation| operation.name.as_str()).collect();
+    assert_eq!(operations, ["push"], "`lose` and `steer` begin after 10 s");
+}
+
+#[test]
 fn what_a_repeated_test_has_beyond_its_operation_is_told() {
     let imported = imported(&with(&[
         ("startTime=\"6.0\" endTime=\"18.0\"", "startTime=\"6.0\" endTime=\"68.0\""),
