@@ -94,8 +94,14 @@ pub struct Distance {
 /// What pymoo made of a distance.
 #[derive(Debug, Clone, Copy, Deserialize)]
 pub struct Distant {
+    /// IGD of the points.
+    pub igd: f64,
     /// IGD⁺ of the points.
     pub igd_plus: f64,
+    /// IGD with the objectives scaled so that those of the front lie from 0 to 1.
+    pub igd_scaled: f64,
+    /// IGD⁺ with the objectives scaled in the same way.
+    pub igd_plus_scaled: f64,
 }
 
 /// The answers to requests, in their order; `None` where nobody named a Python that has the packages. One that is named

@@ -76,16 +76,21 @@ def sort(points):
     return fronts, [[-1.0 if np.isinf(x) else float(x) for x in front] for front in crowding]
 
 
-def igd_plus(front, points):
+def distances(front, points):
+    from pymoo.indicators.igd import IGD
     from pymoo.indicators.igd_plus import IGDPlus
 
-    return float(IGDPlus(np.array(front, dtype=float))(np.array(points, dtype=float)))
+    front, points = np.array(front, dtype=float), np.array(points, dtype=float)
+    named = {"igd": IGD, "igd_plus": IGDPlus}
+    plain = {name: float(of(front)(points)) for name, of in named.items()}
+    scaled = {f"{name}_scaled": float(of(front, zero_to_one=True)(points)) for name, of in named.items()}
+    return plain | scaled
 
 
 for line in sys.stdin:
     request = json.loads(line)
     if "front" in request:
-        print(json.dumps({"igd_plus": igd_plus(request["front"], request["points"])}), flush=True)
+        print(json.dumps(distances(request["front"], request["points"])), flush=True)
     elif "points" in request:
         fronts, crowding = sort(request["points"])
         print(json.dumps({"fronts": fronts, "crowding": crowding}), flush=True)

@@ -7,7 +7,7 @@ use proptest::test_runner::TestRunner;
 use sesame_optimise::crowding::distances;
 use sesame_optimise::dominance::Fitness;
 use sesame_optimise::hypervolume::hypervolume;
-use sesame_optimise::igd::igd_plus;
+use sesame_optimise::igd::{Scaling, igd, igd_plus};
 use sesame_optimise::problems::{Problem, approximate};
 use sesame_optimise::sorting::fronts;
 use sesame_tests::optimisers::{Distance, Distant, ManyObjectives, PYTHON, Ran, Run, Sort, Sorted, ask};
@@ -163,7 +163,15 @@ fn distances_to_fronts_are_those_of_pymoo() {
     for (case, theirs) in cases.iter().zip(theirs) {
         let front: Vec<&[f64]> = case.front.iter().map(Vec::as_slice).collect();
         let points: Vec<&[f64]> = case.points.iter().map(Vec::as_slice).collect();
-        let ours = igd_plus(&points, &front).unwrap();
-        assert!((ours - theirs.igd_plus).abs() <= 1e-12 * ours.max(1.0), "{ours} {}: {case:?}", theirs.igd_plus);
+        let pairs = [
+            (igd(&points, &front, Scaling::Unscaled), theirs.igd),
+            (igd_plus(&points, &front, Scaling::Unscaled), theirs.igd_plus),
+            (igd(&points, &front, Scaling::ByRange), theirs.igd_scaled),
+            (igd_plus(&points, &front, Scaling::ByRange), theirs.igd_plus_scaled),
+        ];
+        for (ours, theirs) in pairs {
+            let ours = ours.unwrap();
+            assert!((ours - theirs).abs() <= 1e-9 * ours.max(1.0), "{ours} {theirs}: {case:?}");
+        }
     }
 }

@@ -1,7 +1,9 @@
-//! IGD⁺: how far a set of points is from a front on average, all objectives minimised (Ishibuchi et al. 2015).
+//! IGD and IGD⁺: how far a set of points is from a front on average, all objectives minimised (Coello and Reyes 2004;
+//! Ishibuchi et al. 2015).
 //!
-//! The distance of a point of the front to a point of the set counts only in the objectives in which the set's point is
-//! worse. So a set that is better than another never has a larger IGD⁺, which the older IGD does not guarantee.
+//! IGD is the mean over the points of the front of the Euclidean distance to the nearest point of the set. In IGD⁺
+//! the distance of a point of the front to a point of the set counts only in the objectives in which the set's point is
+//! worse. So a set that is better than another never has a larger IGD⁺, which IGD does not guarantee.
 
 /// IGD⁺ of a set that only grows.
 ///
@@ -22,15 +24,7 @@ impl IgdPlus {
     /// out, as nothing is near them; `None` where no point is left.
     pub fn to<'p>(front: impl IntoIterator<Item = &'p [f64]>) -> Option<IgdPlus> {
         let front: Vec<&[f64]> = front.into_iter().filter(|point| point.iter().all(|x| x.is_finite())).collect();
-        let scale: Vec<f64> = (0..front.first()?.len())
-            .map(|at| {
-                let values = front.iter().map(|point| point[at]);
-                let (low, high) =
-                    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-                let range = high - low;
-                if range > 0.0 { 1.0 / range } else { 1.0 }
-            })
-            .collect();
+        let scale = ranges(&front)?;
         Some(IgdPlus::scaled(&front, scale))
     }
 
@@ -64,13 +58,55 @@ impl IgdPlus {
     }
 }
 
-/// IGD⁺ of points to a front without scaling, as it was published; `None` without a point or a front.
-pub fn igd_plus(points: &[&[f64]], front: &[&[f64]]) -> Option<f64> {
-    let mut distance = IgdPlus::scaled(front, vec![1.0; front.first()?.len()]);
+/// In what objectives are measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scaling {
+    /// Each objective is divided by the range that the front has in it, where it has one.
+    ByRange,
+    /// As they are.
+    Unscaled,
+}
+
+/// IGD of points to a front; `None` without a point or a front. Points of the front with an infinite value are left out.
+pub fn igd(points: &[&[f64]], front: &[&[f64]], scaling: Scaling) -> Option<f64> {
+    let front: Vec<&[f64]> = front.iter().copied().filter(|point| point.iter().all(|x| x.is_finite())).collect();
+    let scale = match scaling {
+        Scaling::ByRange => ranges(&front)?,
+        Scaling::Unscaled => vec![1.0; front.first()?.len()],
+    };
+    let squared = |a: &[f64], z: &[f64]| -> f64 {
+        a.iter().zip(z).zip(&scale).map(|((a, z), scale)| (a - z) * scale * ((a - z) * scale)).sum()
+    };
+    let nearest = |z: &[f64]| points.iter().map(|a| squared(a, z)).fold(f64::INFINITY, f64::min);
+    let total: f64 = front.iter().map(|z| libm::sqrt(nearest(z))).sum();
+    Some(total / front.len() as f64).filter(|mean| mean.is_finite())
+}
+
+/// IGD⁺ of points to a front; `None` without a point or a front. Points of the front with an infinite value are left out.
+pub fn igd_plus(points: &[&[f64]], front: &[&[f64]], scaling: Scaling) -> Option<f64> {
+    let mut distance = match scaling {
+        Scaling::ByRange => IgdPlus::to(front.iter().copied())?,
+        Scaling::Unscaled => {
+            let finite: Vec<&[f64]> =
+                front.iter().copied().filter(|point| point.iter().all(|x| x.is_finite())).collect();
+            IgdPlus::scaled(&finite, vec![1.0; finite.first()?.len()])
+        }
+    };
     for point in points {
         distance.add(point);
     }
     distance.value()
+}
+
+/// One over the range of each objective of a front, or 1 where it has none; `None` without a front.
+fn ranges(front: &[&[f64]]) -> Option<Vec<f64>> {
+    let scales = (0..front.first()?.len()).map(|at| {
+        let values = front.iter().map(|point| point[at]);
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let range = high - low;
+        if range > 0.0 { 1.0 / range } else { 1.0 }
+    });
+    Some(scales.collect())
 }
 
 #[cfg(test)]
@@ -111,12 +147,25 @@ mod tests {
         // The point is one of the front, and worse by 2 than the other in one objective, better in the other.
         let front: [&[f64]; 2] = [&[2.0, 5.0], &[4.0, 2.0]];
         let close = |value: Option<f64>, expected: f64| (value.unwrap() - expected).abs() < 1e-12;
-        assert!(close(igd_plus(&[&[4.0, 2.0]], &front), 1.0));
-        assert!(close(igd_plus(&[&[5.0, 6.0]], &front), f64::midpoint(libm::sqrt(10.0), libm::sqrt(17.0))));
+        assert!(close(igd_plus(&[&[4.0, 2.0]], &front, Scaling::Unscaled), 1.0));
+        assert!(close(
+            igd_plus(&[&[5.0, 6.0]], &front, Scaling::Unscaled),
+            f64::midpoint(libm::sqrt(10.0), libm::sqrt(17.0))
+        ));
         // A point better than the front has the distance 0; IGD would penalise it.
-        assert_eq!(igd_plus(&[&[1.0, 1.0]], &front), Some(0.0));
-        assert_eq!(igd_plus(&[], &front), None);
-        assert_eq!(igd_plus(&[&[1.0, 1.0]], &[]), None);
+        assert_eq!(igd_plus(&[&[1.0, 1.0]], &front, Scaling::Unscaled), Some(0.0));
+        assert_eq!(igd_plus(&[], &front, Scaling::Unscaled), None);
+        assert_eq!(igd_plus(&[&[1.0, 1.0]], &[], Scaling::Unscaled), None);
+    }
+
+    #[test]
+    fn a_point_better_than_the_front_is_as_far_from_it_as_a_worse_one_in_igd() {
+        let front: [&[f64]; 2] = [&[0.0, 1.0], &[1.0, 0.0]];
+        assert_eq!(igd(&[&[0.0, 1.0], &[1.0, 0.0]], &front, Scaling::Unscaled), Some(0.0));
+        assert_eq!(igd(&[&[0.0, 0.0]], &front, Scaling::Unscaled), Some(1.0));
+        assert_eq!(igd_plus(&[&[0.0, 0.0]], &front, Scaling::Unscaled), Some(0.0));
+        assert_eq!(igd(&[], &front, Scaling::Unscaled), None);
+        assert_eq!(igd(&[&[0.0, 0.0]], &[&[f64::INFINITY, 0.0]], Scaling::ByRange), None);
     }
 
     #[test]
@@ -132,9 +181,39 @@ mod tests {
     proptest! {
         #[test]
         fn it_is_what_the_definition_says((points, front) in any_points()) {
-            let ours = igd_plus(&slices(&points), &slices(&front)).unwrap();
+            let ours = igd_plus(&slices(&points), &slices(&front), Scaling::Unscaled).unwrap();
             let expected = naive(&points, &front);
             prop_assert!((ours - expected).abs() <= 1e-12 * expected.max(1.0), "{ours} {expected}");
+        }
+
+        #[test]
+        fn igd_is_what_the_definition_says((points, front) in any_points()) {
+            let distance = |a: &[f64], z: &[f64]| libm::sqrt(a.iter().zip(z).map(|(a, z)| (a - z) * (a - z)).sum());
+            let naive = |points: &[Vec<f64>], front: &[Vec<f64>]| {
+                let least = |z: &Vec<f64>| points.iter().map(|a| distance(a, z)).fold(f64::INFINITY, f64::min);
+                front.iter().map(least).sum::<f64>() / front.len() as f64
+            };
+            let ours = igd(&slices(&points), &slices(&front), Scaling::Unscaled).unwrap();
+            prop_assert!((ours - naive(&points, &front)).abs() <= 1e-12 * ours.max(1.0), "{ours}");
+            prop_assert!(igd_plus(&slices(&points), &slices(&front), Scaling::Unscaled).unwrap() <= ours + 1e-12);
+            // Scaled, it is that of the scaled points: pymoo's `IGD(front, zero_to_one=True)`.
+            let unit = |of: &[Vec<f64>]| -> Vec<Vec<f64>> {
+                let scaled = |point: &Vec<f64>| {
+                    let ends = |at: usize| {
+                        let values = front.iter().map(|point| point[at]);
+                        (values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max))
+                    };
+                    let to_unit = |(at, x): (usize, &f64)| {
+                        let (low, high) = ends(at);
+                        (x - low) / if high > low { high - low } else { 1.0 }
+                    };
+                    point.iter().enumerate().map(to_unit).collect()
+                };
+                of.iter().map(scaled).collect()
+            };
+            let scaled = igd(&slices(&points), &slices(&front), Scaling::ByRange).unwrap();
+            let expected = naive(&unit(&points), &unit(&front));
+            prop_assert!((scaled - expected).abs() <= 1e-9 * expected.max(1.0), "{scaled} {expected}");
         }
 
         #[test]

@@ -5,6 +5,7 @@
 
 mod compare;
 pub(crate) mod confirmed;
+mod distances;
 mod indicators;
 mod rank_sum;
 pub mod regions;
@@ -21,12 +22,15 @@ use sesame_search::coverage::{Coverage, CurvePoint, Feasible, Grid, curve};
 use sesame_search::sspr::Convention;
 
 use crate::analysis::confirmed::confirmed_tests;
+use crate::analysis::statistics::Sample;
 use crate::record::{Origin, RecordError, Repository, ScannedTest};
 
 pub use crate::present::table::{Datum, Table, TextOptions};
 pub use compare::{CompareError, Comparison, Run, compare};
+pub use distances::{FrontDistance, GivenFront, GivenFrontError, distance_table, distances};
 pub use indicators::{Indicator, IndicatorAnalysis, indicators};
 pub use rank_sum::{RankSum, rank_sum};
+pub use sesame_optimise::igd::Scaling;
 
 /// Which tests are looked at.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -124,6 +128,38 @@ pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, Re
         dataset.row(std::iter::once(Datum::test(test.number)).chain(called).chain(head).chain(values));
     })?;
     Ok(dataset)
+}
+
+/// The values of each metric over the tests of a selection: how many have one, their mean, standard deviation (of a
+/// sample, with `n − 1`), range and median. Tests that stand for an equal one are left out, as reference runs are.
+pub fn statistics(repository: &Repository, selection: &Selection) -> Result<Table, RecordError> {
+    let plan = repository.plan();
+    let mut values: Vec<Vec<f64>> = vec![Vec::new(); plan.metrics.len()];
+    repository.scan(&mut |test| {
+        if test.origin == Origin::Reference || test.duplicate_of.is_some() || !selection.holds(test.number) {
+            return;
+        }
+        for (id, of_metric) in (0u32..).map(MetricId).zip(&mut values) {
+            of_metric.extend(test.value(id).value);
+        }
+    })?;
+    let columns = ["metric", "unit", "tests", "mean", "deviation", "least", "median", "most"];
+    let mut table = Table::new(columns.map(str::to_owned));
+    for (metric, values) in plan.metrics.iter().zip(values) {
+        let sample = Sample::of(values);
+        let real = |of: fn(&Sample) -> Option<f64>| Datum::real(sample.as_ref().and_then(of));
+        table.row([
+            Datum::text(&metric.name),
+            metric.unit.clone().map_or(Datum::Missing, Datum::Text),
+            Datum::count(sample.as_ref().map_or(0, |sample| sample.count)),
+            real(|sample| Some(sample.mean)),
+            real(|sample| sample.deviation),
+            real(|sample| Some(sample.min)),
+            real(|sample| Some(sample.median)),
+            real(|sample| Some(sample.max)),
+        ]);
+    }
+    Ok(table)
 }
 
 /// A test's operations in its order, apart by spaces.

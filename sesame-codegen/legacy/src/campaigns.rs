@@ -238,7 +238,10 @@ fn search(
     held.dedup();
     if held.iter().all(|&at| writer.mapped.parts[at].is_empty()) && !campaign.tests.is_empty() {
         writer.notes.say(Kind::Changed, format!("campaign `{shown}` has no operations: it may use all now"));
-        held = (0..writer.mapped.parts.len()).collect();
+        // All that can be active before its tests end.
+        let end = end_of(original, campaign);
+        let acts = |&at: &usize| writer.permitted(at).is_none_or(|window| window.start < end);
+        held = (0..writer.mapped.parts.len()).filter(acts).collect();
     }
     let operations: Vec<&str> =
         held.iter().flat_map(|&at| &writer.mapped.parts[at]).map(|part| part.name.as_str()).collect();

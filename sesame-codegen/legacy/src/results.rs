@@ -172,10 +172,13 @@ impl Importer<'_> {
         }
         if held.is_empty() {
             // As one operation, whatever number of parts it has.
-            left_out.truncate(1);
-            left_out.into_iter().for_each(|text| notes.lose(Counted::Operation, text, 1));
+            for text in left_out.into_iter().take(1) {
+                notes.lose(Counted::Operation, text, 1);
+            }
         } else {
-            left_out.into_iter().for_each(|text| notes.say(Kind::LeftOut, text));
+            for text in left_out {
+                notes.say(Kind::LeftOut, text);
+            }
         }
         held
     }

@@ -114,15 +114,15 @@ impl Writer<'_> {
     fn system(&mut self, topics: &[(String, String, Type)]) -> String {
         let mut text = "system {\n".to_owned();
         let simulator = self.original.system.simulator.clone().unwrap_or_default();
-        if !simulator.kind.is_empty() {
+        if simulator.kind.is_empty() {
+            let text = "the file names no simulator: the line of the simulator is a placeholder to be replaced";
+            self.notes.say(Kind::Noted, text);
+        } else {
             let (kind, address) = (printable(&simulator.kind), printable(&simulator.address));
             let at = if address.is_empty() { String::new() } else { format!(" at {address}") };
             let doc = format!("In the original: {kind}{at}. Name your simulator here.");
             let _ = write!(text, "  {}", doc_comment(&doc));
             self.notes.say(Kind::Changed, format!("simulator {kind}{at}: its line is a placeholder to be replaced"));
-        } else {
-            let text = "the file names no simulator: the line of the simulator is a placeholder to be replaced";
-            self.notes.say(Kind::Noted, text);
         }
         let step = simulator.step_ms.filter(|step| (0.001..=3_600_000.0).contains(step));
         // Times are whole nanoseconds.

@@ -7,14 +7,15 @@ use std::process::ExitCode;
 use anyhow::{Context as _, bail};
 use clap::{Args, Subcommand, ValueEnum};
 
-use sesame_plan::Dimension;
-use sesame_results::analysis::{self, Run, Selection, Table, regions};
+use sesame_plan::{CampaignPlan, Dimension};
+use sesame_results::analysis::{self, GivenFront, Run, Scaling, Selection, Table, regions};
 use sesame_results::record::{DATABASE, Repository};
 use sesame_results::report::TextOptions;
 use sesame_search::coverage::Grid;
 use sesame_search::sspr::Convention;
 
 use super::shell::{self, Shell};
+use crate::input;
 
 /// What is asked of results files.
 #[derive(Debug, Subcommand)]
@@ -29,6 +30,13 @@ pub(super) enum Results {
     },
     /// All tests with their operations and the values of their metrics.
     Tests {
+        #[command(flatten)]
+        input: Input,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// The values of each metric over all tests: how many, mean, standard deviation and range. For repeated tests.
+    Statistics {
         #[command(flatten)]
         input: Input,
         #[command(flatten)]
@@ -100,6 +108,13 @@ pub(super) enum Results {
         /// one that was fixed while the campaign ran.
         #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "VALUES")]
         reference: Vec<f64>,
+        /// Show the distances IGD and IGD+ to this front instead: CSV or JSON with a column per objective, rows of
+        /// numbers in the order of the objectives, or other results.
+        #[arg(long, value_name = "FILE", conflicts_with = "reference")]
+        against: Option<PathBuf>,
+        /// Measure the distances in the units of the objectives instead of in ranges of the given front.
+        #[arg(long, requires = "against")]
+        unscaled: bool,
         #[command(flatten)]
         output: Output,
     },
@@ -202,6 +217,10 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
             let (repository, selection) = open(&input)?;
             print(&analysis::tests(&repository, &selection)?, &output)
         }
+        Results::Statistics { input, output } => {
+            let (repository, selection) = open(&input)?;
+            print(&analysis::statistics(&repository, &selection)?, &output)
+        }
         Results::Front { input, output } => {
             let (repository, selection) = open(&input)?;
             if repository.plan().campaign.objectives.is_empty() {
@@ -258,9 +277,19 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
             }
             print(&if cells { analysis.cells() } else { analysis.curve() }, &output)
         }
-        Results::Indicators { file, reference, output } => {
+        Results::Indicators { file, reference, against, unscaled, output } => {
             let repository = Repository::open(&file)?;
             let needed = repository.plan().campaign.objectives.len();
+            if let Some(against) = against {
+                if needed == 0 {
+                    bail!("campaign `{}` has no objectives, so there is no front", repository.plan().campaign.name);
+                }
+                let given = given_front(&against, repository.plan())
+                    .with_context(|| format!("cannot take a front from {}", against.display()))?;
+                let scaling = if unscaled { Scaling::Unscaled } else { Scaling::ByRange };
+                let distances = analysis::distances(&repository, &given, scaling)?;
+                return print(&analysis::distance_table(&distances), &output);
+            }
             if !reference.is_empty() && reference.len() != needed {
                 let given = reference.len();
                 bail!(
@@ -298,6 +327,16 @@ fn measured_from(shell: Shell, reference: &[(String, f64)]) {
         let point: Vec<String> = reference.iter().map(|(metric, value)| format!("{metric} {value}")).collect();
         shell.note(format!("hypervolumes are measured from {}", point.join(", ")));
     }
+}
+
+/// The front in a file of points, or of results.
+fn given_front(path: &Path, plan: &CampaignPlan) -> anyhow::Result<GivenFront> {
+    let is_results = path.is_dir() || path.file_name().is_some_and(|name| name == DATABASE);
+    if is_results {
+        return Ok(GivenFront::of_results(&Repository::open(path)?, plan)?);
+    }
+    let text = input::text(path)?;
+    GivenFront::read(&text, plan).map_err(anyhow::Error::msg)
 }
 
 /// The runs at and below paths, each in the group of its path or of its campaign.

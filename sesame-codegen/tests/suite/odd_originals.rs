@@ -19,7 +19,7 @@ fn with(changes: &[(&str, &str)]) -> String {
 /// The results of the campaign at a position.
 fn recorded(imported: &mut Imported, at: usize) -> (TempDir, Repository) {
     let (_, name) = imported.performed().find(|(found, _)| *found == at).expect("the campaign performed tests");
-    let plan = plan(imported, &name.to_owned());
+    let plan = plan(imported, name);
     let folder = tempfile::tempdir().unwrap();
     imported.record(at, &plan, folder.path()).unwrap();
     let repository = Repository::open(folder.path()).unwrap();
@@ -179,6 +179,19 @@ fn a_campaign_of_which_nothing_can_be_said_observes_and_keeps_its_results() {
     assert_eq!((tests.len(), tests[0].operations.len()), (1, 0));
     assert!(tests[0].values.iter().any(|value| value.value == Some(7.0)));
     assert_eq!(imported.notes.lost(Counted::Operation), 1, "{}", said(&imported));
+}
+
+#[test]
+fn a_campaign_without_operations_may_use_those_that_act_before_its_end() {
+    let campaign = r#"
+  <campaigns name="short" metrics="_m1">
+    <performedTests name="Test_idle"><metrics metric="_m1"><result name="hits" value="3.0"/></metrics></performedTests>
+    <endTrigger xsi:type="TestingMM:TimeBasedEnd" timeLimitSeconds="8"/>
+  </campaigns>"#;
+    let mut imported = imported(&space(NUMBERED, &[METRICS, OPERATIONS, CAMPAIGN, campaign, SYSTEM].concat()));
+    let (_folder, repository) = recorded(&mut imported, 2);
+    let operations: Vec<&str> = repository.plan().operations.iter().map(|operation| operation.name.as_str()).collect();
+    assert_eq!(operations, ["push"], "`lose` and `steer` begin after 10 s");
 }
 
 #[test]

@@ -227,6 +227,150 @@ fn hypervolumes_are_measured_anew_from_the_point_given() {
     assert!(farther.generations[6].hypervolume > own.generations[6].hypervolume);
 }
 
+/// The names of the objectives, and the points of the front that `front` shows, in their units.
+fn shown_front(repository: &Repository) -> (Vec<String>, Vec<Vec<f64>>) {
+    let plan = repository.plan();
+    let names: Vec<String> = plan.campaign.objectives.iter().map(|&metric| plan.metric(metric).name.clone()).collect();
+    let table = front(repository, &all()).unwrap();
+    let columns: Vec<Vec<f64>> =
+        names.iter().map(|name| numbers(&table, name).into_iter().map(Option::unwrap).collect()).collect();
+    let points = (0..columns[0].len()).map(|row| columns.iter().map(|column| column[row]).collect()).collect();
+    (names, points)
+}
+
+#[test]
+fn a_front_is_at_no_distance_from_itself_however_it_is_given() {
+    let (folder, repository) = repository();
+    let plan = repository.plan();
+    let (names, points) = shown_front(&repository);
+    let rows = |between: &str| -> String {
+        let row = |point: &Vec<f64>| point.iter().map(f64::to_string).collect::<Vec<_>>().join(between);
+        points.iter().map(row).collect::<Vec<_>>().join("\n")
+    };
+    let table = front(&repository, &all()).unwrap();
+    let reordered = format!("other,\"{}\",{}\n{}", names[1], names[0], {
+        let row = |point: &Vec<f64>| format!("\"a, b\",{},{}", point[1], point[0]);
+        points.iter().map(row).collect::<Vec<_>>().join("\n")
+    });
+    let texts = [
+        table.csv(),
+        table.json(),
+        rows(","),
+        format!("# of pymoo\n{}\n", rows(" ")),
+        serde_json::to_string(&points).unwrap(),
+        reordered,
+    ];
+    let mut given: Vec<GivenFront> =
+        texts.iter().map(|text| GivenFront::read(text, plan).unwrap_or_else(|why| panic!("{why}: {text}"))).collect();
+    given.push(GivenFront::of_results(&Repository::open(folder.path()).unwrap(), plan).unwrap());
+    for given in given {
+        for scaling in [Scaling::ByRange, Scaling::Unscaled] {
+            let found = distances(&repository, &given, scaling).unwrap();
+            let own: Vec<Option<u32>> = repository.indicators().unwrap().iter().map(|it| Some(it.generation)).collect();
+            assert_eq!(found.iter().map(|distance| distance.generation).collect::<Vec<_>>(), own);
+            let last = found.last().unwrap();
+            assert_eq!((last.igd, last.igd_plus), (Some(0.0), Some(0.0)), "{given:?}");
+            assert_eq!(last.front, points.len());
+            assert!(found[0].igd >= found[0].igd_plus && found[0].igd > Some(0.0));
+        }
+    }
+}
+
+#[test]
+fn distances_to_a_given_front_are_those_of_the_definition() {
+    let (_folder, repository) = repository();
+    let plan = repository.plan();
+    let (_, points) = shown_front(&repository);
+    let given = vec![vec![0.0, 0.0], vec![1000.0, 10.0]];
+    let read = GivenFront::read(&serde_json::to_string(&given).unwrap(), plan).unwrap();
+    // Smaller is better.
+    let oriented = |of: &[Vec<f64>], by: [f64; 2]| -> Vec<[f64; 2]> {
+        let one = |point: &Vec<f64>| {
+            let objectives: Vec<_> = plan.objectives().collect();
+            [0, 1].map(|at| objectives[at].oriented(point[at]) / by[at])
+        };
+        of.iter().map(one).collect()
+    };
+    for (scaling, by) in [(Scaling::Unscaled, [1.0, 1.0]), (Scaling::ByRange, [1000.0, 10.0])] {
+        let (front, given) = (oriented(&points, by), oriented(&given, by));
+        let mean = |distance: &dyn Fn(&[f64; 2], &[f64; 2]) -> f64| {
+            let nearest = |z: &[f64; 2]| front.iter().map(|a| distance(a, z)).fold(f64::INFINITY, f64::min);
+            given.iter().map(nearest).sum::<f64>() / given.len() as f64
+        };
+        let igd = mean(&|a, z| libm::hypot(a[0] - z[0], a[1] - z[1]));
+        let plus = mean(&|a, z| libm::hypot((a[0] - z[0]).max(0.0), (a[1] - z[1]).max(0.0)));
+        let found = distances(&repository, &read, scaling).unwrap();
+        let last = found.last().unwrap();
+        assert!((last.igd.unwrap() - igd).abs() < 1e-9 && (last.igd_plus.unwrap() - plus).abs() < 1e-9, "{last:?}");
+    }
+    insta::assert_snapshot!(
+        "distances",
+        distance_table(&distances(&repository, &read, Scaling::ByRange).unwrap())
+            .text(TextOptions { width: None, colour: false })
+    );
+}
+
+#[test]
+fn what_is_no_front_of_the_campaign_is_refused() {
+    let (_folder, repository) = repository();
+    let plan = repository.plan();
+    let name = |at: usize| plan.metric(plan.campaign.objectives[at]).name.clone();
+    let said: Vec<String> = [
+        String::new(),
+        "[]".to_owned(),
+        "1,2,3".to_owned(),
+        "1 2\n3".to_owned(),
+        "1,2\n3,x".to_owned(),
+        "1,2\n3,inf".to_owned(),
+        format!("{},speed\n1,2", name(0)),
+        "[[1, 2], [3]]".to_owned(),
+        "[[1, \"x\"]]".to_owned(),
+        format!("[{{\"{}\": 1}}]", name(0)),
+        "[1, 2]".to_owned(),
+        "[[1, 2]".to_owned(),
+    ]
+    .iter()
+    .map(|text| GivenFront::read(text, plan).map(|_| ()).unwrap_err())
+    .collect();
+    insta::assert_snapshot!(said.join("\n"), @r#"
+    it has no points
+    it has no points
+    it has 3 columns for 2 objectives (fuzzing_time, collision_occurrence)
+    row 2 ends before column 2
+    row 2 holds `x`, which is not a number
+    row 2 holds inf, which is not a finite number
+    it has no column `collision_occurrence`; its columns are fuzzing_time, speed
+    row 2 does not hold 2 numbers, one for each objective (fuzzing_time, collision_occurrence)
+    row 1 holds "x", which is not a number
+    row 1 has no `collision_occurrence`
+    row 1 is neither a list nor an object
+    it is not a list in JSON: EOF while parsing a list at line 1 column 7
+    "#);
+}
+
+#[test]
+fn statistics_are_those_of_the_values_recorded() {
+    let (_folder, repository) = repository();
+    let table = statistics(&repository, &all()).unwrap();
+    let (tests, means) = (numbers(&table, "tests"), numbers(&table, "mean"));
+    let deviations = numbers(&table, "deviation");
+    let rows = repository.tests().unwrap();
+    for (id, _) in (0u32..).zip(&repository.plan().metrics) {
+        let searched = rows.iter().filter(|row| row.origin != Origin::Reference && row.duplicate_of.is_none());
+        let values: Vec<f64> = searched.filter_map(|row| row.value(MetricId(id)).value).collect();
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let variance = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / (n - 1.0);
+        let at = id as usize;
+        assert_eq!(tests[at], Some(n));
+        assert!((means[at].unwrap() - mean).abs() < 1e-9, "{means:?}");
+        assert!((deviations[at].unwrap() - libm::sqrt(variance)).abs() < 1e-9, "{deviations:?}");
+    }
+    let reported = crate::report::summary(&repository).unwrap();
+    let reported: Vec<Option<f64>> = reported.spreads.iter().map(|spread| spread.deviation).collect();
+    assert_eq!(reported, deviations);
+}
+
 /// Runs of one campaign, so many tests long.
 fn runs(folder: &std::path::Path, groups: &[(&str, &[u32])]) -> Vec<Run> {
     let mut plan = sample::plan();

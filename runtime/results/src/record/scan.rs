@@ -62,21 +62,17 @@ impl ScannedTest {
     /// Where it lies in the reduced parameter space; `None` where no operation was active with an effect.
     pub fn point(&self, plan: &CampaignPlan, convention: Convention) -> Option<Point> {
         let mut disturbances: Vec<Disturbance> = Vec::with_capacity(self.operations.len());
-        let mut places = Vec::with_capacity(self.operations.len());
+        let mut places: Vec<usize> = Vec::with_capacity(self.operations.len());
         for operation in &self.operations {
             let intervals = if operation.acted { self.intervals(operation, plan, convention) } else { Vec::new() };
             let found = disturbance(plan, operation.operation, &operation.choices, intervals);
-            let whole = operation.part_of.and_then(|first| places.get(first).copied());
-            match whole {
-                Some(place) => {
-                    let whole: &mut Disturbance = &mut disturbances[place];
-                    whole.parameters.extend(found.parameters);
-                    places.push(place);
-                }
-                None => {
-                    places.push(disturbances.len());
-                    disturbances.push(found);
-                }
+            let whole = operation.part_of.and_then(|first| places.get(first)).copied();
+            if let Some(place) = whole {
+                disturbances[place].parameters.extend(found.parameters);
+                places.push(place);
+            } else {
+                places.push(disturbances.len());
+                disturbances.push(found);
             }
         }
         Point::from_disturbances(&disturbances, convention)
@@ -152,10 +148,8 @@ impl Repository {
             Cursor::over(values.query([]).map_err(failed)?, |row| Ok((position(row, 1)?, metric_value(row, 2)?)))
                 .map_err(failed)?;
 
-        let mut split = match split_operations::are_in(&self.connection).map_err(failed)? {
-            true => Some(prepare(split_operations::QUERY)?),
-            false => None,
-        };
+        let are_split = split_operations::are_in(&self.connection).map_err(failed)?;
+        let mut split = if are_split { Some(prepare(split_operations::QUERY)?) } else { None };
         let mut split = match &mut split {
             Some(split) => Some(
                 Cursor::over(split.query([]).map_err(failed)?, |row| Ok((position(row, 1)?, position(row, 2)?)))

@@ -82,17 +82,20 @@ pub(super) fn front(summary: &Summary) -> Table {
     table
 }
 
-/// How far metrics went.
+/// The values of metrics: how many, between what, and how they vary.
 pub(super) fn spreads(spreads: &[Spread]) -> Table {
     let mut columns = vec![Column::heading("metric")];
-    columns.extend(["tests", "least", "median", "most"].map(Column::number));
+    columns.extend(["tests", "least", "median", "most", "mean", "deviation"].map(Column::number));
     columns.push(Column::words("unit"));
     let mut table = Table::with(columns);
-    for Spread { metric, unit, count, min, median, max } in spreads {
+    for Spread { metric, unit, count, min, median, max, mean, deviation } in spreads {
         let decimals = number::decimals([*min, *median, *max]);
         let [min, median, max] = [min, median, max].map(|value| Datum::Rounded(*value, decimals));
+        // These say more than any single value does.
+        let finer = |value: f64| Datum::Rounded(value, decimals + 1);
+        let (mean, deviation) = (finer(*mean), deviation.map_or(Datum::Missing, finer));
         let unit = Datum::text(unit.clone().unwrap_or_default());
-        table.row([Datum::text(metric), Datum::count(*count), min, median, max, unit]);
+        table.row([Datum::text(metric), Datum::count(*count), min, median, max, mean, deviation, unit]);
     }
     table
 }

@@ -9,6 +9,7 @@ use sesame_base::test_number::TestNumber;
 use sesame_plan::{Bound, CampaignPlan, Confirmation, Copies, Direction, MetricId, Requirement};
 
 use crate::analysis::confirmed::{ConfirmedTest, FAILURES, FindingAgain, confirmed_tests, failed, failed_again};
+use crate::analysis::statistics::Sample;
 use crate::present::number;
 use crate::record::{
     EventKind, Judge, MetricValue, Origin, RecordError, Repository, Standing, TestRow, Verdict, verdict,
@@ -59,7 +60,7 @@ pub struct Summary {
     /// How a test was shrunk, if the campaign does that.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shrinking: Option<Shrinking>,
-    /// The range of each metric, in the plan's order; the main result of a campaign without objectives.
+    /// The values of each metric, in the plan's order; the main result of a campaign without objectives.
     pub spreads: Vec<Spread>,
     /// How much of the space is covered, if the campaign counts coverage.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -212,7 +213,7 @@ pub struct NotFinite {
     pub metrics: Vec<String>,
 }
 
-/// The range of a metric over all tests that have a value.
+/// The values of a metric over all tests that have one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spread {
     /// The metric.
@@ -227,6 +228,10 @@ pub struct Spread {
     pub median: f64,
     /// The largest value.
     pub max: f64,
+    /// The mean.
+    pub mean: f64,
+    /// The standard deviation of a sample (with `n − 1`); `None` if one test has a value.
+    pub deviation: Option<f64>,
 }
 
 /// What a campaign found, from its results.
@@ -494,24 +499,13 @@ fn spreads(plan: &CampaignPlan, rows: &[TestRow]) -> Vec<Spread> {
     (0u32..)
         .zip(&plan.metrics)
         .filter_map(|(id, metric)| {
-            let mut values: Vec<f64> = rows
+            let values = rows
                 .iter()
                 .filter(|row| row.origin != Origin::Reference && row.duplicate_of.is_none())
-                .filter_map(|row| row.value(MetricId(id)).value)
-                .collect();
-            values.sort_by(f64::total_cmp);
-            let (min, max) = (*values.first()?, *values.last()?);
-            let upper = values[values.len() / 2];
-            let lower = values[(values.len() - 1) / 2];
-            let median = f64::midpoint(lower, upper);
-            Some(Spread {
-                metric: metric.name.clone(),
-                unit: metric.unit.clone(),
-                count: values.len(),
-                min,
-                median,
-                max,
-            })
+                .filter_map(|row| row.value(MetricId(id)).value);
+            let Sample { count, mean, deviation, min, median, max } = Sample::of(values)?;
+            let (metric, unit) = (metric.name.clone(), metric.unit.clone());
+            Some(Spread { metric, unit, count, min, median, max, mean, deviation })
         })
         .collect()
 }
