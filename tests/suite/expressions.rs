@@ -47,7 +47,8 @@ fn payload(path: &str, x: f64, y: f64) -> Value {
 
 /// The values of metrics, each with its formula, after ten seconds.
 fn values(formulas: &[(&str, &str)]) -> Vec<Option<f64>> {
-    let metrics: String = formulas.iter().map(|(name, formula)| format!("metric {name} = {formula}\n")).collect();
+    let metrics: Vec<String> = formulas.iter().map(|(name, formula)| format!("metric {name} = {formula}\n")).collect();
+    let metrics = metrics.concat();
     let names: Vec<&str> = formulas.iter().map(|(name, _)| *name).collect();
     let campaign = format!("campaign look {{ passive 1 times  observes {}  end after 10s }}", names.join(", "));
     let mut sources = sesame_dsl::source::SourceMap::new();
