@@ -27,6 +27,7 @@ mod single;
 mod traces;
 mod worker;
 mod worker_process;
+mod worker_program;
 
 pub use confirmation::{Confirmations, confirm_recorded};
 pub use error::CampaignError;
@@ -39,3 +40,4 @@ pub use run::{CampaignEnd, run_campaign};
 pub use settings::{Settings, default_timeout};
 pub use single::{SingleSettings, run_single};
 pub use worker::serve;
+pub use worker_program::WorkerProgram;

@@ -13,7 +13,9 @@ pub mod campaign;
 #[cfg(feature = "campaign")]
 mod changed_files;
 #[cfg(feature = "campaign")]
-mod cli;
+pub mod cli;
+#[cfg(all(feature = "campaign", feature = "process"))]
+mod interpreted;
 #[cfg(feature = "campaign")]
 mod runner;
 #[cfg(feature = "campaign")]
@@ -22,6 +24,8 @@ mod tampered;
 
 #[cfg(feature = "campaign")]
 pub use cli::main;
+#[cfg(all(feature = "campaign", feature = "process"))]
+pub use interpreted::Interpreted;
 #[cfg(feature = "campaign")]
 pub use runner::Runner;
 pub use sesame_base::{activation, condition, observation, time, verdict};
@@ -40,7 +44,7 @@ pub use sesame_search as search;
 pub use sesame_search::{coverage, sspr};
 
 /// The version of the interface between generated code and this crate.
-pub const GENERATOR_ABI: u32 = 2;
+pub const GENERATOR_ABI: u32 = 3;
 
 /// Fails to compile when generated code was written for another version of the interface.
 #[macro_export]

@@ -7,26 +7,29 @@ mod fmt;
 mod import;
 mod progress;
 mod results;
+mod runner;
 mod search_space;
 mod shell;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{CommandFactory as _, Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
+use sesame_runtime::cli::{Internal, Running, Showing};
 
 use self::arguments::{Deny, Diagnostics, ExplainFormat, Generation, Purpose};
 use crate::environment::{Options, RuntimeChoice};
 use crate::frontend::Language;
+use crate::project;
 
 pub use shell::Shell;
 
 const EXIT_CODES: &str = "Exit codes: 0 success, 1 errors in the input or generated files out of date, 2 wrong usage; \
                           `run` passes on the exit code of the runner.";
 
-/// Compiler for `.sesame` spaces: checks them, generates test runners for robots, and runs test campaigns.
+/// Checks `.sesame` spaces, runs test campaigns of robots, and generates their runners.
 #[derive(Debug, Parser)]
-#[command(name = "sesamec", version, about, after_help = EXIT_CODES)]
+#[command(name = "sesamec", version, after_help = EXIT_CODES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -38,8 +41,11 @@ enum Command {
     New {
         /// The folder of the project; its last part becomes the name of the space.
         folder: PathBuf,
+        /// A simulator in Python instead of Rust: nothing is compiled.
+        #[arg(long)]
+        python: bool,
         /// Where the runtime comes from: `path:FOLDER` or a version.
-        #[arg(long, value_parser = RuntimeChoice::parse)]
+        #[arg(long, value_parser = RuntimeChoice::parse, conflicts_with = "python")]
         runtime: Option<RuntimeChoice>,
         /// A folder with templates that replace sesamec's own by name; see docs/sesamec.md.
         #[arg(long, value_name = "FOLDER")]
@@ -85,16 +91,25 @@ enum Command {
         #[arg(long)]
         vendor: bool,
     },
-    /// Check, generate, build, and run a campaign.
+    /// Check and run a campaign; generate and build its runner first if the campaign needs Rust code of yours.
     #[command(after_help = "Everything after `--` goes to the runner, for example `-- --seed 7 --workers 4`.\n\n\
                             Exit codes: 1 if checking, generating or building failed, 2 wrong usage, otherwise that of the runner.")]
     Run {
         #[command(flatten)]
         generation: Generation,
+        /// Generate and build the runner even if the campaign needs no Rust code: simulator a program, no hooks.
+        #[arg(long)]
+        build: bool,
         /// Arguments for the runner.
         #[arg(last = true, value_name = "RUNNER ARGUMENTS")]
         arguments: Vec<std::ffi::OsString>,
     },
+    #[command(flatten)]
+    Running(Running),
+    #[command(flatten)]
+    Showing(Showing),
+    #[command(flatten)]
+    Internal(Internal),
     /// Analyse the results of campaigns: what ran, fronts, points in the reduced parameter space, coverage.
     #[command(subcommand)]
     Results(results::Results),
@@ -130,6 +145,18 @@ enum Command {
     },
 }
 
+/// The commands of runners, as runners have them.
+fn runners() -> clap::Command {
+    Showing::augment_subcommands(Running::augment_subcommands(clap::Command::new("runner")))
+}
+
+/// The whole command line: commands of runners also say whose.
+fn command_line() -> clap::Command {
+    let runners = runners();
+    let names = runners.get_subcommands().map(|command| command.get_name().to_owned());
+    names.fold(Arguments::command(), |command, name| command.mut_subcommand(name, runner::RunnerOf::arguments))
+}
+
 /// The command line of this process.
 pub fn main(language: &Language) -> ExitCode {
     run(Shell::of_the_process(), language, std::env::args_os())
@@ -141,9 +168,13 @@ pub fn run(
     language: &Language,
     arguments: impl IntoIterator<Item = impl Into<std::ffi::OsString> + Clone>,
 ) -> ExitCode {
-    let result = match Arguments::parse_from(arguments).command {
-        Command::New { folder, runtime, templates } => {
-            commands::new(shell, &folder, runtime.as_ref(), templates.as_deref())
+    let matches = command_line().get_matches_from(arguments);
+    let parsed = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let of_campaign = matches.subcommand().expect("a command is required");
+    let result = match parsed.command {
+        Command::New { folder, python, runtime, templates } => {
+            let simulator = if python { project::Simulator::Python } else { project::Simulator::Rust };
+            commands::new(shell, &folder, simulator, runtime.as_ref(), templates.as_deref())
         }
         Command::Check { file, deny, diagnostics } => {
             commands::check_only(shell, language, &file, deny, diagnostics.format)
@@ -158,7 +189,10 @@ pub fn run(
             let options = Options { self_contained, vendor, ..generation.options() };
             commands::generate(shell, language, &generation, &options, purpose)
         }
-        Command::Run { generation, arguments } => commands::run(shell, language, &generation, &arguments),
+        Command::Run { generation, build, arguments } => runner::run(shell, language, &generation, build, &arguments),
+        Command::Running(command) => runner::running(shell, language, &command, of_campaign),
+        Command::Showing(command) => runner::showing(shell, language, &command, of_campaign.1),
+        Command::Internal(command) => Ok(sesame_runtime::cli::serve(&command)),
         Command::Results(asked) => results::results(shell, asked),
         Command::Import { file, out } => import::import(shell, language, &file, &out),
         Command::Explain { what, file: Some(file), format } => {
@@ -167,7 +201,7 @@ pub fn run(
         Command::Explain { what, file: None, .. } => commands::explain_code(language, &what),
         Command::Completions { shell } => {
             let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Arguments::command(), "sesamec", &mut script);
+            clap_complete::generate(shell, &mut command_line(), "sesamec", &mut script);
             shell::asked_for(&String::from_utf8_lossy(&script)).map(|()| ExitCode::SUCCESS)
         }
     };
@@ -183,27 +217,63 @@ mod tests {
 
     #[test]
     fn the_command_line_is_consistent() {
-        Arguments::command().debug_assert();
+        command_line().debug_assert();
     }
 
     #[test]
     fn the_page_on_the_commands_has_every_option() {
         let page = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/sesamec.md");
         let page = std::fs::read_to_string(page).unwrap();
-        for command in Arguments::command().get_subcommands() {
-            let heading = format!("\n## `sesamec {}`\n", command.get_name());
-            let section = page.split_once(&heading).unwrap_or_else(|| panic!("no section{heading}")).1;
-            let section = section.split("\n## ").next().unwrap();
+        let section = |page: &str, heading: String| {
+            let (_, section) = page.split_once(&heading).unwrap_or_else(|| panic!("no section{heading}"));
+            section.split("\n## ").next().unwrap().to_owned()
+        };
+        let guide = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/guide.md");
+        let guide = section(&std::fs::read_to_string(guide).unwrap(), "\n## Running again\n".to_owned());
+        let (runners, command) = (runners(), command_line());
+        let mut missing = Vec::new();
+        for command in command.get_subcommands().filter(|command| !command.is_hide_set()) {
+            let name = command.get_name();
+            let section = if runners.find_subcommand(name).is_some() {
+                let section = section(&page, "\n## Commands of runners\n".to_owned());
+                assert!(section.contains(&format!("`sesamec {name}`")), "{name}");
+                assert!(guide.contains(&format!("| `{name}")), "{name} is not in the guide");
+                section + &guide
+            } else {
+                section(&page, format!("\n## `sesamec {name}`\n"))
+            };
             let nested = command.get_subcommands().flat_map(clap::Command::get_arguments);
             for option in command.get_arguments().chain(nested).filter_map(clap::Arg::get_long) {
-                assert!(
-                    section.contains(&format!("`--{option}")) || section.contains(&format!(", `--{option}")),
-                    "{option}"
-                );
+                let named = section.contains(&format!("`--{option}")) || section.contains(&format!(" --{option}"));
+                if !named {
+                    missing.push(format!("{name} --{option}"));
+                }
             }
         }
+        assert_eq!(missing, [""; 0]);
         for name in sesame_templates::ALL.iter().map(|(name, _)| name) {
             assert!(page.contains(&format!("| `{name}` |")), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_runner_is_given_what_its_command_was_given() {
+        let lines = [
+            &["replay", "a.sesame", "-c", "x", "T5"][..],
+            &["replay", "a.sesame", "T5", "--results", "r/1", "--format", "json", "--timeout", "2.5"],
+            &["known", "--out", "o", "a.sesame", "one", "two", "--fail-on", "violation,crash", "--junit=-j"],
+            &["confirm", "a.sesame", "-n", "3", "--violations", "--workers", "2"],
+            &["repeat", "a.sesame", "T5", "7", "--allow-unheard"],
+            &["shrink", "a.sesame", "--requirement", "R1", "--requirement", "R2", "--", "T5"],
+        ];
+        for line in lines {
+            let matches = command_line().get_matches_from(["sesamec"].iter().chain(line));
+            let (name, of_command) = matches.subcommand().unwrap();
+            let passed = runner::passed_on(&runners(), name, of_command);
+            let again =
+                runners().get_matches_from([std::ffi::OsString::from("runner"), name.into()].into_iter().chain(passed));
+            let given = |matches: &clap::ArgMatches| format!("{:?}", Running::from_arg_matches(matches).unwrap());
+            assert_eq!(given(&matches), given(&again), "{line:?}");
         }
     }
 
@@ -216,7 +286,7 @@ mod tests {
     #[test]
     fn what_follows_two_dashes_is_the_runners() {
         let arguments = Arguments::parse_from(["sesamec", "run", "a.sesame", "-c", "x", "--", "--seed", "7"]);
-        let Command::Run { generation, arguments } = arguments.command else { panic!("{arguments:?}") };
+        let Command::Run { generation, arguments, .. } = arguments.command else { panic!("{arguments:?}") };
         assert_eq!(generation.campaign.as_deref(), Some("x"));
         assert_eq!(arguments, ["--seed", "7"]);
         assert!(Arguments::try_parse_from(["sesamec", "run", "a.sesame", "--seed", "7"]).is_err());

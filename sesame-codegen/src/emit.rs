@@ -30,7 +30,7 @@ use crate::names;
 use crate::plan::{OperationPlan, RunnerPlan};
 
 /// The version of the interface between generated code and the runtime that this generator writes for.
-const ABI: u32 = 2;
+const ABI: u32 = 3;
 
 /// What the crates of a space need of the world around them.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -253,7 +253,7 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
     let note = generated_by(runner, &tree.options);
     let header = format!("// {note}\n");
 
-    let dependencies = package::with_features(&environment.dependencies, &features(runner));
+    let dependencies = package::with_features(&environment.dependencies, &FEATURES);
     tree.add(
         "Cargo.toml",
         Owner::Machine,
@@ -332,18 +332,9 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
     Ok(tree)
 }
 
-/// The features of the runtime that a campaign uses, so that its runner compiles nothing else.
-fn features(runner: &RunnerPlan) -> Vec<&'static str> {
-    let transport = match runner.plan.simulator.transport {
-        Transport::InProcess { .. } => "in-process",
-        Transport::Process { .. } => "process",
-    };
-    let mut features = vec!["campaign", transport];
-    if runner.plan.campaign.record.is_some() {
-        features.push("mcap");
-    }
-    features
-}
+/// The features of the runtime that runners use. They are the same for all campaigns, whatever transport or traces one
+/// asks for, so that a change of the space does not compile the runtime again.
+const FEATURES: [&str; 4] = ["campaign", "in-process", "mcap", "process"];
 
 /// `campaign.rs`: the campaign as the runtime takes it.
 fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> String {
@@ -373,7 +364,7 @@ fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> Str
             const SIMULATOR: &str = #folder;
         };
         let connect = quote! {
-            ::sesame_runtime::transport::process(::core::env!("CARGO_MANIFEST_DIR"), SIMULATOR)
+            ::sesame_runtime::transport::process(::std::path::Path::new(::core::env!("CARGO_MANIFEST_DIR")).join(SIMULATOR))
         };
         (simulator, connect)
     };
@@ -391,9 +382,9 @@ fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> Str
             /// Everything the runtime is told.
             pub fn runner() -> ::sesame_runtime::Runner {
                 ::sesame_runtime::Runner {
-                    plan: ::core::include_str!("../../campaign.plan.json"),
-                    directory: ::core::env!("CARGO_MANIFEST_DIR"),
-                    space: SPACE,
+                    plan: ::core::include_str!("../../campaign.plan.json").into(),
+                    directory: ::core::env!("CARGO_MANIFEST_DIR").into(),
+                    space: SPACE.into(),
                     hooks: super::registry::HOOKS,
                     operations: #operations,
                     connect: #connect,
@@ -419,7 +410,8 @@ fn generated_by(runner: &RunnerPlan, options: &BTreeMap<String, String>) -> Stri
     ))
 }
 
-fn plan_json(runner: &RunnerPlan) -> String {
+/// The plan of a runner, as `campaign.plan.json` holds it.
+pub fn plan_json(runner: &RunnerPlan) -> String {
     let mut json = serde_json::to_string_pretty(&runner.plan).expect("a plan is plain data");
     json.push('\n');
     json

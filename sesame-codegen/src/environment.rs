@@ -210,9 +210,7 @@ pub fn environment(
     options: &Options,
 ) -> Result<Environment, Vec<Error>> {
     let runtime = options.runtime.as_ref();
-    let home = source
-        .parent()
-        .map_or_else(|| Path::new("."), |parent| if parent == Path::new("") { Path::new(".") } else { parent });
+    let home = home(source);
     let out_folder = settled(out).map_err(|error| vec![error])?;
     let runner_folder = out_folder.join("runner");
     let mut errors = Vec::new();
@@ -307,6 +305,25 @@ pub fn environment(
         vendored,
         templates,
     })
+}
+
+/// Whether the user chose the runtime of a space's runners, on the command line or in `sesame.toml`.
+pub fn runtime_is_chosen(source: &Path, options: &Options) -> Result<bool, Error> {
+    Ok(options.runtime.is_some() || settings(&home(source).join(SETTINGS))?.runtime.is_some())
+}
+
+/// The folders of the space and of its simulator, which is a program, for a runner without a crate.
+pub fn program_folders(source: &Path, plan: &RunnerPlan) -> Result<(PathBuf, PathBuf), Error> {
+    let space = settled(home(source))?;
+    simulator_dependency(&space, &space, plan, &BTreeMap::new())?;
+    let simulator = space.join(plan.system_folder());
+    Ok((space, simulator))
+}
+
+/// The folder of a `.sesame` file.
+fn home(source: &Path) -> &Path {
+    let parent = source.parent().unwrap_or(Path::new("."));
+    if parent == Path::new("") { Path::new(".") } else { parent }
 }
 
 /// The runtime as a dependency of a crate in `folder`, which need not exist yet.

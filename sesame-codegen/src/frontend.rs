@@ -196,17 +196,30 @@ mod tests {
 
     const PLAIN: Look = Look::Human { colour: false };
 
+    /// The check of a new project's space.
+    fn new_project(simulator: crate::project::Simulator) -> Checked {
+        let runtime = crate::environment::RuntimeChoice::Version("1.0.0".into());
+        let templates = crate::emit::Templates::default();
+        let files = crate::project::files(Path::new("demo"), simulator, Some(&runtime), &templates).unwrap();
+        check("some/demo.sesame", &files["demo.sesame"], PLAIN)
+    }
+
     #[test]
     fn the_space_of_a_new_project_is_correct() {
-        let runtime = crate::environment::RuntimeChoice::Version("1.0.0".into());
-        let files =
-            crate::project::files(std::path::Path::new("demo"), Some(&runtime), &crate::emit::Templates::default())
-                .unwrap();
-        let checked = check("some/demo.sesame", &files["demo.sesame"], PLAIN);
+        let checked = new_project(crate::project::Simulator::Rust);
         assert_eq!((checked.errors, checked.diagnostics.as_str()), (0, ""));
         assert_eq!(checked.summary, "1 campaign, 2 operations, 2 metrics, 1 requirement");
         assert_eq!(checked.plans[0].plan.source, "demo.sesame");
         assert_eq!(checked.plans[0].hooks[0].metric, "close_calls");
+        assert!(checked.plans[0].needs_rust());
+    }
+
+    #[test]
+    fn the_space_of_a_new_project_in_python_is_correct_and_needs_no_rust() {
+        let checked = new_project(crate::project::Simulator::Python);
+        assert_eq!((checked.errors, checked.diagnostics.as_str()), (0, ""));
+        assert_eq!(checked.summary, "1 campaign, 2 operations, 3 metrics, 1 requirement");
+        assert!(!checked.plans[0].needs_rust());
     }
 
     #[test]

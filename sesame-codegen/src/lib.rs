@@ -20,5 +20,6 @@ pub mod names;
 pub mod output;
 pub mod plan;
 pub mod project;
+pub mod unfilled;
 #[cfg(feature = "cli")]
 pub mod uses;

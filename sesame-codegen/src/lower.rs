@@ -329,6 +329,42 @@ mod tests {
     }
 
     #[test]
+    fn points_texts_pairs_and_regions_arrive_as_data_that_reads_back() {
+        let named = ["metric time", "objectives time", "observes time"];
+        let text = named.iter().fold(CELL.to_owned(), |text, name| text.replace(name, &format!("{name}_fuzzed")));
+        let text = text.replace(
+            "metric seen",
+            "metric high = last(pose.at.z)
+             metric far = max(distance(each of poses.at, (1, 0, -0.5)m)) when tower != \"hold\" and time > 2s
+             metric closest = min(distance(each pair of poses.at))
+             metric fence = max(signed_distance(pose.at, polygon((0, 0), (5, 0), (0, 500))cm))
+             metric room = min(signed_distance(pose.at, box((2, 0, 0), (0, 3, 4))m))
+             metric way = last(sqrt(pose.at.x * pose.at.x) + hypot(pose.at.x, 3mm) * sin(90deg))
+             metric seen",
+        );
+        let text = text.replacen(
+            "topic ",
+            "message Pose { at: point[mm] }  topic tower = \"tower\" : text
+             topic pose = \"pose\" : Pose  topic poses = \"poses/{a,b}\" : Pose  topic ",
+            1,
+        );
+        let mut sources = SourceMap::new();
+        let text = text.replace("observes time_fuzzed", "observes time_fuzzed, high, far, closest, fence, room, way");
+        let file = sources.add("cell.sesame", text);
+        let analysis = analyse(&sources, file);
+        let space = analysis.model.unwrap_or_else(|| panic!("{:#?}", analysis.diagnostics));
+        let RunnerPlan { plan, .. } = lower(&space, space.campaign("again").unwrap(), "cell.sesame", "sesamec 0.0.0");
+        plan.validate().unwrap();
+        let new = ["high", "far", "closest", "fence", "room", "way"];
+        let lines = plan.metrics.iter().filter(|metric| new.contains(&metric.name.as_str()));
+        let lines: Vec<String> = lines.map(|metric| serde_json::to_string(&metric.source).unwrap()).collect();
+        assert_eq!(lines.len(), new.len());
+        insta::assert_snapshot!(lines.join("\n"));
+        let read: plan::CampaignPlan = serde_json::from_str(&serde_json::to_string(&plan).unwrap()).unwrap();
+        assert_eq!(read, plan);
+    }
+
+    #[test]
     fn the_deepest_formula_can_be_read_again_from_the_plan() {
         let nested = format!("{}link{}", "(-(1rad + ".repeat(8), " * 1) * 1)".repeat(8));
         let text = CELL.replace("metric seen", &format!("metric deep = last({nested}) outbound metric seen"));

@@ -6,6 +6,7 @@
 //!
 //! Nothing outside the output folder is read, written or removed: no link in it is followed.
 
+mod fresh_folder;
 mod manifest;
 mod place;
 
@@ -15,6 +16,7 @@ use std::path::{Component, Path, PathBuf};
 
 use similar::TextDiff;
 
+pub use self::fresh_folder::FreshFolder;
 use self::manifest::{Entry, Manifest};
 use self::place::{Found, Place};
 use crate::files::{Owner, Tree};
@@ -255,34 +257,27 @@ pub fn apply(out: &Path, trees: &[Tree], mode: Mode) -> Result<Report, Error> {
 
 /// Writes a new project into a folder that must be empty or not there yet.
 pub fn create(folder: &Path, files: &std::collections::BTreeMap<String, String>) -> Result<(), Error> {
-    let failed = |cause| Error::Io { action: "look into", path: folder.to_owned(), cause };
-    match fs::read_dir(folder) {
-        Ok(mut entries) => {
-            if entries.next().transpose().map_err(failed)?.is_some() {
-                return Err(Error::NotEmpty { folder: folder.to_owned() });
-            }
-        }
-        Err(cause) if cause.kind() == io::ErrorKind::NotFound => {}
-        Err(cause) => return Err(failed(cause)),
-    }
+    is_empty_but_for(folder, "")?;
     files.iter().try_for_each(|(path, contents)| Place { root: folder, below: path }.write(contents.as_bytes()))
+}
+
+/// Whether a folder is there, which then must hold nothing but, perhaps, something of this name.
+fn is_empty_but_for(folder: &Path, name: &str) -> Result<bool, Error> {
+    let failed = |cause| Error::Io { action: "look into", path: folder.to_owned(), cause };
+    let entries = match fs::read_dir(folder) {
+        Err(cause) if cause.kind() == io::ErrorKind::NotFound => return Ok(false),
+        entries => entries.map_err(failed)?,
+    };
+    for entry in entries {
+        if entry.map_err(failed)?.file_name() != name {
+            return Err(Error::NotEmpty { folder: folder.to_owned() });
+        }
+    }
+    Ok(true)
 }
 
 /// The folder for results in a project.
 pub const RESULTS: &str = "results";
-
-/// Takes back what [`create`] wrote into a folder that was empty or, if it was not there before, that came with it: a
-/// file and the results beside it.
-pub fn withdraw(folder: &Path, file: &str, was_there: bool) -> Result<(), Error> {
-    let gone = |path: PathBuf, done: io::Result<()>| match done {
-        Err(cause) if cause.kind() != io::ErrorKind::NotFound => Err(Error::Io { action: "remove", path, cause }),
-        _ => Ok(()),
-    };
-    Place { root: folder, below: file }.remove()?;
-    let results = folder.join(RESULTS);
-    gone(results.clone(), fs::remove_dir_all(&results))?;
-    if was_there { Ok(()) } else { gone(folder.to_owned(), fs::remove_dir(folder)) }
-}
 
 /// Gives a file that is there another text. Who may read and write it stays as it is, and a link stays a link.
 pub fn replace(path: &Path, contents: &str) -> Result<(), Error> {

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use sesame_plan::{CampaignPlan, Direction, MetricSource, Parameter, TopicId};
+use sesame_plan::{CampaignPlan, Direction, MetricSource, Parameter, TopicId, Transport};
 
 /// The plan of one runner crate.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,6 +92,14 @@ impl RunnerPlan {
     /// The folder of the file that declares the simulator, as seen from that of the space; empty where they are one.
     pub fn system_folder(&self) -> &Path {
         Path::new(&self.system_file).parent().unwrap_or(Path::new(""))
+    }
+
+    /// Whether a runner of this campaign contains Rust of the user's: its simulator or hooks. Without, the plan says
+    /// everything.
+    pub fn needs_rust(&self) -> bool {
+        matches!(self.plan.simulator.transport, Transport::InProcess { .. })
+            || self.hooks.iter().any(|hook| self.uses(hook))
+            || self.operations.iter().any(|operation| self.applies(operation))
     }
 
     /// Whether a test of this campaign may hold a custom operation, and so needs its hook to be compiled.

@@ -39,9 +39,19 @@ struct Project<'a> {
     hook_line: &'a str,
 }
 
-/// The files of a project, by path inside its folder.
+/// What the simulator of a new project is written in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Simulator {
+    /// A crate that runners link.
+    Rust,
+    /// A program of its own: no Rust, so nothing is compiled.
+    Python,
+}
+
+/// The files of a project, by path inside its folder. `runtime` says where a simulator in Rust takes the runtime from.
 pub fn files(
     folder: &Path,
+    simulator: Simulator,
     runtime: Option<&RuntimeChoice>,
     templates: &Templates,
 ) -> Result<BTreeMap<String, String>, Error> {
@@ -50,17 +60,29 @@ pub fn files(
     if !plain || !names::check(name) {
         return Err(Error::Name { name: name.to_owned() });
     }
-    let runtime = environment::runtime_for(&folder.join("simulator"), runtime)?;
     let project = Project { name, hook_line: HOOK_LINE };
-    Ok([
-        (format!("{name}.sesame"), templates.render("project/space.sesame.tera", &project)?),
-        ("README.md".to_owned(), templates.render("project/readme.md.tera", &project)?),
-        ("sesame.toml".to_owned(), templates.render("project/sesame.toml.tera", &project)?),
-        (".gitignore".to_owned(), "target/\n".to_owned()),
-        ("simulator/Cargo.toml".to_owned(), simulator_manifest(name, &runtime)),
-        ("simulator/src/lib.rs".to_owned(), templates.render("project/simulator/lib.rs.tera", &project)?),
-    ]
-    .into())
+    let space = format!("{name}.sesame");
+    Ok(match simulator {
+        Simulator::Rust => {
+            let runtime = environment::runtime_for(&folder.join("simulator"), runtime)?;
+            [
+                (space, templates.render("project/space.sesame.tera", &project)?),
+                ("README.md".to_owned(), templates.render("project/readme.md.tera", &project)?),
+                ("sesame.toml".to_owned(), templates.render("project/sesame.toml.tera", &project)?),
+                (".gitignore".to_owned(), "target/\n".to_owned()),
+                ("simulator/Cargo.toml".to_owned(), simulator_manifest(name, &runtime)),
+                ("simulator/src/lib.rs".to_owned(), templates.render("project/simulator/lib.rs.tera", &project)?),
+            ]
+            .into()
+        }
+        Simulator::Python => [
+            (space, templates.render("project/python/space.sesame.tera", &project)?),
+            ("README.md".to_owned(), templates.render("project/python/readme.md.tera", &project)?),
+            (".gitignore".to_owned(), "/runners/*/results/\n__pycache__/\n".to_owned()),
+            ("sim.py".to_owned(), templates.render("project/python/sim.py.tera", &project)?),
+        ]
+        .into(),
+    })
 }
 
 /// The simulator's `Cargo.toml`. The name is an identifier, and toml prints the value.

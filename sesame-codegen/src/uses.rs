@@ -125,27 +125,38 @@ fn line(sources: &SourceMap, span: Span) -> String {
 }
 
 /// A definition and its uses.
+/// A definition with its uses.
 #[derive(Serialize)]
 struct Explained<'a> {
+    /// What is declared, for example `topic`.
     kind: &'static str,
+    /// Its name.
     name: String,
+    /// Where it is declared.
     at: Place<'a>,
+    /// Its doc comment.
     doc: &'a str,
     /// The declaration as written.
     text: &'a str,
+    /// Every place that mentions it.
     uses: Vec<Use<'a>>,
 }
 
+/// A place that mentions a definition.
 #[derive(Serialize)]
 struct Use<'a> {
+    /// Where.
     at: Place<'a>,
+    /// In which declaration.
     within: Within,
 }
 
 /// What mentions it.
 #[derive(Serialize)]
 struct Within {
+    /// What is declared, for example `operation`.
     kind: &'static str,
+    /// Its name.
     name: String,
 }
 

@@ -30,9 +30,10 @@ use std::collections::BTreeMap;
 // What holds no names and no units is the same here and in a plan.
 pub use sesame_plan::stl::Interval;
 pub use sesame_plan::{
-    Aggregate, Averaging, BoostedChildren, Bound, Choice, Comparison, Condition, Confirmation, Copies, Dimension,
-    Direction, Distribution, Drain, Exploration, Expression, Members, Moment, NotFinite, OperationKind, OwnSetting,
-    Recorded, Setting, Shape, Statistic, Step, StopRule, Strategy, StrategyKind, StrategyProperties, Trend, ValueMode,
+    Aggregate, Averaging, BinaryFunction, BoostedChildren, Bound, Choice, Comparison, Condition, Confirmation, Copies,
+    Dimension, Direction, Distance, Distribution, Drain, Exploration, Expression, Members, Moment, NotFinite,
+    OperationKind, OwnSetting, Point, Recorded, Region, Setting, Shape, SignedDistance, Statistic, Step, StopRule,
+    Strategy, StrategyKind, StrategyProperties, TextTest, Trend, UnaryFunction, ValueMode,
 };
 
 use crate::span::FileId;

@@ -2,7 +2,8 @@
 //!
 //! 1. [`collect`] collects names, and reports duplicates and missing declarations
 //! 2. [`system`] resolves message types (ordered so that each follows those it contains), topics, nodes, the simulator
-//! 3. [`metrics`] resolves metrics (their formulas in [`formula`]) and requirements
+//! 3. [`metrics`] resolves metrics and requirements; [`formula`] resolves formulas, with [`function`], [`geometry`],
+//!    [`region`] and [`members`]
 //! 4. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`custom`] those in the user's code)
 //!    and tests
 //! 5. [`campaign`] resolves campaigns, whose inherited clauses [`inherit`] has copied before all else; [`condition`]
@@ -24,16 +25,20 @@ mod disturbance;
 mod eddi;
 mod exploration;
 mod formula;
+mod function;
 mod fuzz;
+mod geometry;
 mod inherit;
 mod lengths;
 mod lifecycle;
+mod members;
 mod message_types;
 mod metrics;
 mod nodes;
 mod parts;
 mod physical;
 mod quantity;
+mod region;
 mod robustness;
 mod simulator;
 mod stop;

@@ -23,6 +23,8 @@ impl Dimension {
     pub const NONE: Dimension = Dimension::of([0; 7]);
     /// The dimension of time.
     pub const TIME: Dimension = Dimension::of([0, 1, 0, 0, 0, 0, 0]);
+    /// The dimension of angles.
+    pub const ANGLE: Dimension = ANGLE;
 
     fn times(self, other: Dimension, power: i8) -> Option<Dimension> {
         let mut exponents = [0; 7];
@@ -156,6 +158,11 @@ impl Unit {
         Unit { text: "s".to_owned(), dimension: Dimension::TIME, scale: Scale::ONE }
     }
 
+    /// The radian, the unit of angles that functions compute.
+    pub fn radians() -> Unit {
+        Unit { text: "rad".to_owned(), dimension: ANGLE, scale: Scale::ONE }
+    }
+
     /// Reads a unit: symbols with optional powers, joined by `*` and `/`, for example `m/s^2`.
     pub fn parse(text: &str) -> Result<Unit, UnitError> {
         let mut dimension = Dimension::NONE;
@@ -249,6 +256,44 @@ pub fn product(left: Option<&Unit>, right: Option<&Unit>, divide: bool) -> Optio
         }
     }
     powers.retain(|&(_, power)| power != 0);
+    if powers.is_empty() {
+        return Some((None, scale));
+    }
+    let unit = Unit::parse(&joined(powers)?).ok()?;
+    if unit.dimension == Dimension::NONE {
+        return Some((None, scale * convert(1.0, Some(&unit), None)));
+    }
+    Some((Some(unit), scale))
+}
+
+/// The unit of a square root, and the factor that the number under the root is multiplied by before. `None` if the
+/// dimension is not that of a square.
+pub fn square_root(unit: Option<&Unit>) -> Option<(Option<Unit>, f64)> {
+    let Some(unit) = unit.filter(|unit| unit.dimension != Dimension::NONE) else {
+        return Some((None, convert(1.0, unit, None)));
+    };
+    let mut powers: Vec<(&str, i8)> = Vec::new();
+    for (symbol, power) in unit.factors() {
+        match powers.iter_mut().find(|(known, _)| *known == symbol) {
+            Some((_, known)) => *known = known.checked_add(power)?,
+            None => powers.push((symbol, power)),
+        }
+    }
+    // Of `m*mm` no symbol has a root, but in base units it is `m^2`.
+    if powers.iter().any(|(_, power)| power % 2 != 0) {
+        powers = BASE.into_iter().zip(unit.dimension.exponents).collect();
+    }
+    if powers.iter().any(|(_, power)| power % 2 != 0) {
+        return None;
+    }
+    let halves = powers.into_iter().filter(|&(_, power)| power != 0).map(|(symbol, power)| (symbol, power / 2));
+    let root = Unit::parse(&joined(halves.collect())?).ok()?;
+    let (square, _) = product(Some(&root), Some(&root), false)?;
+    Some((Some(root), convert(1.0, Some(unit), square.as_ref())))
+}
+
+/// Symbols with their powers, none of which is 0, as the text of a unit.
+fn joined(mut powers: Vec<(&str, i8)>) -> Option<String> {
     // Factors come before divisors: a unit does not begin with `/`.
     powers.sort_by_key(|&(_, power)| power < 0);
     let mut text = String::new();
@@ -263,14 +308,7 @@ pub fn product(left: Option<&Unit>, right: Option<&Unit>, divide: bool) -> Optio
             text.extend(["^", &power.to_string()]);
         }
     }
-    if text.is_empty() {
-        return Some((None, scale));
-    }
-    let unit = Unit::parse(&text).ok()?;
-    if unit.dimension == Dimension::NONE {
-        return Some((None, scale * convert(1.0, Some(&unit), None)));
-    }
-    Some((Some(unit), scale))
+    Some(text)
 }
 
 /// The dimension of a unit; no unit is a plain number.
@@ -450,6 +488,25 @@ mod tests {
         assert_eq!(product_of("m", "%", false), (Some("m".to_owned()), 0.01));
         assert_eq!(product_of("m", "%", true), (Some("m".to_owned()), 100.0));
         assert_eq!(product(Some(&unit("m^127")), Some(&unit("m")), false), None);
+    }
+
+    #[test]
+    fn roots_are_in_the_unit_whose_square_is_meant() {
+        let root_of = |text: &str| {
+            let unit = Unit::parse(text).ok();
+            square_root(unit.as_ref()).map(|(root, factor)| (root.map(|root| root.text().to_owned()), factor))
+        };
+        let in_unit = |text: &str, factor| Some((Some(text.to_owned()), factor));
+        assert_eq!(root_of("m^2"), in_unit("m", 1.0));
+        assert_eq!(root_of("m*m"), in_unit("m", 1.0));
+        assert_eq!(root_of("mm^2/s^2"), in_unit("mm/s", 1.0));
+        assert_eq!(root_of("m*mm"), in_unit("m", 0.001));
+        assert_eq!(root_of("s^-2"), in_unit("s^-1", 1.0));
+        assert_eq!(root_of("%"), Some((None, 0.01)));
+        assert_eq!(square_root(None), Some((None, 1.0)));
+        for text in ["m", "m^3", "m^2/s", "s^-1"] {
+            assert_eq!(root_of(text), None, "{text}");
+        }
     }
 
     /// The oracle: scales as plain floats, multiplied up from the table without any reduction.

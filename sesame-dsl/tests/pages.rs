@@ -17,16 +17,19 @@ system {
   topic link1 = "joints/link1"  : real[rad]
   topic speed = "cell/speed"    : real[m/s]
   topic zones = "zones/{Z1,Z2}" : Zone
+  topic place = "base/place"    : point[m]
+  topic places = "places/{A,B}" : point[m]
 }
 metric time minimise = fuzzing_time()
 metric farthest      = max(link1)
 metric peak_speed    = max(speed)
 metric clearance     = min(zones.level)
+metric nearest       = min(distance(place, each of places))
 operation jitter on link0 = random offset [-0.3rad, 0.3rad] within [0s, 65s]
 operation lose   on link0 = packet loss [0%, 50%] within [0s, 65s]
 test known { jitter offset [0.1rad, 0.2rad] from 8s to 57s }
 campaign base {
-  objectives time  observes farthest, peak_speed, clearance
+  objectives time  observes farthest, peak_speed, clearance, nearest
   operations jitter, lose 1..5 per test
   search     nsga2 { population 10  evaluations 200 }
   end        after 70s

@@ -11,6 +11,9 @@ pub mod runner;
 pub const ALL: &[(&str, &str)] = &[
     ("project/readme.md.tera", project::README),
     ("project/sesame.toml.tera", project::SETTINGS),
+    ("project/python/readme.md.tera", project::PYTHON_README),
+    ("project/python/sim.py.tera", project::PYTHON_SIMULATOR),
+    ("project/python/space.sesame.tera", project::PYTHON_SPACE),
     ("project/simulator/lib.rs.tera", project::SIMULATOR),
     ("project/space.sesame.tera", project::SPACE),
     ("runner/hook.rs.tera", runner::HOOK),

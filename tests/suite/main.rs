@@ -11,12 +11,15 @@ mod custom;
 mod declarative;
 mod disk;
 mod exported;
+mod expressions;
 mod falsification;
 mod faults;
 mod first_front;
 mod free_running;
 mod hostile;
 mod import;
+#[cfg(unix)]
+mod interpreted;
 mod interruption;
 #[cfg(target_os = "linux")]
 mod killed;

@@ -4,6 +4,7 @@
 //! and passes there, but not where `CI=true`.
 #![cfg(test)]
 
+mod json_page;
 mod rules;
 
 use std::fs;
@@ -64,6 +65,9 @@ fn the_tree_is_tidy() {
         rules::not_on_the_map(&crates, &text("ARCHITECTURE.md")),
         rules::mod_files(&files),
         rules::without_purpose(&files),
+        rules::not_in_the_index(&files),
+        rules::digests(&files),
+        rules::exit_codes(&files),
     ]
     .concat();
     assert!(complaints.is_empty(), "{} things are untidy:\n{}\n", complaints.len(), complaints.join("\n"));

@@ -109,6 +109,45 @@ pub(crate) fn without_purpose(files: &[File]) -> Vec<String> {
     silent.map(|file| format!("{}: begin it with `//!` and a sentence on what it is for", file.path)).collect()
 }
 
+/// Pages of documentation that its index does not list, and entries of the index without a page.
+pub(crate) fn not_in_the_index(files: &[File]) -> Vec<String> {
+    const INDEX: &str = "docs/README.md";
+    let pages = files.iter().filter_map(|file| file.path.strip_prefix("docs/")).filter(|name| name.ends_with(".md"));
+    let pages: Vec<&str> = pages.filter(|name| *name != "README.md").collect();
+    let index = files.iter().find(|file| file.path == INDEX).map_or("", |file| file.text.as_str());
+    let linked: Vec<&str> = index.split("](").skip(1).filter_map(|rest| rest.split(')').next()).collect();
+    let unlisted = pages.iter().filter(|page| !linked.contains(page));
+    let missing = linked.iter().filter(|link| !link.starts_with("..") && !pages.contains(link));
+    let unlisted = unlisted.map(|page| format!("{INDEX}: add a row for docs/{page}"));
+    unlisted.chain(missing.map(|link| format!("{INDEX}: there is no page docs/{link}; remove its row"))).collect()
+}
+
+/// Digests of results in documentation: nobody notices when they are out of date.
+pub(crate) fn digests(files: &[File]) -> Vec<String> {
+    let mut complaints = Vec::new();
+    for file in files.iter().filter(|file| file.ending() == Some("md")) {
+        let mut words = file.text.split(|c: char| !c.is_ascii_hexdigit());
+        if let Some(digest) = words.find(|word| word.len() == 64) {
+            complaints.push(format!("{}: write `(64 hexadecimal digits)` for the digest {digest}", file.path));
+        }
+    }
+    complaints
+}
+
+/// Tables of exit codes beside the one of the guide.
+pub(crate) fn exit_codes(files: &[File]) -> Vec<String> {
+    const PAGE: &str = "docs/guide.md";
+    let mut complaints = Vec::new();
+    for file in files.iter().filter(|file| file.ending() == Some("md")) {
+        let tables = file.text.lines().filter(|line| line.starts_with("| exit code |")).count();
+        if tables != usize::from(file.path == PAGE) {
+            complaints
+                .push(format!("{}: {tables} tables of exit codes; there is one, in {PAGE}: link to it", file.path));
+        }
+    }
+    complaints
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -193,5 +232,31 @@ mod tests {
                 "c.rs: begin it with `//!` and a sentence on what it is for",
             ]
         );
+    }
+
+    #[test]
+    fn the_index_lists_each_page_and_no_other() {
+        let index = "[a](a.md) [gone](gone.md) [up](../README.md)";
+        let files = [file("docs/README.md", index), file("docs/a.md", ""), file("docs/b.md", ""), file("c.md", "")];
+        assert_eq!(
+            not_in_the_index(&files),
+            [
+                "docs/README.md: add a row for docs/b.md",
+                "docs/README.md: there is no page docs/gone.md; remove its row"
+            ]
+        );
+    }
+
+    #[test]
+    fn documentation_has_no_digest_and_one_table_of_exit_codes() {
+        let digest = "84067dcc".repeat(8);
+        let page = |path: &str, text: &str| file(path, text);
+        assert_eq!(digests(&[page("a.md", &format!("Digest {digest}\n"))]).len(), 1);
+        assert_eq!(digests(&[page("a.md", &format!("{digest}0")), page("a.rs", &digest)]), [""; 0]);
+        let table = "| exit code | means |\n";
+        let [guide, twice] = [table.to_owned(), table.repeat(2)];
+        assert_eq!(exit_codes(&[page("docs/guide.md", &guide), page("docs/b.md", "")]), [""; 0]);
+        assert_eq!(exit_codes(&[page("docs/guide.md", &twice), page("docs/b.md", table)]).len(), 2);
+        assert_eq!(exit_codes(&[page("docs/guide.md", "")]).len(), 1);
     }
 }

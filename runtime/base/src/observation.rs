@@ -164,12 +164,24 @@ pub struct MetricObservation {
     pub not_finite: Option<f64>,
     /// Change points `(seconds, value)` in time order; the value holds until the next point. Always finite.
     pub series: Vec<(f64, f64)>,
+    /// Of the robustness of a formula its [signal](crate::robustness), thinned: change points as in `series`, but the
+    /// last one ends it and repeats the value before. Empty for other metrics. It follows from the run like everything
+    /// else, and explains the value; it is neither part of the digest nor compared when a run is repeated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub robustness: Vec<(f64, f64)>,
 }
 
 impl MetricObservation {
     /// Of a run that came to its end, with nothing in it that was not finite.
     pub fn whole(value: Option<f64>, set: bool, series: Vec<(f64, f64)>) -> Self {
-        MetricObservation { value, set, reach: Reach::of_whole_run(value), not_finite: None, series }
+        MetricObservation {
+            value,
+            set,
+            reach: Reach::of_whole_run(value),
+            not_finite: None,
+            series,
+            robustness: Vec::new(),
+        }
     }
 }
 
@@ -230,7 +242,7 @@ impl MetricValue {
 
 impl From<&MetricObservation> for MetricValue {
     fn from(shown: &MetricObservation) -> Self {
-        let MetricObservation { value, set, reach, not_finite, series: _ } = *shown;
+        let MetricObservation { value, set, reach, not_finite, series: _, robustness: _ } = *shown;
         MetricValue { value, set, reach, not_finite }
     }
 }
@@ -258,8 +270,13 @@ impl Observation {
     /// The same run without the series of its metrics, which are most of it.
     #[must_use]
     pub fn without_series(&self) -> Self {
-        let metric = |&MetricObservation { value, set, reach, not_finite, series: _ }: &MetricObservation| {
-            MetricObservation { value, set, reach, not_finite, series: Vec::new() }
+        let metric = |&MetricObservation { value, set, reach, not_finite, .. }: &MetricObservation| MetricObservation {
+            value,
+            set,
+            reach,
+            not_finite,
+            series: Vec::new(),
+            robustness: Vec::new(),
         };
         Observation {
             outcome: self.outcome.clone(),

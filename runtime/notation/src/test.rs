@@ -65,6 +65,11 @@ pub fn activation_named<'a>(
     }
 }
 
+/// The seed of the simulator, as a member of a `test` block.
+pub fn simulator_seed(seed: u64) -> String {
+    format!("simulator seed {seed}")
+}
+
 /// What is expected of a metric, as a member of a `test` block.
 pub fn expectation(expected: &Expectation, metrics: &[Metric]) -> String {
     let metric = &metrics[expected.metric.index()];

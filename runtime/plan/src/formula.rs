@@ -35,10 +35,23 @@ pub enum Side {
 /// A value held from the messages of a topic: a number, true or false (1 or 0), or a point.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Input {
-    /// Where it comes from.
+    /// Where it comes from. Its path may end with `x`, `y` or `z` of a point.
     pub field: FieldRef,
     /// What is made of a group's members; [`Members::Min`] for a single topic.
     pub members: Members,
+    /// For a field that is a text: the input is whether this holds of it. `None` for all others, and then not written.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub text: Option<TextTest>,
+}
+
+/// A comparison of a text.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TextTest {
+    /// It is equal to this one.
+    Is(String),
+    /// It is not equal to this one.
+    IsNot(String),
 }
 
 /// What is made of the last values of a group's members, of those that had a message.
@@ -51,8 +64,12 @@ pub enum Members {
     Max,
     /// The sum.
     Sum,
-    /// The latest.
+    /// The latest. Those of several groups are of members at the same position.
     Each,
+    /// That of the first member of a pair: the formula is that of each pair of different members of one group.
+    First,
+    /// That of the second member of a pair.
+    Second,
 }
 
 /// How a formula's values become the metric's.
@@ -118,15 +135,167 @@ pub enum Expression {
     Min(Vec<Expression>),
     /// The greatest.
     Max(Vec<Expression>),
-    /// How far two inputs that are points are from each other, in the unit of the first.
-    Distance {
-        /// Position of the first in [`Formula::inputs`].
-        from: u32,
-        /// Position of the second.
-        to: u32,
-        /// How many units of the first one unit of the second is.
-        scale: f64,
+    /// How far two points are from each other, in the unit of the first.
+    Distance(Box<Distance>),
+    /// How far a point is from the boundary of a region, in its own unit: positive outside, negative inside.
+    SignedDistance(Box<SignedDistance>),
+    /// The simulation time since the beginning of the run, in seconds.
+    Time,
+    /// A function of one number.
+    Unary {
+        /// Which.
+        function: UnaryFunction,
+        /// Of what.
+        of: Box<Expression>,
     },
+    /// A function of two numbers.
+    Binary {
+        /// Which.
+        function: BinaryFunction,
+        /// Its first argument.
+        left: Box<Expression>,
+        /// Its second argument.
+        right: Box<Expression>,
+    },
+}
+
+impl Expression {
+    /// The expressions that it is directly computed from, in order.
+    pub fn parts(&self) -> Vec<&Expression> {
+        match self {
+            Expression::Constant(_)
+            | Expression::Input(_)
+            | Expression::Distance(_)
+            | Expression::SignedDistance(_)
+            | Expression::Time => Vec::new(),
+            Expression::Negate(of) | Expression::Absolute(of) | Expression::Unary { of, .. } => vec![of],
+            Expression::Divide { value: left, by: right } | Expression::Binary { left, right, .. } => vec![left, right],
+            Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) | Expression::Max(of) => {
+                of.iter().collect()
+            }
+        }
+    }
+
+    /// The points that it is directly computed from, in order.
+    pub fn points(&self) -> Vec<Point> {
+        match self {
+            Expression::Distance(distance) => vec![distance.from, distance.to],
+            Expression::SignedDistance(distance) => vec![distance.from],
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// How far two points are from each other.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Distance {
+    /// The first.
+    pub from: Point,
+    /// The second.
+    pub to: Point,
+    /// How many units of the first one unit of the second is.
+    pub scale: f64,
+}
+
+/// How far a point is from the boundary of a region.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SignedDistance {
+    /// The point.
+    pub from: Point,
+    /// The region, in the unit of the point.
+    pub to: Region,
+}
+
+/// A point in space.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Point {
+    /// An input that is a point: position in [`Formula::inputs`].
+    Input(u32),
+    /// A point that is written in the space.
+    Constant([f64; 3]),
+}
+
+/// A part of space with an inside and an outside.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Region {
+    /// Along each axis between two numbers.
+    Box {
+        /// The corner with the least coordinates.
+        low: [f64; 3],
+        /// The corner with the greatest coordinates: along each axis above the other one.
+        high: [f64; 3],
+    },
+    /// All points whose `x` and `y` lie in a simple polygon, at any `z`.
+    Polygon {
+        /// At least three, in order around the polygon, in either direction.
+        corners: Vec<[f64; 2]>,
+    },
+}
+
+/// A function of one number. Angles are in radians.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum UnaryFunction {
+    /// The square root.
+    Sqrt,
+    /// The sine of an angle.
+    Sin,
+    /// The cosine of an angle.
+    Cos,
+    /// The tangent of an angle.
+    Tan,
+    /// The angle from -π/2 to π/2 with this sine.
+    Asin,
+    /// The angle from 0 to π with this cosine.
+    Acos,
+    /// The angle from -π/2 to π/2 with this tangent.
+    Atan,
+    /// The power of e.
+    Exp,
+    /// The natural logarithm.
+    Ln,
+}
+
+impl UnaryFunction {
+    /// Its name in the language.
+    pub const fn name(self) -> &'static str {
+        match self {
+            UnaryFunction::Sqrt => "sqrt",
+            UnaryFunction::Sin => "sin",
+            UnaryFunction::Cos => "cos",
+            UnaryFunction::Tan => "tan",
+            UnaryFunction::Asin => "asin",
+            UnaryFunction::Acos => "acos",
+            UnaryFunction::Atan => "atan",
+            UnaryFunction::Exp => "exp",
+            UnaryFunction::Ln => "ln",
+        }
+    }
+}
+
+/// A function of two numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BinaryFunction {
+    /// Of y and x: the angle from -π to π of the point (x, y), in radians.
+    Atan2,
+    /// The root of the sum of squares.
+    Hypot,
+    /// The first to the power of the second.
+    Pow,
+}
+
+impl BinaryFunction {
+    /// Its name in the language.
+    pub const fn name(self) -> &'static str {
+        match self {
+            BinaryFunction::Atan2 => "atan2",
+            BinaryFunction::Hypot => "hypot",
+            BinaryFunction::Pow => "pow",
+        }
+    }
 }
 
 /// Something that holds or does not.

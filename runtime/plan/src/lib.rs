@@ -17,6 +17,7 @@ mod exploration;
 mod formula;
 mod id;
 mod kind;
+mod meaning;
 mod metric;
 mod model;
 mod objective;

@@ -9,10 +9,11 @@ use crate::{Comparison, Expression, Input, Side};
 /// By how much a run keeps a formula (positive) or breaks it (negative).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Robustness {
-    /// What the signals refer to by position; at least one. Those that are [`crate::Members::Each`] are all of one
-    /// group: then the formula is that of each member, and the least robustness counts.
+    /// What the signals refer to by position; at least one. Those that are [`crate::Members::Each`] are all of groups
+    /// of one size: then the formula is that of each member, with those at the same position of the other groups.
+    /// Those that are of pairs are all of one group: then it is that of each pair. The least robustness counts.
     pub inputs: Vec<Input>,
-    /// The signals of the formula, all in one unit; each refers to an input.
+    /// The signals of the formula, all in one unit; each refers to an input or to the time.
     pub signals: Vec<Expression>,
     /// What is to hold.
     pub formula: Formula,

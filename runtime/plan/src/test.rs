@@ -99,6 +99,10 @@ pub struct KnownTest {
     pub test: Test,
     /// What must come out.
     pub expectations: Vec<Expectation>,
+    /// The seed of the simulator with which [`Task::Known`](crate::Task::Known) runs it; `None` for a test that is run
+    /// with that of the run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulator_seed: Option<u64>,
 }
 
 /// What must come out of a known test.

@@ -6,7 +6,7 @@
 
 use crate::{
     Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Copies, Count, Distribution, Domain, Drain,
-    Field, FieldRef, KnownTest, MessageId, MessageType, Metric, MetricId, MetricSource, Operation, OperationId,
+    Field, FieldRef, KnownTest, MessageId, MessageType, Metric, MetricId, MetricSource, Node, Operation, OperationId,
     OperationKind, Parameter, Requirement, SCHEMA, Search, Shape, Simulator, Span, Step, Strategy, Test, TestOperation,
     Topic, TopicId, Transport, Type, ValueMode,
 };
@@ -74,6 +74,11 @@ pub fn topic(name: &str, paths: &[&str], ty: Type) -> Topic {
     Topic { name: name.to_owned(), doc: String::new(), paths: paths.iter().map(|&path| path.to_owned()).collect(), ty }
 }
 
+/// A node that neither publishes nor subscribes.
+pub fn node(name: &str) -> Node {
+    Node { name: name.to_owned(), doc: String::new(), publishes: Vec::new(), subscribes: Vec::new() }
+}
+
 /// A metric without a unit, a direction or a trend.
 pub fn metric(name: &str, source: MetricSource) -> Metric {
     Metric {
@@ -97,7 +102,7 @@ pub fn requirement(name: &str, metric: u32, bound: Bound) -> Requirement {
 
 /// A known test that expects nothing.
 pub fn known_test(name: &str, test: Test) -> KnownTest {
-    KnownTest { name: name.to_owned(), doc: String::new(), test, expectations: Vec::new() }
+    KnownTest { name: name.to_owned(), doc: String::new(), test, expectations: Vec::new(), simulator_seed: None }
 }
 
 /// An operation that is permitted in the first ten seconds, on whole messages of a topic; on no topic if it acts beside

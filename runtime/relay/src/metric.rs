@@ -11,8 +11,11 @@ use crate::value::{Text, Value};
 mod aggregate;
 mod engine;
 mod expression;
+#[cfg(test)]
+mod group_tests;
 mod held;
 mod probe;
+mod region;
 mod robustness;
 #[cfg(test)]
 mod tests;

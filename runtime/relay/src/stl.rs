@@ -49,15 +49,19 @@ use node::{Node, Stretch};
 use piece::{Piece, Span};
 use thiserror::Error;
 
+use sesame_base::robustness::{Quantifier, quantifier};
 use sesame_base::time::SimTime;
 use sesame_plan::stl::Formula;
 
 mod minimum;
 mod node;
 mod piece;
+mod signal;
 #[cfg(test)]
 mod tests;
 mod until;
+
+pub(crate) use signal::Signal;
 
 /// A time after everything, in nanoseconds.
 const FOREVER: i64 = i64::MAX / 2;
@@ -125,6 +129,9 @@ pub struct Monitor {
     robustness: VecDeque<Piece>,
     /// Whether only windows count that are completely within the trace.
     whole: bool,
+    quantifier: Option<Quantifier>,
+    /// Up to where the trace was known when the robustness was.
+    decided: Option<i64>,
 }
 
 impl Monitor {
@@ -142,7 +149,17 @@ impl Monitor {
             now: SimTime::from_nanos(i64::MIN),
             robustness: VecDeque::new(),
             whole: false,
+            quantifier: quantifier(formula),
+            decided: None,
         })
+    }
+
+    /// The same monitor, which keeps the signal of its formula for [`Monitor::finish_with_signal`].
+    pub(crate) fn keeping_its_signal(mut self) -> Self {
+        if self.quantifier.is_some() {
+            self.root.keep_signal();
+        }
+        self
     }
 
     /// The same monitor, for which windows that the end of the trace would cut do not count: see the module's words on
@@ -178,12 +195,34 @@ impl Monitor {
     /// trace, since a signal of the formula never had a sample. It is infinite when the trace ends before anything is
     /// asked of it, or by a signal that is infinite or NaN.
     pub fn finish(mut self, end: SimTime) -> Option<f64> {
+        self.close(end).map(|(_, robustness)| robustness)
+    }
+
+    /// The same with the signal of the formula, if the monitor [keeps](Monitor::keeping_its_signal) it.
+    pub(crate) fn finish_with_signal(mut self, end: SimTime) -> Option<(f64, Signal)> {
+        let (start, robustness) = self.close(end)?;
+        let signal = match self.quantifier {
+            Some(_) => {
+                let (from, pieces) = self.root.signal()?;
+                Signal::of(start, from, &pieces, end)
+            }
+            None => Signal::known_at(
+                self.decided.map_or(end, |decided| start + SimTime::from_nanos(decided)),
+                robustness,
+                end,
+            ),
+        };
+        Some((robustness, signal))
+    }
+
+    /// Ends the trace: when it began, and its robustness.
+    fn close(&mut self, end: SimTime) -> Option<(SimTime, f64)> {
         assert!(end >= self.now, "a trace ends no earlier than its last sample, and {end} is before {}", self.now);
         let start = self.start?;
         self.extend((end - start).nanos().saturating_add(1), true, None);
         // Without it no window is whole that the formula asks for. The sum turns the zero that is negative, a matter of
         // how often it was negated, into the other.
-        Some(self.robustness.front().map_or(f64::INFINITY, |first| first.value + 0.0))
+        Some((start, self.robustness.front().map_or(f64::INFINITY, |first| first.value + 0.0)))
     }
 
     /// The least and the greatest robustness that the trace may still come to, when it breaks off at `now`, which is no
@@ -211,5 +250,8 @@ impl Monitor {
     fn extend(&mut self, end: i64, last: bool, unknown: Option<f64>) {
         let stretch = Stretch { end, last, unknown, whole: self.whole };
         self.root.extend(stretch, &self.values, &mut self.robustness);
+        if self.decided.is_none() && !self.robustness.is_empty() {
+            self.decided = Some(end);
+        }
     }
 }

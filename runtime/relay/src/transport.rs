@@ -8,7 +8,7 @@ mod in_process;
 #[cfg(feature = "process")]
 mod process;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
@@ -153,26 +153,17 @@ fn unknown_topic<'a>(path: &str, known: impl Iterator<Item = &'a String> + Clone
 }
 
 /// Creates the transport to the simulator; generated code names the one that its space declares.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Connect {
-    make: fn(&CampaignPlan, Place) -> Box<dyn Transport>,
-    place: Place,
-}
-
-/// Where a simulator is, for transports that start one.
-#[derive(Clone, Copy)]
-#[cfg_attr(not(feature = "process"), expect(dead_code, reason = "only a simulator that is a program has a place"))]
-struct Place {
-    /// Folder of the runner's crate.
-    runner: &'static str,
-    /// Folder of the `.sesame` file, relative to it.
-    space: &'static str,
+    make: fn(&CampaignPlan, &Path) -> Box<dyn Transport>,
+    /// The folder that a simulator that is a program runs in.
+    folder: PathBuf,
 }
 
 impl Connect {
     /// A transport as the plan describes it.
-    pub fn transport(self, plan: &CampaignPlan) -> Box<dyn Transport> {
-        (self.make)(plan, self.place)
+    pub fn transport(&self, plan: &CampaignPlan) -> Box<dyn Transport> {
+        (self.make)(plan, &self.folder)
     }
 }
 

@@ -149,7 +149,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// The value at the end of a path of field names; `x`, `y`, `z` are fields of a point only for reading, see
+    /// The value at the end of a path of field names. The coordinates of a point are only numbers: see
     /// [`Value::number_at`].
     pub fn at<S: AsRef<str>>(&self, path: &[S]) -> Option<&Value> {
         path.iter().try_fold(self, |value, name| match value {
@@ -166,12 +166,31 @@ impl Value {
         })
     }
 
-    /// The number at the end of a path: a real, a whole number, a truth value as 0 or 1.
+    /// The number at the end of a path: a real, a whole number, a truth value as 0 or 1. The path may end with `x`, `y`
+    /// or `z` of a point.
     pub fn number_at<S: AsRef<str>>(&self, path: &[S]) -> Option<f64> {
-        match self.at(path)? {
+        match self.at(path) {
+            Some(value) => value.number(),
+            None => self.coordinate_at(path),
+        }
+    }
+
+    /// This value as a number: a real, a whole number, a truth value as 0 or 1.
+    pub(crate) fn number(&self) -> Option<f64> {
+        match self {
             Value::Real(x) => Some(*x),
             Value::Int(n) => Some(*n as f64),
             Value::Bool(b) => Some(f64::from(u8::from(*b))),
+            _ => None,
+        }
+    }
+
+    /// The coordinate of a point at the end of a path: `x`, `y` or `z`.
+    pub(crate) fn coordinate_at<S: AsRef<str>>(&self, path: &[S]) -> Option<f64> {
+        let (coordinate, before) = path.split_last()?;
+        let axis = ["x", "y", "z"].iter().position(|axis| *axis == coordinate.as_ref())?;
+        match self.at(before)? {
+            Value::Point(point) => Some(point[axis]),
             _ => None,
         }
     }

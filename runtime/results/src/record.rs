@@ -27,6 +27,7 @@ mod scan;
 mod schema;
 mod series;
 mod series_views;
+mod split_operations;
 #[cfg(test)]
 mod tests;
 mod write_tests;
@@ -48,6 +49,7 @@ pub use scan::{ScannedOperation, ScannedTest};
 pub use schema::SCHEMA;
 pub use sesame_base::observation::MetricValue;
 pub use sesame_base::verdict::{Verdict, fails, verdict, violation_spans};
+pub use split_operations::SplitOperation;
 
 /// One test with everything that is known of it.
 #[derive(Debug, Clone, PartialEq)]

@@ -29,10 +29,7 @@ use crate::{SearchError, Strategy};
 pub fn strategy_of_task(plan: &CampaignPlan, task: &Task, seed: u64) -> Result<Box<dyn Strategy>, SearchError> {
     match task {
         Task::Campaign => strategy(plan, seed),
-        Task::Known { tests } => {
-            let known = tests.iter().map(|&id| (id, plan.test(id).test.clone()));
-            Ok(Box::new(FixedTests::known(known.collect())))
-        }
+        Task::Known { tests } => Ok(Box::new(FixedTests::known(plan, tests))),
         Task::Repeat { test, times, .. } => Ok(Box::new(FixedTests::repeated(test, *times, seed))),
         Task::Shrink(shrinking) => Ok(Box::new(Shrink::new(plan, shrinking.clone()))),
     }

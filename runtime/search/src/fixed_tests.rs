@@ -1,6 +1,6 @@
 //! Tests that are known before anything is run: known tests, and one test that is repeated.
 
-use sesame_plan::{KnownTestId, Test};
+use sesame_plan::{CampaignPlan, KnownTest, KnownTestId, Test};
 use sesame_rng::derive_seed;
 
 use crate::{Candidate, Evaluated, Strategy};
@@ -13,11 +13,14 @@ pub(crate) struct FixedTests {
 }
 
 impl FixedTests {
-    /// Known tests, each once, in this order.
-    pub(crate) fn known(tests: Vec<(KnownTestId, Test)>) -> Self {
-        let candidate =
-            |(id, test)| Candidate { test, parents: Vec::new(), generation: 0, known: Some(id), simulator_seed: None };
-        FixedTests { candidates: tests.into_iter().map(candidate).collect(), awaited: 0 }
+    /// Known tests, each once, in this order, and with the seed of the simulator that it names.
+    pub(crate) fn known(plan: &CampaignPlan, tests: &[KnownTestId]) -> Self {
+        let candidate = |&id| {
+            let KnownTest { test, simulator_seed, .. } = plan.test(id);
+            let (test, simulator_seed) = (test.clone(), *simulator_seed);
+            Candidate { test, parents: Vec::new(), generation: 0, known: Some(id), simulator_seed }
+        };
+        FixedTests { candidates: tests.iter().map(candidate).collect(), awaited: 0 }
     }
 
     /// One test this many times, with equal operation seeds, but another seed of the simulator each time. `seed` is
@@ -50,21 +53,25 @@ impl Strategy for FixedTests {
 #[cfg(test)]
 mod tests {
     use sesame_optimise::dominance::Fitness;
+    use sesame_plan::testing;
 
     use super::*;
 
     #[test]
     fn known_tests_are_asked_for_once_and_a_repeated_one_with_seeds_of_its_own() {
-        let known = (0..3).map(|id| (KnownTestId(id), Test::default())).collect();
+        let test = |name| testing::known_test(name, Test::default());
+        let seeded = KnownTest { simulator_seed: Some(11), ..test("seeded") };
+        let plan = CampaignPlan { tests: vec![test("a"), seeded, test("b")], ..testing::minimal() };
+        let known = FixedTests::known(&plan, &[0, 1, 2].map(KnownTestId));
         let repeated = FixedTests::repeated(&Test::default(), 3, 7);
-        for (mut search, is_known) in [(FixedTests::known(known), true), (repeated, false)] {
+        for (mut search, is_known) in [(known, true), (repeated, false)] {
             let asked = search.ask();
             assert_eq!(asked.len(), 3);
             assert!(asked.iter().all(|test| test.known.is_some() == is_known));
             let mut seeds: Vec<u64> = asked.iter().filter_map(|test| test.simulator_seed).collect();
             seeds.sort_unstable();
             seeds.dedup();
-            assert_eq!(seeds.len(), if is_known { 0 } else { 3 });
+            assert!(if is_known { seeds == [11] } else { seeds.len() == 3 }, "{seeds:?}");
             let results: Vec<Evaluated> = (1..)
                 .zip(asked)
                 .map(|(number, candidate)| Evaluated {

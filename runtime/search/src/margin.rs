@@ -95,7 +95,7 @@ mod tests {
                 Reach { low: low.map(f64::from), high: more.map(|more| f64::from(low.unwrap_or(70) + more)) }
             };
             let not_finite = (!finite).then_some(1.0);
-            let shown = MetricObservation { value: x.map(f64::from), set: true, reach, not_finite, series: Vec::new() };
+            let shown = MetricObservation { value: x.map(f64::from), set: true, reach, not_finite, ..MetricObservation::default() };
             let verdict = verdict(Bound::AtMost { value: 70.0 }, &outcome, (&shown).into());
             let margin = margin(outcome, shown);
             prop_assert_eq!(margin.violated, verdict == Verdict::Violated);

@@ -55,7 +55,8 @@ pub enum Convention {
     #[default]
     Ours,
     /// The original platform's code: P2 is a variance, O2 counts delays and O3 losses, packet loss is taken as the
-    /// probability to keep a message, and of a range of delays the lower end counts.
+    /// probability to keep a message, of a range of delays the lower end counts, and parameters of custom operations
+    /// do not count.
     Original,
     /// The paper's text: as ours, but a value is divided by the width of its range without subtracting the lower end.
     Paper,
@@ -98,6 +99,7 @@ impl Point {
         let lengths: Vec<f64> = shares.iter().map(|(start, end)| end - start).collect();
         let parameters: Vec<f64> = active
             .iter()
+            .filter(|of| convention != Convention::Original || of.class != Class::Other)
             .flat_map(|of| of.parameters.iter().filter_map(|parameter| parameter.normalised(of.class, convention)))
             .collect();
         let intensity = (!parameters.is_empty()).then(|| {

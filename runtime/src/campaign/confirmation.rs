@@ -138,7 +138,8 @@ pub fn confirm_recorded(
         runs.push((number, first..=first.saturating_add(confirmations.times - 1)));
     }
     let total = confirmations.times.saturating_mul(u32::try_from(confirmations.tests.len()).unwrap_or(u32::MAX));
-    let mut pool = Pool::start(&settings.pool(total, directory, default_timeout(longest)))?;
+    let timeout = settings.timeout.unwrap_or_else(|| default_timeout(longest));
+    let mut pool = Pool::start(&settings.pool(total, directory, timeout))?;
     let mut evaluator = Evaluator::for_repetitions(recorder, &mut pool, interrupted)?;
     match evaluator.repeat(&mut repeated, &runs, settings.seed, &mut |runs| each(runs, total)) {
         Ok(()) => Ok(true),
@@ -220,7 +221,7 @@ impl Evaluator<'_> {
         each(repeated.runs);
         while !waiting.is_empty() {
             let JobResult { number: job, observation, notes, trace_failure: _, killed: _, lock_stepped: _ } =
-                self.next()?;
+                self.next(&mut || {})?;
             let Some((test, position, simulator_seed)) = waiting.remove(&job) else { continue };
             let repetition = Repetition::of(test, position, simulator_seed, &observation);
             self.recorder.put_repetition(&repetition, &observation.warnings)?;

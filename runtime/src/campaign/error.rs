@@ -31,7 +31,7 @@ pub enum CampaignError {
     /// A reference run was killed, and killed again when it was repeated. It is not recorded, so that `resume` runs it
     /// again.
     #[error(
-        "the reference run failed: {reason}\nT{test} is not recorded, and what was recorded before is kept: `resume` runs it \
+        "the reference run failed: {reason}\nT{test} is not recorded, and what was recorded before is kept: resuming the run runs it \
          again. If you did not kill it, give it more memory, or the campaign fewer `--workers`"
     )]
     Killed {
@@ -51,7 +51,7 @@ pub enum CampaignError {
     /// A trace could not be written. The test is not recorded, so that `resume` runs it again with its trace.
     #[error(
         "{reason}\nT{test} is not recorded without its trace, and what was recorded before is kept: when this is mended, \
-         `resume` goes on"
+         the run can be resumed"
     )]
     Trace {
         /// The test.
@@ -65,6 +65,23 @@ pub enum CampaignError {
          version; start a new run with `run`"
     )]
     OtherCampaign(u32),
+}
+
+impl CampaignError {
+    /// Whether the run can be resumed once the cause is gone.
+    pub fn leaves_the_run_resumable(&self) -> bool {
+        match self {
+            CampaignError::Executor(_)
+            | CampaignError::Record(_)
+            | CampaignError::Killed { .. }
+            | CampaignError::Trace { .. } => true,
+            CampaignError::Search(_)
+            | CampaignError::Grid(_)
+            | CampaignError::Reference(_)
+            | CampaignError::Unheard(_)
+            | CampaignError::OtherCampaign(_) => false,
+        }
+    }
 }
 
 /// Why a campaign halts before its end.

@@ -83,6 +83,16 @@ impl<'a> Evaluator<'a> {
         planned: Vec<PlannedTest>,
         each: &mut dyn FnMut(&TestRecord),
     ) -> Result<(), Halt> {
+        self.evaluate_awaited(planned, each, &mut || {})
+    }
+
+    /// As [`Evaluator::evaluate`]; `awaited` is called several times a second while no test ends.
+    pub(super) fn evaluate_awaited(
+        &mut self,
+        planned: Vec<PlannedTest>,
+        each: &mut dyn FnMut(&TestRecord),
+        awaited: &mut dyn FnMut(),
+    ) -> Result<(), Halt> {
         let mut waiting = BTreeMap::new();
         let mut duplicates = Vec::new();
         let mut read_ahead = VecDeque::new();
@@ -107,7 +117,8 @@ impl<'a> Evaluator<'a> {
             }
         }
         while !waiting.is_empty() {
-            let JobResult { number, observation, notes, trace_failure, killed, lock_stepped: _ } = self.next()?;
+            let JobResult { number, observation, notes, trace_failure, killed, lock_stepped: _ } =
+                self.next(awaited)?;
             let Some(test) = waiting.remove(&number) else { continue };
             if let Some(reason) = trace_failure {
                 return Err(CampaignError::Trace { test: number, reason }.into());
@@ -129,8 +140,13 @@ impl<'a> Evaluator<'a> {
         Ok(())
     }
 
-    /// Waits for the next result of the executor.
-    pub(super) fn next(&mut self) -> Result<JobResult, Halt> {
+    /// How many tests were recorded when the campaign was resumed, without reference runs.
+    pub(super) fn earlier(&self) -> Result<u32, RecordError> {
+        Ok(u32::try_from(self.recorder.repository().evaluated()?).unwrap_or(u32::MAX))
+    }
+
+    /// Waits for the next result of the executor; `awaited` is called several times a second meanwhile.
+    pub(super) fn next(&mut self, awaited: &mut dyn FnMut()) -> Result<JobResult, Halt> {
         loop {
             if self.interrupted.load(Ordering::Relaxed) {
                 return Err(Halt::Stopped);
@@ -138,6 +154,7 @@ impl<'a> Evaluator<'a> {
             if let Some(result) = self.executor.next(WAIT)? {
                 return Ok(result);
             }
+            awaited();
         }
     }
 

@@ -1,5 +1,7 @@
 //! What a campaign tells its listeners while it runs: a progress bar today, a live view later.
 
+use std::time::Duration;
+
 use sesame_optimise::front::Front;
 use sesame_results::record::TestRecord;
 use sesame_search::coverage::Coverage;
@@ -8,8 +10,25 @@ use sesame_search::coverage::Coverage;
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub enum CampaignEvent<'a> {
+    /// The first reference run has not ended yet; told several times a second.
+    ReferenceRunAwaited {
+        /// How long it has been awaited.
+        waited: Duration,
+        /// After how long it is stopped.
+        limit: Duration,
+    },
+    /// The first reference run has shown something that a user should know before the search. It is recorded too.
+    Warned {
+        /// What, in a sentence.
+        text: &'a str,
+    },
     /// The first reference run has ended, and the search begins.
-    SearchStarted,
+    SearchStarted {
+        /// How long the reference run took, in wall time.
+        reference: Duration,
+        /// After how long a test is stopped, in wall time.
+        timeout: Duration,
+    },
     /// A test has ended and is recorded; in a resumed campaign also one that was recorded before.
     TestEnded(&'a TestRecord),
     /// Runs to confirm tests have begun, or one of them has ended and is recorded.
@@ -33,6 +52,8 @@ pub struct Progress<'a> {
     pub done: u32,
     /// Tests to be evaluated in total; a search may stop earlier.
     pub total: u32,
+    /// The tests that were recorded when a stopped campaign was taken up again. They are told first.
+    pub earlier: u32,
     /// Runs to confirm tests so far. They are not tests, and `done` leaves them out.
     pub confirmation_runs: u32,
     /// The front so far.

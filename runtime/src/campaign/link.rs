@@ -39,7 +39,7 @@ mod system {
     pub(in crate::campaign) fn offer(command: &mut Command) -> io::Result<Offer> {
         // Both ends are closed in every other program that this process starts.
         let (ours, theirs) = UnixStream::pair()?;
-        command.arg("worker").stdin(Stdio::from(OwnedFd::from(theirs)));
+        command.stdin(Stdio::from(OwnedFd::from(theirs)));
         Ok(Offer { ours })
     }
 
@@ -110,7 +110,7 @@ mod system {
     /// Opens a port, and tells the worker that this command starts where it is.
     pub(in crate::campaign) fn offer(command: &mut Command) -> io::Result<Offer> {
         let port = Port::open()?;
-        command.arg("worker").arg(port.address()?.to_string()).env(TOKEN, port.token()).stdin(Stdio::null());
+        command.arg(port.address()?.to_string()).env(TOKEN, port.token()).stdin(Stdio::null());
         Ok(Offer { port })
     }
 

@@ -8,7 +8,6 @@
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread::{self, JoinHandle};
@@ -22,6 +21,7 @@ use crate::campaign::link::{self, Stream};
 use crate::campaign::protocol::{self, Hello, Reply};
 use crate::campaign::traces;
 use crate::campaign::worker_process::{WORKER, WorkerProcess};
+use crate::campaign::worker_program::WorkerProgram;
 
 /// How long a fresh worker may take to report.
 const START_LIMIT: Duration = Duration::from_secs(30);
@@ -34,8 +34,8 @@ const DEATH_LIMIT: Duration = Duration::from_secs(2);
 pub struct PoolSettings {
     /// How many workers; at least one.
     pub workers: usize,
-    /// The program that is a worker when called with `worker`: the runner itself.
-    pub program: PathBuf,
+    /// What is started as each worker: the runner itself.
+    pub program: WorkerProgram,
     /// Folder in which each worker gets a folder of its own.
     pub directory: PathBuf,
     /// Wall time after which a test is stopped and its worker replaced.
@@ -235,11 +235,11 @@ impl Worker {
         let directory = slot.directory();
         fs::create_dir_all(&directory)?;
         let output = File::options().create(true).append(true).open(output_file(&directory))?;
-        let mut command = Command::new(&slot.settings.program);
+        let mut command = slot.settings.program.command(&directory)?;
         let offer = link::offer(&mut command)?;
         command.env(WORKER, slot.number.to_string()).current_dir(&directory).stdout(output.try_clone()?).stderr(output);
         let mut process = WorkerProcess::start(command)
-            .map_err(|error| io::Error::other(format!("{}: {error}", slot.settings.program.display())))?;
+            .map_err(|error| io::Error::other(format!("{}: {error}", slot.settings.program.executable().display())))?;
         let taken = offer.taken(START_LIMIT, &mut || {
             if slot.stop.load(Ordering::Relaxed) {
                 return Err(io::Error::new(io::ErrorKind::TimedOut, "the run was stopped"));

@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
 
 use sesame_base::observation::{Observation, Outcome};
 use sesame_optimise::front::Front;
@@ -24,7 +25,7 @@ use crate::campaign::observer::{EndedTest, Generation, Observer};
 use crate::campaign::observers::{counted_point, observers};
 use crate::campaign::pool::Pool;
 use crate::campaign::reference::{self, Unheard};
-use crate::campaign::settings::{FIRST_TIMEOUT, Settings, default_timeout};
+use crate::campaign::settings::{Settings, default_timeout};
 
 /// The warning of a campaign whose simulator nobody steps.
 const FREE_RUNNING: &str = "the simulator runs freely, so equal tests may give different results: equal tests are simulated \
@@ -52,7 +53,7 @@ pub fn run_campaign(
     // Before any process is started, so that a plan without a search is refused at once.
     let task = recorder.repository().task().clone();
     let strategy = search::strategy_of_task(plan, &task, settings.seed)?;
-    let mut pool = Pool::start(&settings.pool(task.evaluations(plan), directory, FIRST_TIMEOUT))?;
+    let mut pool = Pool::start(&settings.pool(task.evaluations(plan), directory, settings.first_timeout()))?;
     run_with(plan, strategy, recorder, settings, &mut pool, interrupted, listener)
 }
 
@@ -102,6 +103,8 @@ struct Campaign<'a, 'l> {
     front: Front,
     /// Tests evaluated.
     done: u32,
+    /// Those of them that were recorded before this session.
+    earlier: u32,
     /// Tests to evaluate in total, at most.
     total: u32,
     listener: &'a mut Listener<'l>,
@@ -119,31 +122,47 @@ impl<'a, 'l> Campaign<'a, 'l> {
     ) -> Result<Self, Halt> {
         let lock_stepped = evaluator.executor.lock_stepped();
         let mut numbering = Numbering::new(settings.seed, lock_stepped);
-        let reference = reference_run(&mut evaluator, &mut numbering)?;
-        if let Outcome::Crash { .. } | Outcome::Timeout { .. } = reference.outcome {
-            return Err(CampaignError::Reference(reference.outcome.detail().unwrap_or_default()).into());
+        let front = Front::default();
+        let (total, earlier) = (task.evaluations(plan), evaluator.earlier()?);
+        let begun = Progress { done: 0, total, earlier, confirmation_runs: 0, front: &front, coverage: None };
+        let (started, limit) = (Instant::now(), settings.first_timeout());
+        let reference = reference_run(&mut evaluator, &mut numbering, &mut || {
+            listener(CampaignEvent::ReferenceRunAwaited { waited: started.elapsed(), limit }, begun);
+        })?;
+        match &reference.outcome {
+            outcome @ Outcome::Timeout { .. } => {
+                let stopped = outcome.detail().unwrap_or_default();
+                let remedy =
+                    "if the simulator is slow and not stuck, give it more time with `--reference-timeout SECONDS`";
+                return Err(CampaignError::Reference(format!("{stopped}; {remedy}")).into());
+            }
+            outcome @ Outcome::Crash { .. } => {
+                return Err(CampaignError::Reference(outcome.detail().unwrap_or_default()).into());
+            }
+            Outcome::Completed | Outcome::NoEffect | Outcome::Unknown => {}
         }
         let unheard = reference::unheard(plan, task, &reference);
         if unheard.iter().any(Unheard::wholly) && !settings.allow_unheard {
             return Err(CampaignError::Unheard(unheard.into_iter().filter(Unheard::wholly).collect()).into());
         }
-        for unheard in unheard {
-            evaluator.warn(Some(0), unheard.to_string())?;
-        }
-        for text in reference::violations(plan, &reference) {
-            evaluator.warn(Some(0), text)?;
-        }
-        if !lock_stepped {
-            evaluator.warn(None, FREE_RUNNING.to_owned())?;
-        }
-        if settings.timeout.is_none() {
-            evaluator.executor.set_timeout(default_timeout(reference.wall.run));
-        }
         let observers = observers(plan, &reference)?;
-        for text in observers.iter().filter_map(|observer| observer.warning()) {
-            evaluator.warn(None, text)?;
+        let of_run = unheard.iter().map(Unheard::to_string).chain(reference::violations(plan, &reference));
+        let of_campaign = (!lock_stepped).then(|| FREE_RUNNING.to_owned());
+        let of_observers = observers.iter().filter_map(|observer| observer.warning());
+        let warnings = of_run
+            .map(|text| (Some(0), text))
+            .chain(of_campaign.into_iter().chain(of_observers).map(|text| (None, text)));
+        for text in &reference.warnings {
+            listener(CampaignEvent::Warned { text }, begun);
         }
+        for (test, text) in warnings {
+            listener(CampaignEvent::Warned { text: &text }, begun);
+            evaluator.warn(test, text)?;
+        }
+        let timeout = settings.timeout.unwrap_or_else(|| default_timeout(reference.wall.run));
+        evaluator.executor.set_timeout(timeout);
         strategy.begin(&reference);
+        let took = Duration::from_secs_f64(reference.wall.run);
         let mut campaign = Campaign {
             plan,
             evaluator,
@@ -153,12 +172,13 @@ impl<'a, 'l> Campaign<'a, 'l> {
             observers,
             confirmed: plan.campaign.confirm.map(|confirmation| ConfirmedSearch::new(confirmation, settings.seed)),
             neighbours: Neighbours::from_plan(plan),
-            front: Front::default(),
+            front,
             done: 0,
-            total: task.evaluations(plan),
+            earlier,
+            total,
             listener,
         };
-        campaign.tell(CampaignEvent::SearchStarted);
+        campaign.tell(CampaignEvent::SearchStarted { reference: took, timeout });
         Ok(campaign)
     }
 
@@ -179,7 +199,7 @@ impl<'a, 'l> Campaign<'a, 'l> {
             reason = why;
         }
         self.tell(CampaignEvent::SearchEnded { reason: &reason });
-        let last = reference_run(&mut self.evaluator, &mut self.numbering)?;
+        let last = reference_run(&mut self.evaluator, &mut self.numbering, &mut || {})?;
         // A simulator that runs freely differs in any case, and the campaign has said so.
         let lock_stepped = self.evaluator.executor.lock_stepped();
         if let Some(text) = reference::difference(self.plan, &self.reference, &last).filter(|_| lock_stepped) {
@@ -227,7 +247,7 @@ impl<'a, 'l> Campaign<'a, 'l> {
     fn evaluate(&mut self, planned: Vec<PlannedTest>) -> Result<(Vec<Evaluated>, BTreeSet<u32>), Halt> {
         let plan = self.plan;
         let series = self.strategy.reads_series();
-        let total = self.total;
+        let (total, earlier) = (self.total, self.earlier);
         let mut tests = Vec::with_capacity(planned.len());
         let mut violating = BTreeSet::new();
         let Campaign { evaluator, observers, confirmed, front, done, listener, .. } = self;
@@ -258,6 +278,7 @@ impl<'a, 'l> Campaign<'a, 'l> {
                 Progress {
                     done: *done,
                     total,
+                    earlier,
                     confirmation_runs: confirmed.as_ref().map_or(0, ConfirmedSearch::runs),
                     front,
                     coverage: coverage(observers),
@@ -270,11 +291,13 @@ impl<'a, 'l> Campaign<'a, 'l> {
 
     /// Confirms what is to be confirmed of a generation, and puts confirmed values in place of those of single runs.
     fn confirm(&mut self, tests: &mut [Evaluated], violating: &BTreeSet<u32>) -> Result<(), Halt> {
-        let Campaign { plan, evaluator, observers, confirmed, numbering, front, done, total, listener, .. } = self;
+        let Campaign {
+            plan, evaluator, observers, confirmed, numbering, front, done, earlier, total, listener, ..
+        } = self;
         let Some(confirmed) = confirmed else { return Ok(()) };
-        let (done, total) = (*done, *total);
+        let (done, earlier, total) = (*done, *earlier, *total);
         confirmed.confirm(plan, evaluator, numbering, tests, violating, &mut |confirmation_runs, front| {
-            let progress = Progress { done, total, confirmation_runs, front, coverage: coverage(observers) };
+            let progress = Progress { done, total, earlier, confirmation_runs, front, coverage: coverage(observers) };
             listener(CampaignEvent::ConfirmationAdvanced, progress);
         })?;
         *front = confirmed.front();
@@ -285,6 +308,7 @@ impl<'a, 'l> Campaign<'a, 'l> {
         let progress = Progress {
             done: self.done,
             total: self.total,
+            earlier: self.earlier,
             confirmation_runs: self.confirmed.as_ref().map_or(0, ConfirmedSearch::runs),
             front: &self.front,
             coverage: coverage(&self.observers),
@@ -297,10 +321,15 @@ fn coverage(observers: &[Box<dyn Observer>]) -> Option<&search::coverage::Covera
     observers.iter().find_map(|observer| observer.coverage())
 }
 
-/// Performs a reference run: it is a test without operations.
-fn reference_run(evaluator: &mut Evaluator<'_>, numbering: &mut Numbering) -> Result<Observation, Halt> {
+/// Performs a reference run: it is a test without operations. `awaited` is called several times a second until it ends.
+fn reference_run(
+    evaluator: &mut Evaluator<'_>,
+    numbering: &mut Numbering,
+    awaited: &mut dyn FnMut(),
+) -> Result<Observation, Halt> {
     let mut shown = None;
-    evaluator.evaluate(vec![numbering.reference_run()], &mut |record| shown = Some(record.observation.clone()))?;
+    let planned = vec![numbering.reference_run()];
+    evaluator.evaluate_awaited(planned, &mut |record| shown = Some(record.observation.clone()), awaited)?;
     Ok(shown.unwrap_or_else(|| unreachable!("each test that is evaluated is shown")))
 }
 

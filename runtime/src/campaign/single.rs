@@ -6,12 +6,13 @@ use std::time::Duration;
 
 use crate::campaign::executor::{Executor as _, ExecutorError, Job, JobResult};
 use crate::campaign::pool::{Pool, PoolSettings};
+use crate::campaign::worker_program::WorkerProgram;
 
 /// Where and how long one test runs.
 #[derive(Debug, Clone)]
 pub struct SingleSettings {
     /// The runner's program, started again as the worker.
-    pub program: PathBuf,
+    pub program: WorkerProgram,
     /// Folder in which the worker gets a folder of its own.
     pub directory: PathBuf,
     /// Wall time after which the test is stopped.

@@ -1,6 +1,5 @@
 //! A worker process: runs the tests it is sent, one after another, until the supervisor is gone.
 
-use std::path::Path;
 use std::sync::{Mutex, mpsc};
 use std::time::Duration;
 use std::{io, thread};
@@ -37,7 +36,7 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
     let wires = WireTable::new(plan);
     let metrics = MetricTable::new(plan, &wires, runner.hooks).map_err(io::Error::other)?;
     let jobs = read_jobs(stream.try_clone()?);
-    let space = Path::new(runner.directory).join(runner.space);
+    let space = runner.directory.join(&runner.space);
     let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
     let files = if may_change { ChangedFiles::for_worker(&space) } else { Ok(ChangedFiles::unlocked(&space)) };
     let mut custom = Custom { hooks: runner.operations, files: Box::new(files.map_err(io::Error::other)?) };

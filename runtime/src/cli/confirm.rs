@@ -1,13 +1,12 @@
 //! `confirm`: tests of a finished run again, each with fresh seeds of the simulator, to see whether what was found in
 //! them comes again.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use clap::Args;
 
-use sesame_plan::CampaignPlan;
 use sesame_results::record::{Origin, Recorder, Repository, TestRow, Verdict};
 use sesame_results::report;
 
@@ -16,16 +15,16 @@ use crate::cli::execution::{ExecutionArgs, claim_files, interruptible, refuse_un
 use crate::cli::failure::{Failure, STOPPED};
 use crate::cli::gate::Gate;
 use crate::cli::results_folder::{open, refuse_changed};
+use crate::cli::session::Session;
 use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json, say, text_options};
-use crate::runner::Runner;
 
 /// How often a line is printed.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
 /// Which tests are run again, and how.
 #[derive(Debug, Args)]
-pub(super) struct Options {
+pub struct Options {
     /// The tests, for example `T158 T17`; by default those of the front (with `--violations` those that violate)
     #[arg(value_name = "TEST")]
     tests: Vec<String>,
@@ -47,12 +46,8 @@ pub(super) struct Options {
     execution: ExecutionArgs,
 }
 
-pub(super) fn confirm(
-    runner: &Runner,
-    plan: &CampaignPlan,
-    results: &Path,
-    options: &Options,
-) -> Result<ExitCode, Failure> {
+pub(super) fn confirm(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let Session { plan, results, .. } = session;
     let repository = open(results, options.results.as_deref())?;
     let mut tests = match options.tests.as_slice() {
         [] if options.violations => run_once(&repository)?,
@@ -70,7 +65,7 @@ pub(super) fn confirm(
         )));
     }
     for test in &mut tests {
-        refuse_changed(&repository, plan, *test)?;
+        refuse_changed(session, &repository, *test)?;
         // A duplicate is what its original is.
         *test = repository.row(*test)?.duplicate_of.unwrap_or(*test);
     }
@@ -82,9 +77,9 @@ pub(super) fn confirm(
     drop(repository);
 
     let mut recorder = Recorder::reopen(&folder, options.execution.workers())?;
-    let files = claim_files(runner, plan)?;
-    refuse_unfilled(runner, plan, true)?;
-    let settings = options.execution.settings(seed, &files)?;
+    let files = claim_files(&session.runner, plan)?;
+    refuse_unfilled(&session.runner, plan, true)?;
+    let settings = options.execution.settings(session, seed, &files);
     let interrupted = interruptible()?;
     let confirmations = Confirmations { tests, times: options.times };
     let mut said = Instant::now();

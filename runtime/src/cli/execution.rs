@@ -21,7 +21,9 @@ use crate::campaign::{CampaignEnd, Settings, run_campaign};
 use crate::changed_files::ChangedFiles;
 use crate::cli::failure::{Failure, STOPPED};
 use crate::cli::gate::Gate;
-use crate::cli::progress::{Display, Waiting, wait};
+use crate::cli::progress::{Display, Waiting};
+use crate::cli::progress_line::wait;
+use crate::cli::session::Session;
 use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json, say, text_options};
 use crate::runner::Runner;
@@ -40,6 +42,9 @@ pub(super) struct ExecutionArgs {
     /// Seconds of wall time after which a test is stopped; by default 20 times the reference run, at least 60
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     timeout: Option<Duration>,
+    /// Seconds of wall time after which the first reference run is stopped; by default those of `--timeout`, or 600
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    reference_timeout: Option<Duration>,
     /// Go on although nothing receives what an operation disturbs: the simulator does not subscribe to its topic, and
     /// no outbound metric reads it
     #[arg(long)]
@@ -87,14 +92,20 @@ impl ExecutionArgs {
     }
 
     /// What a campaign is told of it.
-    pub(super) fn settings(&self, seed: u64, files: &Files) -> Result<Settings, Failure> {
+    pub(super) fn settings(&self, session: &Session, seed: u64, files: &Files) -> Settings {
         // A file that is changed is changed for every simulator.
         let workers = if files.may_change { 1 } else { self.processes() };
         if self.workers.is_some_and(|asked| asked.get() > workers) {
             say(format_args!("note: tests run one at a time, since operations may change files"));
         }
-        let (timeout, allow_unheard) = (self.timeout, self.allow_unheard);
-        Ok(Settings { seed, workers, timeout, program: std::env::current_exe()?, allow_unheard })
+        Settings {
+            seed,
+            workers,
+            timeout: self.timeout,
+            reference_timeout: self.reference_timeout,
+            program: session.program.clone(),
+            allow_unheard: self.allow_unheard,
+        }
     }
 
     fn processes(&self) -> usize {
@@ -124,7 +135,7 @@ pub(super) fn refuse_unfilled(runner: &Runner, plan: &CampaignPlan, allowed: boo
     if objectives.is_empty() {
         return Ok(());
     }
-    let hooks = Path::new(runner.directory).join("../hooks");
+    let hooks = runner.directory.join("../hooks");
     let hooks = hooks.canonicalize().unwrap_or(hooks);
     Err(Failure(format!(
         "the hook of {} is not filled in yet, and the campaign is to optimise it\n  \
@@ -137,7 +148,7 @@ pub(super) fn refuse_unfilled(runner: &Runner, plan: &CampaignPlan, allowed: boo
 /// Puts back files of the space that an earlier run left changed, and keeps other runners of the space out if tests may
 /// change files. A file that a test may choose and that is not there ends the run before it starts.
 pub(super) fn claim_files(runner: &Runner, plan: &CampaignPlan) -> Result<Files, Failure> {
-    let space = Path::new(runner.directory).join(runner.space);
+    let space = runner.directory.join(&runner.space);
     let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
     let (files, restored) = ChangedFiles::for_supervisor(&space, may_change)?;
     for path in restored {
@@ -179,6 +190,7 @@ impl Files {
 
 /// Begins the results of a run in a fresh folder of this name.
 pub(super) fn begin(
+    session: &Session,
     results: &Path,
     name: &str,
     plan: &CampaignPlan,
@@ -188,7 +200,8 @@ pub(super) fn begin(
 ) -> Result<(Recorder, PathBuf), Failure> {
     let claim = record::claim_folder(results, name)?;
     if let Some(unfinished) = &claim.unfinished {
-        say(format_args!("note: an earlier run is unfinished: `resume {}` goes on with it", shown(unfinished)));
+        let resume = session.caller.command("resume", &[&shown(unfinished)]);
+        say(format_args!("note: an earlier run is unfinished; this continues it:\n    {resume}"));
     }
     let folder = claim.folder.clone();
     Ok((Recorder::create_in(claim, plan, task, seed, execution.workers())?, folder))
@@ -196,23 +209,34 @@ pub(super) fn begin(
 
 /// Runs a campaign to its end and says what was found.
 pub(super) fn execute(
-    plan: &CampaignPlan,
+    session: &Session,
     recorder: Recorder,
     folder: &Path,
-    seed: u64,
     execution: &ExecutionArgs,
     output: &OutputArgs,
     files: Files,
 ) -> Result<ExitCode, Failure> {
-    let settings = execution.settings(seed, &files)?;
+    let campaign = recorder.repository().campaign();
+    let (plan, seed) = (campaign.plan.clone(), campaign.seed);
+    let settings = execution.settings(session, seed, &files);
     let interrupted = interruptible()?;
     let started = Instant::now();
-    let mut display = Display::new(plan, seed);
-    let end = run_campaign(plan, recorder, &settings, &folder.join("workers"), &interrupted, &mut |event, progress| {
-        display.update(event, progress);
-    });
+    let mut display = Display::new(&plan, seed, execution.workers());
+    let end =
+        run_campaign(&plan, recorder, &settings, &folder.join("workers"), &interrupted, &mut |event, progress| {
+            display.update(event, progress);
+        });
     display.finish();
     files.finish()?;
+    let resume = || session.caller.command("resume", &[&shown(folder)]);
+    let end = end.map_err(|error| {
+        let continued = if error.leaves_the_run_resumable() {
+            format!("\nThis continues the run:\n    {}", resume())
+        } else {
+            String::new()
+        };
+        Failure(format!("{error}{continued}"))
+    });
     match end? {
         CampaignEnd::Finished(repository) => {
             let code = report_outcome(&repository, folder, &folder.join("report.html"), output)?;
@@ -225,8 +249,8 @@ pub(super) fn execute(
         }
         CampaignEnd::Interrupted => {
             say(format_args!(
-                "stopped; everything measured so far is kept. `resume {}` continues to the same results",
-                shown(folder)
+                "stopped; everything measured so far is kept. This continues to the same results:\n    {}",
+                resume()
             ));
             Ok(ExitCode::from(STOPPED))
         }
@@ -252,6 +276,7 @@ struct Concluded<'a> {
     results: &'a Path,
     /// The page with pictures.
     report: &'a Path,
+    /// The hash of the run's content.
     digest: String,
     #[serde(flatten)]
     summary: &'a Summary,

@@ -17,7 +17,7 @@ use crate::cli::view::Which;
 
 /// Which test is written, and under which name.
 #[derive(Debug, Args)]
-pub(super) struct Options {
+pub struct Options {
     /// The test, for example `T158`
     test: String,
     /// Name of the block; by default made of the campaign's name and the test's

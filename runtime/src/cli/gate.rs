@@ -50,6 +50,9 @@ impl Gate {
         for objection in &objections {
             say(format_args!("not as required: {objection}"));
         }
+        if let Some(note) = seed_note(summary, repository.plan(), repository.task(), repository.campaign().seed) {
+            say(format_args!("note: {note}"));
+        }
         if objections.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(NOT_AS_REQUIRED) }
     }
 
@@ -124,6 +127,27 @@ fn not_as_expected(summary: &Summary) -> Vec<String> {
     objections
 }
 
+/// With which seed regression tests ran that name none and are not as expected: with another seed, they may be.
+fn seed_note(summary: &Summary, plan: &CampaignPlan, task: &Task, seed: u64) -> Option<String> {
+    let Task::Known { .. } = task else { return None };
+    let names_no_seed = |name: &str| plan.tests.iter().any(|test| test.name == name && test.simulator_seed.is_none());
+    let found = summary.expectations.iter().filter(|expectation| expectation.verdict != Verdict::Satisfied);
+    let mut names: Vec<String> = found
+        .map(|expectation| &expectation.known_test)
+        .filter(|name| names_no_seed(name))
+        .map(|name| format!("`{name}`"))
+        .collect();
+    names.dedup();
+    (!names.is_empty()).then(|| {
+        format!(
+            "these tests name no `simulator seed`, so they ran with that of seed {seed}: {}. Values that were measured \
+             with another seed may differ: `known --seed N` runs the tests with that one, and `export` writes the seed of a \
+             test into its block",
+            names.join(", ")
+        )
+    })
+}
+
 /// Why results are insufficient: so little is known that "nothing was found" would mislead, whichever gates are set.
 ///
 /// Shrinking and repeating are about a single test: if it crashes, so do most of their runs.
@@ -151,8 +175,9 @@ fn insufficient(summary: &Summary, plan: &CampaignPlan, task: &Task) -> Vec<Stri
 
 #[cfg(test)]
 mod tests {
+    use sesame_plan::KnownTestId;
     use sesame_results::record::{Standing, sample};
-    use sesame_results::report::{Failure, FindingAgain, NotFinite, summary};
+    use sesame_results::report::{ExpectationSummary, Failure, FindingAgain, NotFinite, summary};
 
     use super::*;
 
@@ -232,6 +257,28 @@ mod tests {
         assert_eq!(objections(&[], &summary, &plan), ["none of 13 tests is conclusive about any requirement"]);
         summary.requirements.clear();
         assert_eq!(objections(&[], &summary, &plan), [""; 0], "there was nothing to judge");
+    }
+
+    #[test]
+    fn tests_that_name_no_seed_and_are_not_as_expected_are_told_the_seed_of_the_run() {
+        let (mut summary, mut plan) = found();
+        let known = Task::Known { tests: vec![KnownTestId(0)] };
+        let expected = |verdict| ExpectationSummary {
+            test: TestNumber(1),
+            known_test: plan.tests[0].name.clone(),
+            metric: "top_speed".to_owned(),
+            bound: "== 1 m/s".to_owned(),
+            value: Some(2.0),
+            verdict,
+        };
+        summary.expectations = vec![expected(Verdict::Satisfied)];
+        assert_eq!(seed_note(&summary, &plan, &known, 7), None);
+        summary.expectations = vec![expected(Verdict::Violated), expected(Verdict::Violated)];
+        let note = seed_note(&summary, &plan, &known, 7).unwrap();
+        assert!(note.contains("that of seed 7: `known_jitter`. "), "{note}");
+        assert_eq!(seed_note(&summary, &plan, &Task::Campaign, 7), None, "expectations are of `known`");
+        plan.tests[0].simulator_seed = Some(11);
+        assert_eq!(seed_note(&summary, &plan, &known, 7), None);
     }
 
     #[test]

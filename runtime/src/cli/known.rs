@@ -1,6 +1,6 @@
 //! `known`: runs regression tests and checks their expectations.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
@@ -9,15 +9,17 @@ use sesame_plan::{CampaignPlan, KnownTestId, Task};
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
 use crate::cli::failure::Failure;
-use crate::runner::Runner;
+use crate::cli::session::Session;
+use crate::cli::terminal::say;
 
 /// Which regression tests are run, and how.
 #[derive(Debug, Args)]
-pub(super) struct Options {
+pub struct Options {
     /// Names of regression tests; by default all that this campaign can run
     #[arg(value_name = "NAME")]
     names: Vec<String>,
-    /// The seed of the simulator's randomness; by default the campaign's
+    /// The seed of the simulator's randomness, for all of them; by default each has the `simulator seed` that it names,
+    /// and that of the campaign's seed if it names none
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Folder in which the results get a folder `known`; by default `results` in the runner's folder
@@ -29,20 +31,36 @@ pub(super) struct Options {
     output: OutputArgs,
 }
 
-pub(super) fn known(
-    runner: &Runner,
-    plan: &CampaignPlan,
-    results: &Path,
-    options: &Options,
-) -> Result<ExitCode, Failure> {
+pub(super) fn known(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let Session { plan, results, .. } = session;
     let task = Task::Known { tests: chosen(plan, &options.names).map_err(Failure)? };
-    let plan = task.plan(plan);
-    let files = claim_files(runner, &plan)?;
-    refuse_unfilled(runner, &plan, true)?;
+    let mut plan = task.plan(plan);
+    if options.seed.is_some() {
+        let replaced = forget_seeds(&mut plan, &task);
+        if !replaced.is_empty() {
+            let names = replaced.join(", ");
+            say(format_args!("note: with --seed, tests do not run with the `simulator seed` that they name: {names}"));
+        }
+    }
+    let files = claim_files(&session.runner, &plan)?;
+    refuse_unfilled(&session.runner, &plan, true)?;
     let seed = options.seed.unwrap_or(plan.campaign.seed);
     let results = options.results.as_deref().unwrap_or(results);
-    let (recorder, folder) = begin(results, "known", &plan, &task, seed, &options.execution)?;
-    execute(&plan, recorder, &folder, seed, &options.execution, &options.output, files)
+    let (recorder, folder) = begin(session, results, "known", &plan, &task, seed, &options.execution)?;
+    execute(session, recorder, &folder, &options.execution, &options.output, files)
+}
+
+/// Takes from the tests of a task the simulator's seeds that they name; returns the names of those that had one.
+fn forget_seeds(plan: &mut CampaignPlan, task: &Task) -> Vec<String> {
+    let Task::Known { tests } = task else { return Vec::new() };
+    let mut replaced = Vec::new();
+    for id in tests {
+        let test = &mut plan.tests[id.index()];
+        if test.simulator_seed.take().is_some() {
+            replaced.push(test.name.clone());
+        }
+    }
+    replaced
 }
 
 /// The regression tests of these names, each once and in the space's order; all of them when no name is given.
@@ -87,6 +105,12 @@ mod tests {
         assert_eq!(chosen(&["second", "second"]), Ok(vec![KnownTestId(1)]));
         assert_eq!(chosen(&["second", "known_jitter"]), Ok(vec![KnownTestId(0), KnownTestId(1)]));
         assert!(chosen(&["third"]).unwrap_err().ends_with("it can run known_jitter, second"));
+        plan.tests[1].simulator_seed = Some(7);
+        let mut seeded = plan.clone();
+        assert_eq!(forget_seeds(&mut seeded, &Task::Known { tests: vec![KnownTestId(0)] }), [""; 0]);
+        assert_eq!(seeded, plan);
+        assert_eq!(forget_seeds(&mut seeded, &Task::Known { tests: vec![KnownTestId(1)] }), ["second"]);
+        assert_eq!(seeded.tests[1].simulator_seed, None);
         plan.tests.clear();
         assert!(super::chosen(&plan, &[]).unwrap_err().contains("none of the space's regression tests"));
     }

@@ -9,48 +9,85 @@ use sesame_plan::{CampaignPlan, Direction, MetricSource};
 use sesame_results::record::TestRecord;
 
 use crate::campaign::{CampaignEvent, Progress};
+use crate::cli::progress_line::{Line, awaited, cost, countdown, warning};
 use crate::cli::terminal::say;
 
 /// How often a line is printed where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
+/// How long the reference run is awaited before a terminal counts down.
+const COUNT_DOWN_AFTER: Duration = Duration::from_secs(2);
+
+/// The columns of a terminal that does not tell them.
+const COLUMNS: usize = 80;
+
 /// Shows how far a campaign is, on standard error.
 pub(super) struct Display<'a> {
     plan: &'a CampaignPlan,
+    seed: u64,
+    workers: u32,
     bar: Option<ProgressBar>,
-    started: Instant,
+    /// When the first test of this session began.
+    began: Instant,
     last_line: Instant,
+    /// When it is next said that the reference run is awaited.
+    awaited_due: Duration,
     worst: Vec<Option<f64>>,
 }
 
 impl<'a> Display<'a> {
-    pub(super) fn new(plan: &'a CampaignPlan, seed: u64) -> Self {
+    pub(super) fn new(plan: &'a CampaignPlan, seed: u64, workers: u32) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10));
-            let template = "{prefix} {bar:20} {pos}/{len}  {wide_msg}";
-            let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-            bar.set_style(style.progress_chars("██░"));
-            bar.set_prefix(format!(" {}  seed {seed} ", plan.campaign.name));
+            bar.set_style(ProgressStyle::with_template("{msg}").unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar
         });
         let now = Instant::now();
-        Display { plan, bar, started: now, last_line: now, worst: vec![None; plan.campaign.objectives.len()] }
+        let worst = vec![None; plan.campaign.objectives.len()];
+        Display { plan, seed, workers, bar, began: now, last_line: now, awaited_due: Duration::ZERO, worst }
     }
 
     pub(super) fn update(&mut self, event: CampaignEvent<'_>, progress: Progress<'_>) {
-        if let CampaignEvent::TestEnded(record) = event {
-            self.remember(record);
-        }
-        let rest = self.rest(progress);
-        match &self.bar {
-            Some(bar) => {
-                bar.set_length(u64::from(progress.total));
-                bar.set_position(u64::from(progress.done));
-                bar.set_message(rest);
+        let name = &self.plan.campaign.name;
+        match event {
+            CampaignEvent::ReferenceRunAwaited { waited, limit } => {
+                match &self.bar {
+                    Some(bar) if waited >= COUNT_DOWN_AFTER => {
+                        bar.set_message(countdown(name, waited, limit, columns()));
+                    }
+                    Some(_) => {}
+                    None => {
+                        if let Some(line) = awaited(name, waited, limit, &mut self.awaited_due) {
+                            say(format_args!("{line}"));
+                        }
+                    }
+                }
+                return;
             }
+            CampaignEvent::Warned { text } => return self.say(&warning(text)),
+            CampaignEvent::SearchStarted { reference, timeout } => {
+                self.began = Instant::now();
+                // How long the rest of a campaign takes that was stopped, its tests will show.
+                if progress.earlier == 0
+                    && let Some(cost) = cost(reference, timeout, progress.total, self.workers)
+                {
+                    self.say(&cost);
+                }
+            }
+            CampaignEvent::TestEnded(record) => {
+                self.remember(record);
+                if progress.done <= progress.earlier {
+                    self.began = Instant::now();
+                }
+            }
+            _ => {}
+        }
+        let line = self.line(progress, self.began.elapsed());
+        match &self.bar {
+            Some(bar) => bar.set_message(line.fit(columns())),
             None if self.last_line.elapsed() >= LINE_EVERY => {
                 self.last_line = Instant::now();
-                say(format_args!("{} {}/{}  {rest}", self.plan.campaign.name, progress.done, progress.total));
+                say(format_args!("{}", line.whole()));
             }
             None => {}
         }
@@ -59,6 +96,14 @@ impl<'a> Display<'a> {
     pub(super) fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
+        }
+    }
+
+    /// Says a line that stays, above the bar if there is one.
+    fn say(&self, line: &str) {
+        match &self.bar {
+            Some(bar) => bar.suspend(|| say(format_args!("{line}"))),
+            None => say(format_args!("{line}")),
         }
     }
 
@@ -74,7 +119,19 @@ impl<'a> Display<'a> {
         }
     }
 
-    fn rest(&self, progress: Progress<'_>) -> String {
+    /// The line after the tests of this session took so long.
+    fn line(&self, progress: Progress<'_>, took: Duration) -> Line {
+        Line {
+            name: self.plan.campaign.name.clone(),
+            seed: self.seed,
+            done: progress.done,
+            total: progress.total,
+            left: left(progress, took),
+            details: self.details(progress),
+        }
+    }
+
+    fn details(&self, progress: Progress<'_>) -> Vec<String> {
         let mut parts = Vec::new();
         if !self.plan.campaign.objectives.is_empty() {
             parts.push(format!("front of {}", progress.front.numbers().len()));
@@ -97,12 +154,20 @@ impl<'a> Display<'a> {
                 format!("{word} {} {worst:.4}", metric.name).trim_end_matches('0').trim_end_matches('.').to_owned(),
             );
         }
-        if progress.done > 0 && progress.done < progress.total {
-            let each = self.started.elapsed().as_secs_f64() / f64::from(progress.done);
-            parts.push(format!("{} left", wait(each * f64::from(progress.total - progress.done))));
-        }
-        parts.join("  ")
+        parts
     }
+}
+
+/// How long the remaining tests will take if each takes as long as those of this session.
+fn left(progress: Progress<'_>, took: Duration) -> Option<Duration> {
+    let here = progress.done.checked_sub(progress.earlier).filter(|&here| here > 0)?;
+    let rest = progress.total.checked_sub(progress.done).filter(|&rest| rest > 0)?;
+    Some(took.mul_f64(f64::from(rest) / f64::from(here)))
+}
+
+/// How wide the terminal is.
+fn columns() -> usize {
+    console::Term::stderr().size_checked().map_or(COLUMNS, |(_, columns)| usize::from(columns))
 }
 
 /// Says on a terminal what takes a while, until it is dropped; elsewhere nothing.
@@ -131,13 +196,25 @@ impl Drop for Waiting {
     }
 }
 
-/// A length of wall time in words.
-pub(super) fn wait(seconds: f64) -> String {
-    if seconds < 90.0 {
-        format!("{seconds:.0} s")
-    } else if seconds < 5400.0 {
-        format!("{:.0} min", seconds / 60.0)
-    } else {
-        format!("{:.1} h", seconds / 3600.0)
+#[cfg(test)]
+mod tests {
+    use sesame_optimise::front::Front;
+
+    use super::*;
+
+    fn progress(done: u32, earlier: u32, front: &Front) -> Progress<'_> {
+        Progress { done, total: 200, earlier, confirmation_runs: 0, front, coverage: None }
+    }
+
+    #[test]
+    fn the_estimate_counts_only_tests_of_this_session() {
+        let front = Front::default();
+        let seconds =
+            |done, earlier| left(progress(done, earlier, &front), Duration::from_secs(20)).map(|left| left.as_secs());
+        assert_eq!(seconds(20, 0), Some(180));
+        assert_eq!(seconds(120, 100), Some(80), "20 tests took 20 s, and 80 are left");
+        for nothing in [(0, 0), (100, 100), (60, 100), (200, 100)] {
+            assert_eq!(seconds(nothing.0, nothing.1), None, "{nothing:?}");
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! `repeat`: one test again and again, with another seed of the simulator each time.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
@@ -12,11 +12,11 @@ use sesame_rng::derive_seed;
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
 use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_changed};
-use crate::runner::Runner;
+use crate::cli::session::Session;
 
 /// Which test is repeated, and how.
 #[derive(Debug, Args)]
-pub(super) struct Options {
+pub struct Options {
     /// A regression test's name, or a recorded test, for example `T158`
     test: String,
     /// How often
@@ -49,12 +49,8 @@ struct Repeated {
     results: PathBuf,
 }
 
-pub(super) fn repeat(
-    runner: &Runner,
-    plan: &CampaignPlan,
-    results: &Path,
-    options: &Options,
-) -> Result<ExitCode, Failure> {
+pub(super) fn repeat(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let Session { plan, results, .. } = session;
     let declared = plan.tests.iter().find(|test| test.name == options.test && options.results.is_none());
     let Repeated { name, test, plan, seed, results } = match declared {
         Some(KnownTest { name, test, .. }) => Repeated {
@@ -64,23 +60,24 @@ pub(super) fn repeat(
             seed: plan.campaign.seed,
             results: results.to_owned(),
         },
-        None => recorded(plan, results, options)?,
+        None => recorded(session, options)?,
     };
     let seed = options.seed.unwrap_or_else(|| derive_seed(seed, &format!("repeat {name}"), &[]));
     let folder_name = format!("repeat-{name}");
     let task = Task::Repeat { name, test, times: options.times };
     let plan = task.plan(&plan);
-    let files = claim_files(runner, &plan)?;
-    refuse_unfilled(runner, &plan, true)?;
+    let files = claim_files(&session.runner, &plan)?;
+    refuse_unfilled(&session.runner, &plan, true)?;
     let results = options.into.as_deref().unwrap_or(&results);
-    let (recorder, folder) = begin(results, &folder_name, &plan, &task, seed, &options.execution)?;
-    execute(&plan, recorder, &folder, seed, &options.execution, &options.output, files)
+    let (recorder, folder) = begin(session, results, &folder_name, &plan, &task, seed, &options.execution)?;
+    execute(session, recorder, &folder, &options.execution, &options.output, files)
 }
 
-fn recorded(plan: &CampaignPlan, results: &Path, options: &Options) -> Result<Repeated, Failure> {
+fn recorded(session: &Session, options: &Options) -> Result<Repeated, Failure> {
+    let results = &session.results;
     let repository = open(results, options.results.as_deref())?;
     let number = repository.find(&options.test)?;
-    refuse_changed(&repository, plan, number)?;
+    refuse_changed(session, &repository, number)?;
     let run = repository.path().parent().unwrap_or(results);
     Ok(Repeated {
         name: TestNumber(number).to_string(),

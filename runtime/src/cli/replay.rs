@@ -1,6 +1,6 @@
 //! `replay`: a recorded test once more, just as it was.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -8,7 +8,6 @@ use clap::Args;
 
 use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
-use sesame_plan::CampaignPlan;
 use sesame_results::record::{TestRecord, differences};
 use sesame_results::report::{Replay, replay_text};
 
@@ -16,14 +15,14 @@ use crate::campaign::{Job, JobResult, SingleSettings, default_timeout, run_singl
 use crate::cli::execution::{claim_files, interruptible, refuse_unfilled, seconds};
 use crate::cli::failure::{Failure, NOT_AS_REQUIRED, STOPPED};
 use crate::cli::results_folder::{open, refuse_changed};
+use crate::cli::session::Session;
 use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json, say, text_options};
 use crate::cli::view::Which;
-use crate::runner::Runner;
 
 /// Which test is run once more.
 #[derive(Debug, Args)]
-pub(super) struct Options {
+pub struct Options {
     /// The test, for example `T158`
     test: String,
     #[command(flatten)]
@@ -34,21 +33,17 @@ pub(super) struct Options {
     timeout: Option<Duration>,
 }
 
-pub(super) fn replay(
-    runner: &Runner,
-    plan: &CampaignPlan,
-    results: &Path,
-    options: &Options,
-) -> Result<ExitCode, Failure> {
+pub(super) fn replay(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let Session { plan, results, .. } = session;
     let repository = open(results, options.which.results.as_deref())?;
     let record = repository.test(repository.find(&options.test)?)?;
-    refuse_changed(&repository, plan, record.number)?;
-    let files = claim_files(runner, plan)?;
-    refuse_unfilled(runner, plan, true)?;
+    refuse_changed(session, &repository, record.number)?;
+    let files = claim_files(&session.runner, plan)?;
+    refuse_unfilled(&session.runner, plan, true)?;
     let interrupted = interruptible()?;
     let folder = Scratch::new()?;
     let settings = SingleSettings {
-        program: std::env::current_exe()?,
+        program: session.program.clone(),
         directory: folder.0.clone(),
         timeout: options.timeout.unwrap_or_else(|| limit(&record)),
     };

@@ -5,15 +5,16 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+#[cfg(feature = "mcap")]
 use sesame_plan::CampaignPlan;
 
 use crate::cli::failure::Failure;
+use crate::cli::session::Session;
 use crate::cli::terminal::Format;
-use crate::runner::Runner;
 
 /// Which recording is fed.
 #[derive(Debug, Args)]
-pub(super) struct Options {
+pub struct Options {
     /// The recording, for example `results/42/traces/T17.mcap`
     #[arg(value_name = "FILE")]
     recording: PathBuf,
@@ -23,18 +24,17 @@ pub(super) struct Options {
 }
 
 #[cfg(not(feature = "mcap"))]
-pub(super) fn replay_recording(_: &Runner, plan: &CampaignPlan, options: &Options) -> Result<ExitCode, Failure> {
+pub(super) fn replay_recording(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
     let Options { recording, format: _ } = options;
     Err(Failure(format!(
-        "the runner of a campaign that records nothing cannot read {}: add `record mcap failing` to `{}` and generate it \
-         again",
-        recording.display(),
-        plan.campaign.name
+        "the runner of `{}` was built without the feature `mcap` of sesame-runtime, so it cannot read {}",
+        session.plan.campaign.name,
+        recording.display()
     )))
 }
 
 #[cfg(feature = "mcap")]
-pub(super) fn replay_recording(runner: &Runner, plan: &CampaignPlan, options: &Options) -> Result<ExitCode, Failure> {
+pub(super) fn replay_recording(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
     use std::panic::{self, AssertUnwindSafe};
 
     use sesame_relay::metric::MetricTable;
@@ -46,6 +46,7 @@ pub(super) fn replay_recording(runner: &Runner, plan: &CampaignPlan, options: &O
     use super::failure::NOT_AS_REQUIRED;
     use super::terminal::{print, print_json, say, text_options};
 
+    let Session { runner, plan, .. } = session;
     refuse_unfilled(runner, plan, true)?;
     let wires = WireTable::new(plan);
     let table = MetricTable::new(plan, &wires, runner.hooks)?;

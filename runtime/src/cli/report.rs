@@ -11,7 +11,7 @@ use crate::cli::results_folder::open;
 
 /// Which run is reported on, and where to.
 #[derive(Debug, Args)]
-pub(super) struct Options {
+pub struct Options {
     /// Folder of the run, for example `results/42`; by default the latest
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,

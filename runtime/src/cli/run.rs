@@ -1,17 +1,17 @@
 //! `run` and `resume`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
 
-use sesame_plan::{CampaignPlan, Task};
+use sesame_plan::Task;
 use sesame_results::record::{self, Recorder};
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled, shown};
 use crate::cli::failure::Failure;
-use crate::cli::results_folder::same_model;
-use crate::runner::Runner;
+use crate::cli::results_folder::run_folder;
+use crate::cli::session::Session;
 
 /// How a campaign is run. Nothing here but the seed and the number of evaluations changes results.
 #[derive(Debug, Args)]
@@ -36,7 +36,7 @@ pub(super) struct Options {
 
 /// How a stopped run is taken up again.
 #[derive(Debug, Args)]
-pub(super) struct ResumeOptions {
+pub struct ResumeOptions {
     /// Folder of the run, for example `results/42`; by default the latest that is unfinished
     #[arg(value_name = "DIR")]
     results: Option<PathBuf>,
@@ -46,46 +46,37 @@ pub(super) struct ResumeOptions {
     output: OutputArgs,
 }
 
-pub(super) fn run(
-    runner: &Runner,
-    plan: &CampaignPlan,
-    results: &Path,
-    options: &Options,
-) -> Result<ExitCode, Failure> {
+pub(super) fn run(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let Session { plan, results, .. } = session;
     let mut plan = plan.clone();
     if let Some(wanted) = options.evaluations {
         plan.campaign.search.set_evaluations(wanted);
     }
-    let files = claim_files(runner, &plan)?;
-    refuse_unfilled(runner, &plan, options.allow_unimplemented)?;
+    let files = claim_files(&session.runner, &plan)?;
+    refuse_unfilled(&session.runner, &plan, options.allow_unimplemented)?;
     let seed = options.seed.unwrap_or(plan.campaign.seed);
     let results = options.results.as_deref().unwrap_or(results);
-    let (recorder, folder) = begin(results, &seed.to_string(), &plan, &Task::Campaign, seed, &options.execution)?;
-    execute(&plan, recorder, &folder, seed, &options.execution, &options.output, files)
+    let (recorder, folder) =
+        begin(session, results, &seed.to_string(), &plan, &Task::Campaign, seed, &options.execution)?;
+    execute(session, recorder, &folder, &options.execution, &options.output, files)
 }
 
-pub(super) fn resume(
-    runner: &Runner,
-    plan: &CampaignPlan,
-    results: &Path,
-    options: &ResumeOptions,
-) -> Result<ExitCode, Failure> {
+pub(super) fn resume(session: &Session, options: &ResumeOptions) -> Result<ExitCode, Failure> {
+    let Session { plan, results, .. } = session;
     let folder = match &options.results {
-        Some(folder) => folder.clone(),
+        Some(folder) => run_folder(results, folder),
         None => record::latest_unfinished(results)?.ok_or_else(|| {
             Failure(format!("there is nothing to go on with: no run in {} is unfinished", results.display()))
         })?,
     };
     let recorder = Recorder::resume(&folder, options.execution.workers())?;
-    let campaign = recorder.repository().campaign();
-    let (recorded, seed) = (campaign.plan.clone(), campaign.seed);
-    if !same_model(&recorded, plan) {
+    if let Some(difference) = recorder.repository().campaign().plan.model_difference(plan) {
         return Err(Failure(format!(
-            "the model has changed since {} was begun: start anew with `run`",
+            "the model has changed since {} was begun ({difference}): start anew with `run`",
             shown(&folder)
         )));
     }
-    let files = claim_files(runner, plan)?;
-    refuse_unfilled(runner, plan, true)?;
-    execute(&recorded, recorder, &folder, seed, &options.execution, &options.output, files)
+    let files = claim_files(&session.runner, plan)?;
+    refuse_unfilled(&session.runner, plan, true)?;
+    execute(session, recorder, &folder, &options.execution, &options.output, files)
 }

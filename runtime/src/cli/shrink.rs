@@ -1,6 +1,6 @@
 //! `shrink`: reduces a failing test while it still fails in the same way.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
@@ -13,11 +13,11 @@ use sesame_results::record::{Origin, Repository, TestRecord, Verdict, verdict};
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
 use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_changed};
-use crate::runner::Runner;
+use crate::cli::session::Session;
 
 /// Which test is shrunk, and how.
 #[derive(Debug, Args)]
-pub(super) struct Options {
+pub struct Options {
     /// The test, for example `T158`
     test: String,
     /// Folder of the run that recorded the test, for example `results/42`; by default the latest
@@ -43,12 +43,8 @@ pub(super) struct Options {
     output: OutputArgs,
 }
 
-pub(super) fn shrink(
-    runner: &Runner,
-    plan: &CampaignPlan,
-    results: &Path,
-    options: &Options,
-) -> Result<ExitCode, Failure> {
+pub(super) fn shrink(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let Session { results, .. } = session;
     if options.evaluations < options.runs {
         return Err(Failure(format!(
             "--evaluations {} is less than --runs {}: not even the test itself could be run that often",
@@ -59,7 +55,7 @@ pub(super) fn shrink(
     let record = repository.test(repository.find(&options.test)?)?;
     let name = TestNumber(record.number).to_string();
     let failing = failing(&repository, &record, &options.requirement)?;
-    refuse_changed(&repository, plan, record.number)?;
+    refuse_changed(session, &repository, record.number)?;
     let run = repository.path().parent().unwrap_or(results);
     let into = options.into.as_deref().or(run.parent()).unwrap_or(run);
     let seed = repository.campaign().seed;
@@ -73,10 +69,10 @@ pub(super) fn shrink(
         evaluations: options.evaluations,
     });
     let plan = task.plan(repository.plan());
-    let files = claim_files(runner, &plan)?;
-    refuse_unfilled(runner, &plan, true)?;
-    let (recorder, folder) = begin(into, &folder_name, &plan, &task, seed, &options.execution)?;
-    execute(&plan, recorder, &folder, seed, &options.execution, &options.output, files)
+    let files = claim_files(&session.runner, &plan)?;
+    refuse_unfilled(&session.runner, &plan, true)?;
+    let (recorder, folder) = begin(session, into, &folder_name, &plan, &task, seed, &options.execution)?;
+    execute(session, recorder, &folder, &options.execution, &options.output, files)
 }
 
 /// How a test failed, and with which requirements.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use serde::Serialize;
 
 use sesame_results::report;
 
@@ -13,7 +14,7 @@ use crate::cli::terminal::{Format, print, print_json, text_options};
 
 /// Which run, and how it is shown.
 #[derive(Debug, Args)]
-pub(super) struct Which {
+pub struct Which {
     /// Folder of the run, for example `results/42`; by default the latest
     #[arg(long, value_name = "DIR")]
     pub(super) results: Option<PathBuf>,
@@ -38,11 +39,18 @@ pub(super) fn show(results: &Path, which: &Which, test: &str) -> Result<ExitCode
     }
 }
 
+/// The hash of a run's content.
+#[derive(Serialize)]
+struct Digest {
+    /// 64 hexadecimal digits: equal runs have equal digests.
+    digest: String,
+}
+
 pub(super) fn digest(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
     let repository = open(results, which.results.as_deref())?;
     let digest = repository.digest()?;
     match which.format {
         Format::Text => print(&format!("{digest}\n")),
-        Format::Json => print_json(&serde_json::json!({ "digest": digest })),
+        Format::Json => print_json(&Digest { digest }),
     }
 }

@@ -190,6 +190,7 @@ fn moments(
                     Members::Min => known.reduce(f64::min),
                     Members::Max => known.reduce(f64::max),
                     Members::Sum => known.reduce(|a, b| a + b),
+                    Members::First | Members::Second => unreachable!("no case has pairs"),
                 }
             };
             let values: Option<Vec<f64>> = inputs.iter().enumerate().map(value).collect();
@@ -287,7 +288,12 @@ fn value(of: &Expression, inputs: &[f64]) -> f64 {
         Expression::Absolute(of) => value(of, inputs).abs(),
         Expression::Min(of) => all(of).reduce(f64::min).unwrap(),
         Expression::Max(of) => all(of).reduce(f64::max).unwrap(),
-        Expression::Divide { .. } | Expression::Distance { .. } => unreachable!("no case has these"),
+        Expression::Divide { .. }
+        | Expression::Distance(_)
+        | Expression::SignedDistance(_)
+        | Expression::Time
+        | Expression::Unary { .. }
+        | Expression::Binary { .. } => unreachable!("no case has these"),
     }
 }
 

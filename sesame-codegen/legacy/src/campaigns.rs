@@ -1,23 +1,17 @@
 //! Campaigns of the original, and the tests that they repeat, in the words of the language.
 
-use std::collections::BTreeMap;
-use std::mem::discriminant;
+use std::collections::{BTreeMap, BTreeSet};
 
-use sesame_notation::{self as notation, Clause, Unit, activation_named, quoted};
-use sesame_plan::condition as grown;
-use sesame_plan::{self as plan, Copies, CoverageGoal, Dimension, GridAxis, MetricId, Strategy};
+use sesame_notation::{self as notation, Clause, Unit};
+use sesame_plan::{Copies, CoverageGoal, Dimension, GridAxis, Strategy};
 
+use crate::known_tests::{harmless_member, held_by, known_test};
 use crate::notes::Kind;
 use crate::original::{
-    Activation, ActivationMode, Approach, Campaign, Comparison, Condition, Coverage, Domain, MetricSource, Operand,
-    Operation, OperationKind, Original, Reference, Test,
+    Activation, ActivationMode, Approach, Campaign, Condition, Coverage, Operand, Operation, Original, Reference,
 };
-use crate::parts::{Effect, matching};
 use crate::writer::{Writer, called_before, meant};
-use crate::xml::{cleaned, printable};
-
-/// Levels of a condition that the language permits.
-const MOST_LEVELS: u32 = 40;
+use crate::xml::printable;
 
 /// When the tests of a campaign end, in seconds. Where a campaign does not say it is the original's own constant, or
 /// later where its operations are.
@@ -74,7 +68,8 @@ pub(crate) fn write(writer: &mut Writer<'_>) -> (String, String) {
     (tests, campaigns)
 }
 
-/// One campaign; its name, if there is a way to say it.
+/// One campaign; its name, if there is a way to say it. There is one for every campaign that performed tests, so that
+/// their results have a place: where nothing of what it did can be said, it only observes.
 fn campaign_text(
     writer: &mut Writer<'_>,
     campaign: &Campaign,
@@ -84,33 +79,41 @@ fn campaign_text(
 ) -> Option<String> {
     let original = writer.original;
     let shown = printable(&campaign.name);
-    let leave_out = |writer: &mut Writer<'_>, why: &str| {
-        writer.notes.say(Kind::LeftOut, format!("campaign `{shown}`: {why}"));
-        None
-    };
-    let names = |writer: &Writer<'_>, metrics: &mut dyn Iterator<Item = Reference>| -> Vec<String> {
+    let names = |writer: &Writer<'_>, metrics: &mut dyn Iterator<Item = usize>| -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
-        for name in metrics.filter_map(|it| writer.metric(it)) {
-            if !names.iter().any(|known| known == name) {
-                names.push(name.to_owned());
+        for name in metrics.filter_map(|at| writer.mapped.metrics[at].as_ref()) {
+            if !names.contains(name) {
+                names.push(name.clone());
             }
         }
         names
     };
-    let optimised = |&it: &Reference| original.metric(it).is_some_and(|at| original.metrics[at].optimised);
-    let mut objectives = names(writer, &mut campaign.metrics.iter().copied().filter(optimised));
+    let repeats = matches!(campaign.approach, Approach::Repeat { .. });
+    let of_campaign = || campaign.metrics.iter().filter_map(|&metric| original.metric(metric));
+    let mut objectives = names(writer, &mut of_campaign().filter(|&at| original.metrics[at].optimised));
     if objectives.is_empty() {
-        objectives = names(writer, &mut campaign.metrics.iter().copied());
+        objectives = names(writer, &mut of_campaign());
+        if !objectives.is_empty() && !repeats {
+            let text = format!("campaign `{shown}` marks no metric for optimisation: all that it has are objectives");
+            writer.notes.say(Kind::Noted, text);
+        }
     }
-    if objectives.is_empty() && !matches!(campaign.approach, Approach::Repeat { .. }) {
+    if objectives.is_empty() && !repeats {
         objectives = writer.mapped.metrics.iter().flatten().cloned().collect();
         writer.notes.say(Kind::Changed, format!("campaign `{shown}` measures nothing: it has all objectives now"));
     }
-    let mut clauses: Vec<Clause> = Vec::new();
     // What else its tests have values or conditions of is measured too, so that results have a place for it.
-    let measured = campaign.tests.iter().flat_map(|test| test.values.iter().map(|&(metric, _)| metric));
-    let compared = campaign.tests.iter().flat_map(|test| &test.operations).flat_map(compared_by);
-    let mut observed = names(writer, &mut campaign.metrics.iter().copied().chain(measured).chain(compared));
+    let measured: BTreeSet<usize> =
+        campaign.tests.iter().flat_map(|test| &test.values).filter_map(|value| original.measured(value)).collect();
+    let compared: BTreeSet<usize> = campaign
+        .tests
+        .iter()
+        .flat_map(|test| &test.operations)
+        .flat_map(compared_by)
+        .filter_map(|metric| original.metric(metric))
+        .collect();
+    let mut observed = names(writer, &mut of_campaign().chain(measured).chain(compared.iter().copied()));
+    odd_tests(writer, campaign, &shown, &compared);
     let end = end_of(original, campaign);
     if campaign.limit.is_none() {
         let after = Unit::SECONDS.number(end);
@@ -118,58 +121,30 @@ fn campaign_text(
         writer.notes.say(Kind::Changed, text);
     }
 
-    if let Approach::Repeat { times, .. } = campaign.approach {
-        let Some((place, named)) = repeated(original, writer.mapped.campaigns.len()) else {
-            return leave_out(writer, "the test that it repeats is not in the file");
-        };
-        if !named {
-            let text =
-                format!("campaign `{shown}`: the test that it repeats is not in the file; it repeats its first copy");
-            writer.notes.say(Kind::Changed, text);
-        }
-        let test = if let Some(name) = known.get(&place) {
-            name.clone()
-        } else {
-            let repeated = &original.campaigns[place.0].tests[place.1];
-            let over = first_end(original, place);
-            let Some(members) = held_by(writer, repeated, over).or_else(|| harmless_member(writer, repeated, end))
-            else {
-                return leave_out(writer, "nothing of the test that it repeats can be said");
-            };
-            let name = known_test(writer, repeated, members, tests);
-            known.insert(place, name.clone());
-            name
-        };
-        clauses.push(notation::repeat_clause(&test, times.max(1), None));
+    let found = if repeats {
+        repetition(writer, campaign, &shown, end, known, tests)
     } else {
-        let mut held: Vec<usize> = campaign.included.iter().filter_map(|&it| original.operation(it)).collect();
-        held.extend(writer.mapped.holders.used_by(original, &campaign.tests));
-        held.sort_unstable();
-        held.dedup();
-        if held.iter().all(|&at| writer.mapped.parts[at].is_empty()) && !campaign.tests.is_empty() {
-            writer.notes.say(Kind::Changed, format!("campaign `{shown}` has no operations: it may use all now"));
-            held = (0..writer.mapped.parts.len()).collect();
+        search(writer, campaign, &shown, &objectives, &mut observed)
+    };
+    let mut clauses = match found {
+        Ok(clauses) => clauses,
+        Err(why) if campaign.tests.is_empty() => {
+            writer.notes.say(Kind::LeftOut, format!("campaign `{shown}`: {why}"));
+            return None;
         }
-        let operations: Vec<&str> =
-            held.iter().flat_map(|&at| &writer.mapped.parts[at]).map(|part| part.name.as_str()).collect();
-        if operations.is_empty() {
-            return leave_out(writer, "none of its operations can be said");
+        Err(why) => {
+            observed.extend(objectives.into_iter().filter(|name| !observed.contains(name)).collect::<Vec<_>>());
+            writer.notes.say(
+                Kind::Changed,
+                format!("campaign `{shown}`: {why}, so it only observes now; its results are kept"),
+            );
+            let times = match campaign.approach {
+                Approach::Repeat { times, .. } => times.max(1),
+                _ => 1,
+            };
+            vec![("passive", format!("{times} times"))]
         }
-        if objectives.is_empty() {
-            return leave_out(writer, "it measures nothing that could be an objective");
-        }
-        let parts = |operation: &Operation| {
-            writer.mapped.holders.find(original, operation).map_or(0, |at| writer.mapped.parts[at].len())
-        };
-        let longest = campaign.tests.iter().map(|test| test.operations.iter().map(parts).sum::<usize>()).max();
-        let most = u32::try_from(operations.len().max(longest.unwrap_or(0))).unwrap_or(u32::MAX);
-        clauses.push(("objectives", objectives.join(", ")));
-        observed.retain(|name| !objectives.contains(name));
-        // The original platform lets copies of one operation act together.
-        clauses.push(notation::operations_clause(&operations, (1, most), Copies::MayOverlap));
-        clauses.push(("activate", format!("by {}", activation(writer, campaign, &shown, &mut observed))));
-        search(writer, campaign, &shown, &mut clauses);
-    }
+    };
     if !observed.is_empty() {
         clauses.push(("observes", observed.join(", ")));
     }
@@ -179,6 +154,114 @@ fn campaign_text(
     text.push('\n');
     text.push_str(&notation::campaign_block(&doc, &name, clauses));
     Some(name)
+}
+
+/// Notes what is odd about the tests of a campaign, whose conditions compare these metrics.
+fn odd_tests(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, compared: &BTreeSet<usize>) {
+    let idle = campaign.tests.iter().filter(|test| test.operations.is_empty()).count();
+    if idle > 0 {
+        let text = format!("campaign `{shown}`: performed tests without operations, which disturb nothing");
+        writer.notes.times(Kind::Noted, text, idle);
+    }
+    let operations = || campaign.tests.iter().flat_map(|test| &test.operations);
+    let with_itself = operations().filter(|operation| compares_with_itself(writer.original, operation)).count();
+    if with_itself > 0 {
+        let text = format!(
+            "campaign `{shown}`: conditions of performed tests that compare a metric with itself, which decides nothing"
+        );
+        writer.notes.times(Kind::Noted, text, with_itself);
+    }
+    let offered: BTreeSet<usize> =
+        campaign.condition_metrics.iter().filter_map(|&metric| writer.original.metric(metric)).collect();
+    let others: Vec<&str> =
+        compared.difference(&offered).filter_map(|&metric| writer.mapped.metrics[metric].as_deref()).collect();
+    if !others.is_empty() {
+        let others = others.join(", ");
+        let text = format!(
+            "campaign `{shown}`: conditions of its tests compare what is not among its condition metrics: {others}"
+        );
+        writer.notes.say(Kind::Noted, text);
+    }
+}
+
+/// What a campaign does that repeats a test; the error says why it cannot.
+fn repetition(
+    writer: &mut Writer<'_>,
+    campaign: &Campaign,
+    shown: &str,
+    end: f64,
+    known: &mut BTreeMap<(usize, usize), String>,
+    tests: &mut String,
+) -> Result<Vec<Clause>, String> {
+    let original = writer.original;
+    let Approach::Repeat { times, .. } = campaign.approach else { return Err("it does not repeat a test".to_owned()) };
+    let Some((place, named)) = repeated(original, writer.mapped.campaigns.len()) else {
+        return Err("the test that it repeats is not in the file".to_owned());
+    };
+    if !named {
+        let text =
+            format!("campaign `{shown}`: the test that it repeats is not in the file; it repeats its first copy");
+        writer.notes.say(Kind::Changed, text);
+    }
+    let test = if let Some(name) = known.get(&place) {
+        name.clone()
+    } else {
+        let repeated = &original.campaigns[place.0].tests[place.1];
+        let over = first_end(original, place);
+        let members = held_by(writer, repeated, over);
+        let members = if members.is_empty() {
+            let harmless = harmless_member(writer, repeated, over.min(end));
+            vec![harmless.ok_or("nothing of the test that it repeats can be said")?]
+        } else {
+            members
+        };
+        let name = known_test(writer, repeated, members, tests);
+        known.insert(place, name.clone());
+        name
+    };
+    Ok(vec![notation::repeat_clause(&test, times.max(1), None)])
+}
+
+/// What a campaign does that searches; the error says why it cannot. What it has as objectives it does not observe
+/// besides.
+fn search(
+    writer: &mut Writer<'_>,
+    campaign: &Campaign,
+    shown: &str,
+    objectives: &[String],
+    observed: &mut Vec<String>,
+) -> Result<Vec<Clause>, String> {
+    let original = writer.original;
+    let mut held: Vec<usize> = campaign.included.iter().filter_map(|&it| original.operation(it)).collect();
+    held.extend(writer.mapped.holders.used_by(original, &campaign.tests));
+    held.sort_unstable();
+    held.dedup();
+    if held.iter().all(|&at| writer.mapped.parts[at].is_empty()) && !campaign.tests.is_empty() {
+        writer.notes.say(Kind::Changed, format!("campaign `{shown}` has no operations: it may use all now"));
+        held = (0..writer.mapped.parts.len()).collect();
+    }
+    let operations: Vec<&str> =
+        held.iter().flat_map(|&at| &writer.mapped.parts[at]).map(|part| part.name.as_str()).collect();
+    if operations.is_empty() {
+        return Err("none of its operations can be said".to_owned());
+    }
+    if objectives.is_empty() {
+        return Err("it measures nothing that could be an objective".to_owned());
+    }
+    let parts = |operation: &Operation| {
+        writer.mapped.holders.find(original, operation).map_or(0, |at| writer.mapped.parts[at].len())
+    };
+    let longest = campaign.tests.iter().map(|test| test.operations.iter().map(parts).sum::<usize>()).max();
+    let most = u32::try_from(operations.len().max(longest.unwrap_or(0))).unwrap_or(u32::MAX);
+    observed.retain(|name| !objectives.contains(name));
+    let mut clauses = vec![
+        ("objectives", objectives.join(", ")),
+        // The original platform lets copies of one operation act together.
+        notation::operations_clause(&operations, (1, most), Copies::MayOverlap),
+    ];
+    clauses.push(("activate", format!("by {}", activation(writer, campaign, shown, observed))));
+    strategy(writer, campaign, shown, &mut clauses);
+    Ok(clauses)
 }
 
 /// By what the tests of a campaign switch operations. Variables of conditions are observed anyway.
@@ -203,7 +286,8 @@ fn activation(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, observe
     format!("condition over {}{settings}", over.join(", "))
 }
 
-fn search(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, clauses: &mut Vec<Clause>) {
+/// How a campaign finds its tests, and the cells that it counts.
+fn strategy(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, clauses: &mut Vec<Clause>) {
     let performed = u32::try_from(campaign.tests.len()).unwrap_or(u32::MAX);
     match &campaign.approach {
         Approach::Nsga { population, evaluations, coverage } => {
@@ -273,335 +357,48 @@ fn cells(writer: &mut Writer<'_>, coverage: &Coverage, shown: &str) -> Option<Co
     Some(CoverageGoal { axes, hits: coverage.hits.max(1), stop_at })
 }
 
-/// The metrics that the conditions of an operation compare.
-pub(crate) fn compared_by(operation: &Operation) -> Vec<Reference> {
-    fn collect(condition: &Condition, into: &mut Vec<Reference>) {
-        match condition {
-            Condition::Compare(left, _, right) => {
-                into.push(*left);
-                if let Operand::Metric(right) = right {
-                    into.push(*right);
-                }
-            }
-            Condition::And(a, b) | Condition::Or(a, b) => {
-                collect(a, into);
-                collect(b, into);
-            }
+/// The conditions of an operation.
+fn conditions(operation: &Operation) -> impl Iterator<Item = &Condition> {
+    let (start, end) = match &operation.activation {
+        Activation::Condition(start, end) => (start.as_ref(), end.as_ref()),
+        Activation::ConditionFor(start, _) => (start.as_ref(), None),
+        Activation::Time(..) | Activation::Unsaid => (None, None),
+    };
+    start.into_iter().chain(end)
+}
+
+/// Shows every comparison in a condition.
+fn comparisons(condition: &Condition, each: &mut impl FnMut(Reference, Operand)) {
+    match condition {
+        Condition::Compare(left, _, right) => each(*left, *right),
+        Condition::And(a, b) | Condition::Or(a, b) => {
+            comparisons(a, each);
+            comparisons(b, each);
         }
     }
+}
+
+/// The metrics that the conditions of an operation compare.
+fn compared_by(operation: &Operation) -> Vec<Reference> {
     let mut metrics = Vec::new();
-    match &operation.activation {
-        Activation::Condition(start, end) => {
-            [start, end].into_iter().flatten().for_each(|condition| collect(condition, &mut metrics));
-        }
-        Activation::ConditionFor(start, _) => start.iter().for_each(|condition| collect(condition, &mut metrics)),
-        Activation::Time(..) | Activation::Unsaid => {}
+    for condition in conditions(operation) {
+        comparisons(condition, &mut |left, right| {
+            metrics.push(left);
+            if let Operand::Metric(right) = right {
+                metrics.push(right);
+            }
+        });
     }
     metrics
 }
 
-/// A test that is repeated, as a regression test with these members; its name.
-fn known_test(writer: &mut Writer<'_>, test: &Test, members: Vec<String>, text: &mut String) -> String {
-    let name = writer.name("test", &test.name);
-    let doc = if name == *test.name { String::new() } else { called_before(&test.name) };
-    text.push('\n');
-    text.push_str(&notation::test_block(&doc, &name, members));
-    name
-}
-
-/// The member of a regression test that disturbs nothing: an operation that adds 0, or loses nothing.
-fn harmless_member(writer: &mut Writer<'_>, test: &Test, end: f64) -> Option<Vec<String>> {
-    if !test.operations.is_empty() {
-        return None;
+fn compares_with_itself(original: &Original, operation: &Operation) -> bool {
+    let mut found = false;
+    for condition in conditions(operation) {
+        comparisons(condition, &mut |left, right| {
+            let Operand::Metric(right) = right else { return };
+            found |= original.metric(left).is_some() && original.metric(left) == original.metric(right);
+        });
     }
-    let holders = &writer.mapped.holders.operations;
-    let parts =
-        holders.iter().zip(&writer.mapped.parts).flat_map(|(holder, parts)| parts.iter().map(move |it| (holder, it)));
-    let mut harmless = parts.filter_map(|(holder, part)| match (&part.effect, &holder.kind) {
-        (&Effect::Value { set, relative: true }, OperationKind::RandomValue { values, .. }) => match values[set].domain
-        {
-            Domain::Reals(low, high) if low.min(high) <= 0.0 && low.max(high) >= 0.0 => {
-                Some((holder, &part.name, "offset", Unit::None.range(0.0, 0.0)))
-            }
-            _ => None,
-        },
-        (Effect::Loss, OperationKind::PacketLoss { keep }) if keep.0.max(keep.1) >= 1.0 => {
-            Some((holder, &part.name, "loss", Unit::Share.number(0.0)))
-        }
-        _ => None,
-    });
-    let (holder, name, parameter, nothing) = harmless.next()?;
-    let (start, end) = match holder.activation {
-        Activation::Time(from, to) if from.max(0.0) < to.min(end) => (from.max(0.0), to.min(end)),
-        _ => (0.0, end),
-    };
-    let (shown, harmless) = (printable(&test.name), format!("{name} {parameter} {nothing}"));
-    let window = when(writer, &plan::Activation::Time { start, end });
-    let member = notation::test_member(name, [(parameter, nothing)], &window, None);
-    writer.notes.say(Kind::Changed, format!("known test `{shown}` disturbs nothing: it holds `{harmless}`"));
-    Some(vec![member])
-}
-
-/// The operations of a regression test, as members of its block; `None` if none of them can be translated. The test is
-/// over after so many seconds.
-fn held_by(writer: &mut Writer<'_>, test: &Test, over: f64) -> Option<Vec<String>> {
-    let shown = printable(&test.name);
-    let mut members = Vec::new();
-    for operation in &test.operations {
-        let Some(at) = writer.mapped.holders.find(writer.original, operation) else { continue };
-        let template = writer.mapped.holders.operations[at].clone();
-        for part in writer.mapped.parts[at].clone() {
-            let offline = matches!(part.effect, Effect::Custom { offline: true, .. });
-            let window =
-                if offline { Ok(plan::Activation::Offline) } else { window(writer, operation, &template, over) };
-            match window.and_then(|window| Ok((window, choices(operation, &template, &part.effect)?))) {
-                Ok((window, choices)) => {
-                    let seed = (operation.seed != 0 && !offline).then(|| operation.seed.cast_unsigned());
-                    members.push(notation::test_member(&part.name, choices, &when(writer, &window), seed));
-                }
-                Err(why) => {
-                    writer.notes.say(Kind::LeftOut, format!("known test `{shown}`, operation `{}`: {why}", part.name));
-                }
-            }
-        }
-    }
-    (!members.is_empty()).then_some(members)
-}
-
-/// When an operation of a regression test is active, as text. The metrics of a condition are those of the original, by
-/// position.
-fn when(writer: &Writer<'_>, activation: &plan::Activation) -> String {
-    let before_start = plan::OperationKind::Custom { moment: plan::Moment::BeforeStart };
-    activation_named(activation, &before_start, &|metric| {
-        let at = metric.index();
-        let name = writer.mapped.metrics[at].as_deref();
-        let name = name.expect("a condition compares metrics that were translated");
-        (name, if is_timed(writer, at) { Unit::SECONDS } else { Unit::None })
-    })
-}
-
-fn is_timed(writer: &Writer<'_>, metric: usize) -> bool {
-    writer.original.metrics[metric].source == MetricSource::FuzzingTime
-}
-
-/// A delay as far as a template permits it, in seconds.
-fn permitted_delay(template: &Operation, delay: f64) -> f64 {
-    let delay = match template.kind {
-        OperationKind::Latency { delay: of, .. } => delay.clamp(of.0.min(of.1), of.0.max(of.1)),
-        _ => delay,
-    };
-    delay.max(0.0)
-}
-
-/// What a test chooses, by parameter. What its template does not permit is the nearest that it does, so that the space
-/// is right.
-fn choices<'e>(
-    operation: &Operation,
-    template: &Operation,
-    effect: &'e Effect,
-) -> Result<Vec<(&'e str, String)>, String> {
-    let sets = |operation: &Operation| match &operation.kind {
-        OperationKind::RandomValue { values: sets, .. } | OperationKind::Custom { parameters: sets } => sets.clone(),
-        _ => Vec::new(),
-    };
-    let (held, permitted) = (sets(operation), sets(template));
-    let domain = |at: usize| {
-        let chosen = matching(&held, &permitted, at).map(|set| &set.domain);
-        chosen.ok_or_else(|| "it has no value of its own there".to_owned())
-    };
-    let within = |low: f64, high: f64, at: usize| match permitted.get(at).map(|set| &set.domain) {
-        Some(&Domain::Reals(from, to)) => {
-            let (from, to) = (from.min(to), from.max(to));
-            (low.clamp(from, to), high.clamp(from, to))
-        }
-        Some(&Domain::Integers(from, to)) => {
-            let (from, to) = (from.min(to) as f64, from.max(to) as f64);
-            (low.clamp(from, to), high.clamp(from, to))
-        }
-        _ => (low, high),
-    };
-    Ok(match (effect, &operation.kind) {
-        (&Effect::Value { set, relative }, _) => {
-            let (low, high) = match *domain(set)? {
-                Domain::Reals(low, high) => (low.min(high), low.max(high)),
-                Domain::Integers(low, high) => (low.min(high) as f64, low.max(high) as f64),
-                _ => return Err("it does not choose numbers".to_owned()),
-            };
-            let (low, high) = within(low, high, set);
-            let word = if relative { "offset" } else { "value" };
-            vec![(word, Unit::None.range(low, high))]
-        }
-        (Effect::Loss, OperationKind::PacketLoss { keep }) => {
-            let chosen = match template.kind {
-                OperationKind::PacketLoss { keep: of } => keep.0.min(keep.1).clamp(of.0.min(of.1), of.0.max(of.1)),
-                _ => keep.0.min(keep.1),
-            };
-            vec![("loss", Unit::Share.number(meant(1.0 - chosen.clamp(0.0, 1.0))))]
-        }
-        (Effect::Delay { randomised: false }, OperationKind::Latency { delay, .. }) => {
-            vec![("delay", Unit::SECONDS.number(permitted_delay(template, delay.0.min(delay.1))))]
-        }
-        (Effect::Delay { randomised: true }, OperationKind::Latency { delay, .. }) => {
-            let (low, high) = (delay.0.min(delay.1), delay.0.max(delay.1));
-            let (low, high) = (permitted_delay(template, low), permitted_delay(template, high));
-            vec![("delay", Unit::SECONDS.range(low, high))]
-        }
-        (Effect::Custom { parameters, .. }, _) => {
-            let mut all = Vec::new();
-            for (name, at) in parameters {
-                let chosen = domain(*at)?;
-                if permitted.get(*at).is_some_and(|set| discriminant(&set.domain) != discriminant(chosen)) {
-                    return Err(format!("what it chooses for `{name}` is of another kind than its template permits"));
-                }
-                let chosen = match chosen {
-                    Domain::Reals(low, high) => Unit::None.number(within(low.min(*high), *high, *at).0),
-                    Domain::Integers(low, high) => {
-                        let low = *low.min(high);
-                        Unit::None.number(match permitted.get(*at).map(|set| &set.domain) {
-                            Some(&Domain::Integers(from, to)) => low.clamp(from.min(to), from.max(to)) as f64,
-                            _ => low as f64,
-                        })
-                    }
-                    Domain::Points(low, _) => {
-                        let mut point = *low;
-                        if let Some(Domain::Points(from, to)) = permitted.get(*at).map(|set| &set.domain) {
-                            for axis in 0..3 {
-                                point[axis] = point[axis].clamp(from[axis].min(to[axis]), from[axis].max(to[axis]));
-                            }
-                        }
-                        Unit::None.point(point)
-                    }
-                    Domain::Texts(texts) => {
-                        let offered = |text: &str| match permitted.get(*at).map(|set| &set.domain) {
-                            Some(Domain::Texts(offered)) => offered.iter().any(|it| **it == *text),
-                            _ => true,
-                        };
-                        match texts.first().filter(|text| offered(text)) {
-                            Some(text) => quoted(&cleaned(text)),
-                            None => return Err("it chooses no text that its template offers".to_owned()),
-                        }
-                    }
-                    Domain::Other(_) => return Err("it chooses something that nothing is like".to_owned()),
-                };
-                all.push((name.as_str(), chosen));
-            }
-            all
-        }
-        (Effect::Blackhole, _) => Vec::new(),
-        (Effect::Loss | Effect::Delay { .. }, _) => return Err("it does something else than its template".to_owned()),
-    })
-}
-
-/// When an operation of a regression test is active. The metrics of a condition are those of the original, by position.
-fn window(
-    writer: &Writer<'_>,
-    operation: &Operation,
-    template: &Operation,
-    over: f64,
-) -> Result<plan::Activation, String> {
-    let forever = 1e6;
-    let times = 1;
-    let never = || Err("it is never active".to_owned());
-    match &operation.activation {
-        Activation::Time(start, end) => {
-            let (mut start, mut end) = (start.min(*end).max(0.0), start.max(*end));
-            if let Activation::Time(from, to) = template.activation
-                && from.max(0.0) < to
-            {
-                (start, end) = (start.max(from), end.min(to));
-            }
-            if start >= over {
-                return Err(format!("its window begins when the test is over, after {}", Unit::SECONDS.number(over)));
-            }
-            if start < end { Ok(plan::Activation::Time { start, end }) } else { never() }
-        }
-        Activation::Condition(start, end) => {
-            let start = match start.as_ref().map(|it| settled(writer, it)).transpose()? {
-                Some(Truth::Sometimes(start)) => start,
-                Some(Truth::Always) => return Err("it begins at once, which is no condition".to_owned()),
-                Some(Truth::Never) | None => return never(),
-            };
-            match end.as_ref().map(|it| settled(writer, it)).transpose()? {
-                Some(Truth::Sometimes(end)) => Ok(plan::Activation::Condition { start, end, times }),
-                Some(Truth::Always) => Err("it ends at once, which is no condition".to_owned()),
-                Some(Truth::Never) | None => Ok(plan::Activation::ConditionFor { start, length: forever, times }),
-            }
-        }
-        Activation::ConditionFor(start, length) => match start.as_ref().map(|it| settled(writer, it)).transpose()? {
-            Some(Truth::Sometimes(start)) if *length > 0.0 => {
-                Ok(plan::Activation::ConditionFor { start, length: *length, times })
-            }
-            Some(Truth::Always) => Err("it begins at once, which is no condition".to_owned()),
-            _ => never(),
-        },
-        Activation::Unsaid => Err("it does not say when it is active".to_owned()),
-    }
-}
-
-/// A condition, unless it goes one way in every test.
-enum Truth {
-    Always,
-    Never,
-    Sometimes(grown::Condition),
-}
-
-fn settled(writer: &Writer<'_>, condition: &Condition) -> Result<Truth, String> {
-    settled_at(writer, condition, 1)
-}
-
-fn settled_at(writer: &Writer<'_>, condition: &Condition, level: u32) -> Result<Truth, String> {
-    if level > MOST_LEVELS {
-        return Err(format!("its condition has more than {MOST_LEVELS} levels"));
-    }
-    let both = |a: &Condition, b: &Condition| -> Result<(Truth, Truth), String> {
-        Ok((settled_at(writer, a, level + 1)?, settled_at(writer, b, level + 1)?))
-    };
-    Ok(match condition {
-        Condition::And(a, b) => match both(a, b)? {
-            (Truth::Never, _) | (_, Truth::Never) => Truth::Never,
-            (Truth::Always, other) | (other, Truth::Always) => other,
-            (Truth::Sometimes(a), Truth::Sometimes(b)) => {
-                Truth::Sometimes(grown::Condition::And(Box::new(a), Box::new(b)))
-            }
-        },
-        Condition::Or(a, b) => match both(a, b)? {
-            (Truth::Always, _) | (_, Truth::Always) => Truth::Always,
-            (Truth::Never, other) | (other, Truth::Never) => other,
-            (Truth::Sometimes(a), Truth::Sometimes(b)) => {
-                Truth::Sometimes(grown::Condition::Or(Box::new(a), Box::new(b)))
-            }
-        },
-        Condition::Compare(left, by, right) => {
-            let named = |metric: Reference| {
-                let at = writer.original.metric(metric).filter(|&at| writer.mapped.metrics[at].is_some());
-                at.ok_or_else(|| "its condition compares something that is not a metric".to_owned())
-            };
-            let variable = named(*left)?;
-            let timed = is_timed(writer, variable);
-            let comparison = |right: grown::Operand| {
-                Truth::Sometimes(grown::Condition::Compare { left: operand(variable), by: (*by).into(), right })
-            };
-            match *right {
-                Operand::Integer(value) if timed && value < 0 => match by {
-                    Comparison::Greater => Truth::Always,
-                    Comparison::Less | Comparison::Equal => Truth::Never,
-                },
-                Operand::Integer(0) if timed && *by == Comparison::Less => Truth::Never,
-                Operand::Integer(value) => comparison(grown::Operand::Number(value as f64)),
-                Operand::Metric(other) => match named(other)? {
-                    other if other == variable && *by == Comparison::Equal => Truth::Always,
-                    other if other == variable => Truth::Never,
-                    other if is_timed(writer, other) != timed => {
-                        return Err("its condition compares seconds with a plain number".to_owned());
-                    }
-                    other => comparison(operand(other)),
-                },
-            }
-        }
-    })
-}
-
-/// A metric of the original, by position, as a variable of a condition.
-fn operand(metric: usize) -> grown::Operand {
-    grown::Operand::Variable(MetricId(u32::try_from(metric).expect("a file has fewer than 2^32 metrics")))
+    found
 }

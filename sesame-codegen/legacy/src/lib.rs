@@ -2,12 +2,13 @@
 //! `.sesame` file and results.
 //!
 //! A file is read into an [`Original`] (`xml`, `dialect`, `read`), which is mapped to the text of a space that passes
-//! `check` (`space`, `campaigns`, both with `writer`; `parts`, `types`, `naming`), and its performed tests to records
+//! `check` (`space`, `campaigns`, `known_tests`, all with `writer`; `parts`, `types`, `naming`), and its performed tests to records
 //! (`results`). Everything that changes on the way is listed in [`Notes`]. No name or text of the file becomes anything
 //! but a name, a quoted text or a comment.
 
 mod campaigns;
 mod dialect;
+mod known_tests;
 mod naming;
 mod notes;
 mod original;
@@ -26,7 +27,7 @@ use sesame_plan::CampaignPlan;
 use sesame_results::record::RecordError;
 
 pub use dialect::Dialect;
-pub use notes::{Kind, Notes};
+pub use notes::{Counted, Kind, Notes};
 pub use original::Original;
 pub use results::Recorded;
 pub use xml::Broken;

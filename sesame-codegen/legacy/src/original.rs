@@ -63,6 +63,24 @@ impl References {
         let Reference(number) = self.of(id);
         self.targets[number as usize] = Some(target);
     }
+
+    /// The reference of a metric's name, which leads nowhere before [`References::name_metrics`].
+    pub(crate) fn of_name(&mut self, name: &str) -> Reference {
+        // No id or path holds a blank.
+        self.of(&format!("name {name}"))
+    }
+
+    /// Says what the names of these metrics lead to: of each metric whose name no other has.
+    pub(crate) fn name_metrics(&mut self, metrics: &[Metric]) {
+        let mut named: HashMap<&str, Option<usize>> = HashMap::new();
+        for (at, metric) in metrics.iter().enumerate() {
+            named.entry(&metric.name).and_modify(|found| *found = None).or_insert(Some(at));
+        }
+        for (name, at) in named.into_iter().filter_map(|(name, at)| Some((name, at?))) {
+            let Reference(number) = self.of_name(name);
+            self.targets[number as usize] = Some(Target::Metric(at));
+        }
+    }
 }
 
 /// What a path from the root leads to, `//@campaigns.0/@performedTests.3`.
@@ -97,6 +115,16 @@ impl Original {
             Target::Metric(at) if at < self.metrics.len() => Some(at),
             _ => None,
         }
+    }
+
+    /// The position of the metric that a value is of: the one that it refers to, or else the one of its name.
+    pub fn measured(&self, value: &Measured) -> Option<usize> {
+        value.metric.and_then(|metric| self.metric(metric)).or_else(|| self.metric(value.name?))
+    }
+
+    /// Whether a value refers to no metric and is known by its name alone.
+    pub(crate) fn is_named_only(&self, value: &Measured) -> bool {
+        value.metric.and_then(|metric| self.metric(metric)).is_none()
     }
 
     /// The position of an operation that tests may hold.
@@ -387,9 +415,22 @@ pub struct Test {
     /// What it disturbed.
     pub operations: Vec<Operation>,
     /// What was measured.
-    pub values: Vec<(Reference, f64)>,
+    pub values: Vec<Measured>,
+    /// How many metrics stand there without a value.
+    pub without_value: usize,
     /// The tests it was made of.
     pub parents: Vec<Reference>,
+}
+
+/// A value that was measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// The metric that it refers to.
+    pub metric: Option<Reference>,
+    /// The metric of its name.
+    pub name: Option<Reference>,
+    /// The value, which may be infinite or not a number.
+    pub value: f64,
 }
 
 /// A set of tests.

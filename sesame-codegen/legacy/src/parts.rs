@@ -138,11 +138,13 @@ fn widen(held: &mut Operation, by: &Operation) {
     }
 }
 
-/// The value set of an operation that stands for one of its template: of the same name, or else at the same place.
+/// The value set of an operation that stands for one of its template: of the same name, or else at the same place. Of
+/// several of one name it is the one that comes as late among them.
 pub(crate) fn matching<'s>(sets: &'s [ValueSet], template: &[ValueSet], at: usize) -> Option<&'s ValueSet> {
     let wanted = template.get(at)?;
     let same_name = |set: &&ValueSet| !wanted.name.is_empty() && set.name == wanted.name;
-    sets.iter().find(same_name).or_else(|| sets.get(at))
+    let before = template[..at].iter().filter(same_name).count();
+    sets.iter().filter(same_name).nth(before).or_else(|| sets.get(at))
 }
 
 /// Bounds in their order. Reversed ones are noted.

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use crate::original::{
     Activation, ActivationMode, Approach, Campaign, Comparison, Condition, Constraint, Coverage, Domain, FieldOfType,
-    Metric, MetricSource, Node, Operand, Operation, OperationKind, Original, Reference, ResultSet, Simulator, Target,
-    Test, TypeOfValue, ValueSet,
+    Measured, Metric, MetricSource, Node, Operand, Operation, OperationKind, Original, Reference, ResultSet, Simulator,
+    Target, Test, TypeOfValue, ValueSet,
 };
 use crate::xml::{Broken, Element, Source, Step, printable};
 
@@ -46,6 +46,7 @@ pub(crate) fn read(path: &Path, file: File) -> Result<Original, Broken> {
         Step::End => {}
         Step::Open(_) | Step::Close => return Err(source.broken("something follows after the testing space")),
     }
+    original.references.name_metrics(&original.metrics);
     Ok(original)
 }
 
@@ -222,13 +223,14 @@ fn test(original: &mut Original, element: &Element) -> Result<Test, String> {
     for child in &element.children {
         match child.tag.as_str() {
             "operations" => test.operations.push(operation(original, child)?),
-            "metrics" => {
-                let measured = reference(original, child, "metric");
-                let result = child.children.iter().find(|it| it.tag == "result");
-                if let (Some(measured), Some(result)) = (measured, result) {
-                    test.values.push((measured, loose_number(result, "value", 0.0)?));
-                }
-            }
+            "metrics" => match child.children.iter().find(|part| part.tag == "result") {
+                Some(result) => test.values.push(Measured {
+                    metric: reference(original, child, "metric"),
+                    name: result.get("name").map(|name| original.references.of_name(name)),
+                    value: loose_number(result, "value", 0.0)?,
+                }),
+                None => test.without_value += 1,
+            },
             _ => {}
         }
     }
@@ -278,8 +280,7 @@ fn operation(original: &mut Original, element: &Element) -> Result<Operation, St
         None => Activation::Unsaid,
         Some(found) => match found.kind.as_deref() {
             Some("FixedTimeActivation") => {
-                // Nothing happens before a test begins.
-                Activation::Time(number(found, "startTime", 0.0)?.max(0.0), number(found, "endTime", 0.0)?.max(0.0))
+                Activation::Time(number(found, "startTime", 0.0)?, number(found, "endTime", 0.0)?)
             }
             Some("ConditionBasedActivation") => {
                 Activation::Condition(condition(original, found, "starting")?, condition(original, found, "ending")?)

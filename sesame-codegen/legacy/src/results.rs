@@ -1,15 +1,16 @@
 //! From the tests that a campaign performed to records of the results repository.
 
 use std::collections::BTreeMap;
+use std::mem::discriminant;
 use std::path::Path;
 
 use sesame_base::observation::{MetricObservation, Observation, OperationEffect, Outcome, WallTime};
 use sesame_plan::{CampaignPlan, Choice, MetricId, OperationId, Span, TestOperation, condition as plan_condition};
-use sesame_results::record::{Origin, RecordError, Recorder, ResultSet, Status, TestRecord};
+use sesame_results::record::{Origin, RecordError, Recorder, ResultSet, SplitOperation, Status, TestRecord};
 
-use crate::notes::{Kind, Notes};
+use crate::notes::{Counted, Kind, Notes};
 use crate::original::{Activation, Campaign, Condition, Domain, Operand, Operation, OperationKind, Original, Test};
-use crate::parts::{Effect, Part, matching};
+use crate::parts::{Effect, Part, called, matching};
 use crate::writer::Mapped;
 use crate::xml::{cleaned, printable};
 
@@ -46,9 +47,11 @@ pub(crate) fn record(
         (0..).zip(&plan.operations).map(|(id, operation)| (operation.name.as_str(), OperationId(id))).collect();
     let importer = Importer { original, mapped, plan, metrics, operations };
     let mut recorder = Recorder::create(folder, plan, plan.campaign.seed, 0)?;
-    for (index, test) in campaign.tests.iter().enumerate() {
-        recorder.commit(&importer.test(at, index, test, notes))?;
-    }
+    let mut split = Vec::new();
+    // In one transaction: to wait for the disk after each test would take longer than everything else.
+    let tests = campaign.tests.iter().enumerate();
+    recorder.commit_all(tests.map(|(index, test)| importer.test(at, index, test, &mut split, notes)))?;
+    recorder.put_split_operations(&split)?;
     let names: Vec<(u32, String)> =
         campaign.tests.iter().enumerate().map(|(index, test)| (number_of(index), printable(&test.name))).collect();
     recorder.put_original_names(names.iter().map(|(number, name)| (*number, name.as_str())))?;
@@ -66,32 +69,28 @@ fn number_of(index: usize) -> u32 {
 }
 
 impl Importer<'_> {
-    fn test(&self, campaign: usize, index: usize, test: &Test, notes: &mut Notes) -> TestRecord {
+    fn test(
+        &self,
+        campaign: usize,
+        index: usize,
+        test: &Test,
+        split: &mut Vec<SplitOperation>,
+        notes: &mut Notes,
+    ) -> TestRecord {
         let mut operations = Vec::new();
         let mut effects = Vec::new();
         for operation in &test.operations {
+            let first = operations.len();
             for (held, effect) in self.operations(operation, notes) {
+                let position = operations.len();
+                if position > first {
+                    split.push(SplitOperation { test: number_of(index), position, first });
+                }
                 operations.push(held);
                 effects.push(effect);
             }
         }
-        let mut metrics = vec![MetricObservation::default(); self.plan.metrics.len()];
-        for &(metric, value) in &test.values {
-            let at = self.original.metric(metric).and_then(|at| self.mapped.metrics[at].as_deref());
-            let Some(&id) = at.and_then(|name| self.metrics.get(name)) else {
-                notes.say(Kind::LeftOut, "values of what is no metric");
-                continue;
-            };
-            if !value.is_finite() {
-                notes.say(
-                    Kind::LeftOut,
-                    format!("values of `{}` that are no finite numbers", self.plan.metric(id).name),
-                );
-                continue;
-            }
-            let default = self.original.metric(metric).and_then(|at| self.original.metrics[at].default);
-            metrics[id.index()] = MetricObservation::whole(Some(value), default != Some(value), Vec::new());
-        }
+        let metrics = self.values(test, notes);
         let mut parents = Vec::new();
         for &parent in &test.parents {
             match self.original.test(parent) {
@@ -120,19 +119,63 @@ impl Importer<'_> {
         }
     }
 
+    /// The values that were measured in a test, by metric of the plan.
+    fn values(&self, test: &Test, notes: &mut Notes) -> Vec<MetricObservation> {
+        let mut metrics = vec![MetricObservation::default(); self.plan.metrics.len()];
+        let mut measured = vec![false; metrics.len()];
+        notes.lose(Counted::Value, "metrics of performed tests that have no value", test.without_value);
+        for value in &test.values {
+            let Some(at) = self.original.measured(value) else {
+                notes.lose(Counted::Value, "values of performed tests that are of no metric of the file", 1);
+                continue;
+            };
+            let name = self.mapped.metrics[at].as_deref();
+            let Some(&id) = name.and_then(|name| self.metrics.get(name)) else {
+                let name = printable(&self.original.metrics[at].name);
+                notes.lose(Counted::Value, format!("values of `{name}`, which is not a metric here"), 1);
+                continue;
+            };
+            let name = &self.plan.metric(id).name;
+            if !value.value.is_finite() {
+                notes.lose(Counted::Value, format!("values of `{name}` that are no finite numbers"), 1);
+                continue;
+            }
+            if std::mem::replace(&mut measured[id.index()], true) {
+                notes.lose(Counted::Value, format!("values of `{name}` that a later one of the same test replaces"), 1);
+            }
+            if self.original.is_named_only(value) {
+                let text = format!("values that refer to no metric are of `{name}`, which has their name");
+                notes.say(Kind::Mapped, text);
+            }
+            let default = self.original.metrics[at].default;
+            metrics[id.index()] = MetricObservation::whole(Some(value.value), default != Some(value.value), Vec::new());
+        }
+        metrics
+    }
+
     /// What an operation of a test became: one for each part that can be said.
     fn operations(&self, operation: &Operation, notes: &mut Notes) -> Vec<(TestOperation, OperationEffect)> {
-        let Some(at) = self.mapped.holders.find(self.original, operation) else { return Vec::new() };
+        let at = self.mapped.holders.find(self.original, operation);
+        let Some(at) = at.filter(|&at| !self.mapped.parts[at].is_empty()) else {
+            let text = "operations of performed tests whose operation of the space was left out";
+            notes.lose(Counted::Operation, text, 1);
+            return Vec::new();
+        };
         let template = &self.mapped.holders.operations[at];
-        if self.mapped.parts[at].is_empty() {
-            notes.say(Kind::LeftOut, "operations of performed tests whose operation of the space was left out");
-        }
         let mut held = Vec::new();
+        let mut left_out = Vec::new();
         for part in &self.mapped.parts[at] {
-            match self.part(operation, template, part) {
+            match self.part(operation, template, part, notes) {
                 Ok(done) => held.push(done),
-                Err(why) => notes.say(Kind::LeftOut, format!("`{}` in performed tests where {why}", part.name)),
+                Err(why) => left_out.push(format!("`{}` in performed tests where {why}", part.name)),
             }
+        }
+        if held.is_empty() {
+            // As one operation, whatever number of parts it has.
+            left_out.truncate(1);
+            left_out.into_iter().for_each(|text| notes.lose(Counted::Operation, text, 1));
+        } else {
+            left_out.into_iter().for_each(|text| notes.say(Kind::LeftOut, text));
         }
         held
     }
@@ -142,17 +185,25 @@ impl Importer<'_> {
         operation: &Operation,
         template: &Operation,
         part: &Part,
+        notes: &mut Notes,
     ) -> Result<(TestOperation, OperationEffect), String> {
         let id = *self.operations.get(part.name.as_str()).ok_or("the campaign does not use it")?;
         let parameters = choices(operation, template, &part.effect)?;
         let offline = matches!(part.effect, Effect::Custom { offline: true, .. });
         let (activation, planned) =
-            if offline { (sesame_plan::Activation::Offline, None) } else { self.activation(&operation.activation)? };
+            if offline { (sesame_plan::Activation::Offline, None) } else { self.activation(operation, notes)? };
         // Activity by time was never measured: the original switched by the clock alone.
         let active = operation.recorded.filter(|_| !offline).or(planned);
+        // An activation of length 0 was one: it has a point, as it had for the original.
+        let over = self.plan.campaign.end_after;
         let intervals = active.and_then(|(start, end)| {
-            let (start, end) = (start.max(0.0), end.min(self.plan.campaign.end_after));
-            (start < end).then_some(Span { start, end })
+            let whole = Span { start, end };
+            let cut = Span { start: start.max(0.0), end: end.min(over) };
+            if cut != whole {
+                let text = format!("activity of `{}` in performed tests is cut at the end of the test", part.name);
+                notes.say(Kind::Changed, text);
+            }
+            (cut.start <= cut.end).then_some(cut)
         });
         let test_operation =
             TestOperation { operation: id, activation, parameters, operation_seed: operation.seed.cast_unsigned() };
@@ -161,14 +212,24 @@ impl Importer<'_> {
     }
 
     /// When an operation was to be active, and the window if time decided it.
-    fn activation(&self, activation: &Activation) -> Result<(sesame_plan::Activation, Option<(f64, f64)>), String> {
+    fn activation(
+        &self,
+        operation: &Operation,
+        notes: &mut Notes,
+    ) -> Result<(sesame_plan::Activation, Option<(f64, f64)>), String> {
         let condition = |condition: &Option<Condition>| match condition {
             Some(condition) => self.condition(condition).map(Some),
             None => Ok(None),
         };
-        match activation {
+        match &operation.activation {
             Activation::Time(start, end) => {
-                let (start, end) = (start.min(*end), start.max(*end));
+                let (first, last) = (start.min(*end), start.max(*end));
+                // Nothing happens before a test begins.
+                let (start, end) = (first.max(0.0), last.max(0.0));
+                if first < 0.0 {
+                    let called = called(operation);
+                    notes.say(Kind::Changed, format!("{called} in performed tests: windows begin at 0s, not before"));
+                }
                 Ok((sesame_plan::Activation::Time { start, end }, Some((start, end))))
             }
             Activation::Condition(start, end) => match (condition(start)?, condition(end)?) {
@@ -180,7 +241,11 @@ impl Importer<'_> {
                 (None, _) => Err("nothing starts it".to_owned()),
             },
             Activation::ConditionFor(start, length) => match condition(start)? {
-                Some(start) => Ok((sesame_plan::Activation::ConditionFor { start, length: *length, times: 1 }, None)),
+                Some(start) => {
+                    // Times are whole nanoseconds.
+                    let length = length.max(1e-9);
+                    Ok((sesame_plan::Activation::ConditionFor { start, length, times: 1 }, None))
+                }
                 None => Err("nothing starts it".to_owned()),
             },
             Activation::Unsaid => Err("it does not say when it is active".to_owned()),
@@ -274,8 +339,12 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
         }
         (Effect::Custom { parameters, .. }, _) => {
             let mut chosen = Vec::new();
-            for (_, at) in parameters {
-                chosen.push(match domain(*at)? {
+            for (name, at) in parameters {
+                let held = domain(*at)?;
+                if !is_permitted(template, *at, held) {
+                    return Err(format!("what it chooses for `{name}` is of another kind than its template permits"));
+                }
+                chosen.push(match held {
                     Domain::Reals(low, high) => Choice::Value { value: low.min(*high) },
                     Domain::Integers(low, high) => Choice::Value { value: *low.min(high) as f64 },
                     Domain::Points(low, _) => Choice::Point { point: *low },
@@ -291,4 +360,10 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
         (Effect::Blackhole, _) => Vec::new(),
         (Effect::Loss | Effect::Delay { .. }, _) => return Err("it does something else".to_owned()),
     })
+}
+
+/// Whether what an operation chooses from a value set is of the kind that its template has at this position.
+fn is_permitted(template: &Operation, at: usize, held: &Domain) -> bool {
+    let OperationKind::Custom { parameters } = &template.kind else { return false };
+    parameters.get(at).is_some_and(|set| discriminant(&set.domain) == discriminant(held))
 }

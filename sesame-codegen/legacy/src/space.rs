@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use sesame_notation::{self as notation, Clauses, Unit, doc_comment, quoted};
 use sesame_plan::condition::Integers;
-use sesame_plan::{self as plan, Shape, Span};
+use sesame_plan::{self as plan, Shape};
 
 use crate::campaigns;
 use crate::dialect::Dialect;
@@ -120,6 +120,9 @@ impl Writer<'_> {
             let doc = format!("In the original: {kind}{at}. Name your simulator here.");
             let _ = write!(text, "  {}", doc_comment(&doc));
             self.notes.say(Kind::Changed, format!("simulator {kind}{at}: its line is a placeholder to be replaced"));
+        } else {
+            let text = "the file names no simulator: the line of the simulator is a placeholder to be replaced";
+            self.notes.say(Kind::Noted, text);
         }
         let step = simulator.step_ms.filter(|step| (0.001..=3_600_000.0).contains(step));
         // Times are whole nanoseconds.
@@ -240,6 +243,7 @@ impl Writer<'_> {
             self.notes.say(Kind::LeftOut, format!("{called}: it names no variable"));
             return Vec::new();
         };
+        self.note_unpublished(operation, &called, &topic);
         let mut parts = Vec::new();
         match &operation.kind {
             OperationKind::RandomValue { relative, values } => {
@@ -291,6 +295,10 @@ impl Writer<'_> {
             }
             OperationKind::PacketLoss { keep } => {
                 let (low, high) = ordered(keep.0, keep.1, &called, self.notes);
+                if low < 0.0 || high > 1.0 {
+                    let text = format!("{called}: its probability [{low}, {high}] is cut to what lies between 0 and 1");
+                    self.notes.say(Kind::Changed, text);
+                }
                 let (low, high) = (low.clamp(0.0, 1.0), high.clamp(0.0, 1.0));
                 let loss = Unit::Share.range(meant(1.0 - high), meant(1.0 - low));
                 self.notes.say(
@@ -302,6 +310,13 @@ impl Writer<'_> {
                 parts.push(Part { name, effect: Effect::Loss });
             }
             OperationKind::Latency { delay, randomised } => {
+                if *delay == (0.0, 0.0) {
+                    let text = format!("{called}: the file gives no range of delays, so it delays by 0s");
+                    self.notes.say(Kind::Noted, text);
+                }
+                if delay.0.min(delay.1) < 0.0 {
+                    self.notes.say(Kind::Changed, format!("{called}: no delay is negative, so its range begins at 0s"));
+                }
                 let (low, high) = ordered(delay.0.max(0.0), delay.1.max(0.0), &called, self.notes);
                 let uniform = if *randomised { " uniform" } else { "" };
                 let name = self.declared_name(&wanted, operation, text);
@@ -382,12 +397,24 @@ impl Writer<'_> {
         self.notes.say(Kind::Mapped, format!("{called} is custom: its Java code is to be written in Rust"));
         let offline = topic.is_none();
         if let Some((topic, _)) = topic {
+            self.note_unpublished(operation, &called, &topic);
             let _ = writeln!(text, "operation {name} on {topic} = custom {block}{clauses}");
         } else {
             self.notes.say(Kind::Changed, format!("{called} names no variable: it is called before the start"));
             let _ = writeln!(text, "operation {name} = custom before start {block}");
         }
         vec![Part { name, effect: Effect::Custom { parameters, offline } }]
+    }
+
+    /// Notes that no node of the file publishes what an operation disturbs.
+    fn note_unpublished(&mut self, operation: &Operation, called: &str, topic: &str) {
+        let original = self.original;
+        let disturbed = operation.variable.and_then(|variable| original.variable(variable));
+        let published = original.system.nodes.iter().flat_map(|node| &node.publishes);
+        if !published.into_iter().any(|&variable| original.variable(variable) == disturbed) {
+            self.notes
+                .say(Kind::Noted, format!("{called}: no node of the file publishes `{topic}`, which it disturbs"));
+        }
     }
 
     /// The name of an operation, and above its line what it was called.
@@ -403,17 +430,14 @@ impl Writer<'_> {
         let mut clauses = Clauses::default();
         if let Activation::Time(start, end) = operation.activation {
             let (start, end) = ordered(start, end, &format!("the window of {called}"), self.notes);
-            let start = start.max(0.0);
-            if start >= end {
-                self.notes
-                    .say(Kind::Changed, format!("{called}: its window is empty, so it may be active at any time"));
-            } else if start >= self.first_ends[at] {
-                self.notes.say(
-                    Kind::Changed,
-                    format!("{called}: its window begins when tests are over, so it may be active at any time"),
-                );
-            } else {
-                clauses.within = Some(Span { start, end });
+            if start < 0.0 && end > 0.0 {
+                let start = Unit::SECONDS.number(start);
+                self.notes.say(Kind::Changed, format!("{called}: its window begins at {start}: at 0s now"));
+            }
+            clauses.within = self.permitted(at);
+            if clauses.within.is_none() {
+                let why = if start.max(0.0) < end { "begins when tests are over" } else { "is empty" };
+                self.notes.say(Kind::Changed, format!("{called}: its window {why}, so it may be active at any time"));
             }
         }
         if operation.priority != 0 {

@@ -165,20 +165,15 @@ impl Messages {
         at
     }
 
-    /// Makes sure that a path leads from a type to a number, if need be by declaring fields on the way. What stands in
-    /// the way is said in words.
+    /// Makes sure that a path leads from a type to a number, if need be by declaring fields on the way. A step may name
+    /// an element of a list, `objects[0]`. What stands in the way is said in words.
     pub(crate) fn reach(&mut self, from: &Type, path: &[String], names: &mut Names) -> Result<(), String> {
         let mut ty = from.clone();
-        for (at, name) in path.iter().enumerate() {
-            let Type::Message(message) = ty else { return Err(format!("there is no field `{}`", printable(name))) };
-            if name.contains('[') {
-                return Err("elements of lists cannot be disturbed".to_owned());
-            }
-            if !is_field(name) {
-                return Err(format!("`{}` is no name of a field", printable(name)));
-            }
+        for (at, step) in path.iter().enumerate() {
+            let Type::Message(message) = ty else { return Err(format!("there is no field `{}`", printable(step))) };
+            let (name, in_list) = field_of(step)?;
             let found = self.list[message].fields.iter().find(|(field, _)| field == name).map(|(_, ty)| ty.clone());
-            ty = if let Some(found) = found {
+            let field = if let Some(found) = found {
                 found
             } else {
                 let new = if at + 1 == path.len() {
@@ -187,8 +182,14 @@ impl Messages {
                     let inner = format!("{}_{name}", self.list[message].name);
                     Type::Message(self.add(&inner, names))
                 };
-                self.list[message].fields.push((name.clone(), new.clone()));
+                let new = if in_list { Type::List(Box::new(new)) } else { new };
+                self.list[message].fields.push((name.to_owned(), new.clone()));
                 new
+            };
+            ty = match field {
+                Type::List(element) if in_list => *element,
+                _ if in_list => return Err(format!("`{name}` is not a list")),
+                field => field,
             };
         }
         match ty {
@@ -228,6 +229,24 @@ impl Messages {
             let _ = writeln!(text, "  message {} {{ {} }}", message.name, fields.join("  "));
         }
         text
+    }
+}
+
+/// The field that a step of a path names, and whether the step goes on to an element of it.
+fn field_of(step: &str) -> Result<(&str, bool), String> {
+    let (name, position) = match step.split_once('[') {
+        Some((name, rest)) => (name, Some(rest.strip_suffix(']').unwrap_or_default())),
+        None => (step, None),
+    };
+    if !is_field(name) {
+        return Err(format!("`{}` is no name of a field", printable(step)));
+    }
+    let is_position = |text: &str| (1..=6).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit());
+    match position {
+        Some(position) if !is_position(position) => {
+            Err(format!("`{}` does not name an element of a list", printable(step)))
+        }
+        position => Ok((name, position.is_some())),
     }
 }
 

@@ -1,8 +1,10 @@
 //! What the parts of a space share while they are written: names that were given, and what of the original became what.
 
+use sesame_plan::Span;
+
 use crate::naming::Names;
 use crate::notes::{Kind, Notes};
-use crate::original::{Original, Reference};
+use crate::original::{Activation, Original, Reference};
 use crate::parts::{Holders, Part};
 use crate::types::{Messages, Type};
 use crate::xml::printable;
@@ -44,6 +46,13 @@ impl Writer<'_> {
             self.notes.say(Kind::Renamed, format!("{kind} `{}` is `{name}` here", printable(original)));
         }
         name
+    }
+
+    /// When what tests hold may be active, by its position, as its `within` says; `None` for at any time.
+    pub(crate) fn permitted(&self, at: usize) -> Option<Span> {
+        let Activation::Time(start, end) = self.mapped.holders.operations[at].activation else { return None };
+        let (start, end) = (start.min(end).max(0.0), start.max(end));
+        (start < end && start < self.first_ends[at]).then_some(Span { start, end })
     }
 
     /// The topic that a reference to a variable became.

@@ -68,6 +68,12 @@ pub(super) enum Purpose {
 }
 
 impl Generation {
+    /// With the defaults of everything but the campaign and the place of its runner.
+    pub(super) fn of(file: PathBuf, campaign: Option<String>, out: Option<PathBuf>) -> Self {
+        let diagnostics = Diagnostics { format: Format::Human };
+        Generation { file, campaign, out, force: false, runtime: None, templates: None, diagnostics }
+    }
+
     pub(super) fn options(&self) -> Options {
         Options { runtime: self.runtime.clone(), templates: self.templates.clone(), ..Options::default() }
     }

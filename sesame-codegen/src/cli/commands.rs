@@ -1,15 +1,13 @@
 //! What each subcommand does.
 
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail};
 use sesame_dsl::diagnostic::visible;
 use sesame_plan::Transport;
 
 use super::arguments::{Deny, ExplainFormat, Generation, Purpose};
-use super::build;
 use super::shell::{self, Format, Shell};
 use crate::emit::Templates;
 use crate::environment::{self, Options, RuntimeChoice, environment};
@@ -18,32 +16,41 @@ use crate::frontend::{Checked, Language};
 use crate::input;
 use crate::output::{self, Change, Mode, Orphan, Report};
 use crate::plan::{OperationPlan, RunnerPlan};
-use crate::{emit, names, project};
+use crate::{emit, project};
 
 /// `sesamec new`
 pub(super) fn new(
     shell: Shell,
     folder: &Path,
+    simulator: project::Simulator,
     runtime: Option<&RuntimeChoice>,
     templates: Option<&Path>,
 ) -> anyhow::Result<ExitCode> {
     let templates = templates.map_or_else(|| Ok(Templates::default()), environment::templates);
     let templates = templates.map_err(|errors| all(&errors))?;
-    output::create(folder, &project::files(folder, runtime, &templates)?)?;
+    output::create(folder, &project::files(folder, simulator, runtime, &templates)?)?;
     let name = folder.file_name().unwrap_or_default().display();
     let space = folder.join(format!("{name}.sesame"));
     let (space, hook) = (space.display(), folder.join(project::HOOK_FILE));
     let (sesamec, hook, line) = (shell::command(), hook.display(), project::HOOK_LINE);
-    shell.did("Created", format!("{}: a space, a simulator of its own, and a README", folder.display()));
-    shell.text(&format!(
-        "\nNext steps to a first front:\n\
-         \n  1. generate the runner and a stub for its metric\n\
-         \n         {sesamec} generate {space}\n\
-         \n  2. fill in the stub: in {hook}, replace the body of `on_clearance` with\n\
-         \n         {line}\n\
-         \n  3. run the campaign\n\
-         \n         {sesamec} run {space}\n"
-    ));
+    match simulator {
+        project::Simulator::Rust => {
+            shell.did("Created", format!("{}: a space, a simulator of its own, and a README", folder.display()));
+            shell.text(&format!(
+                "\nNext steps to a first front:\n\
+                 \n  1. generate the runner and a stub for its metric\n\
+                 \n         {sesamec} generate {space}\n\
+                 \n  2. fill in the stub: in {hook}, replace the body of `on_clearance` with\n\
+                 \n         {line}\n\
+                 \n  3. run the campaign\n\
+                 \n         {sesamec} run {space}\n"
+            ));
+        }
+        project::Simulator::Python => {
+            shell.did("Created", format!("{}: a space, a simulator in Python, and a README", folder.display()));
+            shell.text(&format!("\nTo a first front:\n\n    {sesamec} run {space}\n"));
+        }
+    }
     Ok(ExitCode::SUCCESS)
 }
 
@@ -153,38 +160,6 @@ fn preview(out: &Path, report: &Report) -> String {
     text
 }
 
-/// `sesamec run`
-pub(super) fn run(
-    shell: Shell,
-    language: &Language,
-    generation: &Generation,
-    arguments: &[OsString],
-) -> anyhow::Result<ExitCode> {
-    let checked = check(shell, language, &generation.file, generation.diagnostics.format)?;
-    let chosen = choose(&checked, &generation.file, generation.campaign.as_deref())?;
-    let mode = if generation.force { Mode::Force } else { Mode::Write };
-    let (out, _) = write(shell, generation, &generation.options(), &checked, &[chosen], mode)?;
-    let campaign = &checked.plans[chosen].plan.campaign.name;
-    let program = build::build(shell, &out.join(names::campaign_folder(campaign)), campaign)?;
-    let mut runner = Command::new(&program);
-    runner.arg("run").args(arguments);
-    start(runner).with_context(|| format!("cannot run {}", program.display()))
-}
-
-/// Becomes the runner: Ctrl-C and exit code are then its own.
-#[cfg(unix)]
-fn start(mut runner: Command) -> std::io::Result<ExitCode> {
-    use std::os::unix::process::CommandExt as _;
-    Err(runner.exec())
-}
-
-/// Waits for the runner, which gets Ctrl-C from the console as well.
-#[cfg(not(unix))]
-fn start(mut runner: Command) -> std::io::Result<ExitCode> {
-    let code = runner.status()?.code().unwrap_or(1);
-    Ok(u8::try_from(code).map_or(ExitCode::FAILURE, ExitCode::from))
-}
-
 /// `sesamec explain CODE`
 pub(super) fn explain_code(language: &Language, code: &str) -> anyhow::Result<ExitCode> {
     if let Some(page) = (language.explain)(code) {
@@ -239,7 +214,7 @@ pub(super) fn explain_name(
 }
 
 /// The campaign of a name, or the only one.
-fn choose(checked: &Checked, file: &Path, name: Option<&str>) -> anyhow::Result<usize> {
+pub(super) fn choose(checked: &Checked, file: &Path, name: Option<&str>) -> anyhow::Result<usize> {
     let campaigns: Vec<&str> = checked.plans.iter().map(|runner| runner.plan.campaign.name.as_str()).collect();
     let file = file.display();
     let Some(name) = name else {
@@ -262,7 +237,7 @@ fn choose(checked: &Checked, file: &Path, name: Option<&str>) -> anyhow::Result<
 }
 
 /// Generates some of a space's campaigns, and says so.
-fn write(
+pub(super) fn write(
     shell: Shell,
     generation: &Generation,
     options: &Options,
@@ -308,7 +283,7 @@ fn write(
 }
 
 /// Several errors as one; the shell shows each on its own.
-fn all(errors: &[impl std::fmt::Display]) -> anyhow::Error {
+pub(super) fn all(errors: &[impl std::fmt::Display]) -> anyhow::Error {
     anyhow!(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\u{1e}"))
 }
 

@@ -1,7 +1,7 @@
 //! `sesamec import`: a testing space of the original platform becomes a space and results.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail};
@@ -10,6 +10,7 @@ use sesame_legacy::{Imported, Kind, Recorded};
 use super::commands;
 use super::shell::{self, Format, Shell};
 use crate::frontend::{Checked, Language};
+use crate::output::FreshFolder;
 use crate::{input, output};
 
 /// Notes of one kind that are shown at most; files repeat themselves.
@@ -37,15 +38,14 @@ pub(super) fn import(shell: Shell, language: &Language, file: &Path, out: &Path)
         written.unwrap_or_else(|| commands::has_errors(&space, found.errors).context(nothing()))
     })?;
     let checked = commands::check_text(shell, language, &space, &text, Format::Human).with_context(nothing)?;
-    let was_there = out.exists();
-    output::create(out, &BTreeMap::from([(name.clone(), text)]))?;
-    let recorded = record(&mut imported, &checked, out).inspect_err(|_| {
-        // The first error is the one to hear of.
-        drop(output::withdraw(out, &name, was_there));
-    })?;
+    let folder = FreshFolder::begin(out)?;
+    output::create(folder.path(), &BTreeMap::from([(name, text)]))?;
+    let recorded = record(&mut imported, &checked, folder.path())?;
+    folder.settle()?;
     shell.did("Imported", format!("{}: into {}", file.display(), space.display()));
     shell.did("Checked", format!("{}: {}", space.display(), checked.summary));
-    for (folder, Recorded { tests, sets }) in recorded {
+    for (campaign, Recorded { tests, sets }) in recorded {
+        let folder = out.join(output::RESULTS).join(campaign);
         shell.did(
             "Recorded",
             format!("{}: {}, {}", folder.display(), counted(tests, "test"), counted(sets, "result set")),
@@ -77,19 +77,20 @@ pub(super) fn import(shell: Shell, language: &Language, file: &Path, out: &Path)
     Ok(ExitCode::SUCCESS)
 }
 
-/// Records the tests of every campaign that performed some: the folder of each, and what is in it.
-fn record(imported: &mut Imported, checked: &Checked, out: &Path) -> anyhow::Result<Vec<(PathBuf, Recorded)>> {
+/// Records the tests of every campaign that performed some: the name of the folder of each, and what is in it.
+fn record(imported: &mut Imported, checked: &Checked, out: &Path) -> anyhow::Result<Vec<(String, Recorded)>> {
     let performed: Vec<(usize, String)> = imported.performed().map(|(at, name)| (at, name.to_owned())).collect();
     let mut all = Vec::new();
     for (at, campaign) in performed {
         let plan = checked.plans.iter().find(|runner| runner.plan.campaign.name == campaign);
         let Some(plan) = plan else { bail!("the space has no campaign `{campaign}`") };
-        let folder = out.join(output::RESULTS).join(crate::names::campaign_folder(&campaign));
+        let name = crate::names::campaign_folder(&campaign);
+        let folder = out.join(output::RESULTS).join(&name);
         let recorded = imported
             .record(at, &plan.plan, &folder)
             .map_err(|error| anyhow!(error))
             .with_context(|| format!("cannot import the results of `{campaign}`, so nothing was written"))?;
-        all.push((folder, recorded));
+        all.push((name, recorded));
     }
     Ok(all)
 }

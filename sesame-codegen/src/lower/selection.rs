@@ -102,6 +102,7 @@ impl Selection {
             doc: test.declaration.doc.clone(),
             test: plan::Test { operations: operations.collect() },
             expectations: expectations.collect(),
+            simulator_seed: test.simulator_seed,
         }
     }
 
@@ -157,6 +158,7 @@ pub(super) fn without_operations() -> plan::KnownTest {
         doc: String::new(),
         test: plan::Test { operations: Vec::new() },
         expectations: Vec::new(),
+        simulator_seed: None,
     }
 }
 

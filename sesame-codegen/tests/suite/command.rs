@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use sesame_codegen::cli::{Shell, run};
 use sesame_codegen::frontend::{Checked, Diagnosed, Found, Language, Look};
+use sesame_codegen::project::Simulator;
 
 use crate::plans::small;
 
@@ -129,16 +130,22 @@ fn a_new_project_has_a_name_that_a_space_can_have() {
     }
 }
 
+fn new_project(simulator: Simulator) -> String {
+    let runtime = sesame_codegen::environment::RuntimeChoice::Version("0.1.0".into());
+    let templates = sesame_codegen::emit::Templates::default();
+    let files = sesame_codegen::project::files(Path::new("demo"), simulator, Some(&runtime), &templates).unwrap();
+    let shown: Vec<String> = files.iter().map(|(path, text)| format!("═══ {path}\n{text}")).collect();
+    shown.join("\n")
+}
+
 #[test]
 fn the_texts_of_a_new_project() {
-    let files = sesame_codegen::project::files(
-        Path::new("demo"),
-        Some(&sesame_codegen::environment::RuntimeChoice::Version("0.1.0".into())),
-        &sesame_codegen::emit::Templates::default(),
-    )
-    .unwrap();
-    let shown: Vec<String> = files.iter().map(|(path, text)| format!("═══ {path}\n{text}")).collect();
-    insta::assert_snapshot!(shown.join("\n"));
+    insta::assert_snapshot!(new_project(Simulator::Rust));
+}
+
+#[test]
+fn the_texts_of_a_new_project_in_python() {
+    insta::assert_snapshot!(new_project(Simulator::Python));
 }
 
 #[test]

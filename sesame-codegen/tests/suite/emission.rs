@@ -46,7 +46,8 @@ fn a_simulator_that_is_a_program_needs_its_transport_and_no_crate() {
     let trees = emit(&[with_program("c")], &environment).unwrap();
     let file = |path: &str| trees[1].files[path].text().into_owned();
     insta::assert_snapshot!(file("src/generated/campaign.rs"));
-    assert!(file("Cargo.toml").contains(r#"features = ["campaign", "process"]"#), "{}", file("Cargo.toml"));
+    let features = r#"features = ["campaign", "in-process", "mcap", "process"]"#;
+    assert!(file("Cargo.toml").contains(features), "{}", file("Cargo.toml"));
     let plan: sesame_plan::CampaignPlan = serde_json::from_str(&file("campaign.plan.json")).unwrap();
     assert_eq!(plan, with_program("c").plan);
 }

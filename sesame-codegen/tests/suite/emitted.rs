@@ -116,7 +116,13 @@ fn the_simulator_of_a_new_project_passes_its_own_tests() {
     let project = folder.path().join("demo");
     sesame_codegen::output::create(
         &project,
-        &sesame_codegen::project::files(&project, None, &Templates::default()).unwrap(),
+        &sesame_codegen::project::files(
+            &project,
+            sesame_codegen::project::Simulator::Rust,
+            None,
+            &Templates::default(),
+        )
+        .unwrap(),
     )
     .unwrap();
     let workspace = sesame_codegen::environment::checkout_runtime().unwrap();

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
 use sesame_codegen::cli::{Shell, run};
@@ -70,7 +70,7 @@ const VALUES: &[&str] = &[
 ];
 
 /// Numbers from a seed (`SplitMix64`).
-struct Draws(u64);
+pub(crate) struct Draws(pub(crate) u64);
 
 impl Draws {
     fn bits(&mut self) -> u64 {
@@ -81,7 +81,7 @@ impl Draws {
         x ^ (x >> 31)
     }
 
-    fn below(&mut self, n: usize) -> usize {
+    pub(crate) fn below(&mut self, n: usize) -> usize {
         usize::try_from(self.bits() % u64::try_from(n.max(1)).unwrap()).unwrap()
     }
 }
@@ -292,4 +292,57 @@ fn what_is_not_mutated_is_imported() {
     // A campaign of 8 s repeats the test too, in which other operations begin later.
     assert!(text.contains("push offset [-0.15, 0.15] from 6s to 18s"), "{text}");
     assert!(!text.contains("lose loss 50% from"), "{text}");
+}
+
+/// A file whose import takes a while: the first performed test is there so many times.
+fn large(times: usize) -> String {
+    let (before, test) = WHOLE.split_once("    <performedTests ").unwrap();
+    let (test, after) = test.split_once("</performedTests>\n").unwrap();
+    let tests = format!("    <performedTests {test}</performedTests>\n").repeat(times);
+    [before, &tests, after].concat()
+}
+
+#[test]
+fn an_import_that_is_killed_leaves_nothing_half_imported() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("arm.model");
+    fs::write(&file, large(150)).unwrap();
+    let import = |out: &Path| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sesamec"));
+        command.args(["import".as_ref(), file.as_os_str(), "-o".as_ref(), out.as_os_str()]);
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        command
+    };
+    let begun = Instant::now();
+    let whole = folder.path().join("whole");
+    assert!(import(&whole).status().unwrap().success());
+    let (all, takes) = (names(&whole).len(), begun.elapsed());
+    let mut killed = 0;
+    for moment in 0..6 {
+        let out = folder.path().join("out");
+        let there = moment % 2 == 0;
+        if there {
+            fs::create_dir(&out).unwrap();
+        }
+        let mut import = import(&out).spawn().unwrap();
+        std::thread::sleep(takes * moment / 7);
+        import.kill().unwrap();
+        if !import.wait().unwrap().success() {
+            killed += 1;
+        }
+        // All of it, or nothing that could be taken for a space or for results.
+        let found = if out.exists() { names(&out) } else { BTreeSet::new() };
+        let hidden = out.join(".sesamec-import");
+        let seen = found.iter().filter(|path| !path.starts_with(&hidden)).count();
+        assert!(seen == 0 || seen == all, "{found:?}");
+        // The next import into the folder is as the first.
+        if seen == 0 {
+            assert!(sesamec(&["import", file.to_str().unwrap(), "-o", out.to_str().unwrap()]));
+            assert_eq!(names(&out).len(), all);
+        }
+        fs::remove_dir_all(&out).unwrap();
+    }
+    assert!(killed >= 3, "{killed} of 6 were killed before they were done");
+    let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(left.len(), 2, "{left:?}");
 }

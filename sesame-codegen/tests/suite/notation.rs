@@ -12,7 +12,7 @@ use sesame_dsl::diagnostic::Severity;
 use sesame_dsl::diagnostic::render::human;
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::units;
-use sesame_notation::{doc_comment, expectation, test_block, test_operation};
+use sesame_notation::{doc_comment, expectation, simulator_seed, test_block, test_operation};
 use sesame_plan::condition::{
     Comparison, Condition, ConditionEnd, ConditionSpace, Constraint, Integers, Operand, Variable,
 };
@@ -109,7 +109,8 @@ fn written(system: &str, plan: &CampaignPlan) -> String {
     for test in &plan.tests {
         let operations = test.test.operations.iter().map(|used| test_operation(plan, used));
         let expected = test.expectations.iter().map(|expected| expectation(expected, &plan.metrics));
-        text.push_str(&test_block(&test.doc, &test.name, operations.chain(expected)));
+        let seed = test.simulator_seed.map(simulator_seed);
+        text.push_str(&test_block(&test.doc, &test.name, operations.chain(seed).chain(expected)));
     }
     text
 }
@@ -313,13 +314,11 @@ fn tests(operations: &[Operation], metrics: u32) -> impl Strategy<Value = Vec<Kn
     let used = (0..).map(OperationId).zip(operations).map(|(id, operation)| used(id, operation, metrics));
     let used = Union::new(used);
     let expected = (0..metrics, bound()).prop_map(|(metric, bound)| Expectation { metric: MetricId(metric), bound });
-    let test = (prop::collection::vec(used, 1..12), prop::collection::vec(expected, 0..4), doc());
+    let seed = prop::option::of(any::<u64>());
+    let test = (prop::collection::vec(used, 1..12), prop::collection::vec(expected, 0..4), doc(), seed);
     prop::collection::vec(test, 1..6).prop_map(|tests| {
-        let tests = tests.into_iter().enumerate().map(|(at, (operations, expectations, doc))| KnownTest {
-            name: format!("test{at}"),
-            doc,
-            test: Test { operations },
-            expectations,
+        let tests = tests.into_iter().enumerate().map(|(at, (operations, expectations, doc, simulator_seed))| {
+            KnownTest { name: format!("test{at}"), doc, test: Test { operations }, expectations, simulator_seed }
         });
         tests.collect()
     })
@@ -405,7 +404,7 @@ fn campaign(like: &Campaign, metrics: &[Metric], end_after: f64) -> impl Strateg
 }
 
 /// A plan like this one with some of its operations, with other numbers, texts, tests and settings.
-fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<> {
+pub(crate) fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<> {
     let (like, metrics) = (like.clone(), u32::try_from(like.metrics.len()).expect("there are a few metrics"));
     let settings = like.clone();
     let campaigns = (1.0..1e4f64).prop_flat_map(move |end| campaign(&settings.campaign, &settings.metrics, end));
@@ -432,7 +431,7 @@ fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<> {
 
 /// A plan that a failure shows as text.
 #[derive(Clone)]
-struct Shown(CampaignPlan);
+pub(crate) struct Shown(pub(crate) CampaignPlan);
 
 impl fmt::Debug for Shown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -441,7 +440,7 @@ impl fmt::Debug for Shown {
 }
 
 /// A system in every unit, and the plan of a campaign with each operation.
-fn everything() -> (String, CampaignPlan) {
+pub(crate) fn everything() -> (String, CampaignPlan) {
     let units: Vec<&str> = units::symbols().chain(COMPOUND).chain([""]).collect();
     let system = system(&units);
     let operations = operations(&units);

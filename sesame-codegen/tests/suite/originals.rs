@@ -12,7 +12,7 @@ use sesame_search::sspr::Convention;
 use tempfile::TempDir;
 
 /// A space in a dialect: its head, and names of elements and attributes that changed over the years.
-fn space(head: &str, body: &str) -> String {
+pub(crate) fn space(head: &str, body: &str) -> String {
     format!(
         r#"<?xml version="1.0" encoding="ASCII"?>
 <TestingMM:TestingSpace xmi:version="2.0" xmlns:xmi="http://www.omg.org/XMI" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" {head} xmi:id="_space" name="arm-space">
@@ -22,10 +22,10 @@ fn space(head: &str, body: &str) -> String {
     )
 }
 
-const NUMBERED: &str =
+pub(crate) const NUMBERED: &str =
     r#"xmlns="Metrics" xmlns:TestingMM="TestingMM" xmlns:_1="FuzzingOperations" xmlns:_2="MRSPackage""#;
 
-const SYSTEM: &str = r#"
+pub(crate) const SYSTEM: &str = r#"
   <mrs launchDelaySeconds="10">
     <variables xmi:id="_v0" name="arm/link0" type="_t0"/>
     <variables xmi:id="_v1" name="/arm/velocityIN" type="_t1"/>
@@ -37,12 +37,12 @@ const SYSTEM: &str = r#"
     <propertyType xmi:id="_t2" name="SafetyZone"/>
   </mrs>"#;
 
-const METRICS: &str = r#"
+pub(crate) const METRICS: &str = r#"
   <metrics xsi:type="FuzzingOperationTimesMetric" xmi:id="_m0" name="times" dir="LOWEST" useInOptimisation="true"><valueIfNotReceived defaultVal="1000.0"/></metrics>
   <metrics xsi:type="StreamMetric" xmi:id="_m1" name="hits" relatedVariables="_v2" useInOptimisation="true"><valueIfNotReceived/></metrics>
   <metrics xsi:type="StreamMetric" xmi:id="_m2" name="near" relatedVariables="_v2"><initValue defaultVal="10.0"/></metrics>"#;
 
-const OPERATIONS: &str = r#"
+pub(crate) const OPERATIONS: &str = r#"
   <possibleFuzzingOperations xsi:type="_1:RandomValueFromSetOperation" xmi:id="_o0" name="push" variableToAffect="_v0" isRelative="true">
     <activation xsi:type="_1:FixedTimeActivation" endTime="60.0"/>
     <valueSet xsi:type="_1:DoubleRange" propertyName="" lowerBound="0.3" upperBound="-0.3"/>
@@ -57,7 +57,7 @@ const OPERATIONS: &str = r#"
     <valueSet xsi:type="_1:DoubleRange" propertyName="geometry_msgs/Twist.angular.Z" lowerBound="-2.0" upperBound="2.0"/>
   </possibleFuzzingOperations>"#;
 
-const CAMPAIGN: &str = r#"
+pub(crate) const CAMPAIGN: &str = r#"
   <campaigns name="first-campaign" metrics="_m0 _m1" includedOperations="_o0 _o1 _o2">
     <approach xsi:type="TestingMM:NSGAWithCoverageCells" populationSize="5" iterations="40" targetCoverageProportion="0.5" useMutationEnhancingCoverage="true">
       <dimensionRecords maxValue="1.0" count="4"/>
@@ -98,7 +98,7 @@ const CAMPAIGN: &str = r#"
     <endTrigger xsi:type="TestingMM:TimeBasedEnd" timeLimitSeconds="70"/>
   </campaigns>"#;
 
-fn whole() -> String {
+pub(crate) fn whole() -> String {
     space(NUMBERED, &[METRICS, OPERATIONS, CAMPAIGN, SYSTEM].concat())
 }
 
@@ -114,7 +114,7 @@ fn read(path: &Path) -> Result<Imported, Broken> {
     Imported::read(path, File::open(path).unwrap())
 }
 
-fn imported(words: &str) -> Imported {
+pub(crate) fn imported(words: &str) -> Imported {
     let (_folder, path) = written(words);
     read(&path).unwrap_or_else(|broken| panic!("{broken}"))
 }
@@ -126,7 +126,7 @@ fn broken(words: &str) -> String {
 }
 
 /// The plan of a campaign of the space that was written, which has no errors.
-fn plan(imported: &Imported, campaign: &str) -> CampaignPlan {
+pub(crate) fn plan(imported: &Imported, campaign: &str) -> CampaignPlan {
     let checked = (SESAME.check)("arm.sesame", imported.text(), Look::Human { colour: false });
     assert_eq!(checked.errors, 0, "{}\n{}", checked.diagnostics, imported.text());
     let plan = checked.plans.into_iter().find(|runner| runner.plan.campaign.name == campaign);

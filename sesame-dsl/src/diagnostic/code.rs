@@ -79,6 +79,8 @@ codes! {
     NOT_A_CONDITION = "E0306": "A condition contains something other than comparisons of metrics.",
     CONSTANT_COMPARISON = "E0307": "A comparison has the same outcome in every test.",
     TEMPORAL_REACH = "E0308": "The scope of a temporal operator is ambiguous.",
+    BAD_REGION = "E0309": "The corners of a region do not enclose anything, or not one thing.",
+    UNPAIRED = "E0310": "Members of groups are read together that do not belong together.",
     REVERSED_RANGE = "E0401": "A range begins above its end.",
     OUT_OF_RANGE = "E0402": "A value is outside the permitted range.",
     WRONG_CHOICE = "E0403": "A test's choice does not fit the operation's parameter.",

@@ -244,6 +244,11 @@ impl<'a> Indexer<'a> {
     fn path(&mut self, path: &'a Path, within: DefinitionId) {
         let mut target = self.mention(&path.topic, within);
         for field in &path.fields {
+            let ty = target.and_then(|target| self.types.get(&target));
+            if ty.is_some_and(|ty| matches!(ty.kind, TypeKind::Point)) {
+                // Its coordinates are words of the language.
+                return;
+            }
             target = self.field(target, field, within);
         }
     }
@@ -260,12 +265,19 @@ impl<'a> Indexer<'a> {
 
     fn expression(&mut self, expression: &'a Expression, within: DefinitionId) {
         match &expression.kind {
-            ExpressionKind::Number(_) | ExpressionKind::Truth(_) => {}
+            ExpressionKind::Number(_)
+            | ExpressionKind::Truth(_)
+            | ExpressionKind::Text(_)
+            | ExpressionKind::Point(_)
+            | ExpressionKind::Region(_) => {}
             ExpressionKind::Field(path) if path.fields.is_empty() => {
                 // Inside of a monitor its own names come first.
                 let own = self.members.get(&(within, path.topic.text.as_str())).copied();
+                // The simulation time is a word of the language, unless something is named like it.
+                let time = path.topic.text == "time" && !self.names.contains_key("time");
                 match own {
                     Some(own) => self.refer(path.topic.span, Some(own), within),
+                    None if time => {}
                     None => self.path(path, within),
                 }
             }
@@ -383,7 +395,7 @@ impl<'a> Indexer<'a> {
     }
 
     fn test(&mut self, test: &'a Test, id: DefinitionId) {
-        let Test { head: _, operations, expectations, has_errors: _ } = test;
+        let Test { head: _, operations, expectations, simulator_seeds: _, has_errors: _ } = test;
         for used in operations {
             let operation = self.mention(&used.operation, id);
             for (name, _) in &used.choices {

@@ -3,7 +3,7 @@
 //! Numbers are in the units of the wire or of a conversion that is part of the expression; so evaluating one
 //! needs no units.
 
-use sesame_plan::{Aggregate, Condition, Members};
+use sesame_plan::{Aggregate, Condition, Members, TextTest};
 
 use super::system::FieldPath;
 
@@ -27,8 +27,10 @@ pub struct Formula {
 /// A value held from the messages of a topic.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Input {
-    /// Where it comes from.
+    /// Where it comes from. Its fields may end with `x`, `y` or `z` of a point.
     pub field: FieldPath,
     /// What is made of a group's members.
     pub members: Members,
+    /// For a text: the input is whether this holds of it.
+    pub text: Option<TextTest>,
 }

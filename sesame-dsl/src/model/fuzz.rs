@@ -104,6 +104,8 @@ pub struct Test {
     pub operations: Vec<TestOperation>,
     /// What must come out.
     pub expectations: Vec<Expectation>,
+    /// The seed of the simulator, if the test has one of its own.
+    pub simulator_seed: Option<u64>,
 }
 
 /// An operation as a known test applies it.

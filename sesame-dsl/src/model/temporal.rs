@@ -8,10 +8,11 @@ use super::formula::Input;
 /// By how much a test keeps a temporal formula (positive) or breaks it (negative), in the unit of its comparisons.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Robustness {
-    /// What its signals refer to by position; each once, at least one. Of those that are `each of` a group's members,
-    /// all are of one group: then the formula is that of each member, and the least counts.
+    /// What its signals refer to by position; each once, at least one. Those that are `each of` are all of groups with
+    /// the same members: then the formula is that of each member. Those that are of pairs are all of one group: then it
+    /// is that of each pair. The least counts.
     pub inputs: Vec<Input>,
-    /// What its comparisons refer to by position, all in one unit; each has an input.
+    /// What its comparisons refer to by position, all in one unit; each has an input or the time.
     pub signals: Vec<Expression>,
     /// What is to hold.
     pub formula: Temporal,

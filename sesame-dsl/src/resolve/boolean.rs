@@ -2,9 +2,9 @@
 
 use std::cmp::Ordering;
 
-use super::{Kind, Resolver};
+use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{Comparison, Condition, Expression, Id as _, Input, Type};
+use crate::model::{Comparison, Condition, Expression, Input, TextTest, Type};
 use crate::span::Span;
 use crate::syntax::ast::{self, ExpressionKind, Path, PrefixWord, Relation};
 
@@ -17,6 +17,9 @@ impl<'a> Resolver<'a> {
             ExpressionKind::Compare(left, comparison, right) => {
                 let comparison = relation(*comparison);
                 let equality = matches!(comparison, Comparison::Equal | Comparison::NotEqual);
+                if self.is_text(left) || self.is_text(right) {
+                    return self.compared_texts(inputs, left, comparison, right).map(Condition::Input);
+                }
                 if equality && self.is_condition(left) && self.is_condition(right) {
                     let left = self.condition(inputs, left);
                     let right = self.condition(inputs, right);
@@ -100,12 +103,88 @@ impl<'a> Resolver<'a> {
         };
         let (field, _) = self.field(path)?;
         if matches!(members, Some((ast::Members::Sum, _))) {
-            let title = format!("`{}` is a `bool`, which cannot be summed", self.text(path.span));
-            let label = "expected a number after `sum of`";
-            self.report(Diagnostic::new(Code::WRONG_TYPE, expression.span, title).label(label));
+            self.not_summed(expression.span, path, "a `bool`");
             return None;
         }
-        self.input(inputs, path, field, members)
+        self.input(inputs, path, field, members, None)
+    }
+
+    fn not_summed(&mut self, span: Span, path: &Path, is: &str) {
+        let title = format!("`{}` is {is}, which cannot be summed", self.text(path.span));
+        let label = "expected a number after `sum of`";
+        self.report(Diagnostic::new(Code::WRONG_TYPE, span, title).label(label));
+    }
+
+    /// Whether an expression is a text, of a message or written. Reports nothing.
+    pub(super) fn is_text(&self, expression: &ast::Expression) -> bool {
+        match &expression.kind {
+            ExpressionKind::Text(_) => true,
+            ExpressionKind::Field(path) | ExpressionKind::Members(_, _, path) => {
+                self.type_at(&path.topic, &path.fields).is_some_and(|ty| *ty == Type::Text)
+            }
+            _ => false,
+        }
+    }
+
+    /// The position of an input that is whether a text of a message is, or is not, one that is written.
+    pub(super) fn compared_texts(
+        &mut self,
+        inputs: &mut Vec<Input>,
+        left: &'a ast::Expression,
+        by: Comparison,
+        right: &'a ast::Expression,
+    ) -> Option<u32> {
+        let (of, text) = match (&left.kind, &right.kind) {
+            (_, ExpressionKind::Text(text)) => (left, text),
+            (ExpressionKind::Text(text), _) => (right, text),
+            _ => {
+                let (text, other) = if self.is_text(left) { (left, right) } else { (right, left) };
+                let title = format!("the text `{}` is not compared with a written text", self.text(text.span));
+                let diagnostic = Diagnostic::new(Code::WRONG_TYPE, other.span, title)
+                    .label("expected a text in double quotes, such as `\"ready\"`");
+                self.report(diagnostic);
+                return None;
+            }
+        };
+        let (path, members) = match &of.kind {
+            ExpressionKind::Field(path) if self.is_text(of) => (path, None),
+            ExpressionKind::Members(members, word, path) if self.is_text(of) => (path, Some((*members, *word))),
+            ExpressionKind::Text(_) => {
+                let title = format!("`{}` compares two constants", self.text(left.span.to(right.span)));
+                let diagnostic = Diagnostic::new(Code::WRONG_TYPE, left.span.to(right.span), title);
+                self.report(diagnostic.label("expected a topic or field of type `text` on one side"));
+                return None;
+            }
+            _ => {
+                // Mistakes in the other side itself come first.
+                let before = self.diagnostics.len();
+                if !self.is_condition(of) {
+                    self.number(inputs, of);
+                }
+                if self.diagnostics.len() == before {
+                    let title = format!("`{}` is not a text", self.text(of.span));
+                    let label = "expected a topic or field of type `text`";
+                    self.report(Diagnostic::new(Code::WRONG_TYPE, of.span, title).label(label));
+                }
+                return None;
+            }
+        };
+        let test = match by {
+            Comparison::Equal => TextTest::Is(text.text.clone()),
+            Comparison::NotEqual => TextTest::IsNot(text.text.clone()),
+            _ => {
+                let title = "texts have no order";
+                let span = left.span.to(right.span);
+                self.report(Diagnostic::new(Code::WRONG_TYPE, span, title).label("compare them by `==` or `!=`"));
+                return None;
+            }
+        };
+        let (field, _) = self.field(path)?;
+        if matches!(members, Some((ast::Members::Sum, _))) {
+            self.not_summed(of.span, path, "a `text`");
+            return None;
+        }
+        self.input(inputs, path, field, members, Some(test))
     }
 
     fn conditions(&mut self, inputs: &mut Vec<Input>, parts: &'a [ast::Expression]) -> Option<Vec<Condition>> {
@@ -124,20 +203,10 @@ impl<'a> Resolver<'a> {
             | ExpressionKind::Until(..)
             | ExpressionKind::Implies(..) => true,
             ExpressionKind::Field(path) | ExpressionKind::Members(_, _, path) => {
-                self.type_at(path).is_some_and(|ty| *ty == Type::Bool)
+                self.type_at(&path.topic, &path.fields).is_some_and(|ty| *ty == Type::Bool)
             }
             _ => false,
         }
-    }
-
-    fn type_at(&self, path: &Path) -> Option<&Type> {
-        let definition = self.names.get(path.topic.text.as_str()).filter(|found| found.kind == Kind::Topic)?;
-        let topic = self.system.topics.get(definition.index)?.as_ref()?;
-        path.fields.iter().try_fold(&topic.ty, |ty, name| {
-            let Type::Message(id) = ty else { return None };
-            let message = self.system.messages.get(id.index())?.as_ref()?;
-            message.fields.iter().find(|field| field.declaration.name == name.text).map(|field| &field.ty)
-        })
     }
 }
 

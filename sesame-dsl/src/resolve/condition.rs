@@ -5,7 +5,8 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::model::condition::{
     Comparison, Condition, ConditionSpace, Constraint, Integers, Operand, ValueRange, Variable,
 };
-use crate::model::{Activation, Aggregate, End, Expression, Id as _, Metric, MetricId, MetricSource, Range};
+use crate::model::{Activation, Aggregate, BinaryFunction, End, Expression, Id as _, Metric, MetricId, MetricSource};
+use crate::model::{Range, UnaryFunction};
 use crate::span::Span;
 use crate::syntax::ast::{self, ByCondition, Contained, ExpressionKind, Relation, Trigger, TriggerEnd};
 use crate::units::{Unit, convert, dimension};
@@ -160,7 +161,15 @@ impl<'a> Resolver<'a> {
         match &side.kind {
             ExpressionKind::Number(quantity) => Some(Side::Number(quantity)),
             ExpressionKind::Field(path) if path.fields.is_empty() => {
-                let index = self.find(&path.topic, Kind::Metric)?;
+                let before = self.diagnostics.len();
+                let found = self.find(&path.topic, Kind::Metric);
+                if path.topic.text == "time"
+                    && let Some(diagnostic) = self.diagnostics.get_mut(before)
+                {
+                    let note = "to act from a time on, write a window such as `from 5s to 10s` instead of a condition";
+                    diagnostic.notes.push(note.to_owned());
+                }
+                let index = found?;
                 let id = MetricId::from_index(index);
                 self.metrics[index].is_some().then_some(())?;
                 self.known_during_a_test(id, side.span)?;
@@ -178,11 +187,18 @@ impl<'a> Resolver<'a> {
                     | ExpressionKind::Any(_) => {
                         format!("`{written}` is a condition, not a metric")
                     }
+                    ExpressionKind::Text(_) => format!("`{written}` is a text, but metrics are numbers"),
                     _ => format!("`{written}` is an expression, not a metric"),
+                };
+                let note = match kind {
+                    ExpressionKind::Text(_) => format!(
+                        "a condition compares metrics; `when tower == {written} then time` is a metric, and so is `when tower != {written} then time`: the greater of the two is the state that holds"
+                    ),
+                    _ => "a condition compares metrics; declare one for what you want to compare, for example `metric near = last(near1.level)`".to_owned(),
                 };
                 let diagnostic = Diagnostic::new(Code::NOT_A_CONDITION, side.span, title)
                     .label("expected a metric or a number")
-                    .note("a condition compares metrics; declare one for what you want to compare, for example `metric near = last(near1.level)`");
+                    .note(note);
                 self.report(diagnostic);
                 None
             }
@@ -509,11 +525,19 @@ fn known_of(metric: &Metric) -> ValueRange {
 fn never_negative(expression: &Expression) -> bool {
     match expression {
         Expression::Constant(value) => *value >= 0.0,
-        Expression::Absolute(_) | Expression::Distance { .. } => true,
+        Expression::Absolute(_)
+        | Expression::Distance(_)
+        | Expression::Time
+        | Expression::Unary { function: UnaryFunction::Sqrt | UnaryFunction::Exp | UnaryFunction::Acos, .. }
+        | Expression::Binary { function: BinaryFunction::Hypot, .. } => true,
         Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) => of.iter().all(never_negative),
         Expression::Max(of) => of.iter().any(never_negative),
         Expression::Divide { value, by } => never_negative(value) && never_negative(by),
-        Expression::Input(_) | Expression::Negate(_) => false,
+        Expression::Input(_)
+        | Expression::Negate(_)
+        | Expression::SignedDistance(_)
+        | Expression::Unary { .. }
+        | Expression::Binary { .. } => false,
     }
 }
 

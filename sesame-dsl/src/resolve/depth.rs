@@ -14,14 +14,7 @@ pub(super) fn of_aggregate(aggregate: &Aggregate) -> usize {
 
 /// How many expressions are inside of each other, this one included.
 pub(super) fn of_expression(expression: &Expression) -> usize {
-    1 + match expression {
-        Expression::Constant(_) | Expression::Input(_) | Expression::Distance { .. } => 0,
-        Expression::Negate(of) | Expression::Absolute(of) => of_expression(of),
-        Expression::Divide { value, by } => of_expression(value).max(of_expression(by)),
-        Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) | Expression::Max(of) => {
-            of.iter().map(of_expression).max().unwrap_or(0)
-        }
-    }
+    1 + expression.parts().into_iter().map(of_expression).max().unwrap_or(0)
 }
 
 /// How many conditions and expressions are inside of each other, this one included.

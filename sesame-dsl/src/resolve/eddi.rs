@@ -208,6 +208,7 @@ impl<'a> Resolver<'a> {
             );
             return None;
         }
+        self.members_fit(&inputs, evidence.condition.span)?;
         Some(Evidence { declaration: self.declaration(&evidence.head), inputs, condition, held: held?, stale: stale? })
     }
 

@@ -2,25 +2,22 @@
 
 use super::Resolver;
 use super::depth;
+use super::function::is_function;
 use super::parts::first_part;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{Aggregate, Condition, Expression, FieldPath, Formula, Id as _, Input, Members};
-use crate::model::{MetricSource, Type};
-use crate::similar::most_similar;
+use crate::model::{MetricSource, TextTest, Type};
 use crate::span::Span;
-use crate::synonyms::meanings;
 use crate::syntax::ast::{self, ExpressionKind, FormulaKind, Name, Path, PrefixWord};
 use crate::units::{Unit, convert, dimension, product};
 
 /// The outermost functions of a formula. `last` is first: a formula without any most likely means it.
-const AGGREGATES: [&str; 7] = ["last", "min", "max", "mean", "count", "duration", "robustness"];
-/// The functions inside a formula.
-const FUNCTIONS: [&str; 4] = ["abs", "min", "max", "distance"];
+pub(super) const AGGREGATES: [&str; 7] = ["last", "min", "max", "mean", "count", "duration", "robustness"];
 /// The deepest expression. A plan is JSON, whose readers limit its depth.
 pub(super) const MAX_DEPTH: usize = 40;
 
 /// A number with its unit; `None` for a plain one.
-type Number = (Expression, Option<Unit>);
+pub(super) type Number = (Expression, Option<Unit>);
 
 impl<'a> Resolver<'a> {
     /// A formula, with the unit of its value.
@@ -83,10 +80,21 @@ impl<'a> Resolver<'a> {
         self.at_most_one(&formula.outbound, "outbound");
         let outbound = !formula.outbound.is_empty();
         if inputs.is_empty() {
-            self.reads_no_topic(whole);
+            self.no_topic(whole);
             return None;
         }
         let (every, per) = (every?, per?);
+        self.members_fit(&inputs, whole)?;
+        if let Some((word, path)) =
+            formula.per.first().filter(|_| inputs.iter().any(|input| input.members == Members::First))
+        {
+            let title = "`per` cannot be combined with `each pair of`";
+            let diagnostic = Diagnostic::new(Code::UNPAIRED, word.to(path.span), title)
+                .label("remove this")
+                .note("each pair already has a state of its own");
+            self.report(diagnostic);
+            return None;
+        }
         if depth::of_aggregate(&aggregate).max(when.as_ref().map_or(0, depth::of_condition)) > MAX_DEPTH {
             let title = format!("this formula is nested more than {MAX_DEPTH} levels deep");
             self.report(Diagnostic::new(Code::TOO_LARGE, whole, title).label("nested too deeply"));
@@ -99,6 +107,13 @@ impl<'a> Resolver<'a> {
             return Some((MetricSource::Last(inputs[0].field.clone()), unit));
         }
         Some((MetricSource::Formula(Formula { inputs, aggregate, when, every, per, outbound }), unit))
+    }
+
+    pub(super) fn no_topic(&mut self, whole: Span) {
+        let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, whole, "this formula reads no topic")
+            .label("no message changes this value")
+            .note("a metric is computed from messages, so its formula must name a topic");
+        self.report(diagnostic);
     }
 
     /// How many topics on the wire have this field.
@@ -115,7 +130,7 @@ impl<'a> Resolver<'a> {
     ) -> Option<(Aggregate, Option<Unit>)> {
         let (name, arguments) = match &expression.kind {
             ExpressionKind::Call(name, arguments) if AGGREGATES.contains(&name.text.as_str()) => (name, arguments),
-            ExpressionKind::Call(name, _) if !FUNCTIONS.contains(&name.text.as_str()) => {
+            ExpressionKind::Call(name, _) if !is_function(&name.text) => {
                 self.unknown_function(name, &AGGREGATES);
                 return None;
             }
@@ -150,13 +165,6 @@ impl<'a> Resolver<'a> {
         })
     }
 
-    fn reads_no_topic(&mut self, span: Span) {
-        let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, span, "this formula reads no topic")
-            .label("this value is constant")
-            .note("a metric is computed from messages, so its formula must name a topic");
-        self.report(diagnostic);
-    }
-
     fn no_aggregate(&mut self, expression: &'a ast::Expression) {
         let span = expression.span;
         let condition = self.is_condition(expression);
@@ -165,11 +173,11 @@ impl<'a> Resolver<'a> {
             return;
         }
         if let Some((call, name)) = aggregate_in(expression) {
-            self.nested(call, name);
+            self.over_time(call, name);
             return;
         }
         if !reads_a_topic(expression) {
-            self.reads_no_topic(span);
+            self.no_topic(span);
             return;
         }
         let word = if condition { "count" } else { "last" };
@@ -247,6 +255,7 @@ impl<'a> Resolver<'a> {
                 let unit = self.unit_in_formula(quantity)?;
                 (!quantity.value.is_nan()).then_some((Expression::Constant(quantity.value), unit))
             }
+            ExpressionKind::Field(path) if self.is_time(path) => Some((Expression::Time, Some(Unit::seconds()))),
             ExpressionKind::Field(path) => self.numeric_input(inputs, path, None),
             ExpressionKind::Members(members, word, path) => self.numeric_input(inputs, path, Some((*members, *word))),
             ExpressionKind::Negate(of) => {
@@ -269,12 +278,22 @@ impl<'a> Resolver<'a> {
             | ExpressionKind::Any(_)
             | ExpressionKind::Prefixed(..)
             | ExpressionKind::Until(..)
-            | ExpressionKind::Implies(..) => {
-                let title = format!("`{}` is a condition, but a number is needed", self.text(expression.span));
-                self.report(Diagnostic::new(Code::WRONG_TYPE, expression.span, title).label("expected a number"));
-                None
-            }
+            | ExpressionKind::Implies(..) => self.not_a_number(expression.span, "a condition"),
+            ExpressionKind::Text(_) => self.not_a_number(expression.span, "a text"),
+            ExpressionKind::Point(_) => self.not_a_number(expression.span, "a point"),
+            ExpressionKind::Region(_) => self.not_a_number(expression.span, "a region"),
         }
+    }
+
+    fn not_a_number(&mut self, span: Span, is: &str) -> Option<Number> {
+        let title = format!("`{}` is {is}, but a number is needed", self.text(span));
+        self.report(Diagnostic::new(Code::WRONG_TYPE, span, title).label("expected a number"));
+        None
+    }
+
+    /// Whether a path is the simulation time, and not something that the space declares.
+    fn is_time(&self, path: &Path) -> bool {
+        path.topic.text == "time" && path.fields.is_empty() && !self.names.contains_key("time")
     }
 
     /// The unit of a number in a formula, where `2rad*link0` is a likely mistake.
@@ -297,8 +316,16 @@ impl<'a> Resolver<'a> {
         path: &'a Path,
         members: Option<(ast::Members, Span)>,
     ) -> Option<Number> {
-        let (field, unit, _) = self.number_field(path, "a formula")?;
-        let at = self.input(inputs, path, field, members)?;
+        let before = self.diagnostics.len();
+        let field = self.number_field(path);
+        if path.topic.text == "time"
+            && let Some(diagnostic) = self.diagnostics.get_mut(before)
+        {
+            let note = "`time` is the simulation time unless something in the space is named `time`";
+            diagnostic.notes.push(note.to_owned());
+        }
+        let (field, unit) = field?;
+        let at = self.input(inputs, path, field, members, None)?;
         Some((Expression::Input(at), unit))
     }
 
@@ -309,30 +336,10 @@ impl<'a> Resolver<'a> {
         path: &'a Path,
         field: FieldPath,
         members: Option<(ast::Members, Span)>,
+        text: Option<TextTest>,
     ) -> Option<u32> {
-        if let Some((_, word)) = members
-            && self.members_of(&field) == 1
-        {
-            let title = format!("`{}` is one topic, not a group", path.topic.text);
-            let span = word.to(path.span);
-            let diagnostic = Diagnostic::new(Code::IDLE_CLAUSE, span, title)
-                .label(format!("`{} of` combines the members of a group", self.text(word)));
-            let remove = format!("remove `{} of`", self.text(word));
-            self.report(diagnostic.suggest(remove, Span { hi: path.span.lo, ..word }, ""));
-            return None;
-        }
-        let members = match members {
-            None => Members::Min,
-            Some((ast::Members::Max, _)) => Members::Max,
-            Some((ast::Members::Sum, _)) => Members::Sum,
-            Some((ast::Members::Each, _)) => Members::Each,
-        };
-        let input = Input { field, members };
-        let at = inputs.iter().position(|known| *known == input).unwrap_or_else(|| {
-            inputs.push(input);
-            inputs.len() - 1
-        });
-        Some(u32::try_from(at).expect("a formula has fewer than 2^32 inputs"))
+        let members = self.members(path, &field, members)?;
+        Some(position(inputs, Input { field, members, text }))
     }
 
     fn product(&mut self, inputs: &mut Vec<Input>, factors: &'a [(bool, ast::Expression)]) -> Option<Number> {
@@ -416,118 +423,15 @@ impl<'a> Resolver<'a> {
         self.report(Diagnostic::new(Code::WRONG_UNIT, part.span, title).label(label));
         None
     }
+}
 
-    fn call(
-        &mut self,
-        inputs: &mut Vec<Input>,
-        call: &'a ast::Expression,
-        name: &'a Name,
-        arguments: &'a [ast::Expression],
-    ) -> Option<Number> {
-        let all: Vec<&ast::Expression> = arguments.iter().collect();
-        let takes = match (name.text.as_str(), arguments) {
-            ("abs", [of]) => {
-                let (of, unit) = self.number(inputs, of)?;
-                return Some((Expression::Absolute(Box::new(of)), unit));
-            }
-            ("distance", [from, to]) => return self.distance(inputs, from, to),
-            ("min", [_, _, ..]) => {
-                return self.common(inputs, &all).map(|(of, unit)| (Expression::Min(of), unit));
-            }
-            ("max", [_, _, ..]) => {
-                return self.common(inputs, &all).map(|(of, unit)| (Expression::Max(of), unit));
-            }
-            ("abs", _) => "one value",
-            ("distance", _) => "two points",
-            ("min" | "max", [_]) | ("last" | "mean" | "count" | "duration" | "robustness", _) => {
-                self.nested(call.span, name);
-                return None;
-            }
-            ("min" | "max", _) => "two values or more",
-            _ => {
-                self.unknown_function(name, &FUNCTIONS);
-                return None;
-            }
-        };
-        let title = format!("`{}(…)` takes {takes}, not {}", name.text, arguments.len());
-        self.report(Diagnostic::new(Code::NOT_A_FORMULA, call.span, title).label(format!("expected {takes}")));
-        None
-    }
-
-    /// Reports an aggregate over time inside of a formula.
-    fn nested(&mut self, call: Span, name: &Name) {
-        let title = format!("`{}(…)` over time cannot be nested in a formula", name.text);
-        let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, call, title)
-            .label("only allowed as the outermost function of a formula")
-            .note("inside a formula, the name of a topic stands for its last value");
-        if name.text == "min" || name.text == "max" {
-            diagnostic = diagnostic.note(format!("to compare several values, use `{}(a, b)`", name.text));
-        }
-        self.report(diagnostic);
-    }
-
-    fn unknown_function(&mut self, name: &Name, known: &[&'static str]) {
-        let title = format!("no function named `{}`", name.text);
-        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("unknown function");
-        let synonym = meanings(&name.text, |word| known.contains(&word)).first().map(|synonym| synonym.meant);
-        diagnostic = match synonym.or_else(|| most_similar(&name.text, known.iter().copied())) {
-            Some(similar) => diagnostic.did_you_mean(name.span, similar),
-            None => diagnostic.note(format!("the functions allowed here are {}", super::list(known))),
-        };
-        self.report(diagnostic);
-    }
-
-    fn distance(
-        &mut self,
-        inputs: &mut Vec<Input>,
-        from: &'a ast::Expression,
-        to: &'a ast::Expression,
-    ) -> Option<Number> {
-        let from_point = self.point(inputs, from);
-        let (to_at, to_unit) = self.point(inputs, to)?;
-        let (from_at, unit) = from_point?;
-        let [found, wanted] = [dimension(to_unit.as_ref()), dimension(unit.as_ref())];
-        if found != wanted {
-            let [from_name, to_name] = [from, to].map(|side| self.text(side.span));
-            let title = format!("`{to_name}` is {}, but `{from_name}` is {}", found.name(), wanted.name());
-            let label = format!("expected {}", wanted.name());
-            self.report(Diagnostic::new(Code::WRONG_UNIT, to.span, title).label(label));
-            return None;
-        }
-        Some((
-            Expression::Distance { from: from_at, to: to_at, scale: convert(1.0, to_unit.as_ref(), unit.as_ref()) },
-            unit,
-        ))
-    }
-
-    fn point(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<(u32, Option<Unit>)> {
-        let (path, members) = match &expression.kind {
-            ExpressionKind::Field(path) => (path, None),
-            ExpressionKind::Members(members, word, path) => (path, Some((*members, *word))),
-            _ => {
-                let title = format!("`{}` is not a point", self.text(expression.span));
-                let diagnostic = Diagnostic::new(Code::WRONG_TYPE, expression.span, title);
-                self.report(diagnostic.label("expected a topic or field of type `point`"));
-                return None;
-            }
-        };
-        let (field, ty) = self.field(path)?;
-        let Type::Point(unit) = ty else {
-            let title = format!("`{}` is not a point", self.text(path.span));
-            let label = format!("it is {}", super::system::type_in_words(&ty));
-            self.report(Diagnostic::new(Code::WRONG_TYPE, path.span, title).label(label));
-            return None;
-        };
-        if self.members_of(&field) > 1 && !matches!(members, Some((ast::Members::Each, _))) {
-            let title = format!("`{}` is a group of topics, but `distance` needs a single point", path.topic.text);
-            let diagnostic = Diagnostic::new(Code::WRONG_TYPE, expression.span, title)
-                .label("expected one point")
-                .suggest("use each member of the group", expression.span, format!("each of {}", self.text(path.span)));
-            self.report(diagnostic);
-            return None;
-        }
-        Some((self.input(inputs, path, field, members)?, unit))
-    }
+/// The position of an input, which is added if it is new.
+pub(super) fn position(inputs: &mut Vec<Input>, input: Input) -> u32 {
+    let at = inputs.iter().position(|known| *known == input).unwrap_or_else(|| {
+        inputs.push(input);
+        inputs.len() - 1
+    });
+    u32::try_from(at).expect("a formula has fewer than 2^32 inputs")
 }
 
 /// Whether a value depends on messages at all.
@@ -540,8 +444,8 @@ fn reads_a_topic(expression: &ast::Expression) -> bool {
 fn aggregate_in(expression: &ast::Expression) -> Option<(Span, &Name)> {
     first_part(expression, &|part| match &part.kind {
         ExpressionKind::Call(name, arguments) => {
-            let [aggregate, function] = [&AGGREGATES[..], &FUNCTIONS[..]].map(|of| of.contains(&name.text.as_str()));
-            (aggregate && (arguments.len() == 1 || !function)).then_some((part.span, name))
+            let aggregate = AGGREGATES.contains(&name.text.as_str());
+            (aggregate && (arguments.len() == 1 || !is_function(&name.text))).then_some((part.span, name))
         }
         _ => None,
     })

@@ -158,7 +158,12 @@ impl<'a> Resolver<'a> {
                 None => complete = false,
             }
         }
-        complete.then(|| model::Test { declaration: self.declaration(&test.head), operations, expectations })
+        let simulator_seed = match self.single(&test.simulator_seeds, "simulator seed") {
+            Some(seed) => Some(seed.value?),
+            None => None,
+        };
+        let declaration = self.declaration(&test.head);
+        complete.then_some(model::Test { declaration, operations, expectations, simulator_seed })
     }
 
     /// Warns of copies of one operation that are active at the same time, unless the campaigns permit it, and of copies

@@ -14,7 +14,10 @@ fn parts(expression: &Expression) -> Box<dyn Iterator<Item = &Expression> + '_> 
         ExpressionKind::Field(_)
         | ExpressionKind::Members(..)
         | ExpressionKind::Number(_)
-        | ExpressionKind::Truth(_) => Box::new(std::iter::empty()),
+        | ExpressionKind::Truth(_)
+        | ExpressionKind::Text(_)
+        | ExpressionKind::Point(_)
+        | ExpressionKind::Region(_) => Box::new(std::iter::empty()),
         ExpressionKind::Negate(of) | ExpressionKind::Prefixed(_, of) => Box::new(std::iter::once(&**of)),
         ExpressionKind::Sum(terms) | ExpressionKind::Product(terms) => Box::new(terms.iter().map(|(_, of)| of)),
         ExpressionKind::Compare(left, _, right)

@@ -6,7 +6,7 @@ use super::boolean::relation;
 use super::depth;
 use super::formula::{MAX_DEPTH, scaled};
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
-use crate::model::{Comparison, Expression, Input, Interval, Members, MetricSource, Robustness, Temporal};
+use crate::model::{Comparison, Expression, Input, Interval, MetricSource, Point, Robustness, Temporal};
 use crate::span::Span;
 use crate::syntax::ast::{self, ExpressionKind, Prefix, PrefixWord, Relation};
 use crate::units::{Unit, convert, dimension};
@@ -34,6 +34,15 @@ impl Signals {
             self.computed.len() - 1
         })
     }
+
+    /// That an input which is true or false is true.
+    fn truth(&mut self, input: u32) -> Temporal {
+        let signal = self.signal(Expression::Input(input));
+        if !self.truths.contains(&signal) {
+            self.truths.push(signal);
+        }
+        Temporal::Predicate(signal, Comparison::Above, 0.0)
+    }
 }
 
 impl<'a> Resolver<'a> {
@@ -58,16 +67,11 @@ impl<'a> Resolver<'a> {
             self.too_deep(of.span);
             return None;
         }
-        let mut each = inputs.iter().filter(|input| input.members == Members::Each).map(|input| input.field.topic);
-        let first = each.next();
-        if each.any(|topic| Some(topic) != first) {
-            let title = "`each of` refers to two groups in one formula";
-            let diagnostic = Diagnostic::new(Code::WRONG_TYPE, of.span, title)
-                .label("expected at most one group")
-                .note("the formula is evaluated for each member of the group, and the smallest robustness counts");
-            self.report(diagnostic);
+        if inputs.is_empty() {
+            self.no_topic(of.span);
             return None;
         }
+        self.members_fit(&inputs, of.span)?;
         let outbound = !formula.outbound.is_empty();
         let whole_windows = !formula.whole.is_empty();
         let robustness = Robustness { inputs, signals, formula: resolved, outbound, whole_windows };
@@ -124,6 +128,10 @@ impl<'a> Resolver<'a> {
                 None
             }
             ExpressionKind::Compare(left, by, right) => {
+                if self.is_text(left) || self.is_text(right) {
+                    let input = self.compared_texts(&mut parts.inputs, left, relation(*by), right)?;
+                    return Some(parts.truth(input));
+                }
                 if self.is_condition(left) || self.is_condition(right) {
                     return self.compared_truth(parts, expression, left, *by, right);
                 }
@@ -131,11 +139,7 @@ impl<'a> Resolver<'a> {
             }
             ExpressionKind::Field(_) | ExpressionKind::Members(..) if self.is_condition(expression) => {
                 let input = self.truth(&mut parts.inputs, expression)?;
-                let signal = parts.signal(Expression::Input(input));
-                if !parts.truths.contains(&signal) {
-                    parts.truths.push(signal);
-                }
-                Some(Temporal::Predicate(signal, Comparison::Above, 0.0))
+                Some(parts.truth(input))
             }
             _ => {
                 // It is a number; it is reported as in any condition.
@@ -262,7 +266,7 @@ impl<'a> Resolver<'a> {
     ) -> Option<Temporal> {
         let (sides, unit) = self.common(&mut parts.inputs, &[left, right])?;
         let [left, right] = <[Expression; 2]>::try_from(sides).expect("two parts give two numbers");
-        if !names_input(&left) && !names_input(&right) {
+        if !varies(&left) && !varies(&right) {
             self.constant(whole.span);
             return None;
         }
@@ -347,17 +351,11 @@ fn open_end(expression: &ast::Expression) -> Option<(Span, Span, Span)> {
     }
 }
 
-/// Whether a number depends on an input.
-fn names_input(of: &Expression) -> bool {
-    match of {
-        Expression::Constant(_) => false,
-        Expression::Input(_) | Expression::Distance { .. } => true,
-        Expression::Negate(of) | Expression::Absolute(of) => names_input(of),
-        Expression::Divide { value, by } => names_input(value) || names_input(by),
-        Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) | Expression::Max(of) => {
-            of.iter().any(names_input)
-        }
-    }
+/// Whether a number may change during a run.
+fn varies(of: &Expression) -> bool {
+    matches!(of, Expression::Input(_) | Expression::Time)
+        || of.points().iter().any(|point| matches!(point, Point::Input(_)))
+        || of.parts().into_iter().any(varies)
 }
 
 /// A comparison read from right to left.

@@ -108,6 +108,36 @@ impl<'a> Resolver<'a> {
         Some((model::FieldPath { topic: TopicId::from_index(index), fields }, ty))
     }
 
+    /// A path to a value that a formula reads: a field, or a coordinate of a point.
+    pub(super) fn value_field(&mut self, path: &'a ast::Path) -> Option<(model::FieldPath, Type)> {
+        let Some((last, before)) = path.fields.split_last() else { return self.field(path) };
+        let Some(Type::Point(unit)) = self.type_at(&path.topic, before) else { return self.field(path) };
+        if !matches!(last.text.as_str(), "x" | "y" | "z") {
+            let title = format!("a point has no coordinate `{}`", last.text);
+            let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, last.span, title).label("expected `x`, `y` or `z`");
+            self.report(match last.text.to_lowercase().as_str() {
+                lower @ ("x" | "y" | "z") => diagnostic.did_you_mean(last.span, lower),
+                _ => diagnostic,
+            });
+            return None;
+        }
+        let unit = unit.clone();
+        let topic = TopicId::from_index(self.find(&path.topic, Kind::Topic)?);
+        let fields = path.fields.iter().map(|name| name.text.clone()).collect();
+        Some((model::FieldPath { topic, fields }, Type::Real(unit)))
+    }
+
+    /// The type of a topic or field; `None` also for one that does not exist. Reports nothing.
+    pub(super) fn type_at(&self, topic: &Name, fields: &[Name]) -> Option<&Type> {
+        let definition = self.names.get(topic.text.as_str()).filter(|found| found.kind == Kind::Topic)?;
+        let topic = self.system.topics.get(definition.index)?.as_ref()?;
+        fields.iter().try_fold(&topic.ty, |ty, name| {
+            let Type::Message(id) = ty else { return None };
+            let message = self.system.messages.get(id.index())?.as_ref()?;
+            message.fields.iter().find(|field| field.declaration.name == name.text).map(|field| &field.ty)
+        })
+    }
+
     /// The type of a field of a value of this type; `holder` is that value in words.
     pub(super) fn field_in(&mut self, ty: &Type, holder: &str, name: &'a Name) -> Option<Type> {
         let Type::Message(id) = ty else {
@@ -138,35 +168,38 @@ impl<'a> Resolver<'a> {
         Some(field.ty.clone())
     }
 
-    /// A path to a single number: with its unit, and whether it is whole.
-    pub(super) fn number_field(
-        &mut self,
-        path: &'a ast::Path,
-        user: &str,
-    ) -> Option<(model::FieldPath, Option<Unit>, bool)> {
-        let (found, ty) = self.field(path)?;
-        match ty {
-            Type::Int(unit) => Some((found, unit, true)),
-            Type::Real(unit) => Some((found, unit, false)),
-            other => {
-                let is = type_in_words(&other);
-                let title = format!("{user} needs a number, but `{}` is {is}", self.text(path.span));
-                let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, path.span, title).label("expected a number");
-                if let Type::Message(id) = other
-                    && let Some(message) = self.system.messages[id.index()].as_ref()
-                {
-                    let numbers =
-                        message.fields.iter().filter(|field| matches!(field.ty, Type::Int(_) | Type::Real(_)));
-                    for field in numbers.take(3) {
-                        let name = &field.declaration.name;
-                        diagnostic =
-                            diagnostic.suggest(format!("use its field `{name}`"), path.span.end(), format!(".{name}"));
-                    }
-                }
-                self.report(diagnostic);
-                None
+    /// A path to a single number, with its unit.
+    pub(super) fn number_field(&mut self, path: &'a ast::Path) -> Option<(model::FieldPath, Option<Unit>)> {
+        let (found, ty) = self.value_field(path)?;
+        let other = match ty {
+            Type::Int(unit) | Type::Real(unit) => return Some((found, unit)),
+            other => other,
+        };
+        let written = self.text(path.span);
+        let title = format!("a formula needs a number, but `{written}` is {}", type_in_words(&other));
+        let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, path.span, title).label("expected a number");
+        let parts: Vec<String> = match other {
+            Type::Message(id) => {
+                let fields = self.system.messages[id.index()].iter().flat_map(|message| &message.fields);
+                let numbers = fields.filter(|field| matches!(field.ty, Type::Int(_) | Type::Real(_)));
+                numbers.take(3).map(|field| field.declaration.name.clone()).collect()
             }
+            Type::Point(_) => {
+                diagnostic = diagnostic.note("`distance(p, q)` is the distance of two points");
+                ["x", "y", "z"].map(str::to_owned).into()
+            }
+            Type::Text => {
+                diagnostic = diagnostic.note(format!("a text can be compared, for example `{written} == \"ready\"`"));
+                Vec::new()
+            }
+            _ => Vec::new(),
+        };
+        let what = if matches!(other, Type::Point(_)) { "coordinate" } else { "field" };
+        for name in parts {
+            diagnostic = diagnostic.suggest(format!("use its {what} `{name}`"), path.span.end(), format!(".{name}"));
         }
+        self.report(diagnostic);
+        None
     }
 }
 
@@ -184,6 +217,12 @@ pub(super) fn type_in_words(ty: &Type) -> String {
         Type::List(_) => "a list".to_owned(),
         Type::Message(_) => "a message".to_owned(),
     }
+}
+
+/// The members of the group in a path without mistakes; none if there is no group.
+pub(super) fn members_of_path(path: &str) -> Vec<&str> {
+    let group = path.split_once('{').and_then(|(_, rest)| rest.split_once('}'));
+    group.map_or(Vec::new(), |(members, _)| members.split(',').collect())
 }
 
 /// Expands a path with at most one group, `zones/{A,B}/level`.

@@ -200,6 +200,7 @@ pub(super) const BLOCKS: &[Block] = &[
         members: &[
             Member::named(Rule::test_operation, "an operation such as `jitter offset [0.1rad, 0.2rad] from 8s to 57s`"),
             Member::new(Rule::expectation, "expect"),
+            Member::like(Rule::simulator_seed, "simulator", "simulator seed"),
         ],
     },
     Block {

@@ -391,6 +391,7 @@ fn phrases_of(rule: Rule) -> Vec<String> {
             &["the permitted values, such as `int [3, 20]`"]
         }
         Rule::point => &["a point such as `(1, 0, -0.5)m`"],
+        Rule::corner => &["a corner such as `(0, 50)`"],
         Rule::coordinate => &["a number without a unit"],
         Rule::draw_seed => &["`seed`"],
         Rule::dimension => &["a dimension such as `T1 [0, 1] cells 6`"],
@@ -455,6 +456,7 @@ fn phrases_of(rule: Rule) -> Vec<String> {
         | Rule::product
         | Rule::factor
         | Rule::call
+        | Rule::region
         | Rule::function
         | Rule::members
         | Rule::truth => &["a value such as `link0 - 2.5rad`"],
@@ -474,6 +476,7 @@ fn phrases_of(rule: Rule) -> Vec<String> {
         | Rule::k_implies
         | Rule::k_node
         | Rule::k_parameter
+        | Rule::k_pair
         | Rule::element => &[],
         _ => {
             let members: Vec<String> = blocks::members(rule).map(blocks::Member::phrase).collect();

@@ -1,7 +1,7 @@
 //! Whether the formulas of metrics mention only inputs and signals that they have.
 
 use crate::stl::{self, Robustness};
-use crate::{Aggregate, CampaignPlan, Expression, Formula, Span};
+use crate::{Aggregate, CampaignPlan, Expression, Formula, Input, Members, Point, Region, Span};
 
 use super::check::{Checked, at, each, filled, finite, id, positive, require, span};
 
@@ -10,6 +10,9 @@ impl CampaignPlan {
         let inputs = formula.inputs.len();
         at("inputs", filled(&formula.inputs))?;
         each("inputs", &formula.inputs, |input| at("field", self.field(&input.field)))?;
+        at("inputs", self.one_pair(&formula.inputs))?;
+        let paired = formula.inputs.iter().any(|input| input.members == Members::First);
+        at("per", require(!paired || formula.per.is_none(), || "pairs have no keys".to_owned()))?;
         let aggregate = match &formula.aggregate {
             Aggregate::Last { of } | Aggregate::Min { of } | Aggregate::Max { of } | Aggregate::Mean { of } => {
                 expression(of, inputs)
@@ -26,34 +29,58 @@ impl CampaignPlan {
         let inputs = robustness.inputs.len();
         at("inputs", filled(&robustness.inputs))?;
         each("inputs", &robustness.inputs, |input| at("field", self.field(&input.field)))?;
-        let mut groups = robustness.inputs.iter().filter(|input| input.members == crate::Members::Each);
-        let group = groups.next().map(|input| input.field.topic);
-        let other = groups.find(|input| Some(input.field.topic) != group);
-        at("inputs", require(other.is_none(), || "members of more than one group are to be told apart".to_owned()))?;
+        at("inputs", self.one_pair(&robustness.inputs))?;
+        let mut groups = robustness.inputs.iter().filter(|input| input.members == Members::Each);
+        let members = |input: &Input| self.topic(input.field.topic).paths.len();
+        let first = groups.next();
+        let fit = groups.all(|input| first.is_some_and(|first| members(first) == members(input)));
+        at("inputs", require(fit, || "members of groups of different sizes are to be paired".to_owned()))?;
         each("signals", &robustness.signals, |signal| expression(signal, inputs))?;
         at("formula", temporal(&robustness.formula, robustness.signals.len()))
+    }
+
+    /// Inputs that are of a pair are of pairs of one group, and no others are of each member.
+    fn one_pair(&self, inputs: &[Input]) -> Checked {
+        let of_pair = |input: &&Input| matches!(input.members, Members::First | Members::Second);
+        let Some(first) = inputs.iter().find(of_pair) else { return Ok(()) };
+        let group = first.field.topic;
+        let several = inputs.iter().filter(of_pair).any(|input| input.field.topic != group)
+            || inputs.iter().any(|input| input.members == Members::Each);
+        require(!several, || "members of more than one group are to be paired".to_owned())?;
+        let members = self.topic(group).paths.len();
+        require(members >= 2, || format!("there is no pair in a group of {members}"))
     }
 }
 
 fn expression(of: &Expression, inputs: usize) -> Checked {
     let input = |index: u32| id("input", index as usize, inputs);
+    for point in of.points() {
+        match point {
+            Point::Input(index) => input(index)?,
+            Point::Constant(coordinates) => coordinates.into_iter().try_for_each(finite)?,
+        }
+    }
     match of {
-        Expression::Constant(number) => finite(*number),
-        Expression::Input(index) => input(*index),
-        Expression::Negate(of) | Expression::Absolute(of) => expression(of, inputs),
-        Expression::Sum(of) | Expression::Product(of) => of.iter().try_for_each(|of| expression(of, inputs)),
-        Expression::Min(of) | Expression::Max(of) => {
-            filled(of)?;
-            of.iter().try_for_each(|of| expression(of, inputs))
+        Expression::Constant(number) => finite(*number)?,
+        Expression::Input(index) => input(*index)?,
+        Expression::Min(of) | Expression::Max(of) => filled(of)?,
+        Expression::Distance(distance) => finite(distance.scale)?,
+        Expression::SignedDistance(distance) => region(&distance.to)?,
+        _ => {}
+    }
+    of.parts().into_iter().try_for_each(|part| expression(part, inputs))
+}
+
+fn region(of: &Region) -> Checked {
+    match of {
+        Region::Box { low, high } => {
+            low.iter().chain(high).try_for_each(|&end| finite(end))?;
+            let flat = low.iter().zip(high).any(|(low, high)| low >= high);
+            require(!flat, || "a box has no inside".to_owned())
         }
-        Expression::Divide { value, by } => {
-            expression(value, inputs)?;
-            expression(by, inputs)
-        }
-        Expression::Distance { from, to, scale } => {
-            input(*from)?;
-            input(*to)?;
-            finite(*scale)
+        Region::Polygon { corners } => {
+            corners.iter().flatten().try_for_each(|&coordinate| finite(coordinate))?;
+            require(corners.len() >= 3, || format!("a polygon has {} corners", corners.len()))
         }
     }
 }

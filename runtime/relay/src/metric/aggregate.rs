@@ -3,8 +3,8 @@
 //!
 //! A formula over one topic is evaluated at each of its messages. A formula over several topics is evaluated once per
 //! instant of simulation time at which one of them had a message, when all messages of that instant are known: so it
-//! never combines the new value of one topic with the old value of another that changes in the same instant. While the
-//! last value of an input is not finite, the formula is not evaluated.
+//! never combines the new value of one topic with the old value of another that changes in the same instant. The same
+//! holds for pairs of a group's members. While the last value of an input is not finite, the formula is not evaluated.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use sesame_base::time::SimTime;
 use sesame_plan::{Aggregate, CampaignPlan, Formula, Input, Members, TopicId};
 
 use crate::metric::Context;
-use crate::metric::expression::{Held, greatest, holds, least, number};
+use crate::metric::expression::{Held, Moment, greatest, holds, least, number};
 use crate::metric::held::{HeldInputs, hear};
 use crate::value::{Text, Value};
 
@@ -22,11 +22,15 @@ const KEY_LIMIT: usize = 1_000;
 /// A formula in one run.
 pub(super) struct FormulaState<'p> {
     formula: &'p Formula,
-    /// Whether its inputs are on several topics.
+    /// Whether its inputs are on several topics or of several members at a time.
     several: bool,
-    /// The whole state without keys; with keys, the initial state of a new one.
+    /// The whole state without keys; with keys, the initial state of a new one. Of pairs it holds the values.
     common: Stream,
     keys: BTreeMap<Key, Stream>,
+    /// One for each pair of a group's members, if the formula is of pairs.
+    pairs: Vec<Pair>,
+    /// Per member of that group: whether it had a message in the instant that is over. Kept to be used again.
+    spoke: Vec<bool>,
     /// The values of the current message, per input.
     heard: Vec<(usize, Held)>,
 }
@@ -42,10 +46,22 @@ impl<'p> FormulaState<'p> {
     /// Before the first message.
     pub(super) fn new(formula: &'p Formula, plan: &CampaignPlan) -> Self {
         let held = HeldInputs::new(&formula.inputs, plan);
-        let common = Stream { held, tally: Tally::default(), heard: false, members: Vec::new() };
+        let each = || formula.inputs.iter().filter(|input| input.members == Members::Each);
+        let paired = each().any(|input| each().any(|other| other.field.topic != input.field.topic));
+        let common = Stream {
+            held,
+            tally: Tally::default(),
+            heard: false,
+            others: false,
+            members: Vec::new(),
+            paired,
+            latest: None,
+        };
+        let pairs: Vec<Pair> =
+            pairs_of(&formula.inputs, plan).map(|members| Pair { members, tally: Tally::default() }).collect();
         let topics = || formula.inputs.iter().map(|input| input.field.topic);
-        let several = topics().any(|topic| Some(topic) != topics().next());
-        FormulaState { formula, several, common, keys: BTreeMap::new(), heard: Vec::new() }
+        let several = !pairs.is_empty() || topics().any(|topic| Some(topic) != topics().next());
+        FormulaState { formula, several, common, keys: BTreeMap::new(), pairs, spoke: Vec::new(), heard: Vec::new() }
     }
 
     /// A message on the `member`th path of a topic, at the context's time. Returns whether the formula waits for the
@@ -105,7 +121,9 @@ impl<'p> FormulaState<'p> {
 
     /// All messages of the instant at the context's time are known.
     pub(super) fn settle(&mut self, context: &mut Context) {
-        if self.formula.per.is_none() {
+        if !self.pairs.is_empty() {
+            self.common.settle_pairs(self.formula, &mut self.pairs, &mut self.spoke, context);
+        } else if self.formula.per.is_none() {
             self.common.settle(self.formula, context);
         }
         self.common.forget();
@@ -129,8 +147,9 @@ impl<'p> FormulaState<'p> {
         if !matches!(self.formula.aggregate, Aggregate::Duration { .. }) {
             return;
         }
-        for tally in std::iter::once(&mut self.common.tally).chain(self.keys.values_mut().map(|keyed| &mut keyed.tally))
-        {
+        let keyed = self.keys.values_mut().map(|keyed| &mut keyed.tally);
+        let of_pairs = self.pairs.iter_mut().map(|pair| &mut pair.tally);
+        for tally in std::iter::once(&mut self.common.tally).chain(keyed).chain(of_pairs) {
             if tally.holds_since.is_some() {
                 tally.hold(context.now, false);
             }
@@ -138,9 +157,10 @@ impl<'p> FormulaState<'p> {
         self.set(context);
     }
 
-    /// The value over all keys: counts are added, of maxima it is the greatest, of all others the least.
+    /// The value over all keys and pairs: counts are added, of maxima it is the greatest, of all others the least.
     fn set(&self, context: &mut Context) {
-        let tallies = || std::iter::once(&self.common).chain(self.keys.values()).map(|stream| &stream.tally);
+        let streams = || std::iter::once(&self.common).chain(self.keys.values()).map(|stream| &stream.tally);
+        let tallies = || streams().chain(self.pairs.iter().map(|pair| &pair.tally));
         let values = tallies().filter_map(|tally| tally.value);
         let value = match self.formula.aggregate {
             // In whole nanoseconds, so that equal durations have equal values.
@@ -159,6 +179,19 @@ impl<'p> FormulaState<'p> {
     }
 }
 
+/// The pairs of different members of the group whose pairs a formula is of, each once.
+pub(super) fn pairs_of(inputs: &[Input], plan: &CampaignPlan) -> impl Iterator<Item = (usize, usize)> {
+    let group = inputs.iter().find(|input| input.members == Members::First).map(|input| input.field.topic);
+    let count = group.map_or(0, |topic| plan.topic(topic).paths.len());
+    (0..count).flat_map(move |first| (first + 1..count).map(move |second| (first, second)))
+}
+
+/// The aggregated values of a pair of members.
+struct Pair {
+    members: (usize, usize),
+    tally: Tally,
+}
+
 /// The held inputs and the aggregated values; one for each key.
 #[derive(Clone)]
 struct Stream {
@@ -166,27 +199,37 @@ struct Stream {
     tally: Tally,
     /// Whether a message of the current instant has not been aggregated yet.
     heard: bool,
-    /// The members of groups from which it came, if each member has a formula: each once, the latest last.
-    members: Vec<(TopicId, usize)>,
+    /// Whether it was on a topic that is not of the groups below.
+    others: bool,
+    /// The members of groups from which it came, if each member or pair has a formula: each once, the latest last.
+    members: Vec<usize>,
+    /// Whether members of several groups belong together.
+    paired: bool,
+    /// The last member that was aggregated, of groups that belong together.
+    latest: Option<usize>,
 }
 
 impl Stream {
     /// Aggregates a message whose values are held: now, or when its instant is over.
     fn take(&mut self, formula: &Formula, wire: (TopicId, usize), wait: bool, context: &mut Context) {
         if !wait {
-            return self.step(formula, context);
+            return step(formula, &self.held, &mut self.tally, context);
         }
         self.heard = true;
-        let each = |input: &Input| input.members == Members::Each && input.field.topic == wire.0;
-        if formula.inputs.iter().any(each) {
-            self.members.retain(|&member| member != wire);
-            self.members.push(wire);
+        let (topic, member) = wire;
+        let of_members = |input: &Input| matches!(input.members, Members::Each | Members::First);
+        if formula.inputs.iter().any(|input| of_members(input) && input.field.topic == topic) {
+            self.members.retain(|&heard| heard != member);
+            self.members.push(member);
+        } else {
+            self.others = true;
         }
     }
 
     /// The instant is over, and nothing in it is left to aggregate.
     fn forget(&mut self) {
         self.heard = false;
+        self.others = false;
         self.members.clear();
     }
 
@@ -196,61 +239,56 @@ impl Stream {
             return;
         }
         if self.members.is_empty() {
-            return self.step(formula, context);
+            // The values of one member, and not the last one of each group.
+            let one = !self.paired || self.latest.is_some_and(|member| self.held.turn_to(&formula.inputs, member));
+            if one {
+                step(formula, &self.held, &mut self.tally, context);
+            }
+            return;
         }
         let mut members = std::mem::take(&mut self.members);
-        for (topic, member) in members.drain(..) {
-            self.held.turn_to(&formula.inputs, topic, member);
-            self.step(formula, context);
+        for member in members.drain(..) {
+            if self.held.turn_to(&formula.inputs, member) {
+                self.latest = Some(member);
+                step(formula, &self.held, &mut self.tally, context);
+            }
         }
         self.members = members;
     }
 
-    /// Aggregates the values as they are now, once all are known.
-    fn step(&mut self, formula: &Formula, context: &mut Context) {
-        let now = context.now;
-        let Some(inputs) = self.held.values() else {
-            // While a value is not finite, it is not known what holds.
-            if self.tally.holds_since.is_some() {
-                self.tally.hold(now, false);
-            }
-            return;
-        };
-        let due = |tally: &mut Tally| formula.every.is_none_or(|period| tally.due(now, SimTime::from_seconds(period)));
-        let counts = formula.when.as_ref().is_none_or(|when| holds(when, inputs));
-        let of = match &formula.aggregate {
-            Aggregate::Duration { of } => {
-                return self.tally.hold(now, counts && holds(of, inputs));
-            }
-            Aggregate::Count { of } => {
-                let count = self.tally.value.get_or_insert(0.0);
-                let before = *count;
-                if counts && holds(of, inputs) && due(&mut self.tally) {
-                    self.tally.value = Some(before + 1.0);
-                }
-                return;
-            }
-            Aggregate::Last { of } | Aggregate::Min { of } | Aggregate::Max { of } | Aggregate::Mean { of } => of,
-        };
-        if !counts {
-            return;
+    /// The instant is over: aggregates each pair of which a member had a message, or all pairs if another topic had
+    /// one.
+    fn settle_pairs(&mut self, formula: &Formula, pairs: &mut [Pair], spoke: &mut Vec<bool>, context: &mut Context) {
+        // The last pair has the last member.
+        let count = pairs.last().map_or(0, |pair| pair.members.1 + 1);
+        spoke.clear();
+        spoke.resize(count, self.others);
+        for &member in &self.members {
+            spoke[member] = true;
         }
-        let value = number(of, inputs);
-        if !value.is_finite() {
-            context.note(format!("refused the value {value} at {now}"));
-            return;
+        for Pair { members, tally } in pairs {
+            let concerned = spoke[members.0] || spoke[members.1];
+            if concerned && self.held.turn_to_pair(&formula.inputs, *members) {
+                step(formula, &self.held, tally, context);
+            }
         }
-        if due(&mut self.tally) {
-            let tally = &mut self.tally;
-            tally.messages += 1.0;
-            tally.sum += value;
-            tally.value = Some(match (&formula.aggregate, tally.value) {
-                (Aggregate::Min { .. }, Some(before)) => least(before, value),
-                (Aggregate::Max { .. }, Some(before)) => greatest(before, value),
-                (Aggregate::Mean { .. }, _) => tally.sum / tally.messages,
-                _ => value,
-            });
+    }
+}
+
+/// Aggregates the values as they are now, once all are known.
+fn step(formula: &Formula, held: &HeldInputs, tally: &mut Tally, context: &mut Context) {
+    let now = context.now;
+    let Some(inputs) = held.values() else {
+        // While a value is not finite, it is not known what holds.
+        if tally.holds_since.is_some() {
+            tally.hold(now, false);
         }
+        return;
+    };
+    let moment = Moment::new(inputs, now.seconds());
+    tally.take(formula, &moment, now, context);
+    if let Some(undefined) = moment.undefined() {
+        context.note(format!("{undefined} at {now}"));
     }
 }
 
@@ -269,6 +307,45 @@ struct Tally {
 }
 
 impl Tally {
+    /// Aggregates the values of a moment.
+    fn take(&mut self, formula: &Formula, moment: &Moment<'_>, now: SimTime, context: &mut Context) {
+        let due = |tally: &mut Tally| formula.every.is_none_or(|period| tally.due(now, SimTime::from_seconds(period)));
+        let counts = formula.when.as_ref().is_none_or(|when| holds(when, moment));
+        let of = match &formula.aggregate {
+            Aggregate::Duration { of } => {
+                return self.hold(now, counts && holds(of, moment));
+            }
+            Aggregate::Count { of } => {
+                let before = *self.value.get_or_insert(0.0);
+                if counts && holds(of, moment) && due(self) {
+                    self.value = Some(before + 1.0);
+                }
+                return;
+            }
+            Aggregate::Last { of } | Aggregate::Min { of } | Aggregate::Max { of } | Aggregate::Mean { of } => of,
+        };
+        if !counts {
+            return;
+        }
+        let value = number(of, moment);
+        if !value.is_finite() {
+            if moment.undefined().is_none() {
+                context.note(format!("refused the value {value} at {now}"));
+            }
+            return;
+        }
+        if due(self) {
+            self.messages += 1.0;
+            self.sum += value;
+            self.value = Some(match (&formula.aggregate, self.value) {
+                (Aggregate::Min { .. }, Some(before)) => least(before, value),
+                (Aggregate::Max { .. }, Some(before)) => greatest(before, value),
+                (Aggregate::Mean { .. }, _) => self.sum / self.messages,
+                _ => value,
+            });
+        }
+    }
+
     /// Whether a message at this time counts.
     fn due(&mut self, now: SimTime, period: SimTime) -> bool {
         let due = self.counted.is_none_or(|counted| now - counted >= period);

@@ -2,8 +2,9 @@
 
 use sesame_base::observation::{MetricObservation, Reach};
 use sesame_base::time::SimTime;
+use sesame_base::verdict::ends;
 use sesame_plan::stl::Robustness;
-use sesame_plan::{CampaignPlan, Formula, MetricId, MetricSource, Side, Span, TopicId};
+use sesame_plan::{CampaignPlan, Formula, Members, MetricId, MetricSource, Side, Span, TopicId};
 
 use crate::metric::aggregate::FormulaState;
 use crate::metric::robustness::RobustnessState;
@@ -31,6 +32,12 @@ pub enum MetricError {
     /// A hook that the runner does not have.
     #[error("metric `{0}` has no hook in this runner: run `sesamec generate` again")]
     MissingHook(String),
+    /// A formula over each member of groups that have different numbers of members.
+    #[error(
+        "metric `{0}` reads each member of groups of different sizes; the plan was not written by sesamec: run \
+         `sesamec generate` again"
+    )]
+    UnpairedMembers(String),
     /// A temporal formula that is not valid.
     #[error("metric `{metric}`: {error}; the plan was not written by sesamec: run `sesamec generate` again")]
     Formula {
@@ -62,6 +69,13 @@ impl<'p> MetricTable<'p> {
                 MetricSource::Formula { formula } => formula.side == Side::Outbound,
                 _ => false,
             };
+            if let MetricSource::Formula { formula } = &metric.source {
+                let each = formula.inputs.iter().filter(|input| input.members == Members::Each);
+                let mut sizes = each.map(|input| plan.topic(input.field.topic).paths.len());
+                if sizes.next().is_some_and(|first| sizes.any(|size| size != first)) {
+                    return Err(MetricError::UnpairedMembers(metric.name.clone()));
+                }
+            }
             if let MetricSource::Robustness { robustness } = &metric.source {
                 let refused = |error| MetricError::Formula { metric: metric.name.clone(), error };
                 RobustnessState::new(robustness, plan).map_err(refused)?;
@@ -294,7 +308,8 @@ impl Metrics<'_> {
     pub fn finish(mut self, busy: &[Span]) -> (Vec<MetricObservation>, Vec<String>) {
         let mut warnings = Vec::new();
         let mut observations = Vec::with_capacity(self.states.len());
-        for (state, metric) in self.states.iter_mut().zip(&self.table.plan.metrics) {
+        let requirements = &self.table.plan.requirements;
+        for (at, (state, metric)) in self.states.iter_mut().zip(&self.table.plan.metrics).enumerate() {
             let context = &mut state.context;
             if let Some(robustness) = &mut state.robustness {
                 robustness.break_off(self.now, context);
@@ -322,6 +337,14 @@ impl Metrics<'_> {
                 reach,
                 not_finite: context.not_finite.map(|(time, _)| time.seconds()),
                 series: std::mem::take(&mut context.series),
+                robustness: state.robustness.as_mut().map_or_else(Vec::new, |robustness| {
+                    let bounds = requirements.iter().filter(|requirement| requirement.metric.index() == at);
+                    let bounds = bounds.flat_map(|requirement| {
+                        let (low, _, high, _) = ends(requirement.bound);
+                        [low, high].into_iter().flatten()
+                    });
+                    robustness.signal(&bounds.collect::<Vec<f64>>())
+                }),
             });
         }
         (observations, warnings)

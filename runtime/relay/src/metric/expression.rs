@@ -1,45 +1,136 @@
 //! Arithmetic and conditions over the values a formula holds. Nothing here allocates.
 
-use sesame_plan::{Condition, Expression};
+use std::cell::Cell;
+use std::fmt;
+
+use sesame_plan::{BinaryFunction, Condition, Distance, Expression, Point, UnaryFunction};
+
+use crate::metric::region::signed_distance;
 
 /// The values of a formula's inputs: a point, or a number (true is 1, false 0) followed by zeros.
 pub(super) type Held = [f64; 3];
 
+/// What a formula is computed from at one moment.
+pub(super) struct Moment<'a> {
+    inputs: &'a [Held],
+    /// The simulation time, in seconds.
+    time: f64,
+    undefined: Cell<Option<Undefined>>,
+}
+
+impl<'a> Moment<'a> {
+    /// The values of a formula's inputs at a time, in seconds.
+    pub(super) fn new(inputs: &'a [Held], time: f64) -> Self {
+        Moment { inputs, time, undefined: Cell::new(None) }
+    }
+
+    /// The first function that had no value, of all that was computed.
+    pub(super) fn undefined(&self) -> Option<Undefined> {
+        self.undefined.get()
+    }
+
+    fn point(&self, point: Point) -> Held {
+        match point {
+            Point::Input(at) => self.inputs[at as usize],
+            Point::Constant(point) => point,
+        }
+    }
+
+    /// The value of a function, which is remembered if it is not finite although its arguments are.
+    fn checked(&self, function: &'static str, arguments: (f64, Option<f64>), value: f64) -> f64 {
+        let finite = arguments.0.is_finite() && arguments.1.is_none_or(f64::is_finite);
+        if finite && !value.is_finite() && self.undefined.get().is_none() {
+            self.undefined.set(Some(Undefined { function, arguments }));
+        }
+        value
+    }
+}
+
+/// A function without a finite value, such as the square root of a negative number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Undefined {
+    function: &'static str,
+    arguments: (f64, Option<f64>),
+}
+
+impl fmt::Display for Undefined {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Undefined { function, arguments: (first, second) } = self;
+        match second {
+            None => write!(f, "`{function}({first})` has no value"),
+            Some(second) => write!(f, "`{function}({first}, {second})` has no value"),
+        }
+    }
+}
+
 /// The value of an expression; not finite if the arithmetic is not.
-pub(super) fn number(of: &Expression, inputs: &[Held]) -> f64 {
+pub(super) fn number(of: &Expression, at: &Moment<'_>) -> f64 {
     match of {
         Expression::Constant(value) => *value,
-        Expression::Input(at) => inputs[*at as usize][0],
-        Expression::Negate(of) => -number(of, inputs),
-        Expression::Sum(of) => of.iter().map(|term| number(term, inputs)).reduce(|sum, term| sum + term).unwrap_or(0.0),
+        Expression::Input(input) => at.inputs[*input as usize][0],
+        Expression::Negate(of) => -number(of, at),
+        Expression::Sum(of) => of.iter().map(|term| number(term, at)).reduce(|sum, term| sum + term).unwrap_or(0.0),
         Expression::Product(of) => {
-            of.iter().map(|factor| number(factor, inputs)).reduce(|product, factor| product * factor).unwrap_or(1.0)
+            of.iter().map(|factor| number(factor, at)).reduce(|product, factor| product * factor).unwrap_or(1.0)
         }
-        Expression::Divide { value, by } => number(value, inputs) / number(by, inputs),
-        Expression::Absolute(of) => number(of, inputs).abs(),
-        Expression::Min(of) => of.iter().map(|operand| number(operand, inputs)).reduce(least).unwrap_or(f64::NAN),
-        Expression::Max(of) => of.iter().map(|operand| number(operand, inputs)).reduce(greatest).unwrap_or(f64::NAN),
-        Expression::Distance { from, to, scale } => {
-            let [from, to] = [from, to].map(|at| inputs[*at as usize]);
+        Expression::Divide { value, by } => number(value, at) / number(by, at),
+        Expression::Absolute(of) => number(of, at).abs(),
+        Expression::Min(of) => of.iter().map(|operand| number(operand, at)).reduce(least).unwrap_or(f64::NAN),
+        Expression::Max(of) => of.iter().map(|operand| number(operand, at)).reduce(greatest).unwrap_or(f64::NAN),
+        Expression::Distance(distance) => {
+            let Distance { from, to, scale } = **distance;
+            let [from, to] = [from, to].map(|point| at.point(point));
             let square = |axis: usize| {
                 let along = from[axis] - to[axis] * scale;
                 along * along
             };
             libm::sqrt(square(0) + square(1) + square(2))
         }
+        Expression::SignedDistance(distance) => signed_distance(at.point(distance.from), &distance.to),
+        Expression::Time => at.time,
+        Expression::Unary { function, of } => {
+            let of = number(of, at);
+            at.checked(function.name(), (of, None), unary(*function, of))
+        }
+        Expression::Binary { function, left, right } => {
+            let (left, right) = (number(left, at), number(right, at));
+            at.checked(function.name(), (left, Some(right)), binary(*function, left, right))
+        }
+    }
+}
+
+fn unary(function: UnaryFunction, of: f64) -> f64 {
+    match function {
+        UnaryFunction::Sqrt => libm::sqrt(of),
+        UnaryFunction::Sin => libm::sin(of),
+        UnaryFunction::Cos => libm::cos(of),
+        UnaryFunction::Tan => libm::tan(of),
+        UnaryFunction::Asin => libm::asin(of),
+        UnaryFunction::Acos => libm::acos(of),
+        UnaryFunction::Atan => libm::atan(of),
+        UnaryFunction::Exp => libm::exp(of),
+        UnaryFunction::Ln => libm::log(of),
+    }
+}
+
+fn binary(function: BinaryFunction, left: f64, right: f64) -> f64 {
+    match function {
+        BinaryFunction::Atan2 => libm::atan2(left, right),
+        BinaryFunction::Hypot => libm::hypot(left, right),
+        BinaryFunction::Pow => libm::pow(left, right),
     }
 }
 
 /// Whether a condition holds.
-pub(super) fn holds(of: &Condition, inputs: &[Held]) -> bool {
+pub(super) fn holds(of: &Condition, at: &Moment<'_>) -> bool {
     match of {
         Condition::Constant(value) => *value,
-        Condition::Input(at) => inputs[*at as usize][0] != 0.0,
-        Condition::Compare { left, by, right } => by.holds(number(left, inputs), number(right, inputs)),
-        Condition::Same { left, right } => holds(left, inputs) == holds(right, inputs),
-        Condition::All(of) => of.iter().all(|part| holds(part, inputs)),
-        Condition::Any(of) => of.iter().any(|part| holds(part, inputs)),
-        Condition::Not(of) => !holds(of, inputs),
+        Condition::Input(input) => at.inputs[*input as usize][0] != 0.0,
+        Condition::Compare { left, by, right } => by.holds(number(left, at), number(right, at)),
+        Condition::Same { left, right } => holds(left, at) == holds(right, at),
+        Condition::All(of) => of.iter().all(|part| holds(part, at)),
+        Condition::Any(of) => of.iter().any(|part| holds(part, at)),
+        Condition::Not(of) => !holds(of, at),
     }
 }
 
@@ -58,6 +149,14 @@ mod tests {
     use sesame_plan::Comparison;
 
     use super::*;
+
+    fn number(of: &Expression, inputs: &[Held]) -> f64 {
+        super::number(of, &Moment::new(inputs, 0.0))
+    }
+
+    fn holds(of: &Condition, inputs: &[Held]) -> bool {
+        super::holds(of, &Moment::new(inputs, 0.0))
+    }
 
     const INPUTS: [Held; 3] = [[6.0, 0.0, 0.0], [3.0, 4.0, 12.0], [1.0, 0.0, 0.0]];
 
@@ -78,9 +177,65 @@ mod tests {
     #[test]
     fn a_distance_is_in_the_unit_of_the_first_point() {
         let zero: Held = [0.0; 3];
-        let apart = |scale| Expression::Distance { from: 0, to: 1, scale };
+        let apart =
+            |scale| Expression::Distance(Box::new(Distance { from: Point::Input(0), to: Point::Input(1), scale }));
         assert_eq!(number(&apart(1.0), &[zero, INPUTS[1]]), 13.0);
         assert_eq!(number(&apart(1000.0), &[zero, INPUTS[1]]), 13000.0);
+    }
+
+    #[test]
+    fn a_written_point_is_as_good_as_one_of_a_message() {
+        let from = Point::Constant([3.0, 0.0, 12.0]);
+        let distance = Box::new(Distance { from, to: Point::Input(1), scale: 1.0 });
+        assert_eq!(number(&Expression::Distance(distance), &INPUTS), 4.0);
+    }
+
+    #[test]
+    fn time_is_that_of_the_moment() {
+        assert_eq!(super::number(&Expression::Time, &Moment::new(&[], 2.5)), 2.5);
+    }
+
+    #[test]
+    fn functions_compute_what_their_names_say() {
+        use BinaryFunction::{Atan2, Hypot, Pow};
+        use UnaryFunction::{Acos, Asin, Atan, Cos, Exp, Ln, Sin, Sqrt, Tan};
+        let half_turn = std::f64::consts::PI;
+        let unary = [
+            (Sqrt, 9.0, 3.0),
+            (Sin, half_turn / 2.0, 1.0),
+            (Cos, half_turn, -1.0),
+            (Tan, half_turn / 4.0, 1.0),
+            (Asin, 1.0, half_turn / 2.0),
+            (Acos, -1.0, half_turn),
+            (Atan, 1.0, half_turn / 4.0),
+            (Exp, 1.0, std::f64::consts::E),
+            (Ln, std::f64::consts::E, 1.0),
+        ];
+        for (function, of, value) in unary {
+            let found = number(&Expression::Unary { function, of: Box::new(constant(of)) }, &[]);
+            assert!((found - value).abs() < 1e-15, "{} {found}", function.name());
+        }
+        let binary = [(Atan2, 1.0, -1.0, 0.75 * half_turn), (Hypot, 3.0, 4.0, 5.0), (Pow, 2.0, 10.0, 1024.0)];
+        for (function, left, right, value) in binary {
+            let [left, right] = [left, right].map(|argument| Box::new(constant(argument)));
+            assert_eq!(number(&Expression::Binary { function, left, right }, &[]), value, "{}", function.name());
+        }
+    }
+
+    #[test]
+    fn a_function_without_a_value_is_remembered_and_what_was_no_number_before_is_not() {
+        let root = |of: f64| Expression::Unary { function: UnaryFunction::Sqrt, of: Box::new(constant(of)) };
+        let said = |of: &Expression| {
+            let moment = Moment::new(&[], 0.0);
+            super::number(of, &moment);
+            moment.undefined().map(|undefined| undefined.to_string())
+        };
+        assert_eq!(said(&root(-4.0)).as_deref(), Some("`sqrt(-4)` has no value"));
+        let (left, right) = (Box::new(constant(-1.0)), Box::new(constant(0.5)));
+        let power = Expression::Binary { function: BinaryFunction::Pow, left, right };
+        assert_eq!(said(&Expression::Sum(vec![power, root(-4.0)])).as_deref(), Some("`pow(-1, 0.5)` has no value"));
+        assert_eq!(said(&root(4.0)), None);
+        assert_eq!(said(&root(f64::NAN)), None);
     }
 
     #[test]

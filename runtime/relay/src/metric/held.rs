@@ -1,6 +1,6 @@
 //! The values that formulas hold: the last value of each input, and of each member of a group.
 
-use sesame_plan::{CampaignPlan, Input, Members, TopicId};
+use sesame_plan::{CampaignPlan, Input, Members, TextTest, TopicId};
 
 use crate::metric::expression::{Held, greatest, least};
 use crate::value::Value;
@@ -19,18 +19,26 @@ pub(super) fn hear(
     heard.clear();
     let mut all_finite = true;
     for (at, input) in inputs.iter().enumerate().filter(|(_, input)| input.field.topic == topic) {
-        let held = match value.at(&input.field.path) {
-            Some(Value::Point(point)) => *point,
-            Some(Value::Real(x)) => [*x, 0.0, 0.0],
-            Some(Value::Int(n)) => [*n as f64, 0.0, 0.0],
-            Some(Value::Bool(b)) => [f64::from(u8::from(*b)), 0.0, 0.0],
-            _ => return Err(input.field.path.join(".")),
+        let path = &input.field.path;
+        let number = |number: f64| [number, 0.0, 0.0];
+        let held = match (value.at(path), &input.text) {
+            (Some(Value::Point(point)), None) => Some(*point),
+            (Some(value), None) => value.number().map(number),
+            (None, None) => value.coordinate_at(path).map(number),
+            (Some(Value::Text(text)), Some(TextTest::Is(wanted))) => Some(truth(text == wanted.as_str())),
+            (Some(Value::Text(text)), Some(TextTest::IsNot(other))) => Some(truth(text != other.as_str())),
+            (_, Some(_)) => None,
         };
+        let Some(held) = held else { return Err(path.join(".")) };
         let finite = held.iter().all(|x| x.is_finite());
         all_finite &= finite;
         heard.push((at, if finite { held } else { NOT_FINITE }));
     }
     Ok(all_finite)
+}
+
+fn truth(holds: bool) -> Held {
+    [f64::from(u8::from(holds)), 0.0, 0.0]
 }
 
 /// The last values of the inputs of a formula.
@@ -54,14 +62,27 @@ impl HeldInputs {
         }
     }
 
+    /// As [`HeldInputs::new`], for values of one member or pair: those of the others are neither taken nor kept.
+    pub(super) fn of_one(inputs: &[Input], plan: &CampaignPlan) -> Self {
+        let mut held = HeldInputs::new(inputs, plan);
+        for (members, input) in held.members.iter_mut().zip(inputs) {
+            if matches!(input.members, Members::Each | Members::First | Members::Second) {
+                *members = Vec::new();
+            }
+        }
+        held
+    }
+
     /// Takes the values that [`hear`] found in a message on the `member`th path of its topic.
     pub(super) fn hold(&mut self, inputs: &[Input], heard: &[(usize, Held)], member: usize) {
         for &(at, value) in heard {
             self.known[at] = true;
             let members = &mut self.members[at];
-            members[member] = Some(value);
+            if let Some(last) = members.get_mut(member) {
+                *last = Some(value);
+            }
             let join: fn(f64, f64) -> f64 = match inputs[at].members {
-                Members::Each => {
+                Members::Each | Members::First | Members::Second => {
                     self.inputs[at] = value;
                     continue;
                 }
@@ -75,13 +96,30 @@ impl HeldInputs {
         }
     }
 
-    /// Makes one member of a group the latest, if each member has a formula.
-    pub(super) fn turn_to(&mut self, inputs: &[Input], topic: TopicId, member: usize) {
+    /// Makes inputs that are of each member those of this one. Returns whether it had a message for all of them.
+    pub(super) fn turn_to(&mut self, inputs: &[Input], member: usize) -> bool {
+        self.turn(inputs, |input| (input.members == Members::Each).then_some(member))
+    }
+
+    /// Makes inputs that are of a pair those of this one. Returns whether both had a message for all of them.
+    pub(super) fn turn_to_pair(&mut self, inputs: &[Input], (first, second): (usize, usize)) -> bool {
+        self.turn(inputs, |input| match input.members {
+            Members::First => Some(first),
+            Members::Second => Some(second),
+            _ => None,
+        })
+    }
+
+    fn turn(&mut self, inputs: &[Input], member: impl Fn(&Input) -> Option<usize>) -> bool {
+        let mut known = true;
         for (at, input) in inputs.iter().enumerate() {
-            if input.field.topic == topic && input.members == Members::Each {
-                self.inputs[at] = self.members[at][member].unwrap_or(self.inputs[at]);
+            let Some(member) = member(input) else { continue };
+            match self.members[at].get(member).copied().flatten() {
+                Some(value) => self.inputs[at] = value,
+                None => known = false,
             }
         }
+        known
     }
 
     /// The held values of all inputs, once all had a message and while the last ones are finite.

@@ -2,22 +2,23 @@
 //! result at the end of the run.
 
 use sesame_base::observation::Reach;
+use sesame_base::robustness::quantifier;
 use sesame_base::time::SimTime;
 use sesame_plan::stl::{Formula, Interval, Robustness};
 use sesame_plan::{CampaignPlan, Members, TopicId};
 
 use crate::metric::Context;
-use crate::metric::expression::{Held, least, number};
+use crate::metric::aggregate::pairs_of;
+use crate::metric::expression::{Held, Moment, least, number};
 use crate::metric::held::{HeldInputs, hear};
-use crate::stl::{FormulaError, Monitor};
+use crate::stl::{FormulaError, Monitor, Signal};
 use crate::value::Value;
 
 /// A robustness in one run.
 pub(super) struct RobustnessState<'p> {
     robustness: &'p Robustness,
-    /// The group of which each member has a formula of its own.
-    each: Option<TopicId>,
-    /// One for each member of that group; one for a formula without.
+    /// One for each member of the groups, or each pair of the group, of which each has a formula of its own; one for a
+    /// formula without.
     instances: Vec<Instance>,
     /// When the last message came.
     last: SimTime,
@@ -25,11 +26,15 @@ pub(super) struct RobustnessState<'p> {
 }
 
 struct Instance {
+    /// The member that it is of, twice, or the pair.
+    of: (usize, usize),
     held: HeldInputs,
     /// `None` once the run is over, or a number was not finite: then there is an outcome.
     monitor: Option<Monitor>,
     /// `None` as long as there is a monitor, and if the formula was never evaluated.
     said: Option<Said>,
+    /// The robustness with its signal, where the trace had begun.
+    signal: Option<(f64, Signal)>,
 }
 
 /// The outcome of one monitor.
@@ -46,7 +51,8 @@ impl Instance {
     fn break_off(&mut self, now: SimTime, last: SimTime) {
         if let Some(monitor) = self.monitor.take() {
             let reach = monitor.reach(now);
-            self.said = Some(Said { robustness: monitor.finish(last), reach });
+            self.signal = monitor.finish_with_signal(last);
+            self.said = Some(Said { robustness: self.signal.as_ref().map(|signal| signal.0), reach });
         }
     }
 }
@@ -54,14 +60,22 @@ impl Instance {
 impl<'p> RobustnessState<'p> {
     /// Before the first message. Fails for a formula that the generator never writes.
     pub(super) fn new(robustness: &'p Robustness, plan: &CampaignPlan) -> Result<Self, FormulaError> {
-        let monitor = Monitor::new(&robustness.formula, robustness.signals.len())?;
+        let monitor = Monitor::new(&robustness.formula, robustness.signals.len())?.keeping_its_signal();
         let monitor = if robustness.whole_windows { monitor.over_whole_windows() } else { monitor };
         let each = robustness.inputs.iter().find(|input| input.members == Members::Each).map(|input| input.field.topic);
-        let count = each.map_or(1, |topic| plan.topic(topic).paths.len());
-        let instance =
-            || Instance { held: HeldInputs::new(&robustness.inputs, plan), monitor: Some(monitor.clone()), said: None };
-        let instances = (0..count).map(|_| instance()).collect();
-        Ok(RobustnessState { robustness, each, instances, last: SimTime::ZERO, heard: Vec::new() })
+        let instance = |of: (usize, usize)| Instance {
+            of,
+            held: HeldInputs::of_one(&robustness.inputs, plan),
+            monitor: Some(monitor.clone()),
+            said: None,
+            signal: None,
+        };
+        let mut instances: Vec<Instance> = pairs_of(&robustness.inputs, plan).map(instance).collect();
+        if instances.is_empty() {
+            let count = each.map_or(1, |topic| plan.topic(topic).paths.len());
+            instances = (0..count).map(|member| instance((member, member))).collect();
+        }
+        Ok(RobustnessState { robustness, instances, last: SimTime::ZERO, heard: Vec::new() })
     }
 
     /// A message on the `member`th path of a topic, at the context's time.
@@ -76,17 +90,27 @@ impl<'p> RobustnessState<'p> {
             }
         }
         let before = std::mem::replace(&mut self.last, context.now);
-        for (at, instance) in self.instances.iter_mut().enumerate() {
-            let Instance { held, monitor, .. } = instance;
-            // If each member has a formula, values of all members go to all formulas, and those of one member to its
-            // own.
-            let own = self.each != Some(topic) || at == member;
+        for instance in &mut self.instances {
+            let Instance { of, held, monitor, .. } = instance;
+            // If each member or pair has a formula, values of all members go to all formulas, and those of one member
+            // to its own.
             let mut finite = true;
+            let mut concerned = of.0 == of.1;
             for &(input, value) in &self.heard {
-                if own || inputs[input].members != Members::Each {
+                let own = match inputs[input].members {
+                    Members::Min | Members::Max | Members::Sum => true,
+                    Members::Each | Members::First => member == of.0,
+                    Members::Second => member == of.1,
+                };
+                if own {
+                    concerned = true;
                     finite &= value.iter().all(|x| x.is_finite());
                     held.hold(inputs, &[(input, value)], member);
                 }
+            }
+            // There may be many pairs, so those of other members are left alone.
+            if !concerned {
+                continue;
             }
             if !finite {
                 instance.break_off(context.now, before);
@@ -94,11 +118,15 @@ impl<'p> RobustnessState<'p> {
             }
             let (Some(values), Some(monitor)) = (held.values(), monitor) else { continue };
             for (at, signal) in signals.iter().enumerate() {
-                let value = number(signal, values);
+                let moment = Moment::new(values, context.now());
+                let value = number(signal, &moment);
                 // As with other formulas: if arithmetic gives no number, the last value stays.
                 if value.is_finite() {
                     monitor.push(context.now, at, value);
-                } else {
+                }
+                if let Some(undefined) = moment.undefined() {
+                    context.note(format!("{undefined} at {}", context.now));
+                } else if !value.is_finite() {
                     context.note(format!("refused the value {value} at {}", context.now));
                 }
             }
@@ -111,7 +139,8 @@ impl<'p> RobustnessState<'p> {
         for instance in &mut self.instances {
             if let Some(monitor) = instance.monitor.take() {
                 // A formula without a trace says nothing about the run.
-                let robustness = monitor.finish(end);
+                instance.signal = monitor.finish_with_signal(end);
+                let robustness = instance.signal.as_ref().map(|signal| signal.0);
                 instance.said = robustness.map(|value| Said { robustness, reach: (value, value) });
             }
         }
@@ -136,6 +165,12 @@ impl<'p> RobustnessState<'p> {
             context.now = self.last;
             self.set(context);
         }
+    }
+
+    /// The signal once the run is over, in seconds. It is exact as to when it was beyond these values.
+    pub(super) fn signal(&mut self, bounds: &[f64]) -> Vec<(f64, f64)> {
+        let signals = self.instances.iter_mut().filter_map(|instance| instance.signal.take()).collect();
+        Signal::of_least(signals, quantifier(&self.robustness.formula)).thinned(bounds)
     }
 
     /// The values that it may have at the end of the run, once the run is over: the least of all instances counts. If
@@ -198,11 +233,11 @@ mod tests {
     }
 
     fn command() -> Input {
-        Input { field: FieldRef { topic: TopicId(0), path: Vec::new() }, members: Members::Min }
+        Input { field: FieldRef { topic: TopicId(0), path: Vec::new() }, members: Members::Min, text: None }
     }
 
     fn level(members: Members) -> Input {
-        Input { field: FieldRef { topic: TopicId(1), path: vec!["level".into()] }, members }
+        Input { field: FieldRef { topic: TopicId(1), path: vec!["level".into()] }, members, text: None }
     }
 
     fn above(signal: u32) -> Formula {
@@ -270,6 +305,25 @@ mod tests {
         };
         assert_eq!(value(both(), &[(0, 0, -9.0), (100, 0, 3.0), (200, 1, 7.0)]), Some(3.0));
         assert_eq!(value(both(), &[(0, 0, -9.0), (100, 0, 3.0)]), None);
+    }
+
+    #[test]
+    fn the_signal_tells_when_a_robustness_was_lost() {
+        let sent = [(0, 1, 4.0), (2_000, 1, -2.0), (3_000, 1, 1.0), (6_000, 1, -0.5)];
+        let observed = |members, formula| observed(of(vec![level(members)], formula), &sent, Some(10_000)).0;
+        let signal = observed(Members::Min, always(above(0))).robustness;
+        assert_eq!(signal, [(0.0, 4.0), (2.0, -2.0), (3.0, 1.0), (6.0, -0.5), (10.0, -0.5)]);
+        // A request without its answer counts from the request on.
+        let soon = observed(Members::Min, always(eventually(0.0, 1.0, above(0)))).robustness;
+        assert_eq!(soon.iter().copied().find(|point| point.1 < 0.0), Some((6.0, -0.5)));
+    }
+
+    #[test]
+    fn the_signal_of_a_group_is_the_least_of_its_members() {
+        let sent = [(0, 1, 4.0), (0, 2, 3.0), (2_000, 1, -2.0), (3_000, 1, 5.0), (4_000, 2, 1.0)];
+        let each = of(vec![level(Members::Each)], always(above(0)));
+        let signal = observed(each, &sent, Some(10_000)).0.robustness;
+        assert_eq!(signal, [(0.0, 3.0), (2.0, -2.0), (3.0, 3.0), (4.0, 1.0), (10.0, 1.0)]);
     }
 
     #[test]

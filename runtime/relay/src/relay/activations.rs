@@ -451,7 +451,11 @@ fn an_outbound_metric_hears_its_topic() {
     let mut plan = plan(vec![operation(0, OperationKind::Blackhole)]);
     plan.metrics[1].source = MetricSource::Formula {
         formula: Formula {
-            inputs: vec![Input { field: FieldRef { topic: TopicId(0), path: Vec::new() }, members: Members::Min }],
+            inputs: vec![Input {
+                field: FieldRef { topic: TopicId(0), path: Vec::new() },
+                members: Members::Min,
+                text: None,
+            }],
             aggregate: Aggregate::Count { of: Holds::Constant(true) },
             when: None,
             every: None,

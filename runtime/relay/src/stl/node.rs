@@ -56,10 +56,27 @@ pub(super) struct Node {
 
 #[derive(Debug, Clone)]
 enum Operator {
-    Predicate { signal: usize, comparison: Comparison, constant: f64 },
-    Not { of: Box<Node>, input: VecDeque<Piece> },
-    And { left: Box<Node>, right: Box<Node>, input: Pair },
-    Always { of: Box<Node>, input: VecDeque<Piece>, minimum: SlidingMinimum },
+    Predicate {
+        signal: usize,
+        comparison: Comparison,
+        constant: f64,
+    },
+    Not {
+        of: Box<Node>,
+        input: VecDeque<Piece>,
+    },
+    And {
+        left: Box<Node>,
+        right: Box<Node>,
+        input: Pair,
+    },
+    /// `kept` has all that came from `of`, of an operator whose signal is asked for.
+    Always {
+        of: Box<Node>,
+        input: VecDeque<Piece>,
+        minimum: SlidingMinimum,
+        kept: Option<VecDeque<Piece>>,
+    },
     Until(Box<Until>),
 }
 
@@ -173,12 +190,15 @@ impl Node {
                     put(out, end, [left, right].into_iter().find(undecided).unwrap_or(left.min(right)));
                 }
             }
-            Operator::Always { of, input, minimum } => {
+            Operator::Always { of, input, minimum, kept } => {
                 if let Some(extreme) = stretch.undecided().filter(|_| minimum.is_bounded()) {
                     put(out, stretch.end, extreme);
                 } else {
                     of.extend(stretch, values, input);
                     for piece in input.drain(..) {
+                        if let Some(kept) = kept {
+                            put(kept, piece.end, piece.value);
+                        }
                         minimum.push(piece, out);
                     }
                     if stretch.cuts() {
@@ -195,6 +215,36 @@ impl Node {
         }
     }
 
+    /// From now on keeps what its outermost `always` go over: the signal of a formula that has a quantifier.
+    pub(super) fn keep_signal(&mut self) {
+        match &mut self.operator {
+            Operator::Always { kept, .. } => *kept = Some(VecDeque::new()),
+            Operator::Not { of, .. } => of.keep_signal(),
+            Operator::And { left, right, .. } => {
+                left.keep_signal();
+                right.keep_signal();
+            }
+            Operator::Predicate { .. } | Operator::Until(_) => {}
+        }
+    }
+
+    /// The signal that was kept, and where it begins; of several `always` the least at each time.
+    pub(super) fn signal(self) -> Option<(i64, VecDeque<Piece>)> {
+        match self.operator {
+            Operator::Always { of, kept, .. } => {
+                let Span { start, end } = of.asked;
+                let kept = kept?.into_iter().map(|piece| Piece { end: piece.end.min(end), ..piece });
+                Some((start, kept.filter(|piece| piece.end > start).collect()))
+            }
+            Operator::Not { of, .. } => {
+                let (start, pieces) = of.signal()?;
+                Some((start, pieces.into_iter().map(|piece| Piece { value: -piece.value, ..piece }).collect()))
+            }
+            Operator::And { left, right, .. } => Some(least(left.signal()?, right.signal()?)),
+            Operator::Predicate { .. } | Operator::Until(_) => None,
+        }
+    }
+
     /// How many pieces are held in all queues.
     #[cfg(test)]
     pub(super) fn held(&self) -> usize {
@@ -203,7 +253,7 @@ impl Node {
             Operator::Predicate { .. } => 0,
             Operator::Not { of, input } => of.held() + input.len(),
             Operator::And { left, right, input } => left.held() + right.held() + pair(input),
-            Operator::Always { of, input, minimum } => of.held() + input.len() + minimum.held(),
+            Operator::Always { of, input, minimum, kept: _ } => of.held() + input.len() + minimum.held(),
             Operator::Until(until) => {
                 let Until { left, right, lead, input, before, within, ahead, parts, .. } = &**until;
                 let queues = lead.len() + pair(input) + before.held() + within.held() + ahead.len() + pair(parts);
@@ -250,7 +300,12 @@ fn and(left: Node, right: Node) -> Operator {
 }
 
 fn always(window: Window, asked: Span, of: Node) -> Operator {
-    Operator::Always { of: Box::new(of), input: VecDeque::new(), minimum: SlidingMinimum::new(window, asked) }
+    Operator::Always {
+        of: Box::new(of),
+        input: VecDeque::new(),
+        minimum: SlidingMinimum::new(window, asked),
+        kept: None,
+    }
 }
 
 fn window(interval: Interval) -> Result<Window, FormulaError> {
@@ -261,6 +316,29 @@ fn window(interval: Interval) -> Result<Window, FormulaError> {
     }
     let nanos = |seconds| SimTime::from_seconds(seconds).nanos();
     Ok(Window { from: nanos(from), to: to.map(nanos) })
+}
+
+/// The lesser of two signals at each time; where there is only one of them, that one.
+pub(super) fn least(a: (i64, VecDeque<Piece>), b: (i64, VecDeque<Piece>)) -> (i64, VecDeque<Piece>) {
+    let start = a.0.min(b.0);
+    let last = |pieces: &VecDeque<Piece>| pieces.back().map_or(start, |piece| piece.end);
+    let end = last(&a.1).max(last(&b.1));
+    // Nothing is below infinity, so it stands for what is missing before the beginning and after the end.
+    let whole = |(from, mut pieces): (i64, VecDeque<Piece>)| {
+        if from > start {
+            pieces.push_front(Piece { end: from, value: f64::INFINITY });
+        }
+        if last(&pieces) < end {
+            put(&mut pieces, end, f64::INFINITY);
+        }
+        pieces
+    };
+    let mut pair = Pair { left: whole(a), right: whole(b) };
+    let mut pieces = VecDeque::new();
+    while let Some((end, left, right)) = pair.pop() {
+        put(&mut pieces, end, left.min(right));
+    }
+    (start, pieces)
 }
 
 /// By how much a value satisfies a comparison; never NaN.

@@ -272,6 +272,43 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(1_000))]
 
     #[test]
+    fn a_signal_has_the_robustness_at_the_time_that_decides_it(
+        interval in any_interval(), first in any_formula(), second in any_predicate(), shape in 0..4, trace in any_trace(),
+        whole in any::<bool>(),
+    ) {
+        let formula = match shape {
+            0 => always(interval, first),
+            1 => eventually(interval, first),
+            2 => Formula::And {
+                left: Box::new(always(interval, first)),
+                right: Box::new(always(Interval::UNBOUNDED, second)),
+            },
+            _ => implies(always(interval, first), eventually(Interval::UNBOUNDED, second)),
+        };
+        let mut monitor = Monitor::new(&formula, SIGNALS).unwrap().keeping_its_signal();
+        if whole {
+            monitor = monitor.over_whole_windows();
+        }
+        for &(time, signal, value) in &trace.samples {
+            monitor.push(SimTime::from_nanos(time), signal, value);
+        }
+        let plain = if whole { robustness_over_whole(&formula, &trace, 1) } else { robustness(&formula, &trace, 1) };
+        let kept = monitor.finish_with_signal(SimTime::from_nanos(trace.end));
+        prop_assert_eq!(kept.as_ref().map(|kept| kept.0), plain);
+        if let Some((robustness, signal)) = kept && robustness.is_finite() {
+            let points = signal.thinned(&[]);
+            prop_assert!(points.is_sorted_by(|a, b| a.0 <= b.0), "{:?}", points);
+            let values = points.iter().map(|point| point.1);
+            let decisive = if quantifier(&formula) == Some(Quantifier::Always) {
+                values.fold(f64::INFINITY, f64::min)
+            } else {
+                values.fold(f64::NEG_INFINITY, f64::max)
+            };
+            prop_assert_eq!(decisive, robustness);
+        }
+    }
+
+    #[test]
     fn always_is_as_defined(interval in any_interval(), of in any_predicate(), trace in any_trace()) {
         let formula = always(interval, of);
         prop_assert_eq!(robustness(&formula, &trace, 1), naive(&formula, &trace));

@@ -1,6 +1,7 @@
 //! A simulator that is a Rust type inside the runner, stepped in lock-step.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::path::{Path, PathBuf};
 
 use sesame_base::time::SimTime;
 use sesame_plan::CampaignPlan;
@@ -8,16 +9,16 @@ use sesame_plan::CampaignPlan;
 use crate::message;
 use crate::relay::{Delivery, Exchange};
 use crate::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError, Wires};
-use crate::transport::{Capabilities, Connect, Place, Transport, TransportError, unknown_topic};
+use crate::transport::{Capabilities, Connect, Transport, TransportError, unknown_topic};
 use crate::value::Value;
 use crate::wire::Wire;
 
 /// Connects to a simulator that is a Rust type inside the runner.
-pub const fn in_process<S: Simulator + 'static>() -> Connect {
-    Connect { make: connect::<S>, place: Place { runner: "", space: "" } }
+pub fn in_process<S: Simulator + 'static>() -> Connect {
+    Connect { make: connect::<S>, folder: PathBuf::new() }
 }
 
-fn connect<S: Simulator + 'static>(plan: &CampaignPlan, _: Place) -> Box<dyn Transport> {
+fn connect<S: Simulator + 'static>(plan: &CampaignPlan, _: &Path) -> Box<dyn Transport> {
     let sesame_plan::Transport::InProcess { step_ns, .. } = plan.simulator.transport else {
         unreachable!("the generator connects each kind of simulator by its own transport")
     };

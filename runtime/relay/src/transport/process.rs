@@ -29,7 +29,7 @@ use sesame_plan::CampaignPlan;
 use self::free_running::FreeRunning;
 use self::lock_stepped::LockStepped;
 use crate::lifecycle::{self, Program};
-use crate::transport::{Connect, Place, Transport};
+use crate::transport::{Connect, Transport};
 
 /// Ends all simulators of this process with everything they started. It does the same as closing each of them, but may
 /// be called from any thread, even while another one communicates with them.
@@ -62,16 +62,15 @@ fn send_failed(reason: &str) {
     output.write_all(&line).and_then(|()| output.flush()).ok();
 }
 
-/// Connects to a simulator that is a program: `runner` is the folder of the runner's crate, `space` the folder of the
-/// `.sesame` file, relative to it. Only a runner may call this: its own executable becomes the simulator's keeper.
-pub const fn process(runner: &'static str, space: &'static str) -> Connect {
-    Connect { make: connect, place: Place { runner, space } }
+/// Connects to a simulator that is a program and runs in this folder. Only a runner may call this: its own executable
+/// becomes the simulator's keeper.
+pub fn process(folder: PathBuf) -> Connect {
+    Connect { make: connect, folder }
 }
 
-fn connect(plan: &CampaignPlan, place: Place) -> Box<dyn Transport> {
-    let folder = Path::new(place.runner).join(place.space);
+fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
     // Shown in messages, so without `..`. If the folder does not exist, starting the simulator reports it.
-    let folder = folder.canonicalize().unwrap_or(folder);
+    let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     transport(plan, folder, true)
 }
 

@@ -3,6 +3,8 @@
 //! Names of elements and attributes are the program's own (`'static`), everything else goes through one escape. What
 //! comes out is well-formed as XML too, so that any XML parser can check it.
 
+use std::fmt::Write as _;
+
 /// Markup in the making.
 #[derive(Debug, Default)]
 pub(crate) struct Markup {
@@ -48,6 +50,35 @@ impl Markup {
     /// Text.
     pub(crate) fn text(&mut self, text: &str) {
         escape(text, &mut self.text);
+    }
+
+    /// Words in which backticks mark what is code.
+    pub(crate) fn prose(&mut self, text: &str) {
+        let parts: Vec<&str> = text.split('`').collect();
+        // An odd backtick is one that means itself.
+        let pairs = (parts.len() - 1) / 2;
+        for (at, part) in parts.iter().enumerate() {
+            match at {
+                at if at > 2 * pairs => self.text(&format!("`{part}")),
+                at if at % 2 == 1 => self.element("code", &[], part),
+                _ => self.text(part),
+            }
+        }
+    }
+
+    /// Data for the page's script. A document in HTML and one in XML read it alike, since it has none of the characters
+    /// that end a script or that only one of them decodes.
+    pub(crate) fn json(&mut self, id: &str, data: &serde_json::Value) {
+        self.open("script", &[("type", "application/json"), ("id", id)]);
+        for c in data.to_string().chars() {
+            match c {
+                '<' | '>' | '&' | '\u{7F}'..='\u{9F}' | '\u{2028}' | '\u{2029}' | '\u{FFFE}' | '\u{FFFF}' => {
+                    let _ = write!(self.text, "\\u{:04x}", u32::from(c));
+                }
+                c => self.text.push(c),
+            }
+        }
+        self.close();
     }
 
     /// A line end, where markup is to be read as a file.
@@ -145,6 +176,48 @@ mod tests {
             prop_assert_eq!(b.text().unwrap_or_default(), expected);
             prop_assert_eq!(p.children().count(), 1);
         }
+    }
+
+    proptest! {
+        #[test]
+        fn any_data_comes_back_from_html_and_from_xml(text in any::<String>(), tag in "[<>/!&;a-z-]{0,12}") {
+            let data = serde_json::json!({"text": text, "end": format!("</script>{tag}<!--<script>]]>"), tag: 1});
+            let mut markup = Markup::default();
+            markup.json("data", &data);
+            let html = markup.finish();
+            // HTML ends a script at the first end tag and decodes nothing.
+            let (_, raw) = html.split_once('>').unwrap();
+            let raw = raw.split_once("</").unwrap().0;
+            prop_assert!(!raw.contains(['<', '>', '&']), "{}", raw);
+            prop_assert_eq!(&serde_json::from_str::<serde_json::Value>(raw).unwrap(), &data);
+            let document = roxmltree::Document::parse(&html).unwrap();
+            let read = document.root_element().text().unwrap();
+            prop_assert_eq!(&serde_json::from_str::<serde_json::Value>(read).unwrap(), &data);
+        }
+
+        #[test]
+        fn prose_has_every_word_of_its_text(text in "[a`b ]{0,20}") {
+            let mut markup = Markup::default();
+            markup.open("p", &[]);
+            markup.prose(&text);
+            markup.close();
+            let html = markup.finish();
+            let document = roxmltree::Document::parse(&html).unwrap();
+            let read: String = document.descendants().filter(roxmltree::Node::is_text).filter_map(|node| node.text()).collect();
+            let read = read.trim_end_matches('\n').to_owned();
+            let codes = document.descendants().filter(|node| node.has_tag_name("code")).count();
+            let backticks = text.matches('`').count();
+            prop_assert_eq!(codes, backticks / 2);
+            prop_assert_eq!(read.replace('`', ""), text.replace('`', ""));
+            prop_assert_eq!(read.matches('`').count(), backticks % 2);
+        }
+    }
+
+    #[test]
+    fn prose_marks_code() {
+        let mut markup = Markup::default();
+        markup.prose("`reserve` is <2`");
+        assert_eq!(markup.finish(), "<code>reserve</code> is &lt;2`");
     }
 
     #[test]

@@ -4,21 +4,22 @@ use std::fmt::Write as _;
 
 use rusqlite::Connection;
 use rusqlite::types::ValueRef;
+use sesame_plan::CampaignPlan;
 use sha2::{Digest as _, Sha256};
 
-use crate::record::schema::{self, PIECES_SINCE};
+use crate::record::schema::{self, MEANING_SINCE, PIECES_SINCE, STANDARD_WORDS_SINCE};
+use crate::record::split_operations;
 
-/// What is hashed, in this order: a name, and a query whose order of rows depends on nothing but the content.
+/// What is hashed, in this order: a name, and a query whose order of rows depends on nothing but the content. The
+/// meaning of the plan is `?1`.
 const CONTENT: &[(&str, &str)] = &[
     (
         "campaign",
-        "SELECT space, name, source, generator, runtime, seed, evaluations, end_after_s, coalesce(plan || task, plan), stop FROM campaign",
+        "SELECT space, name, generator, runtime, seed, evaluations, end_after_s, coalesce(?1 || task, ?1), stop \
+         FROM campaign",
     ),
     ("metrics", "SELECT id, name, unit, direction, objective, default_value FROM metrics ORDER BY id"),
-    (
-        "requirements",
-        "SELECT id, name, text, metric, low, low_excluded, high, high_excluded FROM requirements ORDER BY id",
-    ),
+    ("requirements", "SELECT id, name, metric, low, low_excluded, high, high_excluded FROM requirements ORDER BY id"),
     (
         "tests",
         // Without the limit that a timeout ran into: it is wall time.
@@ -74,18 +75,41 @@ const CONTENT: &[(&str, &str)] = &[
     ("events", "SELECT test, text FROM events WHERE kind = 'warning' ORDER BY test, text"),
 ];
 
-/// Hashed instead of `series_pieces` in results of schemas before [`PIECES_SINCE`].
-const POINTS: (&str, &str) = (
-    "change_points",
-    "SELECT test, metric, position, time_s, value FROM change_points ORDER BY test, metric, position",
-);
+/// What is hashed of results of an earlier schema: the schema since which it is another, and what was hashed before.
+const EARLIER: [(i64, &str, (&str, &str)); 3] = [
+    (
+        MEANING_SINCE,
+        "campaign",
+        (
+            "campaign",
+            "SELECT space, name, source, generator, runtime, seed, evaluations, end_after_s, plan, stop FROM campaign",
+        ),
+    ),
+    (
+        MEANING_SINCE,
+        "requirements",
+        (
+            "requirements",
+            "SELECT id, name, text, metric, low, low_excluded, high, high_excluded FROM requirements ORDER BY id",
+        ),
+    ),
+    (
+        PIECES_SINCE,
+        "series_pieces",
+        (
+            "change_points",
+            "SELECT test, metric, position, time_s, value FROM change_points ORDER BY test, metric, position",
+        ),
+    ),
+];
 
 /// Bytes that are collected before they are hashed: hashing each number by itself would be slow.
 const PORTION: usize = 1 << 16;
 
-/// SHA-256 over the canonical content of a results repository, as 64 hexadecimal digits.
+/// SHA-256 over the canonical content of results with this plan, as 64 hexadecimal digits.
 ///
-/// Wall times and limits of wall time, hosts, processes, session notes, paths, and the order of writing are left out.
+/// Wall times and limits of wall time, hosts, processes, session notes, paths, and the order of writing are left out,
+/// and so is what a plan says to people only: of the plan, its [meaning](CampaignPlan::meaning) is hashed.
 /// The rest is hashed in the order of this module's list: for each table its name as a text, then its rows, then the
 /// byte `;`. A row is the byte `(` and the content of its columns: `N` for null, `I` and 8 bytes (little endian) for an
 /// integer, `F` and the 8 bytes of the IEEE 754 double (little endian, zero without sign), `T`, the length in bytes as
@@ -94,20 +118,26 @@ const PORTION: usize = 1 << 16;
 ///
 /// The task of a run that is not the campaign is hashed with the plan, which it follows.
 ///
-/// Results of an earlier schema have the digest that their release computed. Names of columns and verdicts are not
-/// hashed, so the content of a run hashes the same in schemas 6 and 7, except for two things: the plan's JSON, and the
-/// outcome of a test without effect, which is `no_effect` in schema 7 and was `void` before.
-pub(super) fn of_connection(connection: &Connection, version: i64) -> rusqlite::Result<String> {
+/// Operations that were one operation in an imported file are hashed last, if there are any.
+///
+/// Results of an earlier schema have the digest that their release computed, over all of the plan's JSON, the sentences
+/// of requirements, and the name of the `.sesame` file. Names of columns and verdicts are not hashed.
+pub(super) fn of_connection(connection: &Connection, version: i64, plan: &CampaignPlan) -> rusqlite::Result<String> {
+    let meaning = serde_json::to_string(&plan.meaning()).expect("a plan is plain data with text keys");
     // One read transaction, so that a run writing meanwhile is seen at one point.
     let transaction = connection.unchecked_transaction()?;
     let mut hash = Sha256::new();
     let mut portion = Vec::with_capacity(2 * PORTION);
-    for &content in CONTENT {
-        let (name, sql) = if content.0 == "series_pieces" && version < PIECES_SINCE { POINTS } else { content };
+    let split = version >= STANDARD_WORDS_SINCE && split_operations::are_in(&transaction)?;
+    let split = split.then_some((split_operations::TABLE, split_operations::QUERY));
+    for content in CONTENT.iter().copied().chain(split) {
+        let earlier = EARLIER.iter().find(|(since, name, _)| version < *since && *name == content.0);
+        let (name, sql) = earlier.map_or(content, |&(.., earlier)| earlier);
         feed(&mut portion, ValueRef::Text(name.as_bytes()));
         let mut statement = transaction.prepare(&schema::query(sql, version))?;
         let columns = statement.column_count();
-        let mut rows = statement.query([])?;
+        let parameters = std::iter::repeat_n(&meaning, statement.parameter_count());
+        let mut rows = statement.query(rusqlite::params_from_iter(parameters))?;
         while let Some(row) = rows.next()? {
             portion.push(b'(');
             for column in 0..columns {

@@ -111,13 +111,18 @@ impl Repository {
                     reach,
                     not_finite,
                     series: Vec::new(),
+                    robustness: Vec::new(),
                 })
                 .collect();
-            for (metric, points) in if series { self.series(row.duplicate_of.unwrap_or(number))? } else { Vec::new() } {
-                let metric = metrics
-                    .get_mut(metric)
-                    .ok_or_else(|| RecordError::damaged(&self.path, format!("{this} has a series without a metric")))?;
-                metric.series = points;
+            if series {
+                let ran = row.duplicate_of.unwrap_or(number);
+                let lacking = || RecordError::damaged(&self.path, format!("{this} has a series without a metric"));
+                for (metric, points) in self.series(ran)? {
+                    metrics.get_mut(metric).ok_or_else(lacking)?.series = points;
+                }
+                for (metric, points) in self.robustness(ran)? {
+                    metrics.get_mut(metric).ok_or_else(lacking)?.robustness = points;
+                }
             }
             records.push(TestRecord {
                 number,

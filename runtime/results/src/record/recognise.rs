@@ -13,8 +13,8 @@ use rusqlite::Connection;
 
 use sesame_plan::CampaignPlan;
 
-use crate::record::schema::{DDL, PIECES_SINCE, STANDARD_WORDS_SINCE, wide_views};
-use crate::record::{RecordError, series_views};
+use crate::record::schema::{DDL, PIECES_SINCE, ROBUSTNESS, STANDARD_WORDS_SINCE, has_robustness, wide_views};
+use crate::record::{RecordError, series_views, split_operations};
 
 /// The objects of a schema by name: the kind of each, and the words of the statement that creates it.
 type Objects = BTreeMap<String, (String, String)>;
@@ -44,12 +44,18 @@ CREATE VIEW series AS
 /// any schema that this release reads.
 pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Result<(), RecordError> {
     static CURRENT: OnceLock<Objects> = OnceLock::new();
+    static WITH_ROBUSTNESS: OnceLock<Objects> = OnceLock::new();
     static SCHEMA_6: OnceLock<Objects> = OnceLock::new();
     static SCHEMA_5: OnceLock<Objects> = OnceLock::new();
     let sound = |made: rusqlite::Result<Objects>| {
         made.unwrap_or_else(|error| unreachable!("the schema of this program is sound: {error}"))
     };
-    let ours = if schema >= STANDARD_WORDS_SINCE {
+    let has_robustness =
+        has_robustness(connection).map_err(|error| RecordError::database("read the results", path, error))?;
+    let ours = if schema >= STANDARD_WORDS_SINCE && has_robustness {
+        let statements = [DDL, &series_views::views(), ROBUSTNESS, &series_views::robustness_views()];
+        WITH_ROBUSTNESS.get_or_init(|| sound(made_by(&statements)))
+    } else if schema >= STANDARD_WORDS_SINCE {
         CURRENT.get_or_init(|| sound(made_by(&[DDL, &series_views::views()])))
     } else if schema >= PIECES_SINCE {
         SCHEMA_6.get_or_init(|| sound(made_by(&[DDL_6, &series_views::views()])))
@@ -60,7 +66,12 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
     if let Some((name, _)) = found.iter().find(|(_, (kind, _))| kind == "trigger") {
         return Err(RecordError::damaged(path, format!("there is a trigger `{name}`, which no run makes")));
     }
-    same(ours, &found, path)
+    same(ours, &found, path)?;
+    if schema >= STANDARD_WORDS_SINCE && found.contains_key(split_operations::TABLE) {
+        let ours = sound(made_by(&["CREATE TABLE tests (number INTEGER PRIMARY KEY)", split_operations::DDL]));
+        same(&ours.into_iter().filter(|(name, _)| name == split_operations::TABLE).collect(), &found, path)?;
+    }
+    Ok(())
 }
 
 /// Checks the views that have a column for each metric of the campaign.

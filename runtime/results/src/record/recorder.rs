@@ -14,7 +14,8 @@ use crate::record::files::{BEGUN, DATABASE};
 use crate::record::folder::Lock;
 use crate::record::write_tests::{unrecordable, write_event, write_test};
 use crate::record::{
-    Claim, Event, EventKind, GenerationCoverage, RecordError, Repository, ResultSet, TestRecord, schema,
+    Claim, Event, EventKind, GenerationCoverage, RecordError, Repository, ResultSet, SplitOperation, TestRecord,
+    schema, split_operations,
 };
 
 /// Writes the results of one campaign run. There is one per folder: it holds the folder's lock.
@@ -115,13 +116,22 @@ impl Recorder {
         let lock = Lock::acquire(folder)?;
         let connection = schema::open(&path, true)?;
         schema::check_whole(&connection, &path)?;
-        let repository = Repository::from_connection(connection, path)?;
+        let mut repository = Repository::from_connection(connection, path)?;
         match repository.campaign().stop {
             Some(_) if !finished => return Err(RecordError::Finished { path: repository.path }),
             None if finished => return Err(RecordError::Unfinished { path: repository.path }),
             _ => {}
         }
         tune(&repository.connection).map_err(|e| RecordError::database("open the results", &repository.path, e))?;
+        if !repository.has_robustness {
+            let install = || {
+                let transaction = repository.connection.unchecked_transaction()?;
+                schema::install_robustness(&transaction)?;
+                transaction.commit()
+            };
+            install().map_err(|e| RecordError::database("open the results", &repository.path, e))?;
+            repository.has_robustness = true;
+        }
         Recorder::begin_session(repository, lock, workers)
     }
 
@@ -152,19 +162,51 @@ impl Recorder {
 
     /// Records a test that has ended: all of it in one transaction, or nothing.
     pub fn commit(&mut self, record: &TestRecord) -> Result<(), RecordError> {
-        let plan = &self.repository.facts.plan;
-        let path = self.repository.path.clone();
         self.lock.check()?;
-        // What would be refused when it is read is never written.
-        let unfit = || plan.validate_test(&record.test).err().map(|error| error.to_string());
-        if let Some(what) = unrecordable(record).or_else(unfit) {
-            return Err(RecordError::Unrecordable { test: TestNumber(record.number), what, path });
-        }
+        self.recordable(record)?;
+        let plan = &self.repository.facts.plan;
         let written = self.repository.connection.transaction().and_then(|transaction| {
             write_test(&transaction, plan, record)?;
             transaction.commit()
         });
-        written.map_err(|source| match source.sqlite_error() {
+        written.map_err(|source| self.not_recorded(record, source))
+    }
+
+    /// Records tests that are all known already, in one transaction: all of them, or none. Each is taken, written, and
+    /// dropped before the next one, so many tests need no more memory than one.
+    pub fn commit_all(&mut self, records: impl IntoIterator<Item = TestRecord>) -> Result<(), RecordError> {
+        self.lock.check()?;
+        let failed = |source| RecordError::database("record the tests", &self.repository.path, source);
+        let transaction = self.repository.connection.unchecked_transaction().map_err(failed)?;
+        for record in records {
+            self.recordable(&record)?;
+            write_test(&transaction, &self.repository.facts.plan, &record)
+                .map_err(|source| self.not_recorded(&record, source))?;
+        }
+        transaction.commit().map_err(failed)
+    }
+
+    /// Records which operations of tests were one operation in the file that they were imported from.
+    pub fn put_split_operations(&mut self, split: &[SplitOperation]) -> Result<(), RecordError> {
+        split_operations::write(&mut self.repository.connection, split)
+            .map_err(|e| RecordError::database("record the operations of tests", &self.repository.path, e))
+    }
+
+    /// What would be refused when it is read is never written.
+    fn recordable(&self, record: &TestRecord) -> Result<(), RecordError> {
+        let unfit = || self.repository.facts.plan.validate_test(&record.test).err().map(|error| error.to_string());
+        match unrecordable(record).or_else(unfit) {
+            Some(what) => {
+                let path = self.repository.path.clone();
+                Err(RecordError::Unrecordable { test: TestNumber(record.number), what, path })
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn not_recorded(&self, record: &TestRecord, source: rusqlite::Error) -> RecordError {
+        let path = self.repository.path.clone();
+        match source.sqlite_error() {
             Some(error) if error.extended_code == rusqlite::ffi::SQLITE_CONSTRAINT_PRIMARYKEY => {
                 match self.repository.row(record.number) {
                     Err(RecordError::NoSuchTest { .. }) => self.repository.without_test(record.number),
@@ -172,7 +214,7 @@ impl Recorder {
                 }
             }
             _ => RecordError::database("record a test", &path, source),
-        })
+        }
     }
 
     /// Records what tests were called in the file they were imported from, each a test that was committed.

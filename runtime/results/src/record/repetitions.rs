@@ -46,7 +46,7 @@ impl Repetition {
     fn observation(&self) -> Observation {
         let shown = |it: &MetricValue| {
             let MetricValue { value, set, reach, not_finite } = *it;
-            MetricObservation { value, set, reach, not_finite, series: Vec::new() }
+            MetricObservation { value, set, reach, not_finite, ..MetricObservation::default() }
         };
         Observation {
             end: self.end,

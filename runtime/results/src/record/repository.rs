@@ -21,6 +21,8 @@ pub struct Repository {
     pub(super) path: PathBuf,
     /// The schema of the file, which may be an earlier one.
     pub(super) schema: i64,
+    /// Whether the file has a table of robustness signals.
+    pub(super) has_robustness: bool,
     pub(super) facts: CampaignFacts,
 }
 
@@ -73,7 +75,15 @@ impl Repository {
         recognise::views(&connection, &path, &plan)?;
         let seed = seed.parse().map_err(|_| RecordError::damaged(&path, format!("`{seed}` is not a seed")))?;
         connection.set_prepared_statement_cache_capacity(STATEMENTS);
-        Ok(Repository { connection, path, schema, facts: CampaignFacts { plan, task, seed, runtime, stop } })
+        let has_robustness = schema::has_robustness(&connection)
+            .map_err(|error| RecordError::database("read the results", &path, error))?;
+        Ok(Repository {
+            connection,
+            path,
+            schema,
+            has_robustness,
+            facts: CampaignFacts { plan, task, seed, runtime, stop },
+        })
     }
 
     /// The database's file.
@@ -117,17 +127,14 @@ impl Repository {
     /// SHA-256 over the canonical content of a results repository, as 64 hexadecimal digits.
     ///
     /// Wall times and limits of wall time, hosts, processes, session notes, paths, and the order of writing are left
-    /// out. The rest is hashed in the order of this module's list: for each table its name as a text, then its rows,
-    /// then the byte `;`. A row is the byte `(` and the content of its columns: `N` for null, `I` and 8 bytes (little
-    /// endian) for an integer, `F` and the 8 bytes of the IEEE 754 double (little endian, zero without sign), `T`, the
-    /// length in bytes as 8 bytes (little endian) and the UTF-8 bytes for a text, `B`, the length likewise and the
-    /// bytes for a blob. Everything is read from the file each time: no stored hash is used.
+    /// out, and so is what a plan says to people only: of the plan, its [meaning](CampaignPlan::meaning) is hashed.
+    /// Everything is read from the file each time: no stored hash is used.
     ///
-    /// Results of an earlier schema have the digest that their release computed. Names of columns and verdicts are not
-    /// hashed, so the content of a run hashes the same in schemas 6 and 7, except for two things: the plan's JSON, and
-    /// the outcome of a test without effect, which is `no_effect` in schema 7 and was `void` before.
+    /// Operations that were one operation in an imported file are hashed last, if there are any.
+    ///
+    /// Results of an earlier schema have the digest that their release computed.
     pub fn digest(&self) -> Result<String, RecordError> {
-        super::digest::of_connection(&self.connection, self.schema)
+        super::digest::of_connection(&self.connection, self.schema, self.plan())
             .map_err(|e| RecordError::database("read the results", &self.path, e))
     }
 

@@ -9,7 +9,7 @@ use sesame_search::sspr::{Convention, Disturbance, Point, disturbance};
 use crate::record::columns::{choice, metric_value, perhaps_finite, position, span};
 use crate::record::cursor::Cursor;
 use crate::record::read_tests::{HEAD, Head};
-use crate::record::{MetricValue, Origin, RecordError, Repository};
+use crate::record::{MetricValue, Origin, RecordError, Repository, split_operations};
 
 /// One test as analyses see it: its operations, when they acted, and the results; without time series.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +43,9 @@ pub struct ScannedOperation {
     pub intervals: Vec<Span>,
     /// Whether it had an effect, or the run cannot tell (it was imported).
     pub acted: bool,
+    /// The position of the first of the operations that were one with it in the file they were imported from, if it is
+    /// not that one.
+    pub part_of: Option<usize>,
 }
 
 impl ScannedTest {
@@ -58,15 +61,39 @@ impl ScannedTest {
 
     /// Where it lies in the reduced parameter space; `None` where no operation was active with an effect.
     pub fn point(&self, plan: &CampaignPlan, convention: Convention) -> Option<Point> {
-        let disturbances: Vec<Disturbance> = self
-            .operations
-            .iter()
-            .map(|operation| {
-                let intervals = if operation.acted { operation.intervals.clone() } else { Vec::new() };
-                disturbance(plan, operation.operation, &operation.choices, intervals)
-            })
-            .collect();
+        let mut disturbances: Vec<Disturbance> = Vec::with_capacity(self.operations.len());
+        let mut places = Vec::with_capacity(self.operations.len());
+        for operation in &self.operations {
+            let intervals = if operation.acted { self.intervals(operation, plan, convention) } else { Vec::new() };
+            let found = disturbance(plan, operation.operation, &operation.choices, intervals);
+            let whole = operation.part_of.and_then(|first| places.get(first).copied());
+            match whole {
+                Some(place) => {
+                    let whole: &mut Disturbance = &mut disturbances[place];
+                    whole.parameters.extend(found.parameters);
+                    places.push(place);
+                }
+                None => {
+                    places.push(disturbances.len());
+                    disturbances.push(found);
+                }
+            }
+        }
         Point::from_disturbances(&disturbances, convention)
+    }
+
+    /// When an operation was active. The original platform did not cut windows at the end of a run.
+    fn intervals(&self, operation: &ScannedOperation, plan: &CampaignPlan, convention: Convention) -> Vec<Span> {
+        if let Some(planned) = operation.planned
+            && convention == Convention::Original
+            && self.outcome == Outcome::Unknown
+        {
+            let cut = Span { start: planned.start, end: planned.end.min(plan.campaign.end_after) };
+            if operation.intervals.is_empty() || operation.intervals == [cut] {
+                return vec![planned];
+            }
+        }
+        operation.intervals.clone()
     }
 
     /// Its point, if it counts for coverage: it had an effect, and is not a duplicate.
@@ -125,6 +152,18 @@ impl Repository {
             Cursor::over(values.query([]).map_err(failed)?, |row| Ok((position(row, 1)?, metric_value(row, 2)?)))
                 .map_err(failed)?;
 
+        let mut split = match split_operations::are_in(&self.connection).map_err(failed)? {
+            true => Some(prepare(split_operations::QUERY)?),
+            false => None,
+        };
+        let mut split = match &mut split {
+            Some(split) => Some(
+                Cursor::over(split.query([]).map_err(failed)?, |row| Ok((position(row, 1)?, position(row, 2)?)))
+                    .map_err(failed)?,
+            ),
+            None => None,
+        };
+
         let ids = self.operation_ids();
         let mut rows = tests.query([]).map_err(failed)?;
         while let Some(row) = rows.next().map_err(failed)? {
@@ -154,6 +193,7 @@ impl Repository {
                     choices: Vec::new(),
                     intervals: Vec::new(),
                     acted,
+                    part_of: None,
                 });
             }
             let stray = |what: &str| damaged(format!("{this} has {what} without an operation"));
@@ -166,6 +206,16 @@ impl Repository {
             for (at, span) in intervals.of(number).map_err(failed)? {
                 test.operations.get_mut(at).ok_or_else(|| stray("an interval"))?.intervals.push(span);
             }
+            if let Some(split) = &mut split {
+                for (at, first) in split.of(number).map_err(failed)? {
+                    if at >= test.operations.len() || first >= at || test.operations[first].part_of.is_some() {
+                        return Err(damaged(format!(
+                            "{this} has no operation {at} that was one with operation {first}"
+                        )));
+                    }
+                    test.operations[at].part_of = Some(first);
+                }
+            }
             for it in &test.operations {
                 let (needed, chosen) = (self.plan().operation(it.operation).parameters.len(), it.choices.len());
                 if needed != chosen {
@@ -177,7 +227,8 @@ impl Repository {
             }
             each(test);
         }
-        let orphans = [operations.orphan(), choices.orphan(), intervals.orphan(), values.orphan()];
+        let split = split.as_ref().and_then(Cursor::orphan);
+        let orphans = [operations.orphan(), choices.orphan(), intervals.orphan(), values.orphan(), split];
         match orphans.into_iter().flatten().min() {
             Some(orphan) => Err(self.without_test(orphan)),
             None => Ok(()),
@@ -222,6 +273,7 @@ mod tests {
                         .get(at)
                         .map_or(Vec::new(), |effect| effect.intervals.clone()),
                     acted: record.observation.operations.get(at).is_none_or(|effect| effect.counters.any_effect()),
+                    part_of: None,
                 })
                 .collect();
             assert_eq!(test.operations, operations);

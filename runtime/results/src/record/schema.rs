@@ -24,6 +24,9 @@ pub(crate) const APPLICATION_ID: i64 = 0x5345_534D;
 
 pub(super) const DDL: &str = include_str!("schema.sql");
 
+/// The table of robustness signals. Results that this schema's first releases wrote have none.
+pub(super) const ROBUSTNESS: &str = include_str!("robustness.sql");
+
 /// The first schema with the standard words for outcomes, verdicts and columns: `no_effect`, `satisfied`,
 /// `inconclusive`, `conclusive`, `operation_seed`. Before, these were `void`, `kept`, `unsaid`, `said` and `draw_seed`.
 /// Verdicts are only in views, which nothing here reads.
@@ -33,6 +36,8 @@ pub(super) const STANDARD_WORDS_SINCE: i64 = 7;
 pub(super) const PIECES_SINCE: i64 = 6;
 /// The first schema with the column `task`.
 pub(super) const TASK_SINCE: i64 = 7;
+/// The first schema whose digest is over the meaning of the plan; before, it was over all of its JSON.
+pub(super) const MEANING_SINCE: i64 = 7;
 
 /// Columns that this release reads from tables, and their names before [`STANDARD_WORDS_SINCE`].
 const RENAMED: [(&str, &str); 2] = [("operation_seed", "draw_seed"), ("no_effect", "void")];
@@ -42,11 +47,7 @@ pub(super) fn query(sql: &str, schema: i64) -> Cow<'_, str> {
     if schema >= STANDARD_WORDS_SINCE {
         return Cow::Borrowed(sql);
     }
-    let sql = if schema < TASK_SINCE {
-        sql.replace(", task FROM", " FROM").replace("coalesce(plan || task, plan)", "plan")
-    } else {
-        sql.to_owned()
-    };
+    let sql = if schema < TASK_SINCE { sql.replace(", task FROM", " FROM") } else { sql.to_owned() };
     Cow::Owned(RENAMED.iter().fold(sql, |sql, (now, before)| sql.replace(now, before)))
 }
 
@@ -61,6 +62,7 @@ pub(crate) fn install(
     let transaction = connection.transaction()?;
     transaction.execute_batch(DDL)?;
     transaction.execute_batch(&series_views::views())?;
+    install_robustness(&transaction)?;
     transaction.execute_batch(&wide_views(plan))?;
     transaction.execute(
         "INSERT INTO campaign (id, space, name, source, generator, runtime, seed, evaluations, end_after_s, plan, task) \
@@ -115,6 +117,18 @@ pub(crate) fn install(
     transaction.pragma_update(None, "application_id", APPLICATION_ID)?;
     transaction.pragma_update(None, "user_version", SCHEMA)?;
     transaction.commit()
+}
+
+/// Makes the table of robustness signals with its views.
+pub(super) fn install_robustness(connection: &Connection) -> rusqlite::Result<()> {
+    connection.execute_batch(ROBUSTNESS)?;
+    connection.execute_batch(&series_views::robustness_views())
+}
+
+/// Whether there is a table of robustness signals.
+pub(super) fn has_robustness(connection: &Connection) -> rusqlite::Result<bool> {
+    connection
+        .query_row("SELECT EXISTS (SELECT 1 FROM sqlite_schema WHERE name = 'robustness_pieces')", [], |row| row.get(0))
 }
 
 /// The views with a column per metric, which only a plan can name: `results` has a row per test, `front` those of the

@@ -110,21 +110,41 @@ fn of_doubles(bytes: &[u8], count: usize) -> Option<Vec<f64>> {
     (rest.is_empty() && numbers.len() == count && numbers.iter().all(|x| x.is_finite())).then_some(numbers)
 }
 
-/// Writes the series of one metric in a test.
+/// A table of pieces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Pieces {
+    /// Of the series of metrics.
+    Series,
+    /// Of robustness signals.
+    Robustness,
+}
+
+impl Pieces {
+    fn table(self) -> &'static str {
+        match self {
+            Pieces::Series => "series_pieces",
+            Pieces::Robustness => "robustness_pieces",
+        }
+    }
+}
+
+/// Writes the series of one metric in a test into a table of pieces.
 pub(super) fn write(
     transaction: &Transaction<'_>,
+    pieces: Pieces,
     test: u32,
     metric: usize,
     series: &[(f64, f64)],
 ) -> rusqlite::Result<()> {
+    let table = pieces.table();
     for (at, points) in series.chunks(PIECE).enumerate() {
         let Piece { points, clock, times, numbers } = Piece::of(points);
         let (start, tick) = clock.unzip();
         transaction
-            .prepare_cached(
-                "INSERT INTO series_pieces (test, metric, position, points, start_ns, tick_ns, times, numbers) \
+            .prepare_cached(&format!(
+                "INSERT INTO {table} (test, metric, position, points, start_ns, tick_ns, times, numbers) \
                  VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
-            )?
+            ))?
             .execute(params![test, index(metric), index(at * PIECE), index(points), start, tick, times, numbers])?;
     }
     Ok(())
@@ -133,22 +153,32 @@ pub(super) fn write(
 impl Repository {
     /// The series of a test, each with the position of its metric; none of a metric that never changed.
     pub(super) fn series(&self, test: u32) -> Result<Vec<(usize, Series)>, RecordError> {
-        let mut found: Vec<(usize, Series)> = Vec::new();
-        let mut add = |metric: usize, points: Series| match found.last_mut() {
-            Some((last, series)) if *last == metric => series.extend(points),
-            _ => found.push((metric, points)),
-        };
         if self.schema < PIECES_SINCE {
+            let mut found = Vec::new();
             let sql = "SELECT metric, time_s, value FROM change_points WHERE test = ?1 ORDER BY metric, position";
             let points = self.read(sql, [test], |row| Ok((position(row, 0)?, (row.get(1)?, row.get(2)?))))?;
             for (metric, point) in points {
-                add(metric, vec![point]);
+                add(&mut found, metric, vec![point]);
             }
             return Ok(found);
         }
+        self.pieces(Pieces::Series, test)
+    }
+
+    /// The robustness signals of a test, each with the position of its metric; none in results that were recorded
+    /// without them.
+    pub(super) fn robustness(&self, test: u32) -> Result<Vec<(usize, Series)>, RecordError> {
+        if self.has_robustness { self.pieces(Pieces::Robustness, test) } else { Ok(Vec::new()) }
+    }
+
+    fn pieces(&self, pieces: Pieces, test: u32) -> Result<Vec<(usize, Series)>, RecordError> {
+        let table = pieces.table();
+        let mut found = Vec::new();
         let pieces = self.read(
-            "SELECT metric, points, start_ns, tick_ns, times, numbers FROM series_pieces WHERE test = ?1 \
-             ORDER BY metric, position",
+            &format!(
+                "SELECT metric, points, start_ns, tick_ns, times, numbers FROM {table} WHERE test = ?1 \
+                 ORDER BY metric, position"
+            ),
             [test],
             |row| {
                 let clock = Option::zip(row.get(2)?, row.get(3)?);
@@ -159,9 +189,17 @@ impl Repository {
         )?;
         for (metric, points) in pieces {
             let problem = || format!("{} has a series that cannot be read", TestNumber(test));
-            add(metric, points.ok_or_else(|| RecordError::damaged(&self.path, problem()))?);
+            add(&mut found, metric, points.ok_or_else(|| RecordError::damaged(&self.path, problem()))?);
         }
         Ok(found)
+    }
+}
+
+/// Adds points to the last series, or begins that of the next metric.
+fn add(found: &mut Vec<(usize, Series)>, metric: usize, points: Series) {
+    match found.last_mut() {
+        Some((last, series)) if *last == metric => series.extend(points),
+        _ => found.push((metric, points)),
     }
 }
 

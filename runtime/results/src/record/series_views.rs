@@ -4,6 +4,22 @@ use std::fmt::Write as _;
 
 /// The views that show series point by point, in any SQLite client: doubles are computed from their digits.
 pub(super) fn views() -> String {
+    let points =
+        "-- Time series as change points, one row each: a value holds until the next one. Ask for a test at a time.";
+    let named = "-- Time series with the names of their metrics.";
+    of_pieces("series_pieces", ("change_points", points), ("series", named))
+}
+
+/// The same of robustness signals.
+pub(super) fn robustness_views() -> String {
+    let points =
+        "-- Robustness over time, one row per change: a value holds until the next one. Ask for a test at a time.";
+    let named = "-- Robustness over time with the names of its metrics.";
+    of_pieces("robustness_pieces", ("robustness_points", points), ("robustness", named))
+}
+
+/// A view of the points of a table of pieces, and one with names of metrics, each after a comment.
+fn of_pieces(pieces: &str, (points, about_points): (&str, &str), (named, about_named): (&str, &str)) -> String {
     let zeros = "'[0' || replace(hex(zeroblob(p.points - 1)), '00', ',0') || ']'";
     let digits = |column: &str, bytes: &str| {
         format!("substr('00000000000000' || hex(substr(p.{column}, k.key * {bytes} + 1, {bytes})), -16)")
@@ -41,20 +57,20 @@ pub(super) fn views() -> String {
     };
     let width = "(length(p.times) / p.points)";
     format!(
-        "-- Time series as change points, one row each: a value holds until the next one. Ask for a test at a time.\n\
-         CREATE VIEW change_points AS\n    \
+        "{about_points}\n\
+         CREATE VIEW {points} AS\n    \
          SELECT p.test AS test, p.metric AS metric, p.position + k.key AS position,\n           \
          CASE WHEN p.tick_ns IS NULL THEN {time}\n                \
          WHEN length(p.times) = 0 THEN (p.start_ns + p.tick_ns * k.key) / 1e9\n                \
          ELSE (p.start_ns + p.tick_ns * (SELECT {ticks} FROM (SELECT {tick_digits} AS digits LIMIT 1))) / 1e9\n           \
          END AS time_s,\n           \
          {value} AS value\n      \
-         FROM series_pieces p, json_each({zeros}) k;\n\
-         -- Time series with the names of their metrics.\n\
-         CREATE VIEW series AS\n    \
+         FROM {pieces} p, json_each({zeros}) k;\n\
+         {about_named}\n\
+         CREATE VIEW {named} AS\n    \
          SELECT t.number AS test, t.name AS test_name, m.name AS metric, m.unit AS unit, c.position AS position,\n           \
          c.time_s AS time_s, c.value AS value\n      \
-         FROM tests t JOIN change_points c ON c.test = coalesce(t.duplicate_of, t.number) \
+         FROM tests t JOIN {points} c ON c.test = coalesce(t.duplicate_of, t.number) \
          JOIN metrics m ON m.id = c.metric;\n",
         time = double("times"),
         value = double("numbers"),

@@ -20,6 +20,7 @@ use super::*;
 mod damage;
 mod digests;
 mod earlier;
+mod robustness;
 mod runs;
 
 fn folder() -> TempDir {
@@ -221,7 +222,7 @@ proptest! {
         let plan = sample::plan();
         let mut record = sample::record(&plan, 3, Origin::Search, Test::default());
         record.observation.end = end;
-        record.observation.metrics[0] = MetricObservation { value, set: true, reach: Reach { low, high }, not_finite, series };
+        record.observation.metrics[0] = MetricObservation { value, set: true, reach: Reach { low, high }, not_finite, series, ..MetricObservation::default() };
         let recorder = commit_all(folder.path(), std::slice::from_ref(&record));
         let read = recorder.repository().test(3).unwrap();
         prop_assert_eq!(&read, &record);
@@ -257,7 +258,7 @@ proptest! {
         };
         let shown = if whole { MetricValue::whole(shown.value, set) } else { shown };
         let MetricValue { value: measured, reach, not_finite, .. } = shown;
-        record.observation.metrics[0] = MetricObservation { value: measured, set, reach, not_finite, series: vec![] };
+        record.observation.metrics[0] = MetricObservation { value: measured, set, reach, not_finite, ..MetricObservation::default() };
         let folder = folder();
         let mut recorder = Recorder::create(folder.path(), &plan, 1, 1).unwrap();
         recorder.commit(&record).unwrap();
@@ -302,6 +303,24 @@ fn what_was_imported_keeps_its_intervals_and_names_without_counts() {
     let seen: Option<i64> =
         repository.connection.query_row("SELECT seen FROM operations", [], |row| row.get(0)).unwrap();
     assert_eq!(seen, None, "nobody counted");
+}
+
+#[test]
+fn tests_that_are_committed_together_are_all_recorded_or_none() {
+    let plan = sample::plan();
+    let mut records = sample::records(&plan, 20);
+    let together = folder();
+    let mut recorder = Recorder::create(together.path(), &plan, 1, 0).unwrap();
+    recorder.commit_all(records.clone()).unwrap();
+    let together = recorder.repository().tests().unwrap();
+    assert_eq!(together, commit_all(folder().path(), &records).repository().tests().unwrap());
+
+    let none = folder();
+    let mut recorder = Recorder::create(none.path(), &plan, 1, 0).unwrap();
+    records.last_mut().unwrap().observation.end = f64::NAN;
+    let refused = recorder.commit_all(records).unwrap_err();
+    assert!(matches!(refused, RecordError::Unrecordable { .. }), "{refused}");
+    assert_eq!(recorder.repository().tests().unwrap(), []);
 }
 
 #[test]

@@ -9,7 +9,8 @@ use sesame_plan::condition::{Condition, Operand};
 use sesame_plan::{Activation, CampaignPlan, Choice};
 
 use crate::record::columns::index;
-use crate::record::{Event, Origin, TestRecord, series};
+use crate::record::series::{self, Pieces};
+use crate::record::{Event, Origin, TestRecord};
 
 /// What SQLite could not return as it was written: numbers that are not finite, counts beyond 63 bits.
 pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
@@ -56,6 +57,7 @@ pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
             metric
                 .series
                 .iter()
+                .chain(&metric.robustness)
                 .flat_map(|point| [("the time of a change", point.0), ("a value in a series", point.1)]),
         );
     }
@@ -170,7 +172,8 @@ pub(super) fn write_test(
         if duplicate_of.is_some() {
             continue;
         }
-        series::write(transaction, *number, metric, &shown.series)?;
+        series::write(transaction, Pieces::Series, *number, metric, &shown.series)?;
+        series::write(transaction, Pieces::Robustness, *number, metric, &shown.robustness)?;
     }
     for (position, text) in observation.warnings.iter().enumerate() {
         transaction

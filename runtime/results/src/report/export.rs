@@ -38,7 +38,8 @@ pub enum ExportError {
 /// The test that a user calls `T158`, `158`, or by the name of a regression test, as a block of the language.
 ///
 /// The block has a `name` of its own, by default one that the space does not use yet. It expects of each objective the
-/// value that was measured; in a campaign without objectives, of each metric that a requirement bounds.
+/// value that was measured; in a campaign without objectives, of each metric that a requirement bounds. It names the
+/// simulator's seed of the run, so it has these values in any campaign that ends at the same time.
 pub fn export(repository: &Repository, test: &str, name: Option<&str>) -> Result<Exported, ExportError> {
     let record = repository.test(repository.find(test)?)?;
     if record.test.operations.is_empty() {
@@ -49,8 +50,7 @@ pub fn export(repository: &Repository, test: &str, name: Option<&str>) -> Result
         || free_name(plan, &format!("{}_{}", plan.campaign.name, TestNumber(record.number))),
         str::to_owned,
     );
-    let doc =
-        format!("{} of `{}`, seed {}.", TestNumber(record.number), plan.campaign.name, repository.campaign().seed);
+    let doc = found_by(plan, repository.campaign().seed, &TestNumber(record.number).to_string(), "");
     let block = block(plan, &doc, &record, &name);
     Ok(Exported { test: TestNumber(record.number), name, block })
 }
@@ -58,12 +58,20 @@ pub fn export(repository: &Repository, test: &str, name: Option<&str>) -> Result
 /// The block of a test that was made out of another one, `original`, in a campaign of this seed.
 pub(super) fn shrunk_block(plan: &CampaignPlan, seed: u64, record: &TestRecord, original: &str) -> String {
     let name = free_name(plan, &format!("{}_{original}_shrunk", plan.campaign.name));
-    block(plan, &format!("{original} of `{}`, seed {seed}, shrunk.", plan.campaign.name), record, &name)
+    block(plan, &found_by(plan, seed, original, ", shrunk"), record, &name)
+}
+
+/// Which campaign a test is from, and on what its values depend besides the test and the simulator's seed.
+fn found_by(plan: &CampaignPlan, seed: u64, test: &str, how: &str) -> String {
+    let campaign = &plan.campaign;
+    let end = notation::Unit::SECONDS.number(campaign.end_after);
+    format!("{test} of `{}`{how} (seed {seed}, end after {end}).", campaign.name)
 }
 
 fn block(plan: &CampaignPlan, doc: &str, record: &TestRecord, name: &str) -> String {
     let operations = record.test.operations.iter().map(|used| notation::test_operation(plan, used));
-    notation::test_block(doc, name, operations.chain(expectations(plan, record)))
+    let seed = [notation::simulator_seed(record.simulator_seed)];
+    notation::test_block(doc, name, operations.chain(seed).chain(expectations(plan, record)))
 }
 
 /// What is expected of the test, or a comment that says why nothing is.
@@ -135,6 +143,7 @@ mod tests {
           jitter_link0 offset [-0.1rad, 0.2rad] when arm_distance < 450mm and (1.5m/s < top_speed or arm_distance < 450mm) until 1.5m/s < top_speed seed 11
           jitter_link1 offset [-0.1rad, 0.2rad] from 1.5s to 20s seed 11
           cut_link1 when 1.5m/s < top_speed for 0.30000000000000004s at most 3 times seed 11
+          simulator seed 18446744073709551610
           expect fuzzing_time == 39.8s
           expect collision_occurrence == 5
         }

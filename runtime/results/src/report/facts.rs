@@ -1,6 +1,7 @@
 //! The facts of reports, each computed once from the results. They serialise to JSON as they are.
 
 pub(super) mod coverage;
+pub(super) mod readable;
 pub(super) mod recording;
 pub(super) mod repetition;
 pub(super) mod replay;

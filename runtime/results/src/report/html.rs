@@ -1,9 +1,11 @@
 //! Reports as HTML: the page, and its parts.
 
 mod cells;
+mod command;
 mod front;
 mod generations;
 mod header;
+mod legend;
 mod page;
 mod policy;
 mod published;
@@ -11,6 +13,7 @@ mod regions;
 mod scatter;
 mod shrinking;
 mod test;
+mod tests;
 mod timeline;
 
 pub use page::{page, write_page, write_page_with};

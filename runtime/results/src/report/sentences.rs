@@ -10,8 +10,9 @@ use crate::present::number::{self, fixed, join_words, plural};
 use crate::present::table::visible;
 use crate::record::{Standing, Verdict};
 use crate::report::facts::coverage::CoverageSummary;
+use crate::report::facts::readable::short_numbers;
 use crate::report::facts::repetition::ViolationRate;
-use crate::report::facts::show::{OperationReport, TestReport};
+use crate::report::facts::show::{OperationReport, TestReport, VerdictReport};
 use crate::report::facts::shrinking::Shrinking;
 use crate::report::facts::summary::Summary;
 
@@ -173,7 +174,7 @@ pub(crate) fn outcome_words(word: &str) -> String {
 /// When an operation was to be active: its window, or the conditions that switched it; a dash for an offline one.
 pub(crate) fn planned_text(operation: &OperationReport) -> String {
     match (&operation.conditions, operation.planned) {
-        (Some(conditions), _) => conditions.clone(),
+        (Some(conditions), _) => short_numbers(conditions),
         (None, planned) => spans_text(planned.as_slice()),
     }
 }
@@ -186,6 +187,19 @@ pub(crate) fn spans_text(spans: &[Span]) -> String {
     let words: Vec<String> = spans.iter().take(4).map(|span| format!("{:.2}–{:.2}", span.start, span.end)).collect();
     let more = if spans.len() > 4 { format!(" and {} more", spans.len() - 4) } else { String::new() };
     format!("{} s{more}", words.join(", "))
+}
+
+/// When a requirement was violated in a run; a dash for never.
+pub(crate) fn outside_text(requirement: &VerdictReport) -> String {
+    if requirement.unrecorded { "not recorded".to_owned() } else { spans_text(&requirement.outside) }
+}
+
+/// A metric's value in a run, of a robustness with the time that decided it: `-2.25 m at 41.20 s`.
+pub(crate) fn verdict_value_text(requirement: &VerdictReport) -> String {
+    match requirement.decided_at {
+        Some(at) => format!("{} at {at:.2} s", requirement.value),
+        None => requirement.value.clone(),
+    }
 }
 
 /// What an operation's parameters are, in words.
@@ -203,7 +217,7 @@ pub(crate) fn effect_text(operation: &OperationReport) -> String {
         (changed, "changed"),
         (dropped, "dropped"),
         (delayed, "delayed"),
-        (queued, "queued behind them"),
+        (queued, "queued behind them after the window"),
         (injected, "injected"),
         (side_effects, "side effects"),
         (unheard, "disturbed without a receiver"),

@@ -15,7 +15,8 @@ use crate::report::facts::summary::{
 };
 use crate::report::facts::wording::value_text;
 use crate::report::sentences::{
-    as_expected, choices_text, effect_text, outcome_words, planned_text, rate_text, spans_text,
+    as_expected, choices_text, effect_text, outcome_words, outside_text, planned_text, rate_text, spans_text,
+    verdict_value_text,
 };
 
 /// The time of a failure, in seconds.
@@ -244,8 +245,8 @@ pub(super) fn verdicts(requirements: &[VerdictReport]) -> Table {
             cells.extend([Datum::Text(tally_words(fresh.tally)), Datum::text(requirement.first.word())]);
         }
         cells.extend([
-            Datum::text(&requirement.value),
-            Datum::Text(spans_text(&requirement.outside)),
+            Datum::Text(verdict_value_text(requirement)),
+            Datum::Text(outside_text(requirement)),
             Datum::text(&requirement.text),
         ]);
         table.row(cells);

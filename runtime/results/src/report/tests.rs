@@ -5,7 +5,9 @@ use sesame_plan::Task;
 use super::*;
 use crate::record::{Origin, Repository, Standing, sample};
 
+mod browser;
 mod page;
+mod robustness;
 mod run_again;
 
 const WIDE: TextOptions = TextOptions { width: None, colour: false };

@@ -96,6 +96,22 @@ fn the_original_swaps_losses_and_delays_and_counts_what_is_kept() {
 }
 
 #[test]
+fn the_original_counts_custom_operations_but_not_their_parameters() {
+    let custom = || disturbance(Class::Other, &[(20.0, 40.0)], &[value(0.7)]);
+    let shifted = disturbance(Class::Value, &[(20.0, 40.0)], &[range(-0.2, 0.4)]);
+    let of = |test: &[Disturbance], dimension| {
+        [Convention::Ours, Convention::Original]
+            .map(|convention| Point::from_disturbances(test, convention).unwrap().get(dimension))
+    };
+    let both = [shifted, custom()];
+    let [ours, original] = of(&both, Dimension::P1).map(Option::unwrap);
+    assert!((ours - 0.4).abs() < 1e-12 && (original - 0.3).abs() < 1e-12, "{ours} {original}");
+    assert_eq!(of(&both, Dimension::P2)[1], Some(0.0));
+    assert_eq!(of(&both, Dimension::O0), [Some(2.0); 2]);
+    assert_eq!(of(&[custom()], Dimension::P1)[1], None);
+}
+
+#[test]
 fn what_was_never_active_is_no_part_of_the_point() {
     let active = disturbance(Class::Value, &[(20.0, 40.0)], &[range(0.0, 1.0)]);
     let idle = disturbance(Class::Loss, &[], &[value(1.2)]);

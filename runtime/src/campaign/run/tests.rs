@@ -1,14 +1,16 @@
 //! Campaigns without processes: an executor in this thread, which ends tests in the order that it is told.
 
-use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use sesame_plan::{Confirmation, Count, CoverageGoal, Dimension, GridAxis, Search, Statistic};
+use sesame_plan::{
+    Bound, Confirmation, Count, CoverageGoal, Dimension, GridAxis, KnownTest, KnownTestId, Search, Statistic,
+};
 use sesame_results::record::{self, sample};
 use sesame_rng::Stream;
 
 use super::*;
+use crate::campaign::WorkerProgram;
 use crate::campaign::executor::{ExecutorError, Job, JobResult};
 
 /// Computes what a run shows, without a simulator.
@@ -68,8 +70,8 @@ fn plan() -> CampaignPlan {
 }
 
 fn settings(plan: &CampaignPlan) -> Settings {
-    let (seed, program) = (plan.campaign.seed, PathBuf::new());
-    Settings { seed, workers: 1, timeout: None, program, allow_unheard: false }
+    let (seed, program) = (plan.campaign.seed, WorkerProgram::compiled().unwrap());
+    Settings { seed, workers: 1, timeout: None, reference_timeout: None, program, allow_unheard: false }
 }
 
 /// Begins or resumes a campaign; returns how it ended, how many tests were run, and its events.
@@ -98,7 +100,9 @@ fn campaign(
         &interrupted,
         &mut |event, progress| {
             events.push(match event {
-                CampaignEvent::SearchStarted => "search started".to_owned(),
+                CampaignEvent::ReferenceRunAwaited { .. } => "awaited".to_owned(),
+                CampaignEvent::Warned { text } => text.to_owned(),
+                CampaignEvent::SearchStarted { .. } => "search started".to_owned(),
                 CampaignEvent::TestEnded(record) => format!("test {} of {}", progress.done, record.number),
                 CampaignEvent::ConfirmationAdvanced => "confirmation".to_owned(),
                 CampaignEvent::GenerationEnded { generation } => format!("generation {generation}"),
@@ -233,4 +237,89 @@ impl Executor for Deaf<'_> {
     fn set_timeout(&mut self, timeout: Duration) {
         self.0.set_timeout(timeout);
     }
+}
+
+#[test]
+fn a_regression_test_runs_with_the_seed_that_it_names_whatever_the_seed_of_the_campaign() {
+    let mut plan = sample::plan();
+    let seeded = KnownTest { name: "seeded".to_owned(), simulator_seed: Some(11), ..plan.tests[0].clone() };
+    plan.tests.push(seeded);
+    let task = Task::Known { tests: vec![KnownTestId(0), KnownTestId(1)] };
+    let values = |seed: u64| {
+        let folder = tempfile::tempdir().unwrap();
+        let claim = record::claim_folder(folder.path(), "known").unwrap();
+        let recorder = Recorder::create_in(claim, &plan, &task, seed, 1).unwrap();
+        let interrupted = AtomicBool::new(false);
+        let (order, waiting) = (None, Vec::new());
+        let mut executor =
+            InThread { plan: &plan, order, waiting, run: 0, stop_after: None, interrupted: &interrupted };
+        let strategy = search::strategy_of_task(&plan, &task, seed).unwrap();
+        let settings = Settings { seed, ..settings(&plan) };
+        let end = run_with(&plan, strategy, recorder, &settings, &mut executor, &interrupted, &mut |_, _| {}).unwrap();
+        let CampaignEnd::Finished(repository) = end else { panic!("it was stopped") };
+        let run = |name: &str| repository.test(repository.find(name).unwrap()).unwrap();
+        let [unseeded, seeded] = [run("known_jitter"), run("seeded")];
+        assert_eq!((unseeded.test, seeded.simulator_seed), (seeded.test, 11));
+        (unseeded.observation.metrics, seeded.observation.metrics)
+    };
+    let [one, other] = [values(1), values(7)];
+    assert_ne!(one.0, other.0);
+    assert_eq!(one.1, other.1);
+}
+
+/// As [`InThread`], with a simulator that takes its time for the first test.
+struct Slow<'a>(InThread<'a>, u32);
+
+impl Executor for Slow<'_> {
+    fn submit(&mut self, job: Job) {
+        self.0.submit(job);
+    }
+
+    fn next(&mut self, wait: Duration) -> Result<Option<JobResult>, ExecutorError> {
+        if self.1 > 0 {
+            self.1 -= 1;
+            return Ok(None);
+        }
+        self.0.next(wait)
+    }
+
+    fn lock_stepped(&self) -> bool {
+        self.0.lock_stepped()
+    }
+
+    fn set_timeout(&mut self, timeout: Duration) {
+        self.0.set_timeout(timeout);
+    }
+}
+
+#[test]
+fn what_the_reference_run_shows_is_told_before_the_search_and_waiting_for_it_is_told_too() {
+    let mut plan = plan();
+    plan.campaign.confirm = None;
+    plan.requirements[0].bound = Bound::Below { value: 0.0 };
+    let folder = tempfile::tempdir().unwrap();
+    let interrupted = AtomicBool::new(false);
+    let (order, waiting) = (None, Vec::new());
+    let quick = InThread { plan: &plan, order, waiting, run: 0, stop_after: None, interrupted: &interrupted };
+    let recorder = Recorder::create(folder.path(), &plan, plan.campaign.seed, 1).unwrap();
+    let strategy = search::strategy(&plan, plan.campaign.seed).unwrap();
+    let settings = Settings { reference_timeout: Some(Duration::from_secs(30)), ..settings(&plan) };
+    let mut events = Vec::new();
+    let mut listener = |event: CampaignEvent<'_>, progress: Progress<'_>| {
+        assert_eq!((progress.total, progress.earlier), (60, 0));
+        events.push(match event {
+            CampaignEvent::ReferenceRunAwaited { limit, .. } => format!("awaited, at most {limit:?}"),
+            CampaignEvent::Warned { text } => text.to_owned(),
+            CampaignEvent::SearchStarted { timeout, .. } => format!("started, {timeout:?} a test"),
+            _ => "later".to_owned(),
+        });
+    };
+    run_with(&plan, strategy, recorder, &settings, &mut Slow(quick, 3), &interrupted, &mut listener).unwrap();
+    assert_eq!(events[..3], ["awaited, at most 30s"; 3]);
+    let warned = &events[3];
+    assert!(warned.starts_with("requirement R1 is violated before anything is fuzzed"), "{warned}");
+    assert_eq!(events[4], "started, 60s a test");
+    assert!(events[5..].iter().all(|event| event == "later"));
+    let recorded = Repository::open(folder.path()).unwrap().events().unwrap();
+    assert!(recorded.iter().any(|event| event.text == *warned), "it is in the report as well");
 }

@@ -8,33 +8,52 @@ use crate::diagnostic::{Applicability, Diagnostic, Severity, hidden};
 use crate::place::Place;
 use crate::source::SourceMap;
 
+/// A part of the source with what is said about it.
 #[derive(Serialize)]
 struct Label<'a> {
+    /// Where it is.
     at: Place<'a>,
+    /// What is said about it; may be empty.
     text: &'a str,
 }
 
+/// A diagnostic.
 #[derive(Serialize)]
 struct Line<'a> {
+    /// Its code, such as `E0203`; `sesamec explain` says more about it.
     code: &'static str,
+    /// `error` or `warning`.
     severity: &'static str,
+    /// What is wrong, in a sentence.
     title: &'a str,
+    /// The place that it is about.
     primary: Label<'a>,
+    /// Other places that have to do with it.
     secondary: Vec<Label<'a>>,
+    /// What else is good to know.
     notes: &'a [String],
+    /// Ways to mend it.
     suggestions: Vec<Suggested<'a>>,
 }
 
+/// A way to mend what is wrong.
 #[derive(Serialize)]
 struct Suggested<'a> {
+    /// What to do.
     message: &'a str,
+    /// `machine_applicable` if a program may apply the edits without asking; `maybe_incorrect` if they remove the
+    /// mistake, but the author may mean something else.
     applicability: &'static str,
+    /// The changes of the source that do it, which can be applied as they are.
     edits: Vec<Edit<'a>>,
 }
 
+/// A change of the source.
 #[derive(Serialize)]
 struct Edit<'a> {
+    /// What is replaced; empty where something is inserted.
     at: Place<'a>,
+    /// By what.
     replacement: &'a str,
 }
 

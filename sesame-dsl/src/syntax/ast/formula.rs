@@ -1,6 +1,6 @@
 //! Formulas of metrics, and the conditions that switch operations.
 
-use super::words::{Comparison, Name, Path, Quantity, Range};
+use super::words::{Comparison, Name, Path, Point, Quantity, Range, Text};
 use crate::span::Span;
 
 /// What a declarative metric is computed from, with its clauses as written.
@@ -37,9 +37,12 @@ pub(crate) struct Expression {
 pub(crate) enum ExpressionKind {
     Number(Quantity),
     Truth(bool),
+    Text(Text),
     Field(Path),
-    /// `max of zones.level`; the span is that of the word.
+    /// `max of zones.level`; the span is that of the words before `of`.
     Members(Members, Span, Path),
+    Point(Box<Point>),
+    Region(Region),
     Negate(Box<Expression>),
     /// Two terms or more; true for one that is subtracted.
     Sum(Vec<(bool, Expression)>),
@@ -90,4 +93,27 @@ pub(crate) enum Members {
     Max,
     Sum,
     Each,
+    EachPair,
+}
+
+/// A part of space, given by its corners.
+#[derive(Debug)]
+pub(crate) struct Region {
+    pub(crate) kind: RegionKind,
+    /// At least one.
+    pub(crate) corners: Vec<Corner>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RegionKind {
+    Box,
+    Polygon,
+}
+
+/// Numbers of one unit.
+#[derive(Debug)]
+pub(crate) struct Corner {
+    /// At least one, each with the region's unit.
+    pub(crate) coordinates: Vec<Quantity>,
+    pub(crate) span: Span,
 }

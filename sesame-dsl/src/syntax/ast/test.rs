@@ -10,6 +10,7 @@ pub(crate) struct Test {
     pub(crate) head: Head,
     pub(crate) operations: Vec<TestOperation>,
     pub(crate) expectations: Vec<Expectation>,
+    pub(crate) simulator_seeds: Vec<(Span, Count)>,
     pub(crate) has_errors: bool,
 }
 

@@ -3,8 +3,10 @@
 use sesame_grammar::Rule;
 
 use super::reader::{Pair, Reader, child, children, comparison, expect_child};
+use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::syntax::ast::{
-    Expression, ExpressionKind, Formula, FormulaKind, Members, Name, Prefix, PrefixWord, Relation, Until,
+    Corner, Expression, ExpressionKind, Formula, FormulaKind, Members, Name, Prefix, PrefixWord, Region, RegionKind,
+    Relation, UnitName, Until,
 };
 
 impl Reader<'_> {
@@ -152,14 +154,20 @@ impl Reader<'_> {
         let kind = match operand.as_rule() {
             Rule::quantity => ExpressionKind::Number(self.quantity(&operand)),
             Rule::truth => ExpressionKind::Truth(child(&operand, Rule::k_true).is_some()),
+            Rule::text => ExpressionKind::Text(self.any_text(&operand)),
+            Rule::point => ExpressionKind::Point(Box::new(self.point(&operand))),
+            Rule::region => ExpressionKind::Region(self.region(&operand)),
             Rule::members => {
                 let word = operand.clone().into_inner().next().expect("a choice of members begins with its word");
+                let pair = child(&operand, Rule::k_pair);
                 let members = match word.as_rule() {
                     Rule::k_max => Members::Max,
                     Rule::k_sum => Members::Sum,
+                    _ if pair.is_some() => Members::EachPair,
                     _ => Members::Each,
                 };
-                ExpressionKind::Members(members, self.span(&word), self.path(&expect_child(&operand, Rule::path)))
+                let words = self.span(&word).to(self.span(&pair.unwrap_or(word)));
+                ExpressionKind::Members(members, words, self.path(&expect_child(&operand, Rule::path)))
             }
             Rule::call => {
                 let function = expect_child(&operand, Rule::function);
@@ -187,5 +195,45 @@ impl Reader<'_> {
                 self.whole(pair, ExpressionKind::Negate(Box::new(of)))
             }
         }
+    }
+
+    /// The unit that is glued to the last parenthesis.
+    fn unit_after(&mut self, pair: &Pair<'_>) -> Option<UnitName> {
+        child(&expect_child(pair, Rule::point_end), Rule::unit).map(|unit| self.unit(&unit))
+    }
+
+    fn region(&mut self, pair: &Pair<'_>) -> Region {
+        let kind = if child(pair, Rule::k_box).is_some() { RegionKind::Box } else { RegionKind::Polygon };
+        let mut unit = self.unit_after(pair);
+        let mut inside = Vec::new();
+        let mut corners = Vec::new();
+        for corner in children(pair, Rule::corner) {
+            let coordinates: Vec<_> =
+                children(&corner, Rule::coordinate).map(|coordinate| self.signed(&coordinate)).collect();
+            inside.extend(coordinates.iter().filter_map(|coordinate| coordinate.unit.clone()));
+            inside.extend(self.unit_after(&corner));
+            corners.push(Corner { coordinates, span: self.span(&corner) });
+        }
+        if let Some(first) = inside.first().cloned() {
+            let title = "the unit of a region is given once, after its last `)`";
+            let mut diagnostic = Diagnostic::new(Code::WRONG_UNIT, first.span, title).label("unexpected unit");
+            let meant = unit.as_ref().unwrap_or(&first).text.clone();
+            // Other units would give other corners.
+            if inside.iter().all(|own| own.text == meant) {
+                let mut edits: Vec<_> = inside.iter().map(|own| (own.span, String::new())).collect();
+                if unit.is_none() {
+                    edits.push((self.span(pair).end(), meant));
+                }
+                let message =
+                    if unit.is_some() { "remove the units inside" } else { "write the unit once, after the last `)`" };
+                diagnostic.suggestions.push(Suggestion::possible(message, edits));
+            }
+            self.report(diagnostic);
+            unit = unit.or(Some(first));
+        }
+        for coordinate in corners.iter_mut().flat_map(|corner| &mut corner.coordinates) {
+            coordinate.unit.clone_from(&unit);
+        }
+        Region { kind, corners }
     }
 }

@@ -9,12 +9,18 @@ use crate::syntax::ast::{
 
 impl Reader<'_> {
     pub(super) fn test(&mut self, pair: &Pair<'_>) -> Test {
-        let mut test = Test { head: self.head(pair), operations: vec![], expectations: vec![], has_errors: false };
+        let head = self.head(pair);
+        let mut test =
+            Test { head, operations: vec![], expectations: vec![], simulator_seeds: vec![], has_errors: false };
         test.has_errors = self.members(pair, |reader, member| match member.as_rule() {
             Rule::expectation => test.expectations.push(Expectation {
                 metric: reader.name(&expect_child(&member, Rule::name)),
                 bound: reader.bound(&expect_child(&member, Rule::bound)),
             }),
+            Rule::simulator_seed => {
+                let span = reader.keyword_span(&member);
+                test.simulator_seeds.push((span, reader.count(&expect_child(&member, Rule::number))));
+            }
             _ => test.operations.push(reader.test_operation(&member)),
         });
         test

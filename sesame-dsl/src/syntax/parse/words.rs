@@ -135,7 +135,19 @@ impl Reader<'_> {
         Count { value, span }
     }
 
+    /// A text that names something, so it is not empty.
     pub(super) fn text_of(&mut self, pair: &Pair<'_>) -> Text {
+        let text = self.any_text(pair);
+        if text.text.trim().is_empty() {
+            let diagnostic = Diagnostic::new(Code::BAD_TEXT, text.span, "this text is empty")
+                .label("expected at least one visible character");
+            self.report(diagnostic);
+        }
+        text
+    }
+
+    /// A text, which may be empty.
+    pub(super) fn any_text(&mut self, pair: &Pair<'_>) -> Text {
         let span = self.span(pair);
         let inner = expect_child(pair, Rule::text_inner);
         let mut text = String::new();
@@ -155,11 +167,6 @@ impl Reader<'_> {
                     Diagnostic::new(Code::BAD_TEXT, span, title).label("the only escapes are `\\\"` and `\\\\`");
                 self.report(diagnostic.fix("write `\\\\` for a backslash", span, format!("\\\\{escaped}")));
             }
-        }
-        if text.trim().is_empty() {
-            let diagnostic = Diagnostic::new(Code::BAD_TEXT, span, "this text is empty")
-                .label("expected at least one visible character");
-            self.report(diagnostic);
         }
         Text { text, span }
     }

@@ -1,12 +1,15 @@
 //! What the digest is of: all content, and nothing else.
 
 use rusqlite::Connection;
+use serde_json::Value;
 
 use sesame_base::observation::{Outcome, WallTime};
-use sesame_plan::{Activation, Choice, KnownTestId};
+use sesame_plan::{Activation, CampaignPlan, Choice, KnownTestId, Type, testing};
 
 use super::{conditional_record, digest_of, folder};
-use crate::record::{DATABASE, Event, EventKind, Origin, Recorder, Repository, ResultSet, Status, TestRecord, sample};
+use crate::record::{
+    DATABASE, Event, EventKind, Origin, Recorder, Repository, ResultSet, SCHEMA, Status, TestRecord, sample,
+};
 
 #[test]
 fn the_digest_does_not_depend_on_wall_times_sessions_and_the_order_of_writing() {
@@ -218,4 +221,61 @@ fn every_byte_of_a_series_is_in_the_digest_and_a_piece_that_nothing_is_written_a
         let said = read.expect_err(change);
         assert!(said.contains(DATABASE), "{change}: {said}");
     }
+}
+
+/// Where each number, text and truth value of this value is.
+fn leaves(at: &str, value: &Value) -> Vec<String> {
+    match value {
+        Value::Object(of) => of.iter().flat_map(|(key, value)| leaves(&format!("{at}/{key}"), value)).collect(),
+        Value::Array(of) => {
+            of.iter().enumerate().flat_map(|(key, value)| leaves(&format!("{at}/{key}"), value)).collect()
+        }
+        _ => vec![at.to_owned()],
+    }
+}
+
+/// Whether what is there in a plan is only for people.
+fn is_for_people(pointer: &str) -> bool {
+    let of_requirement = pointer.starts_with("/requirements/") && pointer.ends_with("/text");
+    of_requirement
+        || ["/generator", "/source"].contains(&pointer)
+        || ["/doc", "/line"].iter().any(|key| pointer.ends_with(key))
+}
+
+#[test]
+fn the_digest_is_over_all_of_a_plan_but_what_is_only_for_people() {
+    let mut plan = sample::plan();
+    plan.messages = vec![testing::message("Zone", vec![testing::field("level", Type::Bool)])];
+    plan.nodes = vec![testing::node("arm")];
+    plan.validate().unwrap();
+    let folder = folder();
+    let repository = sample::campaign(folder.path(), &plan, 20);
+    let digest =
+        |plan: &CampaignPlan| super::super::digest::of_connection(&repository.connection, SCHEMA, plan).unwrap();
+    let whole = digest(&plan);
+    assert_eq!(whole, repository.digest().unwrap());
+    let json = serde_json::to_value(&plan).unwrap();
+    let (mut for_people, mut seen) = (Vec::new(), std::collections::BTreeSet::from([whole.clone()]));
+    for pointer in leaves("", &json) {
+        let mut changed = json.clone();
+        let leaf = changed.pointer_mut(&pointer).unwrap();
+        *leaf = match &*leaf {
+            Value::String(text) => Value::from(format!("{text} once more")),
+            Value::Bool(truth) => Value::from(!truth),
+            Value::Number(number) => {
+                number.as_u64().map_or_else(|| (number.as_f64().unwrap() + 0.001).into(), |whole| (whole + 1).into())
+            }
+            _ => Value::from(1),
+        };
+        // Words of a few, and numbers of things that are not there.
+        let Ok(changed) = serde_json::from_value::<CampaignPlan>(changed) else { continue };
+        if is_for_people(&pointer) {
+            for_people.push(pointer.clone());
+            assert_eq!(digest(&changed), whole, "{pointer}");
+            assert!(changed.same_model(&plan), "{pointer}");
+        } else {
+            assert!(seen.insert(digest(&changed)), "{pointer}");
+        }
+    }
+    assert!(for_people.len() >= 20 && seen.len() > 60, "{for_people:?}, {} others", seen.len());
 }

@@ -1,13 +1,16 @@
 //! The tests of a campaign: a line for each, or everything on one.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::Serialize;
 
-use sesame_base::observation::Counters;
+use sesame_base::observation::{Counters, MetricObservation};
+use sesame_base::robustness;
 use sesame_base::test_number::TestNumber;
 use sesame_notation as notation;
-use sesame_plan::{Activation, CampaignPlan, Choice, Span};
+use sesame_plan::stl::Formula;
+use sesame_plan::{Activation, Bound, CampaignPlan, Choice, Metric, MetricSource, Span};
 
 use crate::analysis::confirmed::{ConfirmedTest, confirmed_test};
 use crate::analysis::statistics::wilson;
@@ -16,6 +19,7 @@ use crate::record::{
     EventKind, Judge, MetricValue, Origin, RecordError, Repetition, Repository, Tally, TestRecord, TestRow, Verdict,
     verdict, violation_spans,
 };
+use crate::report::facts::readable;
 use crate::report::facts::stacked::{Stacked, stacked_in};
 use crate::report::facts::wording;
 
@@ -34,8 +38,10 @@ pub struct ListedTest {
     pub duplicate_of: Option<TestNumber>,
     /// Whether it is on the front.
     pub front: bool,
-    /// A value per metric of the plan, in its order.
+    /// A value per metric of the plan, in the order of the list's `metrics`.
     pub values: Vec<MetricValue>,
+    /// The value of each metric, by its name; `None` where there is none.
+    pub measured: BTreeMap<String, Option<f64>>,
     /// Names of the requirements it violates.
     pub violates: Vec<String>,
     /// Its operations, as in `jitter_link0 ×2, lose_link0`.
@@ -156,6 +162,10 @@ pub struct MetricReport {
     pub set: bool,
     /// How often it changed.
     pub changes: usize,
+    /// Of a robustness its signal over time, as change points `[seconds, value]`; the last one ends it and repeats the
+    /// value before. The least value is the robustness (of an `eventually`, the greatest).
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub robustness: Vec<(f64, f64)>,
 }
 
 /// A requirement in one test.
@@ -178,8 +188,15 @@ pub struct VerdictReport {
     pub fresh: Option<FreshVerdicts>,
     /// The metric's value in the first run, in words.
     pub value: String,
-    /// When the metric's series was outside the bound in the first run, in seconds.
+    /// When the metric's series was outside the bound in the first run, in seconds; of a robustness, when its signal
+    /// was.
     pub outside: Vec<Span>,
+    /// Of a robustness: when its signal had the value of the whole in the first run, in seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub decided_at: Option<f64>,
+    /// Whether it is not known when the bound was violated, since the results were recorded without robustness signals.
+    #[serde(skip)]
+    pub(crate) unrecorded: bool,
 }
 
 /// The verdicts of a test's fresh runs on a requirement.
@@ -213,6 +230,12 @@ fn listed(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow, front: bool) ->
         duplicate_of: row.duplicate_of.map(TestNumber),
         front,
         values: row.values.clone(),
+        measured: plan
+            .metrics
+            .iter()
+            .zip(&row.values)
+            .map(|(metric, shown)| (metric.name.clone(), shown.value))
+            .collect(),
         violates: wording::violated(plan, judge, row),
         operations: wording::operations(plan, row),
     }
@@ -269,12 +292,13 @@ pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, fresh: &[Repet
                     value: shown.and_then(|shown| shown.value),
                     set: shown.is_some_and(|shown| shown.set),
                     changes: shown.map_or(0, |shown| shown.series.len()),
+                    robustness: shown.map_or_else(Vec::new, |shown| shown.robustness.clone()),
                 }
             })
             .collect(),
         requirements: verdicts(plan, record, fresh),
         confirmed: None,
-        warnings: observation.warnings.clone(),
+        warnings: observation.warnings.iter().map(|text| readable::sentence(plan, text)).collect(),
         notes: Vec::new(),
         trace: None,
     }
@@ -327,6 +351,8 @@ fn verdicts(plan: &CampaignPlan, record: &TestRecord, fresh: &[Repetition]) -> V
         let first = verdict(requirement.bound, &observation.outcome, value);
         let tally = Tally::of(fresh.iter().map(|run| run.verdict(requirement)));
         let interval = wilson(tally.violated, tally.conclusive());
+        let outside =
+            shown.map_or_else(Vec::new, |shown| violated_when(metric, shown, requirement.bound, observation.end));
         VerdictReport {
             requirement: requirement.name.clone(),
             text: requirement.text.clone(),
@@ -336,9 +362,34 @@ fn verdicts(plan: &CampaignPlan, record: &TestRecord, fresh: &[Repetition]) -> V
             first,
             fresh: (!fresh.is_empty()).then_some(FreshVerdicts { tally, interval }),
             value: wording::value_text(value, metric.unit.as_deref()),
-            outside: shown
-                .map_or_else(Vec::new, |shown| violation_spans(&shown.series, requirement.bound, observation.end)),
+            unrecorded: first == Verdict::Violated && outside.is_empty() && formula_of(metric).is_some(),
+            outside,
+            decided_at: shown.and_then(|shown| decided_at(metric, shown)),
         }
     });
     reports.collect()
+}
+
+/// The formula of which a metric is the robustness.
+fn formula_of(metric: &Metric) -> Option<&Formula> {
+    match &metric.source {
+        MetricSource::Robustness { robustness } => Some(&robustness.formula),
+        _ => None,
+    }
+}
+
+/// When a metric was outside a bound: by its series, or by the signal of a robustness.
+pub(crate) fn violated_when(metric: &Metric, shown: &MetricObservation, bound: Bound, end: f64) -> Vec<Span> {
+    match formula_of(metric) {
+        Some(formula) => {
+            let lost = |value| robustness::lost(&shown.robustness, robustness::quantifier(formula), bound, value);
+            shown.value.filter(|_| shown.set).map_or_else(Vec::new, lost)
+        }
+        None => violation_spans(&shown.series, bound, end),
+    }
+}
+
+/// When the signal of a robustness had the value of the whole; `None` for other metrics, and where none was recorded.
+pub(crate) fn decided_at(metric: &Metric, shown: &MetricObservation) -> Option<f64> {
+    robustness::decided_at(&shown.robustness, robustness::quantifier(formula_of(metric)?))
 }

@@ -53,7 +53,7 @@ pub struct TestSize {
     pub active_time: Option<f64>,
     /// P1 of its run: the mean of its parameters as shares of what is permitted.
     pub intensity: Option<f64>,
-    /// How strong its operations are in total, each from 0 to 1, see [`strength`].
+    /// How strong its operations are in total, each from 0 to 1 ([`sesame_search::shrink::strength`]).
     pub strength: f64,
     /// The values of its run, of each metric that its failing is about.
     pub values: Vec<NamedValue>,

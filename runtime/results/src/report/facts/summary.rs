@@ -14,6 +14,7 @@ use crate::record::{
     EventKind, Judge, MetricValue, Origin, RecordError, Repository, Standing, TestRow, Verdict, verdict,
 };
 use crate::report::facts::coverage::{CoverageSummary, coverage};
+use crate::report::facts::readable;
 use crate::report::facts::repetition::{Repetition, repetition};
 use crate::report::facts::shrinking::{Shrinking, shrinking};
 use crate::report::facts::stacked::{Stacked, stacked_in};
@@ -34,7 +35,7 @@ pub struct Summary {
     pub counts: Counts,
     /// What the search optimised, in the campaign's order.
     pub objectives: Vec<Objective>,
-    /// The tests no other is better than: most dangerous first, see [`summary`].
+    /// The tests no other is better than: most dangerous first.
     pub front: Vec<FrontTest>,
     /// How the campaign confirms the tests of its front, if it does.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -248,9 +249,10 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
         })
         .collect();
     let warnings = repository.events()?.into_iter().filter(|event| event.kind == EventKind::Warning).map(|event| {
+        let text = readable::sentence(plan, &event.text);
         match event.test {
-            Some(test) => format!("{}: {}", TestNumber(test), event.text),
-            None => event.text,
+            Some(test) => format!("{}: {text}", TestNumber(test)),
+            None => text,
         }
     });
     let judge = repository.judge()?;

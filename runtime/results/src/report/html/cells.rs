@@ -10,6 +10,7 @@ use crate::present::axis::Axis;
 use crate::present::markup::{Markup, coordinate, percent};
 use crate::present::{chart, number};
 use crate::report::facts::coverage::CoverageSummary;
+use crate::report::html::legend::legend;
 use crate::report::html::published::{BOOSTING, CELLS, TRACKING, is_published_grid};
 use crate::report::sentences::coverage_sentence;
 
@@ -34,10 +35,11 @@ pub(crate) fn coverage(markup: &mut Markup, plan: &CampaignPlan, coverage: &Cove
         );
     }
     caption.push_str(
-        "Map: the bluer, the more tests; white: none yet; grey: no test can get there. A square stands for its cells of \
-         every dimension that is not shown.",
+        "Map: the stronger the blue, the more tests; blank: none yet; grey: no test can get there. A square stands for its \
+         cells of every dimension that is not shown.",
     );
     markup.element("p", &[("class", "quiet")], &caption);
+    legend(markup, &coverage.axes.iter().map(|axis| axis.dimension).collect::<Vec<_>>());
     markup.close();
 }
 

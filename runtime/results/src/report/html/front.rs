@@ -104,8 +104,8 @@ fn caption(summary: &Summary, repository: &Repository) -> String {
     }
     let mut caption =
         "Each dot is a test; emphasised: no other test is better in one objective without being worse in another. \
-         The ring is the reference run. Point at a dot to see its operations and values. Click a dot to see its timeline, \
-         if it is on this page; use `show` for other tests."
+         The ring is the reference run. Point at a dot to see its operations and values. Click it to select the test \
+         everywhere on this page."
             .to_owned();
     if let Some(confirmation) = summary.confirmation {
         let _ = write!(

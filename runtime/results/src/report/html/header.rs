@@ -63,7 +63,9 @@ pub(super) fn header(
     }
     body.close();
     for warning in &summary.warnings {
-        body.element("p", &[("class", "warning")], &format!("Warning: {warning}"));
+        body.open("p", &[("class", "warning")]);
+        body.prose(&format!("Warning: {warning}"));
+        body.close();
     }
     body.close();
     Ok(())

@@ -16,6 +16,7 @@ use crate::report::html::generations::generations;
 use crate::report::html::header::header;
 use crate::report::html::policy::policy;
 use crate::report::html::test::test;
+use crate::report::html::tests::tests;
 use crate::report::html::{cells, regions, shrinking};
 use crate::report::sentences::once_sentence;
 use crate::report::tables;
@@ -56,6 +57,7 @@ fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<Strin
     }
     requirements(&mut body, &summary, &drawn);
     front(&mut body, repository, &summary, &rows, &drawn);
+    tests(&mut body, repository, &summary, &rows, &drawn)?;
     generations(&mut body, repository, &summary, &rows, &drawn)?;
     if let Some(coverage) = &summary.coverage {
         cells::coverage(&mut body, repository.plan(), coverage, &drawn);
@@ -75,11 +77,14 @@ fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<Strin
     let title = format!("{} of {}, seed {}", summary.campaign, summary.space, summary.seed);
     let mut escaped = Markup::default();
     escaped.text(&title);
-    let shell = sesame_templates::report::PAGE;
+    let shell = sesame_templates::report::page();
     // The policy is of the shell alone: what is filled in is not permitted to hold styles or scripts.
-    let policy = policy(shell);
-    Ok(fill(shell, &[("policy", &policy), ("title", &escaped.finish()), ("body", &body.finish())]))
+    let policy = policy(&shell);
+    Ok(fill(&shell, &[("policy", &policy), ("title", &escaped.finish()), ("body", &body.finish())]))
 }
+
+/// What the marks of a timeline mean.
+const MARKS: &str = "Outlined: planned; filled: active. Red: outside the bound of a requirement.";
 
 /// Tests that get a timeline, under a heading.
 struct Group {
@@ -105,9 +110,9 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
         }
     }
     let front_caption = if front.len() < all.len() {
-        format!("{} of the {} tests on the front, evenly chosen; use `show` for the others.", front.len(), all.len())
+        format!("{} of the {} tests on the front, evenly chosen. {MARKS}", front.len(), all.len())
     } else {
-        "Outlined: planned; filled: active. Red: outside the bound of a requirement.".to_owned()
+        MARKS.to_owned()
     };
     let shrunk = summary.shrinking.as_ref().map_or_else(Vec::new, Shrinking::ends);
     more.retain(|number| !shrunk.contains(number));

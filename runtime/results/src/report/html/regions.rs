@@ -1,10 +1,13 @@
 //! Where tests fail, as a section of the page.
 
+use sesame_plan::Dimension;
+
 use crate::analysis::Selection;
 use crate::analysis::regions::{Regions, all_regions};
 use crate::present::markup::Markup;
 use crate::present::number;
 use crate::record::{RecordError, Repository};
+use crate::report::html::legend::legend;
 use crate::report::tables;
 
 /// Tests that a rule is worth being made of.
@@ -31,6 +34,7 @@ pub(super) fn regions(body: &mut Markup, repository: &Repository) -> Result<(), 
     for regions in &found {
         of_one(body, regions, repository);
     }
+    legend(body, &Dimension::ALL);
     body.close();
     Ok(())
 }

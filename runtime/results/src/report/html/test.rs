@@ -7,6 +7,7 @@ use crate::record::{MetricValue, RecordError, Repository, Verdict, trace_file};
 use crate::report::facts::show::{TestReport, report_on};
 use crate::report::facts::summary::Summary;
 use crate::report::facts::wording::value_text;
+use crate::report::html::command;
 use crate::report::html::timeline::timeline;
 use crate::report::sentences::outcome_sentence;
 use crate::report::tables;
@@ -26,7 +27,8 @@ pub(super) fn test(
     body.open("article", &[("class", "test"), ("id", &report.test.to_string())]);
     heading(body, summary, &report);
     timeline(body, repository.plan(), &record, &report);
-    figures(body, &report);
+    let (before, after) = command::show(repository.plan(), repository.folder());
+    figures(body, &report, &format!("{before}{}{after}", report.test));
     if repository.trace(number, record.duplicate_of).is_some() {
         trace_link(body, &trace_file(folder, ran));
     }
@@ -56,8 +58,8 @@ fn heading(body: &mut Markup, summary: &Summary, report: &TestReport) {
     body.element("p", &[("class", "values")], &values.join(" · "));
 }
 
-/// Everything on a test as tables, folded away.
-fn figures(body: &mut Markup, report: &TestReport) {
+/// Everything on a test as tables, folded away, and the command that prints it.
+fn figures(body: &mut Markup, report: &TestReport, command: &str) {
     body.open("details", &[]);
     body.element("summary", &[], "Figures");
     body.element(
@@ -76,8 +78,14 @@ fn figures(body: &mut Markup, report: &TestReport) {
         tables::verdicts(&report.requirements).html(body, &[]);
     }
     for warning in &report.warnings {
-        body.element("p", &[("class", "warning")], &format!("Warning: {warning}"));
+        body.open("p", &[("class", "warning")]);
+        body.prose(&format!("Warning: {warning}"));
+        body.close();
     }
+    body.open("p", &[("class", "quiet command")]);
+    body.text("In a terminal: ");
+    body.element("code", &[], command);
+    body.close();
     body.close();
 }
 

@@ -11,8 +11,8 @@ use sesame_plan::{Bound, CampaignPlan, Metric, MetricSource, Span};
 use crate::present::axis::Axis;
 use crate::present::markup::{Markup, coordinate, percent};
 use crate::present::number;
-use crate::record::{TestRecord, violation_spans};
-use crate::report::facts::show::{OperationReport, TestReport};
+use crate::record::TestRecord;
+use crate::report::facts::show::{OperationReport, TestReport, decided_at, violated_when};
 use crate::report::sentences::{choices_text, effect_text, planned_text, spans_text};
 
 /// Height of a lane of an operation, in pixels.
@@ -34,10 +34,9 @@ pub(crate) fn timeline(markup: &mut Markup, plan: &CampaignPlan, record: &TestRe
     let broke_off = matches!(record.observation.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. });
     let broke_off = broke_off.then_some(end);
     let label = format!("{} over time", report.test);
-    markup.open("figure", &[("class", "timeline"), ("aria-label", &label)]);
-    for operation in &report.operations {
-        lane(markup, &time, operation, broke_off);
-    }
+    let until = coordinate(time.high);
+    markup.open("figure", &[("class", "timeline"), ("aria-label", &label), ("data-end", &until)]);
+    lanes(markup, &time, &report.operations, broke_off);
     for id in shown_metrics(plan, record) {
         series(markup, plan, &time, id, &record.observation.metrics[id], (end, broke_off));
     }
@@ -65,6 +64,24 @@ fn row(markup: &mut Markup, label: impl FnOnce(&mut Markup)) {
     markup.open("div", &[("class", "label")]);
     label(markup);
     markup.close();
+}
+
+/// A lane for each operation; those without effect are folded away if there are others.
+fn lanes(markup: &mut Markup, time: &Axis, operations: &[OperationReport], broke_off: Option<f64>) {
+    let idle = |operation: &&OperationReport| operation.counters.is_some_and(|counters| !counters.any_effect());
+    let (without, with): (Vec<&OperationReport>, Vec<&OperationReport>) = operations.iter().partition(idle);
+    for operation in if with.is_empty() { &without } else { &with } {
+        lane(markup, time, operation, broke_off);
+    }
+    if !with.is_empty() && !without.is_empty() {
+        let names: Vec<&str> = without.iter().map(|operation| operation.operation.as_str()).collect();
+        markup.open("details", &[("class", "idle")]);
+        markup.element("summary", &[], &format!("without effect: {}", names.join(", ")));
+        for operation in without {
+            lane(markup, time, operation, broke_off);
+        }
+        markup.close();
+    }
 }
 
 fn lane(markup: &mut Markup, time: &Axis, operation: &OperationReport, broke_off: Option<f64>) {
@@ -104,6 +121,10 @@ fn lane(markup: &mut Markup, time: &Axis, operation: &OperationReport, broke_off
         window(span, if effect == Some(false) { "seen idle" } else { "seen" }, 9.0);
     }
     markup.close();
+    // Below the lane, where long conditions have room.
+    if operation.conditions.is_some() {
+        markup.element("div", &[("class", "quiet when")], &planned_text(operation));
+    }
     markup.close();
 }
 
@@ -113,15 +134,39 @@ fn shown_metrics(plan: &CampaignPlan, record: &TestRecord) -> Vec<usize> {
     let objectives = plan.campaign.objectives.iter().map(|id| id.index());
     let mut order: Vec<usize> = Vec::new();
     for id in bounded.chain(objectives).chain(0..plan.metrics.len()) {
-        // The time spent fuzzing is what the lanes above show; a robustness is known at the end only.
-        let source = &plan.metrics[id].source;
-        let drawn = !matches!(source, MetricSource::FuzzingTime | MetricSource::Robustness { .. })
-            && record.observation.metrics.get(id).is_some_and(|shown| !shown.series.is_empty());
+        // The time spent fuzzing is what the lanes above show.
+        let drawn = !matches!(plan.metrics[id].source, MetricSource::FuzzingTime)
+            && record
+                .observation
+                .metrics
+                .get(id)
+                .is_some_and(|shown| !Line::of(&plan.metrics[id], shown, 0.0).is_empty());
         if drawn && !order.contains(&id) {
             order.push(id);
         }
     }
     order
+}
+
+/// What is drawn of a metric: its change points, and when the last one no longer holds.
+struct Line<'a> {
+    points: &'a [(f64, f64)],
+    end: f64,
+}
+
+impl<'a> Line<'a> {
+    /// The series of a metric up to the end of the run, or the signal of a robustness.
+    fn of(metric: &Metric, shown: &'a MetricObservation, end: f64) -> Line<'a> {
+        match (&metric.source, shown.robustness.split_last()) {
+            (MetricSource::Robustness { .. }, Some((last, points))) => Line { points, end: last.0 },
+            (MetricSource::Robustness { .. }, None) => Line { points: &[], end },
+            _ => Line { points: &shown.series, end },
+        }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
 }
 
 fn series(
@@ -133,6 +178,8 @@ fn series(
     (end, broke_off): (f64, Option<f64>),
 ) {
     let metric: &Metric = &plan.metrics[id];
+    let of_run = end;
+    let Line { points, end } = Line::of(metric, shown, end);
     let unit = metric.unit.as_deref();
     let bounds: Vec<(&str, Bound)> = plan
         .requirements
@@ -140,42 +187,55 @@ fn series(
         .filter(|requirement| requirement.metric.index() == id)
         .map(|requirement| (requirement.name.as_str(), requirement.bound))
         .collect();
-    let lines: Vec<(&str, Bound, f64)> = bounds
+    let lines: Vec<f64> = bounds
         .iter()
-        .flat_map(|&(name, bound)| {
+        .flat_map(|&(_, bound)| {
             let (low, _, high, _) = ends(bound);
-            let both = if low == high { [low, None] } else { [low, high] };
-            both.into_iter().flatten().map(move |at| (name, bound, at))
+            if low == high { [low, None] } else { [low, high] }
         })
+        .flatten()
         .collect();
-    let points = thin(&shown.series, end);
-    let values = || points.iter().map(|point| point.1).chain(lines.iter().map(|line| line.2));
+    let points = thin(points, end);
+    let values = || points.iter().map(|point| point.1).chain(lines.iter().copied());
     let extent = Axis::exact(values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max), 2);
     // The default holds until the first change; one far away (999 s for "never") would flatten all else.
-    let default = metric.default.filter(|&default| (-1.0..=2.0).contains(&extent.share(default)));
+    let robust = matches!(metric.source, MetricSource::Robustness { .. });
+    let default = metric.default.filter(|&default| !robust && (-1.0..=2.0).contains(&extent.share(default)));
     let reach = extent.high.max(default.unwrap_or(extent.high));
     let extent = Axis::exact(extent.low.min(default.unwrap_or(extent.low)), reach, 2);
     let height = |value: f64| MARGIN + (1.0 - extent.share(value)) * (SERIES - 2.0 * MARGIN);
 
     row(markup, |markup| {
         markup.element("b", &[], &metric.name);
-        let value = shown.value.map_or("unmeasured".to_owned(), |value| number::quantity(value, unit));
+        let mut value = shown.value.map_or("unmeasured".to_owned(), |value| number::quantity(value, unit));
+        if let Some(at) = decided_at(metric, shown) {
+            let _ = write!(value, " at {at:.2} s");
+        }
         markup.element("span", &[("class", "quiet")], &value);
+        // Beside the plot, where it covers no line.
+        for &(name, bound) in &bounds {
+            let words = format!("{name} {}", number::bound(bound, unit));
+            markup.element("span", &[("class", "bound-name")], &words);
+        }
     });
-    let broken: Vec<Span> = bounds.iter().flat_map(|&(_, bound)| violation_spans(&shown.series, bound, end)).collect();
+    let broken: Vec<Span> = bounds.iter().flat_map(|&(_, bound)| violated_when(metric, shown, bound, of_run)).collect();
     let mut title =
         format!("{} from {} to {}", metric.name, number::number(extent.low), number::quantity(extent.high, unit));
     if !broken.is_empty() {
         let _ = write!(title, "; outside its bound {}", spans_text(&broken));
     }
     let tall = coordinate(SERIES);
-    markup.open("svg", &[("class", "plot"), ("height", &tall), ("role", "img"), ("aria-label", &title)]);
+    let ends = [extent.low, extent.high].map(|end| end.to_string());
+    let told = [("data-metric", metric.name.as_str()), ("data-low", &ends[0]), ("data-high", &ends[1])];
+    let told_unit = [("data-unit", unit.unwrap_or_default())];
+    let attributes = [("class", "plot"), ("height", tall.as_str()), ("role", "img"), ("aria-label", &title)];
+    markup.open("svg", &[&attributes[..], &told[..], &told_unit[..]].concat());
     backdrop(markup, time, broke_off);
     for span in &broken {
         let (x, width) = (percent(time.share(span.start)), percent(time.share(span.end) - time.share(span.start)));
         markup.leaf("rect", &[("class", "outside"), ("x", &x), ("y", "0"), ("width", &width), ("height", &tall)]);
     }
-    for &(_, _, at) in &lines {
+    for &at in &lines {
         let y = coordinate(height(at));
         markup.leaf("line", &[("class", "bound"), ("x1", "0"), ("x2", "100%"), ("y1", &y), ("y2", &y)]);
     }
@@ -189,7 +249,11 @@ fn series(
         markup.leaf("path", &[("class", "line default"), ("d", &path)]);
     }
     markup.leaf("path", &[("class", "line"), ("d", &step_path(&points, end, height, |_| true))]);
-    let bad = step_path(&points, end, height, |value| bounds.iter().any(|(_, bound)| !bound.holds(value)));
+    // Single times decide a series; what they mean for a robustness depends on its formula.
+    let within = |time: f64| broken.iter().any(|span| (span.start..span.end).contains(&time));
+    let beyond = |value: f64| bounds.iter().any(|(_, bound)| !bound.holds(value));
+    let is_bad = |(time, value): (f64, f64)| if robust { within(time) } else { beyond(value) };
+    let bad = step_path(&points, end, height, is_bad);
     if !bad.is_empty() {
         markup.leaf("path", &[("class", "line bad"), ("d", &bad)]);
     }
@@ -197,19 +261,12 @@ fn series(
     // A value set at the very end has no line, only a place.
     if let Some(&(at, value)) = points.last()
         && at >= end
+        && !(robust && points.len() > 1)
     {
-        let bad = bounds.iter().any(|(_, bound)| !bound.holds(value));
+        let bad = if robust { !broken.is_empty() } else { beyond(value) };
         let (x, y) = (percent(time.share(at)), coordinate(height(value)));
         let class = if bad { "at-end bad" } else { "at-end" };
         markup.leaf("circle", &[("class", class), ("cx", &x), ("cy", &y), ("r", "3")]);
-    }
-    // After the lines, so that none strikes a name out.
-    for &(name, bound, at) in &lines {
-        let y = coordinate(height(at));
-        // On the side where there is room, which is also where an unbroken line is not.
-        let dy = if height(at) < SERIES / 2.0 { "-4" } else { "12" };
-        let words = format!("{name} {}", number::bound(bound, unit));
-        markup.element("text", &[("class", "bound-name"), ("x", "100%"), ("dx", "-2"), ("y", &y), ("dy", dy)], &words);
     }
     let decimals = number::decimals([extent.low, extent.high]);
     for value in [extent.high, extent.low] {
@@ -238,12 +295,17 @@ fn backdrop(markup: &mut Markup, time: &Axis, broke_off: Option<f64>) {
 }
 
 /// A line that holds each value until the next change, where the value is to be drawn.
-fn step_path(points: &[(f64, f64)], end: f64, height: impl Fn(f64) -> f64, drawn: impl Fn(f64) -> bool) -> String {
+fn step_path(
+    points: &[(f64, f64)],
+    end: f64,
+    height: impl Fn(f64) -> f64,
+    drawn: impl Fn((f64, f64)) -> bool,
+) -> String {
     let mut path = String::new();
     let mut going = false;
     for (at, &(time, value)) in points.iter().enumerate() {
         let until = points.get(at + 1).map_or(end, |next| next.0).min(end);
-        if !drawn(value) || time >= end {
+        if !drawn((time, value)) || time >= end {
             going = false;
             continue;
         }
@@ -280,6 +342,8 @@ fn thin(series: &[(f64, f64)], end: f64) -> Vec<(f64, f64)> {
 mod tests {
     use proptest::prelude::*;
 
+    use sesame_base::observation::Counters;
+
     use super::*;
     use crate::record::{Origin, sample};
     use crate::report::facts::show::report_on;
@@ -288,7 +352,7 @@ mod tests {
     fn a_line_holds_its_value_until_the_next_change() {
         let points = [(1.0, 2.0), (3.0, 0.0), (4.0, 5.0), (5.0, 6.0)];
         assert_eq!(step_path(&points, 7.0, |value| value, |_| true), "M1 2H3V0H4V5H5V6H7");
-        assert_eq!(step_path(&points, 7.0, |value| value, |value| value > 1.0), "M1 2H3M4 5H5V6H7");
+        assert_eq!(step_path(&points, 7.0, |value| value, |(_, value)| value > 1.0), "M1 2H3M4 5H5V6H7");
         assert_eq!(step_path(&points, 4.5, |value| value, |_| true), "M1 2H3V0H4V5H4.5");
     }
 
@@ -314,10 +378,32 @@ mod tests {
         timeline(&mut markup, &plan, &record, &report);
         let drawn = markup.finish();
         assert_eq!(drawn.matches(r#"class="planned""#).count(), 3, "{drawn}");
+        assert!(drawn.contains("planned when 1.5m/s &lt; top_speed for 0.3s at most 3 times"), "{drawn}");
         assert!(
-            drawn.contains("planned when 1.5m/s &lt; top_speed for 0.30000000000000004s at most 3 times"),
-            "{drawn}"
+            drawn.contains(r#"quiet when">when 1.5m/s &lt; top_speed for 0.3s at most 3 times"#),
+            "beside the lane: {drawn}"
         );
+    }
+
+    #[test]
+    fn lanes_without_effect_are_folded_away_beside_others() {
+        let plan = sample::plan();
+        let mut record = sample::record(&plan, 1, Origin::Search, sample::conditional_test());
+        let drawn = |record: &TestRecord| {
+            let mut markup = Markup::default();
+            timeline(&mut markup, &plan, record, &report_on(&plan, record, &[], true));
+            markup.finish()
+        };
+        assert!(!drawn(&record).contains("<details"));
+        let idle = Counters { seen: 7, ..Counters::default() };
+        record.observation.operations[0].counters = idle;
+        let (before, folded) =
+            drawn(&record).split_once("<details class=\"idle\">").map(|(a, b)| (a.to_owned(), b.to_owned())).unwrap();
+        assert!(folded.starts_with("<summary>without effect: jitter_link0</summary>"), "{folded}");
+        assert!(!before.contains("<b>jitter_link0</b>") && before.contains("<b>cut_link1</b>"));
+        // Where none had an effect, that is what there is to see.
+        record.observation.operations.iter_mut().for_each(|operation| operation.counters = idle);
+        assert!(!drawn(&record).contains("<details"));
     }
 
     proptest! {

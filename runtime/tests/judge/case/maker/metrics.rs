@@ -28,7 +28,7 @@ impl Maker {
             (true, false) => self.one(&[Members::Min, Members::Max, Members::Sum, Members::Each]),
         };
         let path: Vec<String> = path?.iter().map(|&name| name.to_owned()).collect();
-        Some(Input { field: FieldRef { topic: TopicId(u32::try_from(topic).unwrap()), path }, members })
+        Some(Input { field: FieldRef { topic: TopicId(u32::try_from(topic).unwrap()), path }, members, text: None })
     }
 
     /// Inputs of one or two topics, numbers first; how many are numbers. Always at least one number.
@@ -95,7 +95,8 @@ impl Maker {
     }
 
     fn formula(&mut self) -> Option<Formula> {
-        let (inputs, numbers) = self.inputs(true)?;
+        let (mut inputs, numbers) = self.inputs(true)?;
+        of_one_group(&mut inputs);
         let of = self.expression(numbers, 2);
         let held = self.condition(inputs.len(), numbers, 1);
         let aggregate = match self.between(0, 6) {
@@ -150,15 +151,7 @@ impl Maker {
 
     fn robustness(&mut self) -> Option<Robustness> {
         let (mut inputs, numbers) = self.inputs(false)?;
-        // Members each may be of one group only.
-        let mut each: Option<TopicId> = None;
-        for input in &mut inputs {
-            if input.members == Members::Each && each.is_some_and(|topic| topic != input.field.topic) {
-                input.members = Members::Max;
-            } else if input.members == Members::Each {
-                each = Some(input.field.topic);
-            }
-        }
+        of_one_group(&mut inputs);
         let count = self.between(1, 2);
         let signals: Vec<Expression> = (0..count).map(|_| self.expression(numbers, 1)).collect();
         let formula = self.temporal(signals.len(), 3);
@@ -223,5 +216,17 @@ impl Maker {
             }
         }
         requirements
+    }
+}
+
+/// Lets only one group be read member by member: those of others need not be as many.
+fn of_one_group(inputs: &mut [Input]) {
+    let mut each: Option<TopicId> = None;
+    for input in inputs {
+        if input.members == Members::Each && each.is_some_and(|topic| topic != input.field.topic) {
+            input.members = Members::Max;
+        } else if input.members == Members::Each {
+            each = Some(input.field.topic);
+        }
     }
 }

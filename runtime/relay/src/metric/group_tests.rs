@@ -1,0 +1,320 @@
+//! Formulas over points, texts and times of groups: members of two groups, and pairs of one group's members, beside
+//! naive oracles that look at the whole stream at once.
+
+use proptest::prelude::*;
+
+use sesame_base::time::SimTime;
+use sesame_plan::stl::{self, Interval, Robustness};
+use sesame_plan::testing::plan;
+use sesame_plan::{
+    Aggregate, CampaignPlan, Comparison, Condition, Distance, Expression, FieldRef, Formula, Input, Members,
+    MetricSource, Point, Region, Side, SignedDistance, TextTest, TopicId, Type, UnaryFunction,
+};
+
+use crate::metric::{MetricError, MetricTable};
+use crate::value::{Fields, Record, Value};
+use crate::wire::WireTable;
+
+/// A message: milliseconds, path, where it is along the x axis.
+type Sent = (i64, &'static str, f64);
+
+const POSES: TopicId = TopicId(0);
+const GOALS: TopicId = TopicId(1);
+const TOWER: TopicId = TopicId(2);
+
+fn system() -> CampaignPlan {
+    let mut plan = plan(Vec::new());
+    let mut topic = plan.topics[0].clone();
+    let mut named = |name: &str, paths: &[&str]| {
+        topic.name = name.to_owned();
+        topic.paths = paths.iter().map(|&path| path.to_owned()).collect();
+        topic.ty = Type::Text;
+        topic.clone()
+    };
+    plan.topics = vec![
+        named("poses", &["poses/a", "poses/b", "poses/c"]),
+        named("goals", &["goals/a", "goals/b", "goals/c"]),
+        named("tower", &["tower"]),
+        named("two", &["two/a", "two/b"]),
+    ];
+    plan
+}
+
+/// A place on the x axis, three above the ground; its mode is `ahead` where x is positive.
+fn payload(x: f64) -> Value {
+    let mode = if x > 0.0 { "ahead" } else { "behind" };
+    let fields = Fields::new(["at", "mode"]);
+    Record::new(&fields, vec![Value::Point([x, 0.0, 3.0]), Value::from(mode)]).into()
+}
+
+fn input(topic: TopicId, path: &[&str], members: Members) -> Input {
+    let path = path.iter().map(|&name| name.to_owned()).collect();
+    Input { field: FieldRef { topic, path }, members, text: None }
+}
+
+fn mode(members: Members, test: TextTest) -> Input {
+    Input { text: Some(test), ..input(POSES, &["mode"], members) }
+}
+
+fn apart() -> Expression {
+    Expression::Distance(Box::new(Distance { from: Point::Input(0), to: Point::Input(1), scale: 1.0 }))
+}
+
+fn pairs() -> Vec<Input> {
+    vec![input(POSES, &["at"], Members::First), input(POSES, &["at"], Members::Second)]
+}
+
+fn to_goals() -> Vec<Input> {
+    vec![input(POSES, &["at"], Members::Each), input(GOALS, &["at"], Members::Each)]
+}
+
+fn near(limit: f64) -> Condition {
+    Condition::Compare { left: apart(), by: Comparison::Below, right: Expression::Constant(limit) }
+}
+
+fn formula(inputs: Vec<Input>, aggregate: Aggregate) -> MetricSource {
+    let formula = Formula { inputs, aggregate, when: None, every: None, per: None, side: Side::Inbound };
+    MetricSource::Formula { formula }
+}
+
+/// That the distance is above a limit at all times.
+fn always_above(inputs: Vec<Input>, limit: f64) -> MetricSource {
+    let above = stl::Formula::Predicate { signal: 0, comparison: Comparison::Above, constant: limit };
+    let formula = stl::Formula::Always { interval: Interval::UNBOUNDED, of: Box::new(above) };
+    let signals = vec![apart()];
+    MetricSource::Robustness {
+        robustness: Robustness { inputs, signals, formula, side: Side::Inbound, whole_windows: false },
+    }
+}
+
+/// Value and warnings of a metric after a run of ten seconds.
+fn measured(source: MetricSource, sent: &[Sent]) -> (Option<f64>, Vec<String>) {
+    let mut plan = system();
+    plan.metrics.truncate(1);
+    plan.metrics[0].source = source;
+    let wires = WireTable::new(&plan);
+    let table = MetricTable::new(&plan, &wires, &[]).unwrap();
+    let mut metrics = table.start();
+    metrics.begin();
+    for &(time, path, x) in sent {
+        metrics.message(SimTime::from_nanos(time * 1_000_000), wires.find(path).unwrap(), &payload(x));
+    }
+    metrics.end(SimTime::from_seconds(10.0));
+    let (mut observed, warnings) = metrics.finish(&[]);
+    (observed.remove(0).value, warnings)
+}
+
+fn value(source: MetricSource, sent: &[Sent]) -> Option<f64> {
+    measured(source, sent).0
+}
+
+#[test]
+fn coordinates_are_those_of_the_group_as_other_numbers_are() {
+    let of = |axis: &str, members| {
+        let of = Expression::Input(0);
+        value(
+            formula(vec![input(POSES, &["at", axis], members)], Aggregate::Last { of }),
+            &[(0, "poses/a", 4.0), (0, "poses/b", -7.0)],
+        )
+    };
+    assert_eq!(of("x", Members::Min), Some(-7.0));
+    assert_eq!(of("x", Members::Max), Some(4.0));
+    assert_eq!(of("y", Members::Min), Some(0.0));
+    assert_eq!(of("z", Members::Sum), Some(6.0));
+    let last = MetricSource::Last { input: FieldRef { topic: TOWER, path: vec!["at".into(), "z".into()] } };
+    assert_eq!(value(last, &[(0, "tower", 1.0)]), Some(3.0));
+}
+
+#[test]
+fn a_text_is_compared_at_all_members_at_any_or_at_the_one_of_the_message() {
+    let sent = [(0, "poses/a", 1.0), (1000, "poses/b", -1.0), (3000, "poses/b", 1.0), (6000, "poses/a", -1.0)];
+    let of = |members, test| {
+        let of = Condition::Input(0);
+        value(formula(vec![mode(members, test)], Aggregate::Duration { of }), &sent)
+    };
+    let ahead = || TextTest::Is("ahead".into());
+    assert_eq!(of(Members::Min, ahead()), Some(1.0 + 3.0), "all are");
+    assert_eq!(of(Members::Max, ahead()), Some(10.0), "any is");
+    assert_eq!(of(Members::Min, TextTest::IsNot("ahead".into())), Some(0.0), "none is");
+    assert_eq!(of(Members::Max, TextTest::IsNot("ahead".into())), Some(2.0 + 4.0), "any is not");
+    assert_eq!(of(Members::Each, TextTest::IsNot("elsewhere".into())), Some(10.0));
+}
+
+#[test]
+fn time_is_that_of_the_message() {
+    let late = Condition::Compare { left: Expression::Time, by: Comparison::Above, right: Expression::Constant(2.0) };
+    let sent = [(1000, "tower", 1.0), (2000, "tower", 1.0), (2001, "tower", 1.0), (9000, "tower", 1.0)];
+    let x = || vec![input(TOWER, &["at", "x"], Members::Min)];
+    assert_eq!(value(formula(x(), Aggregate::Count { of: late }), &sent), Some(2.0));
+    assert_eq!(value(formula(x(), Aggregate::Max { of: Expression::Time }), &sent), Some(9.0));
+}
+
+#[test]
+fn a_fence_is_left_by_as_much_as_the_signed_distance_says() {
+    let to = Region::Polygon { corners: vec![[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]] };
+    let of = Expression::SignedDistance(Box::new(SignedDistance { from: Point::Input(0), to }));
+    let at = vec![input(POSES, &["at"], Members::Each)];
+    let sent = [(0, "poses/a", 4.0), (100, "poses/b", 7.5), (200, "poses/a", 0.0)];
+    assert_eq!(value(formula(at, Aggregate::Max { of }), &sent), Some(2.5));
+}
+
+#[test]
+fn a_function_without_a_value_is_a_warning_with_metric_and_moment_and_the_rest_counts() {
+    let root = || Expression::Unary { function: UnaryFunction::Sqrt, of: Box::new(Expression::Input(0)) };
+    let x = || vec![input(TOWER, &["at", "x"], Members::Min)];
+    let sent = [(0, "tower", 9.0), (1500, "tower", -4.0), (2000, "tower", 4.0)];
+    let warned = ["metric `fuzzing_time`: `sqrt(-4)` has no value at 1.500 s".to_owned()];
+    let (found, warnings) = measured(formula(x(), Aggregate::Min { of: root() }), &sent);
+    assert_eq!((found, warnings.as_slice()), (Some(2.0), warned.as_slice()));
+    let above = |right| Condition::Compare { left: root(), by: Comparison::Above, right: Expression::Constant(right) };
+    let (found, warnings) = measured(formula(x(), Aggregate::Count { of: above(1.0) }), &sent);
+    assert_eq!((found, warnings.as_slice()), (Some(2.0), warned.as_slice()), "in a condition");
+    let MetricSource::Robustness { mut robustness } = always_above(x(), 1.0) else { unreachable!("it is one") };
+    robustness.signals = vec![root()];
+    let (found, warnings) = measured(MetricSource::Robustness { robustness }, &sent);
+    assert_eq!((found, warnings.as_slice()), (Some(1.0), warned.as_slice()), "in a robustness");
+}
+
+#[test]
+fn members_of_two_groups_are_read_together_and_only_once_both_had_a_message() {
+    // Each is two from its own goal and far from the others'; b has none before 2 s.
+    let sent = [
+        (0, "goals/a", 2.0),
+        (0, "poses/a", 0.0),
+        (1000, "poses/b", 100.0),
+        (2000, "goals/b", 102.0),
+        (3000, "poses/a", -1.0),
+    ];
+    assert_eq!(value(formula(to_goals(), Aggregate::Min { of: apart() }), &sent), Some(2.0));
+    assert_eq!(value(formula(to_goals(), Aggregate::Max { of: apart() }), &sent), Some(3.0));
+    let always = Aggregate::Count { of: Condition::Constant(true) };
+    assert_eq!(value(formula(to_goals(), always), &sent), Some(3.0), "a at 0 s and 3 s, b at 2 s");
+    assert_eq!(value(always_above(to_goals(), 1.0), &sent), Some(1.0));
+}
+
+#[test]
+fn with_a_third_topic_the_last_member_is_read_again_and_no_mixture() {
+    let mut inputs = to_goals();
+    inputs.push(input(TOWER, &["at", "x"], Members::Min));
+    // The message of goals/b pairs with nothing; what the tower says then is of a.
+    let sent =
+        [(0, "tower", 0.0), (0, "poses/a", 0.0), (0, "goals/a", 1.0), (1000, "goals/b", 50.0), (2000, "tower", 0.0)];
+    assert_eq!(value(formula(inputs, Aggregate::Max { of: apart() }), &sent), Some(1.0));
+}
+
+#[test]
+fn groups_of_different_sizes_are_refused() {
+    let mut plan = system();
+    let two = input(TopicId(3), &["at"], Members::Each);
+    plan.metrics[0].source = formula(vec![input(POSES, &["at"], Members::Each), two], Aggregate::Min { of: apart() });
+    let table = MetricTable::new(&plan, &WireTable::new(&plan), &[]).map(|_| ());
+    assert_eq!(table, Err(MetricError::UnpairedMembers("fuzzing_time".into())));
+}
+
+#[test]
+fn pairs_see_an_instant_as_a_whole() {
+    // All move by ten at once and stay five apart; in between, b would be five before where a was.
+    let sent = [
+        (0, "poses/a", 0.0),
+        (0, "poses/b", 5.0),
+        (0, "poses/c", 10.0),
+        (50, "poses/a", 10.0),
+        (50, "poses/b", 15.0),
+        (50, "poses/c", 20.0),
+    ];
+    assert_eq!(value(formula(pairs(), Aggregate::Min { of: apart() }), &sent), Some(5.0));
+    assert_eq!(value(formula(pairs(), Aggregate::Max { of: apart() }), &sent), Some(10.0));
+    assert_eq!(value(always_above(pairs(), 2.0), &sent), Some(3.0));
+    let all = Aggregate::Count { of: Condition::Constant(true) };
+    assert_eq!(value(formula(pairs(), all), &sent), Some(6.0), "three pairs at two instants");
+}
+
+#[test]
+fn each_pair_has_a_state_of_its_own() {
+    let sent = [(0, "poses/a", 0.0), (0, "poses/b", 1.0), (0, "poses/c", 50.0), (4000, "poses/c", 1.5)];
+    let time = || value(formula(pairs(), Aggregate::Duration { of: near(2.0) }), &sent);
+    assert_eq!(time(), Some(10.0 + 6.0 + 6.0));
+    let last = || value(formula(pairs(), Aggregate::Last { of: apart() }), &sent);
+    assert_eq!(last(), Some(0.5));
+    let MetricSource::Formula { formula: mut limited } = formula(pairs(), Aggregate::Count { of: near(2.0) }) else {
+        unreachable!("it is one")
+    };
+    limited.every = Some(5.0);
+    assert_eq!(value(MetricSource::Formula { formula: limited }, &sent), Some(3.0), "each pair once");
+}
+
+#[test]
+fn of_members_that_never_spoke_there_are_no_pairs() {
+    let alone = [(0, "poses/b", 1.0), (100, "poses/b", 2.0)];
+    assert_eq!(value(formula(pairs(), Aggregate::Min { of: apart() }), &alone), None);
+    assert_eq!(value(always_above(pairs(), 0.0), &alone), None);
+    let two = [(0, "poses/b", 1.0), (100, "poses/c", 2.0)];
+    assert_eq!(value(formula(pairs(), Aggregate::Min { of: apart() }), &two), Some(1.0));
+    assert_eq!(value(always_above(pairs(), 0.0), &two), Some(1.0));
+}
+
+/// Where each path is after all messages up to the end of an instant, and whether it was heard in it.
+fn state(sent: &[Sent], time: i64, path: &str) -> (Option<f64>, bool) {
+    let own = || sent.iter().filter(|message| message.1 == path && message.0 <= time);
+    (own().next_back().map(|message| message.2), own().any(|message| message.0 == time))
+}
+
+/// The oracle: all distances between two paths, with the time from which they last.
+fn distances(sent: &[Sent], one: &str, other: &str) -> Vec<(i64, f64)> {
+    let mut times: Vec<i64> = sent.iter().map(|message| message.0).collect();
+    times.dedup();
+    let at = |time: i64| {
+        let ((x, heard), (y, other_heard)) = (state(sent, time, one), state(sent, time, other));
+        (heard || other_heard).then_some(())?;
+        Some((time, (x? - y?).abs()))
+    };
+    times.into_iter().filter_map(at).collect()
+}
+
+fn held(distances: &[(i64, f64)], limit: f64) -> i64 {
+    let next = distances.iter().skip(1).map(|distance| distance.0).chain([10_000]);
+    distances
+        .iter()
+        .zip(next)
+        .filter(|(distance, _)| distance.1 < limit)
+        .map(|(distance, next)| next - distance.0)
+        .sum()
+}
+
+fn stream() -> impl Strategy<Value = Vec<Sent>> {
+    const PATHS: [&str; 6] = ["poses/a", "poses/b", "poses/c", "goals/a", "goals/b", "goals/c"];
+    prop::collection::vec((0i64..3, 0usize..6, -8i32..8), 0..40).prop_map(|steps| {
+        let mut time = 0;
+        let sent = steps.into_iter().map(|(pause, path, x)| {
+            time += pause * 250;
+            (time, PATHS[path], f64::from(x))
+        });
+        sent.collect()
+    })
+}
+
+proptest! {
+    #[test]
+    fn members_and_pairs_are_as_if_each_had_been_looked_at_alone(sent in stream()) {
+        let among = [("poses/a", "poses/b"), ("poses/a", "poses/c"), ("poses/b", "poses/c")];
+        let own = [("poses/a", "goals/a"), ("poses/b", "goals/b"), ("poses/c", "goals/c")];
+        for (inputs, belong, of_pairs) in [(pairs as fn() -> Vec<Input>, among, true), (to_goals, own, false)] {
+            let each: Vec<Vec<(i64, f64)>> =
+                belong.iter().map(|(one, other)| distances(&sent, one, other)).filter(|of| !of.is_empty()).collect();
+            let all = || each.iter().flatten().map(|distance| distance.1);
+            let least = value(formula(inputs(), Aggregate::Min { of: apart() }), &sent);
+            prop_assert_eq!(least, all().reduce(f64::min));
+            let greatest = value(formula(inputs(), Aggregate::Max { of: apart() }), &sent);
+            prop_assert_eq!(greatest, all().reduce(f64::max));
+            let count = value(formula(inputs(), Aggregate::Count { of: near(3.0) }), &sent);
+            let counted = all().filter(|&distance| distance < 3.0).count() as f64;
+            prop_assert_eq!(count, (!each.is_empty()).then_some(counted));
+            prop_assert_eq!(value(always_above(inputs(), 1.0), &sent), all().map(|distance| distance - 1.0).reduce(f64::min));
+            if of_pairs {
+                let time = value(formula(inputs(), Aggregate::Duration { of: near(3.0) }), &sent);
+                let nanos: i64 = each.iter().map(|of| held(of, 3.0)).sum();
+                prop_assert_eq!(time, (!each.is_empty()).then_some(nanos as f64 / 1e3));
+            }
+        }
+    }
+}

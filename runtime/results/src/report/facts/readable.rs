@@ -1,0 +1,100 @@
+//! Recorded sentences as people read them: numbers with as many digits as matter, values with their units.
+//!
+//! Results record exact words, since they are compared and hashed; only reports shorten them.
+
+use sesame_plan::CampaignPlan;
+
+use crate::present::number;
+
+/// Digits beyond which a number with a fraction is shortened.
+const DIGITS: usize = 6;
+
+/// A recorded sentence with short numbers, and with units where it says what a metric is.
+pub(crate) fn sentence(plan: &CampaignPlan, text: &str) -> String {
+    short_numbers(&with_units(plan, text))
+}
+
+/// Adds units to what a sentence says of metrics: ``` `reserve` is -2.24``` becomes ``` `reserve` is -2.24 m```.
+fn with_units(plan: &CampaignPlan, text: &str) -> String {
+    let mut said = text.to_owned();
+    for metric in &plan.metrics {
+        let (Some(unit), lead) = (&metric.unit, format!("`{}` is ", metric.name)) else { continue };
+        let Some(begin) = said.find(&lead).map(|at| at + lead.len()) else { continue };
+        let length = number_length(&said[begin..]);
+        let ends = said[begin + length..].chars().next().is_none_or(|next| matches!(next, ',' | ';' | '.'));
+        if length > 0 && ends {
+            said.insert_str(begin + length, &format!(" {unit}"));
+        }
+    }
+    said
+}
+
+/// The same words with numbers of many digits as numbers are shown everywhere: `18.927509254124797s` is `18.93s`.
+pub(crate) fn short_numbers(text: &str) -> String {
+    let mut said = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(next) = rest.chars().next() {
+        // A number within a name, such as `zone1.5`, is none.
+        let in_name = said.chars().next_back().is_some_and(|before| before.is_alphanumeric() || before == '_');
+        let length = if in_name { 0 } else { number_length(rest) };
+        let (word, after) = rest.split_at(if length == 0 { next.len_utf8() } else { length });
+        let digits = word.chars().filter(char::is_ascii_digit).count();
+        match word.parse::<f64>() {
+            Ok(x) if digits > DIGITS && word.contains('.') => said.push_str(&number::number(x)),
+            _ => said.push_str(word),
+        }
+        rest = after;
+    }
+    said
+}
+
+/// How long the number is with which a text begins; 0 where there is none.
+fn number_length(text: &str) -> usize {
+    let unsigned = text.strip_prefix('-').unwrap_or(text);
+    let digits = |text: &str| text.bytes().take_while(u8::is_ascii_digit).count();
+    let whole = digits(unsigned);
+    if whole == 0 {
+        return 0;
+    }
+    let mut length = whole;
+    if let Some(fraction) = unsigned[length..].strip_prefix('.').map(digits).filter(|&fraction| fraction > 0) {
+        length += 1 + fraction;
+    }
+    if let Some(exponent) = unsigned[length..].strip_prefix('e') {
+        let sign = usize::from(exponent.starts_with('-'));
+        let exponent = digits(&exponent[sign..]);
+        length += if exponent > 0 { 1 + sign + exponent } else { 0 };
+    }
+    text.len() - unsigned.len() + length
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::sample;
+
+    #[test]
+    fn values_have_their_unit_and_no_more_digits_than_matter() {
+        let plan = sample::plan();
+        let said = |text: &str| sentence(&plan, text);
+        let warning = "requirement R3 is violated before anything is fuzzed: `arm_distance` is -2.244690363500318";
+        assert_eq!(said(warning), "requirement R3 is violated before anything is fuzzed: `arm_distance` is -2.245 mm");
+        assert_eq!(said("`collision_occurrence` is 3"), "`collision_occurrence` is 3", "a plain number");
+        assert_eq!(said("`arm_distance` is no value"), "`arm_distance` is no value");
+        assert_eq!(said("`arm_distance` is 5 of a kind"), "`arm_distance` is 5 of a kind");
+    }
+
+    #[test]
+    fn only_numbers_of_many_digits_are_shortened() {
+        assert_eq!(
+            short_numbers("when 1.5m/s < top_speed for 18.927509254124797s at most 3 times"),
+            "when 1.5m/s < top_speed for 18.93s at most 3 times"
+        );
+        assert_eq!(
+            short_numbers("x1.2345678 of seed 18446744073709551615, T12345678"),
+            "x1.2345678 of seed 18446744073709551615, T12345678"
+        );
+        assert_eq!(short_numbers("-0.30000000000000004"), "-0.3");
+        assert_eq!(short_numbers("ä 1. 2.5e-3x 1.23456789e-7"), "ä 1. 2.5e-3x 1.23e-7");
+    }
+}

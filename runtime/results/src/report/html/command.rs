@@ -1,0 +1,74 @@
+//! Commands on the page, for a reader to copy into a terminal.
+//!
+//! Names come from the results, which may be anyone's, so each argument that is more than a plain name is quoted.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use sesame_plan::CampaignPlan;
+
+/// What shows one test in full, in the folder of the space: what stands before its name, and what after.
+pub(super) fn show(plan: &CampaignPlan, run: &Path) -> (String, String) {
+    let mut after = format!(" --campaign {}", quoted(&plan.campaign.name));
+    if let Some(run) = below_project(run) {
+        let _ = write!(after, " --results {}", quoted(&run));
+    }
+    (format!("sesamec show {} ", quoted(&plan.source)), after)
+}
+
+/// What lists all tests.
+pub(super) fn list(plan: &CampaignPlan, run: &Path) -> String {
+    let (_, after) = show(plan, run);
+    format!("sesamec list {}{after}", quoted(&plan.source))
+}
+
+/// The folder of a run as seen from the folder of its space, if it lies where runners put it:
+/// `runners/NAME/results/1`.
+fn below_project(run: &Path) -> Option<String> {
+    let run = std::path::absolute(run).ok()?;
+    let parts: Vec<&str> = run.iter().map(|part| part.to_str()).collect::<Option<_>>()?;
+    match parts.as_slice() {
+        [.., runners, name, results @ "results", run] => Some([*runners, *name, *results, *run].join("/")),
+        _ => None,
+    }
+}
+
+/// An argument as shells of POSIX read it.
+fn quoted(argument: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.' | '/');
+    if !argument.is_empty() && argument.chars().all(plain) && !argument.starts_with('-') {
+        return argument.to_owned();
+    }
+    let printable: String = argument.chars().filter(|c| !c.is_control()).collect();
+    let quoted = format!("'{}'", printable.replace('\'', r"'\''"));
+    if printable.starts_with('-') { format!("./{quoted}") } else { quoted }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::sample;
+
+    #[test]
+    fn the_command_can_be_pasted_in_the_folder_of_the_space() {
+        let run = Path::new("/home/ada/cell/runners/coverage_experiment/results/3");
+        let (before, after) = show(&sample::plan(), run);
+        assert_eq!(
+            format!("{before}T5{after}"),
+            "sesamec show kuka_cell.sesame T5 --campaign coverage_experiment \
+             --results runners/coverage_experiment/results/3"
+        );
+        let elsewhere = show(&sample::plan(), Path::new("/tmp/sent_by_ada")).1;
+        assert_eq!(elsewhere, " --campaign coverage_experiment");
+    }
+
+    #[test]
+    fn names_of_others_run_nothing() {
+        let mut plan = sample::plan();
+        "a'; rm -rf ~; '.sesame\n".clone_into(&mut plan.source);
+        let (before, _) = show(&plan, Path::new("run"));
+        assert_eq!(before, r"sesamec show 'a'\''; rm -rf ~; '\''.sesame' ");
+        assert_eq!(quoted("$(reboot)"), "'$(reboot)'");
+        assert_eq!(quoted("-rf"), "./'-rf'");
+    }
+}

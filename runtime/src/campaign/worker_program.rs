@@ -1,0 +1,44 @@
+//! The program that a supervisor starts as its worker: its own, which is called again.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The program of this process, as it becomes a worker.
+#[derive(Debug, Clone)]
+pub struct WorkerProgram {
+    executable: PathBuf,
+    /// What an interpreted runner's worker has to know, as JSON.
+    interpreted: Option<String>,
+}
+
+impl WorkerProgram {
+    /// A compiled runner contains all that its workers have to know.
+    pub fn compiled() -> io::Result<Self> {
+        Ok(WorkerProgram { executable: std::env::current_exe()?, interpreted: None })
+    }
+
+    /// A program that interprets a runner reads it from a file.
+    #[cfg(feature = "process")]
+    pub fn interpreted(runner: &crate::interpreted::Interpreted) -> io::Result<Self> {
+        let text = serde_json::to_string(runner)?;
+        Ok(WorkerProgram { executable: std::env::current_exe()?, interpreted: Some(text) })
+    }
+
+    /// The command that starts a worker with this folder of its own.
+    pub(super) fn command(&self, directory: &Path) -> io::Result<Command> {
+        let mut command = Command::new(&self.executable);
+        command.arg("worker");
+        if let Some(text) = &self.interpreted {
+            let file = directory.join("runner.json");
+            std::fs::write(&file, text)?;
+            command.arg("--runner").arg(file.canonicalize()?);
+        }
+        Ok(command)
+    }
+
+    /// The program, as messages name it.
+    pub(super) fn executable(&self) -> &Path {
+        &self.executable
+    }
+}

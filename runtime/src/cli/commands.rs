@@ -1,0 +1,150 @@
+//! The commands of a runner, as a command line names them.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::Subcommand;
+
+use crate::campaign;
+use crate::cli::failure::Failure;
+use crate::cli::session::Session;
+use crate::cli::{confirm, export, known, repeat, replay, replay_recording, report, run, shrink, view};
+
+/// What runs tests, or takes them from a recording.
+#[derive(Debug, Subcommand)]
+pub enum Running {
+    /// Continue a run that was stopped, to the same results
+    Resume(run::ResumeOptions),
+    /// Run the regression tests and check their expectations
+    Known(known::Options),
+    /// Run one test again and again, to see what of its result is chance
+    Repeat(repeat::Options),
+    /// Run recorded tests again with fresh seeds of the simulator and say whether what was found comes again
+    Confirm(confirm::Options),
+    /// Run a recorded test again just as it was and say whether it is the same, bit for bit
+    Replay(replay::Options),
+    /// Make a failing test smaller for as long as it fails as it did: fewer operations, shorter, milder
+    Shrink(shrink::Options),
+    /// Feed a recording to the campaign's metrics, without a simulator
+    ReplayRecording(replay_recording::Options),
+}
+
+/// What shows recorded results: it needs neither the runner nor its plan.
+#[derive(Debug, Subcommand)]
+pub enum Showing {
+    /// Print a recorded test as a `test` block for the `.sesame` file
+    Export(export::Options),
+    /// Write the page with pictures anew and print what was found, also of an unfinished run
+    Report(report::Options),
+    /// List all tests of a run
+    List(view::Which),
+    /// Show one test whole: operations, effects, metrics, requirements
+    Show {
+        /// The test, for example `T158`
+        test: String,
+        /// Which run, and how it is shown
+        #[command(flatten)]
+        which: view::Which,
+    },
+    /// Print the hash of a run's content: equal runs have equal digests
+    Digest(view::Which),
+}
+
+/// What a runner starts of itself, which is nothing for users.
+#[derive(Debug, Subcommand)]
+pub enum Internal {
+    /// Serve a supervisor; started by `run`
+    #[command(hide = true)]
+    Worker {
+        /// The file with an interpreted runner
+        #[cfg(feature = "process")]
+        #[arg(long, value_name = "FILE")]
+        runner: Option<std::path::PathBuf>,
+        /// Where the supervisor is
+        #[command(flatten)]
+        supervisor: campaign::Address,
+    },
+    /// Keep the simulator of a worker; started by `worker`
+    #[cfg(all(feature = "process", target_os = "linux"))]
+    #[command(hide = true)]
+    Simulator {
+        /// Process id of the worker
+        worker: u32,
+        /// The file that is told how the simulator ended
+        report: std::path::PathBuf,
+        /// The simulator's program with its arguments
+        #[arg(required = true, last = true)]
+        program: Vec<std::ffi::OsString>,
+    },
+    /// Become a simulator; started by `simulator`
+    #[cfg(all(feature = "process", target_os = "linux"))]
+    #[command(hide = true)]
+    Simulated {
+        /// Process id of the keeper
+        keeper: u32,
+        /// The simulator's program with its arguments
+        #[arg(required = true, last = true)]
+        program: Vec<std::ffi::OsString>,
+    },
+}
+
+impl Running {
+    pub(super) fn carry_out(&self, session: &Session) -> Result<ExitCode, Failure> {
+        match self {
+            Running::Resume(options) => run::resume(session, options),
+            Running::Known(options) => known::known(session, options),
+            Running::Repeat(options) => repeat::repeat(session, options),
+            Running::Confirm(options) => confirm::confirm(session, options),
+            Running::Replay(options) => replay::replay(session, options),
+            Running::Shrink(options) => shrink::shrink(session, options),
+            Running::ReplayRecording(options) => replay_recording::replay_recording(session, options),
+        }
+    }
+}
+
+impl Showing {
+    /// Carries it out on the runs in a folder of results.
+    pub(super) fn carry_out(&self, results: &Path) -> Result<ExitCode, Failure> {
+        match self {
+            Showing::Export(options) => export::export(results, options),
+            Showing::Report(options) => report::report(results, options),
+            Showing::List(which) => view::list(results, which),
+            Showing::Show { test, which } => view::show(results, which, test),
+            Showing::Digest(which) => view::digest(results, which),
+        }
+    }
+}
+
+impl Internal {
+    /// Carries it out; `compiled` is the session of a runner that contains its own plan.
+    pub(super) fn carry_out(&self, compiled: Option<&Session>) -> Result<ExitCode, Failure> {
+        match self {
+            #[cfg(feature = "process")]
+            Internal::Worker { runner: Some(file), supervisor } => {
+                let runner = crate::interpreted::Interpreted::read(file)
+                    .map_err(|error| Failure(format!("cannot read {}: {error}", file.display())))?
+                    .runner();
+                let plan = serde_json::from_str(&runner.plan)?;
+                campaign::serve(&runner, &plan, supervisor)?;
+                Ok(ExitCode::SUCCESS)
+            }
+            Internal::Worker { supervisor, .. } => {
+                let Some(session) = compiled else {
+                    return Err(Failure("`worker` is started by `run`, not by hand".to_owned()));
+                };
+                campaign::serve(&session.runner, &session.plan, supervisor)?;
+                Ok(ExitCode::SUCCESS)
+            }
+            #[cfg(all(feature = "process", target_os = "linux"))]
+            Internal::Simulator { worker, report, program } => {
+                let (program, arguments) = program.split_first().expect("the program is required");
+                Ok(sesame_relay::transport::keep_simulator(*worker, report, program, arguments))
+            }
+            #[cfg(all(feature = "process", target_os = "linux"))]
+            Internal::Simulated { keeper, program } => {
+                let (program, arguments) = program.split_first().expect("the program is required");
+                Ok(sesame_relay::transport::become_simulator(*keeper, program, arguments))
+            }
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! What each command of a runner works with.
+
+use std::path::PathBuf;
+
+use sesame_plan::CampaignPlan;
+
+use crate::campaign::WorkerProgram;
+use crate::cli::caller::Caller;
+use crate::cli::failure::Failure;
+use crate::runner::Runner;
+
+/// A runner whose command is carried out.
+#[derive(Debug)]
+pub(super) struct Session {
+    pub runner: Runner,
+    pub plan: CampaignPlan,
+    /// The folder of all results.
+    pub results: PathBuf,
+    /// What is started as each worker.
+    pub program: WorkerProgram,
+    pub caller: Caller,
+}
+
+impl Session {
+    pub(super) fn new(runner: Runner, program: WorkerProgram, caller: Caller) -> Result<Self, Failure> {
+        let plan = serde_json::from_str(&runner.plan).map_err(|error| {
+            Failure(format!("the plan in this runner is damaged ({error}): run `sesamec generate` again"))
+        })?;
+        let results = runner.directory.join("results");
+        Ok(Session { runner, plan, results, program, caller })
+    }
+}

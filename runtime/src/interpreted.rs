@@ -1,0 +1,42 @@
+//! Runners without a crate: of a campaign whose simulator is a program and that uses no hooks, the plan says everything.
+//! So one program, `sesamec`, can run any of them at once, with nothing to generate or to compile.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use sesame_relay::transport;
+
+use crate::runner::Runner;
+
+/// An interpreted runner as data: what a compiled one has in its crate.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Interpreted {
+    /// The plan, as `campaign.plan.json` holds it.
+    pub plan: String,
+    /// The runner's folder; results go into `results/` inside it. It need not exist.
+    pub directory: PathBuf,
+    /// Folder of the `.sesame` file, as seen from there.
+    pub space: PathBuf,
+    /// Folder that the simulator runs in, as seen from there.
+    pub simulator: PathBuf,
+}
+
+impl Interpreted {
+    /// Reads what a supervisor wrote for its worker.
+    pub(crate) fn read(file: &Path) -> std::io::Result<Self> {
+        Ok(serde_json::from_slice(&std::fs::read(file)?)?)
+    }
+
+    /// The runner that the runtime takes.
+    pub(crate) fn runner(&self) -> Runner {
+        let Interpreted { plan, directory, space, simulator } = self;
+        Runner {
+            plan: plan.clone().into(),
+            directory: directory.clone(),
+            space: space.clone(),
+            hooks: &[],
+            operations: &[],
+            connect: transport::process(directory.join(simulator)),
+        }
+    }
+}

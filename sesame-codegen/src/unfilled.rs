@@ -1,0 +1,56 @@
+//! Hooks that are still stubs, found in their text, so that nobody waits for a build to hear of them.
+
+use std::path::{Path, PathBuf};
+
+use proc_macro2::{TokenStream, TokenTree};
+
+use crate::input;
+use crate::names;
+use crate::plan::RunnerPlan;
+
+/// The metrics that the campaign optimises and whose hook calls `ctx.unimplemented()`, with the files of the hooks.
+///
+/// What a file cannot tell, rustc and the runner find later: a file that cannot be read or is not Rust is not listed.
+pub fn unfilled_objectives(runner: &RunnerPlan, hooks: &Path) -> Vec<(String, PathBuf)> {
+    let objectives = runner.plan.campaign.objectives.iter().map(|&id| &runner.plan.metric(id).name);
+    objectives
+        .filter(|&name| runner.hooks.iter().any(|hook| hook.metric == *name))
+        .map(|name| (name.clone(), hooks.join(format!("{}.rs", names::snake(name)))))
+        .filter(|(_, file)| input::text(file).is_ok_and(|text| calls_unimplemented(&text)))
+        .collect()
+}
+
+/// Whether Rust code calls a method `unimplemented`; comments and texts do not count.
+fn calls_unimplemented(code: &str) -> bool {
+    code.parse::<TokenStream>().is_ok_and(calls)
+}
+
+fn calls(code: TokenStream) -> bool {
+    let mut after_dot = false;
+    for token in code {
+        match token {
+            TokenTree::Ident(name) if after_dot && name == "unimplemented" => return true,
+            TokenTree::Group(group) if calls(group.stream()) => return true,
+            TokenTree::Punct(punct) => {
+                after_dot = punct.as_char() == '.';
+                continue;
+            }
+            _ => {}
+        }
+        after_dot = false;
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_call_counts() {
+        assert!(calls_unimplemented("fn on_speed(ctx: &mut Context) { let _ = 1; ctx.unimplemented(); }"));
+        assert!(!calls_unimplemented("// ctx.unimplemented();\nfn f() { ctx.set(1.0); }"));
+        assert!(!calls_unimplemented("fn f() { let text = \"ctx.unimplemented()\"; unimplemented!() }"));
+        assert!(!calls_unimplemented("not Rust {"));
+    }
+}

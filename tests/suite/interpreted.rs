@@ -1,0 +1,127 @@
+//! Campaigns that need no Rust are interpreted: nothing is generated or compiled, and everything else is the same.
+
+use std::fs;
+
+use sesame_tests::{Done, Project, command, done, fresh_folder, sesamec, workspace};
+
+/// A copy of the example with a simulator in Python, with fewer tests.
+fn two_robots(name: &str) -> Project {
+    let folder = fresh_folder(name);
+    let example = workspace().join("examples/two_robots");
+    fs::copy(example.join("sim.py"), folder.join("sim.py")).unwrap();
+    let text = fs::read_to_string(example.join("two_robots.sesame")).unwrap();
+    let space = folder.join("two_robots.sesame");
+    fs::write(&space, text.replace("evaluations 100", "evaluations 20")).unwrap();
+    Project { space, runners: folder.join("runners"), folder }
+}
+
+/// `sesamec` in the project's folder, where cargo is a program that fails.
+fn without_cargo(project: &Project, arguments: &[&str]) -> Done {
+    let broken = project.folder.join("broken");
+    fs::create_dir_all(&broken).unwrap();
+    std::os::unix::fs::symlink("/bin/false", broken.join("cargo")).ok();
+    let path = std::env::var_os("PATH").unwrap();
+    let path = std::env::join_paths(std::iter::once(broken).chain(std::env::split_paths(&path))).unwrap();
+    done(command(sesamec()).env("PATH", path).args(arguments).current_dir(&project.folder))
+}
+
+/// The command that a message proposes, below its text, as the arguments after the program's name.
+fn proposed(said: &str) -> Vec<&str> {
+    let command = said.lines().find_map(|line| line.strip_prefix("    sesamec "));
+    command.unwrap_or_else(|| panic!("no command in:\n{said}")).split(' ').collect()
+}
+
+#[test]
+fn an_interpreted_campaign_and_its_crate_have_the_same_digest() {
+    let project = two_robots("interpreted");
+    let run = ["run", "two_robots.sesame", "--campaign", "crossing"];
+    let interpreted = without_cargo(&project, &run).expect(0);
+    assert!(!project.runners.join("crossing/Cargo.toml").exists(), "nothing is generated");
+    assert!(project.runners.join("crossing/results/42/results.sqlite").is_file());
+    let built = project.sesamec("run", &["--campaign", "crossing", "--build"]).expect(0);
+    assert!(project.runners.join("crossing/Cargo.toml").is_file());
+    assert!(project.runners.join("crossing/results/42-2/results.sqlite").is_file(), "{}", built.out);
+    assert_eq!(interpreted.digest(), built.digest());
+
+    // Each continues and repeats what the other one recorded.
+    let replay = ["replay", "two_robots.sesame", "--campaign", "crossing", "T7", "--results", "42-2"];
+    without_cargo(&project, &replay).expect(0);
+    let runner = project.build("crossing");
+    let mut replay = command(&runner.program);
+    done(replay.args(["replay", "T7", "--results"]).arg(project.runners.join("crossing/results/42"))).expect(0);
+}
+
+#[test]
+fn an_interpreted_campaign_that_is_stopped_is_resumed_by_the_command_that_it_proposes() {
+    use std::io::{BufRead as _, BufReader};
+    use std::process::Stdio;
+
+    let project = two_robots("interpreted_stopped");
+    let whole = without_cargo(&project, &["run", "two_robots.sesame", "-c", "crossing"]).expect(0);
+    let mut stopped = command(sesamec());
+    stopped.args(["run", "two_robots.sesame", "-c", "crossing"]).current_dir(&project.folder);
+    let mut stopped = stopped.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // Until the first worker has been started, that is, the first test has begun.
+    let workers = project.runners.join("crossing/results/42-2/workers/1");
+    while !workers.exists() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    interrupt(stopped.id());
+    let said: Vec<String> = BufReader::new(stopped.stderr.take().unwrap()).lines().map(Result::unwrap).collect();
+    assert_eq!(stopped.wait().unwrap().code(), Some(130), "{said:?}");
+    let said = said.join("\n");
+    let resumed = without_cargo(&project, &proposed(&said)).expect(0);
+    assert_eq!(resumed.digest(), whole.digest());
+}
+
+/// As Ctrl-C does.
+fn interrupt(process: u32) {
+    let status = std::process::Command::new("kill").args(["-INT", &process.to_string()]).status().unwrap();
+    assert!(status.success());
+}
+
+#[test]
+fn every_command_of_a_runner_works_from_the_project_without_cargo() {
+    let project = two_robots("interpreted_commands");
+    let of = ["two_robots.sesame", "-c", "crossing"];
+    let sesamec = |command: &str, more: &[&str]| without_cargo(&project, &[&[command], &of[..], more].concat());
+    let digest = sesamec("run", &[]).expect(0).digest();
+    assert_eq!(sesamec("digest", &[]).expect(0).out.trim(), digest);
+    assert!(sesamec("list", &[]).expect(0).out.contains("T20"));
+    assert!(sesamec("show", &["T20", "--format", "json"]).expect(0).out.contains("\"requirements\""));
+    assert!(sesamec("export", &["T20"]).expect(0).out.contains("test "));
+    assert!(sesamec("report", &[]).expect(0).out.contains("report.html"));
+    sesamec("known", &["silent_departure"]).expect(0);
+    sesamec("repeat", &["T20", "2"]).expect(0);
+    sesamec("confirm", &["T20", "--times", "1"]).expect(0);
+    sesamec("replay", &["T20", "--results", "42"]).expect(0);
+    let shrunk = sesamec("shrink", &["T20", "--evaluations", "3", "--results", "42"]);
+    assert!(matches!(shrunk.code, Some(0 | 1)), "{}", shrunk.err);
+    // Results are shown even while the space has errors.
+    fs::write(&project.space, "space two_robots mistake").unwrap();
+    assert!(sesamec("list", &["--results", "42"]).expect(0).out.contains("T20"));
+    sesamec("replay", &["T20"]).expect(1);
+}
+
+#[test]
+fn a_campaign_with_a_hook_is_built_and_its_commands_work_from_the_project_too() {
+    let project = Project::kuka_cell("from_the_project");
+    let campaign = ["--campaign", "coverage_experiment"];
+    let run = [&campaign[..], &["--", "--evaluations", "6"]].concat();
+    let digest = project.sesamec("run", &run).expect(0).digest();
+    let sesamec = |command: &str, more: &[&str]| project.sesamec(command, &[&campaign[..], more].concat());
+    assert_eq!(sesamec("digest", &[]).expect(0).out.trim(), digest);
+    let replayed = sesamec("replay", &["T3", "--format", "json"]).expect(0);
+    assert!(replayed.out.contains("\"same\": true"), "{}", replayed.out);
+    assert!(sesamec("known", &["--workers", "1", "--fail-on", "violation,crash"]).err.contains("Took"));
+}
+
+#[test]
+fn an_objective_whose_hook_is_a_stub_is_told_of_before_the_build() {
+    let space = fs::read_to_string(workspace().join("tests/simulators/faulty/space.sesame")).unwrap();
+    let project = Project::new("unfilled", &space.replace("NAME", "unfilled"), "faulty");
+    let said = project.sesamec("run", &["--campaign", "harmless"]).expect(1).err;
+    assert!(said.contains("is not filled in yet") && said.contains("hooks/"), "{said}");
+    assert!(!said.contains("Building") && !said.contains("Built"), "{said}");
+}
