@@ -67,7 +67,8 @@ pub enum Scaling {
     Unscaled,
 }
 
-/// IGD of points to a front; `None` without a point or a front. Points of the front with an infinite value are left out.
+/// IGD of points to a front; `None` without a point or a front. Points of the front with an infinite value are left
+/// out.
 pub fn igd(points: &[&[f64]], front: &[&[f64]], scaling: Scaling) -> Option<f64> {
     let front: Vec<&[f64]> = front.iter().copied().filter(|point| point.iter().all(|x| x.is_finite())).collect();
     let scale = match scaling {
@@ -82,7 +83,8 @@ pub fn igd(points: &[&[f64]], front: &[&[f64]], scaling: Scaling) -> Option<f64>
     Some(total / front.len() as f64).filter(|mean| mean.is_finite())
 }
 
-/// IGD⁺ of points to a front; `None` without a point or a front. Points of the front with an infinite value are left out.
+/// IGD⁺ of points to a front; `None` without a point or a front. Points of the front with an infinite value are left
+/// out.
 pub fn igd_plus(points: &[&[f64]], front: &[&[f64]], scaling: Scaling) -> Option<f64> {
     let mut distance = match scaling {
         Scaling::ByRange => IgdPlus::to(front.iter().copied())?,
